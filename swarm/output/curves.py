@@ -1,6 +1,7 @@
 """Curves on triangles: where planes cut them, their edges, and those where two of them meet at an angle."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,22 +41,42 @@ def _section(points: Floats, triangles: Indices, above: Floats) -> list[Floats]:
     return joined(points[first] + part[:, None] * (points[last] - points[first]), places.reshape(2, -1).T)
 
 
-def creases(points: Floats, triangles: Indices) -> Indices:
-    """The edges (E, 2) of triangles that are on a rim, or at which two of them meet at an angle."""
+class _Sides(NamedTuple):
+    """The sides of triangles: the two points of each, and of those of two triangles these, and their angle."""
+
+    ends: Indices
+    is_pair: NDArray[np.bool_]
+    mine: Indices
+    other: Indices
+    cosine: Floats
+
+
+def _sides(points: Floats, triangles: Indices) -> _Sides:
     sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     key = sides[:, 0] * len(points) + sides[:, 1]
     order = np.argsort(key, kind="stable")
     begins = np.flatnonzero(np.diff(key[order], prepend=-1))
-    count = np.diff(begins, append=len(order))
+    is_pair = np.diff(begins, append=len(order)) == 2
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.sqrt((normal**2).sum(axis=1, keepdims=True)), 1e-300)
-    of = normal[order // 3]
-    pair = np.flatnonzero(count == 2)
-    cosine = (of[begins[pair]] * of[begins[pair] + 1]).sum(axis=1)
-    shown = count != 2
-    shown[pair] = cosine < math.cos(_EDGE)
-    return np.asarray(sides[order[begins[shown]]])
+    mine, other = order[begins[is_pair]] // 3, order[begins[is_pair] + 1] // 3
+    return _Sides(sides[order[begins]], is_pair, mine, other, (normal[mine] * normal[other]).sum(axis=1))
+
+
+def creases(points: Floats, triangles: Indices) -> Indices:
+    """The sides (E, 2) of triangles that are on a rim, or at which two of them meet at an angle."""
+    found = _sides(points, triangles)
+    shown = ~found.is_pair
+    shown[found.is_pair] = found.cosine < math.cos(_EDGE)
+    return np.asarray(found.ends[shown])
+
+
+def neighbours(points: Floats, triangles: Indices) -> tuple[Indices, Indices]:
+    """The pairs of triangles that meet at a side, but for an angle."""
+    found = _sides(points, triangles)
+    smooth = found.cosine >= math.cos(_EDGE)
+    return found.mine[smooth], found.other[smooth]
 
 
 def joined(points: Floats, pairs: Indices) -> list[Floats]:
@@ -83,3 +104,9 @@ def joined(points: Floats, pairs: Indices) -> list[Floats]:
                 k = onward[0]
             curves.append(points[curve])
     return curves
+
+
+def runs(curve: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
+    """The parts of a curve whose points are kept, two points or more each."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
+    return [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]

@@ -22,6 +22,7 @@ from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
 from ..surfaces.union import Joined, Place
 from . import sharp
+from .curves import runs
 from .named import name_of
 from .parts import parts_of
 from .planar import PlaneWalls
@@ -117,8 +118,8 @@ def bodies_of(surface: Surface) -> int:
 
 
 def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
-    """The shapes of every surface, those of each part of unions, where one of the scene is one; else none."""
-    if not any(isinstance(surface, Joined) for surface in scene.surfaces):
+    """The shapes of every surface, those of each part of unions, where one has parts or an outline; else none."""
+    if not any(isinstance(surface, (Joined, Outlined)) for surface in scene.surfaces):
         return {}
     found: dict[int, list[Shape]] = {}
     for part in parts_of(scene, time):
@@ -310,11 +311,5 @@ class _Walls:
                 gap = self._gap(points.reshape(3, -1)).reshape(_FINE, _FINE)
                 for line in contourpy.contour_generator(*across, gap).lines(0.0):
                     curve = np.insert(np.asarray(line), axis, points[axis, 0, 0], axis=1)
-                    curves += _runs(curve, self._owner(curve.T) == i)
+                    curves += runs(curve, self._owner(curve.T) == i)
         return curves
-
-
-def _runs(curve: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
-    """The parts of a curve whose points are kept, two points or more each."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
-    return [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]

@@ -13,14 +13,13 @@ from ..kernel.vector import vec
 from ..motion import Pose, pose
 from ..particles import Floats
 from ..surfaces import Torus
+from ..surfaces.outlines.polygon import Outlined
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
-from . import curves
+from . import curves, given
 from .cut import Indices, Smooth, cut, found_in
 from .parts import Cover, Part
 
-# Points around the tube of a torus and along it.
-_AROUND, _ALONG = 24, 96
 # A wall of which this part of its box is seen is found again in the box of that, so often.
 _SEEN, _AGAIN = 0.4, 3
 
@@ -80,6 +79,10 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
         edges += curves.joined(found.points, found.rims)
         first += len(found.points)
     vertices, cells = np.concatenate(points), np.concatenate(triangles)
+    if isinstance(surface, Outlined) and len(cells):
+        level = placed.level(given.sides(surface), list(part.covers), [])
+        for line in given.corners(surface, float(low[2]), float(high[2])):
+            edges += curves.runs(line, level(line) <= 0.0)
     wires = edges + curves.across(vertices, cells, frame)
     here = at.placed(vertices.T).T, cells, at.turned(np.concatenate(normals).T).T
     return here, [at.placed(wire.T).T for wire in wires]
@@ -87,9 +90,16 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
 
 def _pieces(placed: _Placed) -> Iterator[tuple[Any, Smooth]]:
     """The triangles of every smooth wall, cut, and the wall."""
-    walls = smooth_walls(placed.part.surface)
-    for wall in walls:
-        others = [other for other in walls if other is not wall]
+    surface: Any = placed.part.surface
+    walls, upright = smooth_walls(surface), isinstance(surface, Outlined)
+    if upright:
+        points, triangles = given.upright(surface, float(placed.low[2]), float(placed.high[2]))
+        # Moved onto themselves, they would stay where they are.
+        wall = Smooth(lambda points: np.zeros(len(points)), walls[0].gradient)
+        level = placed.level(wall, _near(placed, points), [])
+        yield cut(wall, points, triangles, level), wall
+    for wall in walls[upright:]:
+        others = [other for other in walls if other is not wall][: 1 if upright else None]
         low, high = placed.low, placed.high
         for _ in range(_AGAIN):
             points, triangles = _triangles(placed.part.surface, wall, low, high, placed.frame)
@@ -119,6 +129,8 @@ def _near(placed: _Placed, points: Floats) -> list[Cover]:
 
 def smooth_walls(surface: Surface) -> list[Smooth]:
     """Every smooth wall of a surface; of a solid with edges those of what it fills."""
+    if isinstance(surface, Outlined):
+        return [given.sides(surface), *given.lids(surface)]
     filled = surface
     if surface.is_solid():
         try:
@@ -143,15 +155,22 @@ def _smooth(wall: Any) -> Smooth:
 
 def _frame(surface: Surface) -> tuple[Floats, Surface]:
     """A frame along the axes of a surface, the columns of a matrix, and the surface in that."""
-    given: Any = surface
-    if hasattr(given, "turn"):
-        frame = matrix(given.turn())
-        own = replace(given, rotation=None, axis=(0.0, 0.0, 1.0), motion=None, center=_in(frame, given.center))
-        return frame, own
-    if given.rotation is not None and hasattr(given, "center"):
-        frame = matrix(given.rotation)
-        return frame, replace(given, rotation=None, motion=None, center=_in(frame, given.center))
-    return np.eye(3), replace(given, motion=None)
+    whole: Any = surface
+    own: dict[str, Any] = {"motion": None}
+    frame = np.eye(3)
+    if isinstance(whole, Outlined):
+        frame = whole.frame
+        own |= {"axis": (0.0, 0.0, 1.0)}
+    elif hasattr(whole, "turn"):
+        frame = matrix(whole.turn())
+        own |= {"axis": (0.0, 0.0, 1.0)}
+    elif whole.rotation is not None:
+        frame = matrix(whole.rotation)
+    if hasattr(whole, "center"):
+        own |= {"rotation": None, "center": _in(frame, whole.center)}
+    elif whole.rotation is not None:
+        return np.eye(3), replace(whole, motion=None)
+    return frame, replace(whole, **own)
 
 
 def _in(frame: Floats, point: Any) -> Any:
@@ -170,19 +189,7 @@ def _bounds(surface: Any) -> Any:
 
 def _triangles(surface: Any, wall: Smooth, low: Floats, high: Floats, frame: Floats) -> tuple[Floats, Indices]:
     """Triangles on a smooth wall in a box."""
-    if not isinstance(surface, Torus):
-        return found_in(wall, low, high, frame)
-    # A thin tube would be lost between the points of a grid.
-    u, v = (np.linspace(0.0, 2.0 * math.pi, count, endpoint=False) for count in (_ALONG, _AROUND))
-    along, around = np.meshgrid(u, v, indexing="ij")
-    rho = surface.major_radius + surface.minor_radius * np.cos(around)
-    own = np.stack([rho * np.cos(along), rho * np.sin(along), surface.minor_radius * np.sin(around)], axis=-1)
-    points = own.reshape(-1, 3) @ matrix(surface.rotation).T + np.array(surface.center)
-    place = np.arange(_ALONG * _AROUND).reshape(_ALONG, _AROUND)
-    a, b = place, np.roll(place, -1, axis=0)
-    c, d = np.roll(b, -1, axis=1), np.roll(place, -1, axis=1)
-    both = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
-    return points, both.reshape(-1, 3)
+    return given.torus(surface) if isinstance(surface, Torus) else found_in(wall, low, high, frame)
 
 
 def _turned_to(points: Floats, triangles: Indices, normals: Floats) -> NDArray[np.int64]:

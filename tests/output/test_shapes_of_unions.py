@@ -190,3 +190,39 @@ def test_parts_in_files_and_pictures(run, tmp_path):
     assert [line.get_label() for line in pressure.get_lines()] == [*names, "1_sphere"]
     heat = next(axes for axes in figure.axes if axes.get_title().startswith("heat"))
     assert [line.get_label() for line in heat.get_lines()] == [names[0], names[2]]
+
+
+L = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)]
+OUTLINES = {
+    "a prism": ([swarm.Prism(L, height=1.0)], {"0_prism": 14.0}),
+    "a prism with an arc, on its side": (
+        [swarm.Prism([(0.0, 0.0), (1.0, 0.0, 1.0), (1.0, 1.0), (0.0, 1.0)], height=0.5, axis=(1.0, 1.0, 0.0))],
+        {"0_prism": (3.0 + 0.5 * math.pi) * 0.5 + 2.0 + 0.25 * math.pi},
+    ),
+    "a stadium between planes": (
+        [swarm.Stadium(1.0, 2.0), swarm.Box((3.0, 3.0, 0.5))],
+        {"0_stadium": 4.0 + 2.0 * math.pi, "1_box": 2.0 * (4.0 + math.pi)},
+    ),
+    "a post through a box": (
+        [swarm.Polygon([(0.0, 0.0), (0.3, 0.0), (0.0, 0.4)], side="outside"), BOX],
+        {"0_polygon": 1.2, "1_box": 6.0 - 0.12},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", OUTLINES)
+def test_walls_on_an_outline_are_drawn_with_their_edges(name):
+    surfaces, areas = OUTLINES[name]
+    scene = swarm.Scene(surfaces)
+    shapes = shapes_of(scene, NOWHERE)
+    assert {shape.name: pytest.approx(shape.area(), rel=2e-3) for shape in shapes} == areas
+    for shape in shapes:
+        middle, normal = normals_of(shape)
+        assert np.median(scene.gaps(middle + 1e-3 * normal).max(axis=0)) < 0.0
+        for points in (shape.vertices, *shape.wires):
+            assert np.abs(scene.gaps(points.T).max(axis=0)).max() < 2e-3
+    # The lines on the corners, from end to end.
+    sides, corners = surfaces[0], surfaces[0].boundary.turns
+    lines = [curve for curve in shapes[0].wires if len(curve) > 100 and np.ptp(sides.in_plane(curve.T)[:2]) < 2.1]
+    upright = [curve for curve in lines if np.ptp(sides.in_plane(curve.T)[:2], axis=1).max() < 1e-9]
+    assert len(upright) == np.count_nonzero(corners)
