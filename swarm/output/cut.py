@@ -45,6 +45,10 @@ class Smooth(NamedTuple):
             slope = np.nan_to_num(self.gradient(points))
             return np.asarray(slope / np.maximum(np.sqrt((slope**2).sum(axis=1, keepdims=True)), 1e-300))
 
+    def distance(self, points: Floats) -> Floats:
+        """phi as a distance to first order."""
+        return np.asarray(self.phi(points) / np.maximum(np.sqrt((self.gradient(points) ** 2).sum(axis=1)), 1e-300))
+
     def onto(self, points: Floats, farthest: float) -> Floats:
         """The points moved onto the surface, each step at most so far [m]."""
         for _ in range(_STEPS):

@@ -138,10 +138,18 @@ def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
 def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) -> list[Shape]:
     walls, shapes = PlaneWalls(scene, positions, time), []
     grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
+    parts = parts_of(scene, time) if any(isinstance(surface, Joined) for surface in scene.surfaces) else []
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
         bodies = bodies_of(surface) or int(i in grouped)
-        wires = walls.curves(i, at, bodies) if bodies <= most and surface.is_there(time) else []
         name, solid = name_of(scene, i), bodies > 0 or surface.is_solid()
+        if parts and not bodies:
+            for part in (one for one in parts if one.owner == i):
+                wires = walls.of_part(part) if part.surface.is_there(time) else []
+                drawn = *walls.strip(wires), wires, walls.height
+                name, motion = name_of(scene, i, part.place), part.surface.motion if part.place else None
+                shapes.append(Shape(name, part.solid, *drawn, i, part.place, motion))
+            continue
+        wires = walls.curves(i, at, bodies) if bodies <= most and surface.is_there(time) else []
         shapes.append(Shape(name, solid, *walls.strip(wires), wires, walls.height, i))
     return shapes
 

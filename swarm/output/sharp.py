@@ -1,7 +1,6 @@
 """A part of a surface as triangles and wires with its edges sharp: each smooth wall by itself, cut by all others."""
 
 import itertools
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -9,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SceneError
 from ..kernel.vector import vec
 from ..motion import Pose, pose
 from ..particles import Floats
@@ -45,8 +45,7 @@ class _Placed(NamedTuple):
             outwards = self.side() * self.pose.turned(wall.normals(points).T).T
             found = self.part.level(self.pose.placed(points.T).T, outwards, self.size, covers)
             for other in others:
-                steep = np.maximum(np.sqrt((other.gradient(points) ** 2).sum(axis=1)), 1e-300)
-                found = np.maximum(found, other.phi(points) / steep)
+                found = np.maximum(found, other.distance(points))
             return np.asarray(found)
 
         return above
@@ -59,7 +58,7 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
     """The part of a scene in a box, at a time [s]."""
     surface, at = part.surface, pose(part.surface.motion, time)
     frame, own = _frame(surface)
-    low, high = (np.array(corner) for corner in _bounds(own))
+    low, high = (np.array(corner) for corner in filled(own).bounds())
     corners = frame.T @ at.given(np.array(list(itertools.product(*zip(*box, strict=True)))).T)
     low, high = np.maximum(low, corners.min(axis=1)), np.minimum(high, corners.max(axis=1))
     placed = _Placed(part, at, frame, low, high, float((box[1] - box[0]).max()))
@@ -131,14 +130,19 @@ def smooth_walls(surface: Surface) -> list[Smooth]:
     """Every smooth wall of a surface; of a solid with edges those of what it fills."""
     if isinstance(surface, Outlined):
         return [given.sides(surface), *given.lids(surface)]
-    filled = surface
-    if surface.is_solid():
-        try:
-            filled = replace(surface, side="inside")  # type: ignore[call-arg]
-        except Exception:
-            filled = surface
-    walls = filled.walls() if type(filled).phi is Surface.phi else (filled,)
+    whole = filled(surface)
+    walls = whole.walls() if type(whole).phi is Surface.phi else (whole,)
     return [_smooth(wall) for wall in walls]
+
+
+def filled(surface: Surface) -> Surface:
+    """What a solid fills, as a cavity; a cavity itself."""
+    if not surface.is_solid():
+        return surface
+    try:
+        return replace(surface, side="inside")  # type: ignore[call-arg]
+    except SceneError:
+        return surface
 
 
 def _smooth(wall: Any) -> Smooth:
@@ -175,16 +179,6 @@ def _frame(surface: Surface) -> tuple[Floats, Surface]:
 
 def _in(frame: Floats, point: Any) -> Any:
     return tuple((frame.T @ np.array(point)).tolist())
-
-
-def _bounds(surface: Any) -> Any:
-    """The box around the walls of a surface, also of a solid."""
-    if not surface.is_solid():
-        return surface.bounds()
-    try:
-        return replace(surface, side="inside").bounds()
-    except Exception:
-        return np.full(3, -math.inf), np.full(3, math.inf)
 
 
 def _triangles(surface: Any, wall: Smooth, low: Floats, high: Floats, frame: Floats) -> tuple[Floats, Indices]:

@@ -226,3 +226,21 @@ def test_walls_on_an_outline_are_drawn_with_their_edges(name):
     lines = [curve for curve in shapes[0].wires if len(curve) > 100 and np.ptp(sides.in_plane(curve.T)[:2]) < 2.1]
     upright = [curve for curve in lines if np.ptp(sides.in_plane(curve.T)[:2], axis=1).max() < 1e-9]
     assert len(upright) == np.count_nonzero(corners)
+
+
+def test_parts_in_a_plane():
+    """A mushroom: a cap of half a disc and a stem, of which the foot is in none."""
+    cap = swarm.Intersection([swarm.Cylinder(1.0), swarm.Plane((0.0, -1.0, 0.0), 0.0)])
+    stem = swarm.Intersection([swarm.Box((0.25, 0.5, 1.0), (0.0, -0.4, 0.0))])
+    scene = swarm.Scene([swarm.Union([cap, stem]), swarm.Sphere(0.1, (0.5, 0.5, 0.0), "outside")], plane="z")
+    shapes = shapes_of(scene, NOWHERE)
+    lengths = {
+        "0_union_0_0_cylinder": math.pi,
+        "0_union_0_1_plane": 1.5,
+        "0_union_1_0_box": 0.5 + 2.0 * 0.9,
+        "1_sphere": 0.2 * math.pi,
+    }
+    assert {shape.name: pytest.approx(shape.area(), rel=1e-3) for shape in shapes} == lengths
+    for shape in shapes:
+        for curve in shape.wires:
+            assert np.abs(scene.gaps(curve.T).max(axis=0)).max() < 1e-3
