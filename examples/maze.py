@@ -3,8 +3,8 @@
     python -m examples.maze
 
 The scene is `examples/scenes/maze.toml`: one outline of 68 sides, in a plane, with an opening in the wall of its last
-cell. All corridors are parallel to x or y, so that a particle keeps |v_x| and |v_y|, and its directions are four; yet it
-diffuses from cell to cell, and the times of escape of a start that fills the maze have a tail.
+cell. All corridors are parallel to x or y, so that a particle keeps |v_x| and |v_y|, and has four directions; yet it
+wanders from cell to cell, and the times of escape of a start that fills the maze have a tail.
 """
 
 from pathlib import Path

@@ -3,8 +3,8 @@
     python -m examples.stadium
 
 A neighbour at a distance x across the path, whose direction differs by y, is at x + t y after a time t of unit speed. A
-mirror of curvature k, hit at an angle a to its normal, turns (x, y) into (-x, -y + 2 k x/cos a). The log of impacts says
-where and how each particle hits, so the exponent is the growth of ln |(x, y)| along the paths of one run.
+mirror of curvature k, hit at an angle a to its normal, turns (x, y) into (-x, -y + 2 k x/cos a). The log of impacts
+says where and how each particle hits, so the exponent is the growth of ln |(x, y)| along the paths of one run.
 
 Lines alone part neighbours linearly with time, and a circle alone does too; both together exponentially.
 """

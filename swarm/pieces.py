@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,18 @@ from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, corners_of
 from .surfaces.openings import Doorway, Opened, openings_in, reaches, volumes_of
 from .surfaces.surface import Surface, volume_of
-from .surfaces.union import Joined
+from .surfaces.union import Joined, Place
 from .volume import Volume
 
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
+
+
+class PartsOfRows(NamedTuple):
+    """The part that each row of a scene belongs to, `number` where its surface has none; how many parts there are."""
+
+    rows: tuple[int, ...]
+    number: int
 
 
 class Pieces(Volume):
@@ -117,13 +124,43 @@ class Pieces(Volume):
         spans = ((values[i], walls) for i, walls in self.order.spans(self.pieces))
         return tuple(value if walls == 1 else Span(value, float(walls)) for value, walls in spans)
 
+    @cached_property
+    def parts(self) -> tuple[tuple[int, Place], ...]:
+        """The parts of the unions and intersections of the scene: the number of the surface, and the place in that."""
+        joined = ((i, surface) for i, surface in enumerate(self.surfaces) if isinstance(surface, Joined))
+        return tuple((i, place) for i, surface in joined for place in surface.places_of_parts())
+
+    @cached_property
+    def _parts_of_pieces(self) -> list[tuple[int, Place]]:
+        """Of every piece the surface, and the place of its part in that."""
+        every = ((i, image) for i, images in enumerate(self._images) for image in images)
+        return [(i, place) for i, image in every for place in _places_of(image)]
+
+    def parts_of_rows(self) -> PartsOfRows | None:
+        """The part that each row of the scene belongs to, None where no surface has parts."""
+        if not self.parts:
+            return None
+        number = {part: k for k, part in enumerate(self.parts)}
+        of_pieces = [number.get(part, len(number)) for part in self._parts_of_pieces]
+        return PartsOfRows(tuple(of_pieces[i] for i in self.order.owners(self.pieces)), len(number))
+
+    def doorways_of_parts(self) -> dict[tuple[int, Place], list[Surface]]:
+        """The volumes in which walls of a part are open where another room is on their other side."""
+        found: dict[tuple[int, Place], list[Surface]] = {}
+        for part, volumes in zip(self._parts_of_pieces, self._doorways, strict=True):
+            found.setdefault(part, []).extend(volumes)
+        return found
+
     def owners(self) -> list[int]:
         """The surface that each row of the scene belongs to, one for a field."""
         return [self.owners_of_pieces[i] for i in self.order.owners(self.pieces)]
 
     def members(self) -> NDArray[np.int64]:
-        """Of each wall of the scene its surface, and its number in the field that this is or -1: (2, walls)."""
-        return np.array([(self.owners_of_pieces[i], member) for i, member in self.order.members(self.pieces)]).T
+        """Of each wall of the scene its surface, and its number in the field or of the part, or -1: (2, walls)."""
+        number = {part: k for k, part in enumerate(self.parts)}
+        of_pieces = [number.get(part, -1) for part in self._parts_of_pieces]
+        rows = [(i, of_pieces[i] if member < 0 else member) for i, member in self.order.members(self.pieces)]
+        return np.array([(self.owners_of_pieces[i], member) for i, member in rows]).T
 
     def _unions(self) -> list[int]:
         """The surfaces that are unions of several rooms."""
@@ -132,6 +169,10 @@ class Pieces(Volume):
 
 def _pieces_of(image: Surface) -> tuple[Surface, ...]:
     return image.surfaces() if isinstance(image, Joined) else (image,)
+
+
+def _places_of(image: Surface) -> tuple[Place, ...]:
+    return image.places() if isinstance(image, Joined) else ((),)
 
 
 def _thermal(surface: Surface) -> Thermal:

@@ -17,7 +17,7 @@ from .kernel.vector import vec
 from .motion import Guide, Oscillation, Path, Rotation, Translation, parts_of
 from .surfaces.fields.bodies import Spheres
 from .surfaces.fields.many import Many
-from .surfaces.outlines.polygon import Outlined
+from .surfaces.outlines.outlined import Outlined
 from .surfaces.surface import Surface
 from .surfaces.upright import upright
 from .surfaces.wall_law import tries_of

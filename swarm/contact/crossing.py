@@ -43,7 +43,7 @@ def meets(walls, ends, active, path, near):
 
 
 def _leaves_all(rooms, ends, active, path, near):
-    """Whether a step may leave every room of a union."""
+    """Whether a step may leave every room of a union that it begins in."""
     leaves = True
     for room, then in zip(rooms, ends, strict=True):
         met, enters, holds = False, False, False

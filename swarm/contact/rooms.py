@@ -41,19 +41,19 @@ def _ends(walls, number, r, much, near):
     """
     ended = False
     for first, field in _patches(walls):
-        is_of = (number >= first) & (number < first + field.count())
-        ended = (is_of & (not field.members.is_there(number - first, r, much * near))) | ended
+        here = (number >= first) & (number < first + field.count())
+        ended = (here & (not field.members.is_there(number - first, r, much * near))) | ended
     for rooms in walls.joined():
         least, gaps = much * walls.slack, gaps_in(rooms, r)
         for k, room in enumerate(rooms):
             beyond = gaps[k] > least
             for j, gap in enumerate(gaps):
                 beyond = beyond | (gap < -least) if j != k else beyond
-            ended = (_is_of(room, number) & beyond) | ended
+            ended = (is_of(room, number) & beyond) | ended
     return ended
 
 
-def _is_of(room, number):
+def is_of(room, number):
     """Whether a wall is one of a room."""
     return (number >= room[0][0]) & (number <= room[-1][0])
 
@@ -96,7 +96,7 @@ def _wall_on(walls, rooms, number, r):
     """A wall of another room that lies on this one, where the particle is inside of none."""
     found, flies = -1.0, False
     for room in rooms:
-        if not _is_of(room, number):
+        if not is_of(room, number):
             gap = gap_in(room, r)
             flies = flies or gap < -_FLIES * walls.slack
             if gap <= _BEYOND * walls.slack:

@@ -102,6 +102,7 @@ def _decide(method, walls, gravity, share, i):
     if phase == FLYING:
         v = events.off_the_wall(walls, wall, r, v, u)
     slides = phase != FLYING
+    _settle(walls, state, i, found)
     put(state.velocity, 0, i, v)
     contacts.keep[i] = found.keep
     # The step of before is a good first one where the walls are the same.
@@ -112,6 +113,12 @@ def _decide(method, walls, gravity, share, i):
     contacts.phase[i] = phase if phase in (HELD, EDGE) else FLYING
     share.hand_over(i, phase)
     return again < _MOST
+
+
+def _settle(walls, state, i, found):
+    """A particle that begins to slide, on its wall again: where rooms touch what meets one is put inside of it."""
+    if walls.inset is not None and (found.phase == HELD or found.phase == EDGE):
+        put(state.position, 0, i, walls.project(found.wall, column(state.position, 0, i)))
 
 
 @outlined

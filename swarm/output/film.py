@@ -136,7 +136,8 @@ class _Film:
         self._drawn = drawn = Drawn(len(start), trajectory.body, most)
         self._start, self._between = start.position, dict[tuple[int, float], Wires]()
         self._changes = self._scene.moves() or self._scene.has_doors()
-        self._walls = _wires(shapes_of(self._scene, start.position))
+        self._shapes = shapes_of(self._scene, start.position)
+        self._walls = _wires(self._shapes)
         self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, start)
         # With half a pixel round-off takes none away.
         dpi = _DPI * min(1.0, min(pixels) / _ROOM)
@@ -174,15 +175,16 @@ class _Film:
 
     def _walls_at(self, k: int) -> Wires:
         """The curves of every wall at frame k, which are those of the start, moved."""
-        if self._scene.has_doors():
+        if self._scene.has_doors() or any(shape.motion is not None for shape in self._shapes):
+            # Where doors shut, or parts of a union move, other walls are there.
             return self._walls_then(float(self._seen["time"][k]))
         if not self._scene.moves():
             return self._walls
         moved = []
-        for i, (solid, curves) in enumerate(self._walls):
-            places = (self._seen[name][k, i] for name in ("wall_position", "wall_orientation"))
-            turn, way = since_start(self._scene, i, *places)
-            moved.append((solid, [curve @ turn.T + way for curve in curves]))
+        places = self._seen["wall_position"][k], self._seen["wall_orientation"][k]
+        for shape in self._shapes:
+            turn, way = since_start(self._scene, shape, self._seen["time"][k], places)
+            moved.append((shape.solid, [curve @ turn.T + way for curve in shape.wires]))
         return moved
 
     def _walls_then(self, time: float) -> Wires:

@@ -14,7 +14,7 @@ from ..checks import Vector
 from ..errors import SceneError
 from ..motion import Oscillation, Path, Rotation, Translation, parts_of, unit_axis
 from .fields.many import Many
-from .outlines.polygon import Outlined
+from .outlines.outlined import Outlined
 from .surface import Box, Surface
 
 Lengths = tuple[float | None, float | None, float | None]

@@ -61,7 +61,7 @@ class Carried(Walls):
         for wall in self.each:
             last = _during(wall.members if isinstance(wall, Field) else wall, last, remaining, after)
             made = (*made, Field(last) if isinstance(wall, Field) else last)
-        return Walls(made, self.unions, self.slack)
+        return Walls(made, self.unions, self.slack, self.inset)
 
     def in_steps(self):
         return False

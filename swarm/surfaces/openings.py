@@ -22,7 +22,7 @@ from .fields.grouped import by_kind
 from .fields.many import Many
 from .images import Lengths, images_of
 from .instant import has_room, side_of
-from .outlines.polygon import Outlined
+from .outlines.outlined import Outlined
 from .surface import Surface
 from .walls import Field, Walls, all_walls
 
@@ -127,7 +127,7 @@ def require_few(volumes: Sequence[Sequence[Surface]]) -> None:
 
 def reaches(surface: Surface, opening: Surface) -> bool:
     """Whether a volume has points on both sides of a wall."""
-    both = _gap(opening, _sign(opening)), _gap(surface, side_of(surface))
+    both = _gap(opening, sign_of(opening)), _gap(surface, side_of(surface))
     reach = _REACH * max(surface.extent(), opening.extent())
     low, high = (np.array(corner)[:, None] for corner in _box_of(opening))
     # Also where the box of a flat volume has no width
@@ -149,7 +149,7 @@ def _gap(surface: Surface, sign: float) -> Any:
     return lambda points: sign * surface.phi(points), lambda points: sign * surface.gradient(points)
 
 
-def _sign(opening: Surface) -> float:
+def sign_of(opening: Surface) -> float:
     """The distance that phi gives where the volume is not."""
     return 1.0 if isinstance(opening, Many) else side_of(opening)
 
@@ -166,7 +166,7 @@ def are_open(volumes: Sequence[Surface], points: NDArray[np.float64], time: floa
     found = np.zeros(points.shape[1], np.bool_)
     for volume in volumes:
         if is_there(volume.present, time):
-            found |= _sign(volume) * volume.phi(points) <= 0.0
+            found |= sign_of(volume) * volume.phi(points) <= 0.0
     return found
 
 

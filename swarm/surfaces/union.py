@@ -26,6 +26,8 @@ from .surface import UNBOUNDED, Box, Surface
 
 Floats = NDArray[np.float64]
 Room = tuple[Surface, ...]
+# The number of a part, and of a part of this.
+Place = tuple[int, ...]
 
 # Most rooms: each is compiled into the kernels.
 _MOST_ROOMS = 64
@@ -77,15 +79,39 @@ class Joined(Surface):
     @cached_property
     def rooms(self) -> tuple[Room, ...]:
         """The admissible side as a union of intersections of surfaces that are none of these, with their laws."""
-        rooms = [tuple(dict.fromkeys(room)) for room in self._rooms(self.side == "outside")]
-        # What parts have in common may be nothing.
-        return tuple(room for room in rooms if _may_have_volume(room)) if len(rooms) > 1 else tuple(rooms)
+        return tuple(map(tuple, self._places_in_rooms))
 
-    def _rooms(self, turned: bool) -> list[Room]:
-        """`rooms`, or those of what is not admissible."""
-        parts = [_handed_down(self, part) for part in self.parts]
+    def places(self) -> tuple[Place, ...]:
+        """Of each of the `surfaces` the part that it is: its number, and of a part of a part both."""
+        return tuple(place for room in self._places_in_rooms for place in room.values())
+
+    def places_of_parts(self) -> tuple[Place, ...]:
+        """The same of every part, in their order."""
+        return tuple(
+            (k, *place) for k, part in enumerate(self.parts)
+            for place in (part.places_of_parts() if isinstance(part, Joined) else ((),))
+        )  # fmt: skip
+
+    @cached_property
+    def _places_in_rooms(self) -> tuple[dict[Surface, Place], ...]:
+        """The surfaces of every room, and the places of the parts that they are."""
+        rooms: list[dict[Surface, Place]] = []
+        for room in self._rooms(self.side == "outside"):
+            rooms.append({})
+            for surface, place in room:
+                rooms[-1].setdefault(surface, place)
+        # What parts have in common may be nothing.
+        return tuple(room for room in rooms if _may_have_volume(tuple(room))) if len(rooms) > 1 else tuple(rooms)
+
+    def _rooms(self, turned: bool) -> list[tuple[tuple[Surface, Place], ...]]:
+        """The surfaces and places of rooms, or of those of what is not admissible."""
+        parts = [handed_down(self, part) for part in self.parts]
         given = [one._rooms(turned ^ (one.side == "outside")) if isinstance(one, Joined)
-                 else [(_turned(one) if turned else one,)] for one in parts]  # fmt: skip
+                 else [((_turned(one) if turned else one, ()),)] for one in parts]  # fmt: skip
+        given = [
+            [tuple((surface, (k, *place)) for surface, place in room) for room in rooms]
+            for k, rooms in enumerate(given)
+        ]
         if (self._of_gaps is np.minimum) ^ turned:
             return [room for rooms in given for room in rooms]
         if math.prod(map(len, given)) > _MOST_ROOMS:
@@ -225,7 +251,14 @@ def _moves(part: Surface) -> bool:
     return part.motion is not None or (isinstance(part, Joined) and any(map(_moves, part.parts)))
 
 
-def _handed_down(whole: Surface, part: Surface) -> Surface:
+def part_at(surface: Surface, place: Place) -> Surface:
+    """The part at a place of a surface, with what is given to the whole; at no place the surface itself."""
+    for k in place:
+        surface = handed_down(surface, surface.parts[k])  # type: ignore[attr-defined]
+    return surface
+
+
+def handed_down(whole: Surface, part: Surface) -> Surface:
     """A part with what is given to the whole, where it leaves that at its default."""
     defaults = {one.name: one.default for one in fields(Surface)}
     given = {

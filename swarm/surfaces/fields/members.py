@@ -18,12 +18,10 @@ from ..shapes.quadratic import QuadricNumbers
 from ..shapes.slab import AXES, SlabNumbers
 from ..shapes.solid import SolidNumbers
 from ..shapes.sphere import SphereNumbers, ball
-from .grid import Grid, cell_of, until_next
+from .grid import Grid, aligned, cell_of, until_next
 
 # The rows of a rotation that turns nothing.
 _UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
-# Bytes of a line of the cache.
-_LINE = 64
 # What has fields of its own in a table, beside vectors and balls.
 _KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, Rotated, SolidNumbers)
 
@@ -198,15 +196,6 @@ def _written(like: Any) -> list[float]:
     if isinstance(like, SphereNumbers):
         return [*like.center, like.radius]
     return [number for part in like for number in _written(part)] if isinstance(like, tuple) else [float(like)]
-
-
-def aligned(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A copy of a table that begins with a line of the cache."""
-    memory = np.empty(rows.nbytes + _LINE, np.uint8)
-    first = -memory.ctypes.data % _LINE
-    copy = memory[first : first + rows.nbytes].view(np.float64).reshape(rows.shape)
-    copy[:] = rows
-    return copy
 
 
 # --- Outlined, of the cell of a point --------------------------------------------------------------------

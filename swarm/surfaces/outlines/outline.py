@@ -9,13 +9,14 @@ they are where n.d + k/2 |d|^2 = 0 with d = r - a, whose value is the distance t
 import math
 from collections.abc import Iterable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...checks import LARGEST, number, shown
 from ...errors import SceneError
+from .apart import Sides, along, require_apart
 
 Floats = NDArray[np.float64]
 Row = tuple[float, ...]
@@ -28,19 +29,6 @@ _BATCH = 1 << 20
 _POINTS = 65
 # Of the distance of two sides, what is behind one of them and not the other.
 _HALF = 0.4
-
-
-class Sides(NamedTuple):
-    """The sides of an outline, counter-clockwise, arcs of at most half a circle: arrays with an entry a side."""
-
-    start: Floats  # (n, 2)
-    end: Floats
-    normal: Floats  # at the start
-    curvature: Floats  # (n,)
-    ahead: Floats  # the tangents at the start and at the end, (n, 2)
-    behind: Floats
-    length: Floats  # (n,)
-    which: NDArray[np.int64]  # the side of the outline that it is of
 
 
 class Outline:
@@ -61,7 +49,7 @@ class Outline:
         size = float(np.ptp(sides.start, axis=0).max())
         if not _area(sides) > _NOTHING * size * size:
             raise SceneError(f"{name} must go round an area, got {shown(self.rows)}; list the vertices in their order")
-        _require_apart(name, sides, _NOTHING * max(size, self.extent))
+        require_apart(name, sides, _NOTHING * max(size, self.extent))
 
     def __len__(self) -> int:
         return len(self.sides.start)
@@ -96,7 +84,7 @@ class Outline:
         inverse = 1.0 / np.where(bent, s.curvature, 1.0)
         for x, y in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
             point = s.start + inverse[:, None] * (np.sign(s.curvature)[:, None] * np.array([x, y]) - s.normal)
-            here = bent & (_along(point - s.start, s.ahead) >= 0.0) & (_along(point - s.end, s.behind) <= 0.0)
+            here = bent & (along(point - s.start, s.ahead) >= 0.0) & (along(point - s.end, s.behind) <= 0.0)
             found.append(np.where(here[:, None], point, s.start))
         return np.array(found)
 
@@ -107,7 +95,7 @@ class Outline:
         before = self.sides.behind
         sine = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
         # A spike turns back: its sine is 0, and it is no smooth joint.
-        back = _along(before, after) < 0.0
+        back = along(before, after) < 0.0
         return np.where(np.abs(sine) > _SMOOTH, np.sign(sine), np.where(back, 1.0, 0.0)).astype(np.int64)
 
     def wedges(self, side: float) -> Floats:
@@ -117,7 +105,7 @@ class Outline:
         """
         after = np.roll(self.sides.ahead, -1, axis=0)
         # The wedge is what the turn leaves of half a circle.
-        cosine = np.clip(-_along(self.sides.behind, after), -1.0, 1.0)
+        cosine = np.clip(-along(self.sides.behind, after), -1.0, 1.0)
         turns = side * self.turns
         return np.asarray(np.where(turns < 0.0, -np.sqrt(0.5 * (1.0 - cosine)), turns))
 
@@ -127,9 +115,9 @@ class Outline:
         s, n = self.sides, len(self)
         found, bent = np.full(n, self.extent), np.flatnonzero(s.curvature)
         points, owner = [s.start, s.end], [np.arange(n)] * 2
-        for k in bent:
-            points.append(self._curve(int(k))[:: (_POINTS - 1) // 16])
-            owner.append(np.full(len(points[-1]), k))
+        for arc in bent.tolist():
+            points.append(self._curve(arc)[:: (_POINTS - 1) // 16])
+            owner.append(np.full(len(points[-1]), arc))
         every, whose = np.concatenate(points), np.concatenate(owner)
         step = max(1, _BATCH // n)
         for first in range(0, len(every), step):
@@ -149,19 +137,19 @@ class Outline:
             return np.empty(0), np.empty((2, 0))
         return np.concatenate([d for d, _g in parts]), np.concatenate([g for _d, g in parts], axis=1)
 
-    def _distances(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Of points (N, 2) from every side: signed of the whole curve, the unit vector along it, within, the distance."""
+    def _distances(self, points: Floats) -> Any:
+        """Of points (N, 2) from every side: signed of the whole curve, the unit vector along it, within, distance."""
         s, r = self.sides, points[:, None, :]
         off = r - s.start
         grad = s.normal + s.curvature[:, None] * off
-        level = _along(s.normal, off) + 0.5 * s.curvature * _along(off, off)
-        steep = np.sqrt(_along(grad, grad))
+        level = along(s.normal, off) + 0.5 * s.curvature * along(off, off)
+        steep = np.sqrt(along(grad, grad))
         # The distance to the circle, without cancellation: |grad|^2 = 1 + 2 k level
         signed = 2.0 * level / (1.0 + steep)
         out = grad / np.maximum(steep, np.finfo(np.float64).tiny)[..., None]
         foot = off - signed[..., None] * out
-        within = (_along(foot, s.ahead) >= 0.0) & (_along(foot - (s.end - s.start), s.behind) <= 0.0)
-        ends = np.sqrt(np.minimum(_along(off, off), _along(r - s.end, r - s.end)))
+        within = (along(foot, s.ahead) >= 0.0) & (along(foot - (s.end - s.start), s.behind) <= 0.0)
+        ends = np.sqrt(np.minimum(along(off, off), along(r - s.end, r - s.end)))
         return signed, out, within, np.where(within, np.abs(signed), ends)
 
     def _nearest(self, points: Floats) -> tuple[Floats, Floats]:
@@ -171,12 +159,12 @@ class Outline:
         i = np.arange(len(k))
         # At a corner both its sides are at one distance: there the corner says which side of it a point is on.
         off, back = r - s.start[k], r - s.end[k]
-        first = _along(off, off) < _along(back, back)
+        first = along(off, off) < along(back, back)
         turn = np.where(first, np.roll(self.turns, 1)[k], self.turns[k])
         corner = ~within[i, k] & (turn != 0)
         found = np.where(corner, turn * distance[i, k], np.where(signed[i, k] < 0.0, -1.0, 1.0) * distance[i, k])
         away = np.where(first[:, None], off, back)
-        size = np.maximum(np.sqrt(_along(away, away)), np.finfo(np.float64).tiny)
+        size = np.maximum(np.sqrt(along(away, away)), np.finfo(np.float64).tiny)
         slope = np.where((corner & (distance[i, k] > 0.0))[:, None], turn[:, None] * away / size[:, None], out[i, k])
         return found, slope.T
 
@@ -193,10 +181,6 @@ class Outline:
         # a + n (cos - 1)/k + t sin/k, with t the tangent and n the normal at the start
         bend = (np.cos(angle) - 1.0) * s.normal[k] + np.sin(angle) * s.ahead[k]
         return np.asarray(s.start[k] + bend / s.curvature[k])
-
-
-def _along(a: Floats, b: Floats) -> Floats:
-    return np.asarray((a * b).sum(axis=-1))
 
 
 # --- From rows -------------------------------------------------------------------------------------------
@@ -252,10 +236,10 @@ def _sides_of(rows: Floats) -> Sides:
     u, which = np.array([piece[2] for piece in pieces]), np.array([piece[3] for piece in pieces])
     chord = b - a
     width = np.hypot(chord[:, 0], chord[:, 1])
-    along = chord / width[:, None]
+    ahead = chord / width[:, None]
     # Half of the angle of the arc
     sine, cosine = 2.0 * u / (1.0 + u * u), (1.0 - u * u) / (1.0 + u * u)
-    ahead, behind = _turned(along, cosine, -sine), _turned(along, cosine, sine)
+    ahead, behind = _turned(ahead, cosine, -sine), _turned(ahead, cosine, sine)
     normal = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1)
     bent = sine != 0.0
     length = np.where(bent, 2.0 * np.arctan(u) * width / np.where(bent, sine, 1.0), width)
@@ -274,49 +258,3 @@ def _area(sides: Sides) -> float:
     bent = k != 0.0
     caps = np.where(bent, (angle - np.sin(angle)) / np.where(bent, 2.0 * k * k, 1.0), 0.0)
     return float(0.5 * (x0 * y1 - x1 * y0).sum() + caps.sum())
-
-
-def _require_apart(name: str, sides: Sides, nothing: float) -> None:
-    """Raise a `SceneError` where two sides cross or touch other than at the vertex that they share."""
-    n = len(sides.start)
-    i, j = np.triu_indices(n, 1)
-    a, b = (Sides._make(part[k] for part in sides) for k in (i, j))
-    for point in _common(a, b):
-        on = np.isfinite(point).all(axis=1)
-        for one in (a, b):
-            on &= (_along(point - one.start, one.ahead) >= -nothing) & (_along(point - one.end, one.behind) <= nothing)
-        for mine, other, next_to in ((a.end, b.start, j == i + 1), (a.start, b.end, (i == 0) & (j == n - 1))):
-            shared = next_to & (np.hypot(*(point - mine).T) <= 1e4 * nothing) & (np.hypot(*(mine - other).T) <= nothing)
-            on &= ~shared
-        if on.any():
-            k = int(np.flatnonzero(on)[0])
-            raise SceneError(
-                f"{name} must not cross itself, got sides {a.which[k]} and {b.which[k]} that meet at "
-                f"({point[k, 0]:.4g}, {point[k, 1]:.4g}); side k is from vertex k to the next"
-            )
-
-
-def _common(a: Sides, b: Sides) -> list[Floats]:
-    """The two points that each pair of lines or circles has in common, NaN where there is none."""
-    with np.errstate(all="ignore"):
-        ka, kb = a.curvature, b.curvature
-        # A line through both points: kb La - ka Lb has no square; of two lines it is one of them.
-        off = a.start - b.start
-        straight = (ka == 0.0) & (kb == 0.0)
-        # La(r) = na.(r - a) + ka/2 |r - a|^2, about the point a; Lb about it: (nb + kb off).d + Lb(a)
-        nb, cb = b.normal + kb[:, None] * off, _along(b.normal, off) + 0.5 * kb * _along(off, off)
-        ka_, kb_ = np.where(straight, 0.0, ka), np.where(straight, 1.0, kb)
-        normal = kb_[:, None] * a.normal - ka_[:, None] * nb
-        shift = -ka_ * cb
-        size2 = _along(normal, normal)
-        foot = -(shift / size2)[:, None] * normal
-        way = np.stack([-normal[:, 1], normal[:, 0]], axis=1) / np.sqrt(size2)[:, None]
-        # Along that line the level of the one that is bent, or of the other line
-        use_b = (kb != 0.0) | straight
-        n, k, c = np.where(use_b[:, None], nb, a.normal), np.where(use_b, kb, ka), np.where(use_b, cb, 0.0)
-        level = c + _along(n, foot) + 0.5 * k * _along(foot, foot)
-        slope = _along(n, way) + k * _along(foot, way)
-        root = np.sqrt(slope * slope - 2.0 * k * level)
-        q = -(slope + np.copysign(root, slope))
-        times = np.where(k == 0.0, -level / slope, q / k), np.where(k == 0.0, np.nan, 2.0 * level / q)
-        return [a.start + foot + t[:, None] * way for t in times]
