@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         Ellipsoids,
         Formula,
         Intersection,
+        Mesh,
         OwnSurface,
         Paraboloid,
         Plane,
@@ -78,8 +79,8 @@ _HOMES = {
     "surfaces.data.mesh": ("from_mesh",),
     "surfaces": (
         "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",
-        "Intersection", "OwnSurface", "Paraboloid", "Plane", "Quadric", "Sampled", "Slab", "Sphere", "Spheres", "Torus",
-        "Union",
+        "Intersection", "Mesh", "OwnSurface", "Paraboloid", "Plane", "Quadric", "Sampled", "Slab", "Sphere", "Spheres",
+        "Torus", "Union",
     ),
     "surfaces.wall_law": ("WallLaw",),
 }  # fmt: skip
@@ -88,7 +89,7 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
     "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
-    "Impact", "ImpactLog", "Intersection", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path",
+    "Impact", "ImpactLog", "Intersection", "Mesh", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path",
     "Penalty", "Plane", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere",
     "Spheres", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Union", "Verlet",
     "WallLaw", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "from_mesh",

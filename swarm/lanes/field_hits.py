@@ -14,6 +14,7 @@ from ..kernel.record import Record
 from ..kernel.vector import column, put
 from ..surfaces import flights
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
+from ..surfaces.facets.members import Facets
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import Few, gathered, member, width
 from ..surfaces.period import on_time
@@ -107,10 +108,23 @@ def seek(walls, gravity, lanes, live):
 @outlined
 def _seek(gravity, members, before, lanes, live):
     """The same with one field that has so many walls before it."""
-    if isinstance(members, Few):
+    if isinstance(members, Facets):
+        _go_through(gravity, members, before, lanes, live)
+    elif isinstance(members, Few):
         _look_at_all(members, before, lanes, live)
     else:
         _look_at_near(gravity, members, before, lanes, live)
+
+
+def _go_through(gravity, facets, before, lanes, live):
+    """Every lane from cell to cell of the facets of a mesh."""
+    course = lanes.course
+    for i in range(index(live)):
+        lane = lanes.lane(i)
+        time, wall = facets.field_hit(gravity, lane.r, lane.v)
+        sooner = time < course[_TIME, i]
+        course[_TIME, i] = select(sooner, time, course[_TIME, i])
+        course[_WALL, i] = select(sooner, select(wall < 0.0, -1.0, wall + before), course[_WALL, i])
 
 
 def _look_at_all(members, before, lanes, live):

@@ -8,6 +8,7 @@ the run.
 
 from .contract import Smooth as Smooth
 from .data.sampled import Sampled
+from .facets.mesh import Mesh
 from .fields.bodies import Boxes, Capsules, Cylinders, Ellipsoids, Spheres
 from .fields.many import Many
 from .formulas.formula import Formula
@@ -40,6 +41,7 @@ __all__ = [
     "Ellipsoids",
     "Formula",
     "Intersection",
+    "Mesh",
     "OwnSurface",
     "Paraboloid",
     "Plane",
@@ -75,6 +77,7 @@ ALL_SURFACES: dict[str, type[Surface]] = {
     "slab": Slab,
     "formula": Formula,
     "sampled": Sampled,
+    "mesh": Mesh,
     "union": Union,
     "intersection": Intersection,
     **ALL_FIELDS,
