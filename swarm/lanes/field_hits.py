@@ -20,6 +20,7 @@ from ..surfaces.fields.members import Few, gathered, member, width
 from ..surfaces.period import on_time
 from ..surfaces.walls import Walls
 from .arrays import Flying
+from .from_cell_to_cell import go_through
 from .table import STRIDE, marked_lanes
 
 # Safe steps are for all lanes where more than this part of them needs one.
@@ -109,22 +110,11 @@ def seek(walls, gravity, lanes, live):
 def _seek(gravity, members, before, lanes, live):
     """The same with one field that has so many walls before it."""
     if isinstance(members, Facets):
-        _go_through(gravity, members, before, lanes, live)
+        go_through(gravity, members, before, lanes, live)
     elif isinstance(members, Few):
         _look_at_all(members, before, lanes, live)
     else:
         _look_at_near(gravity, members, before, lanes, live)
-
-
-def _go_through(gravity, facets, before, lanes, live):
-    """Every lane from cell to cell of the facets of a mesh."""
-    course = lanes.course
-    for i in range(index(live)):
-        lane = lanes.lane(i)
-        time, wall = facets.field_hit(gravity, lane.r, lane.v)
-        sooner = time < course[_TIME, i]
-        course[_TIME, i] = select(sooner, time, course[_TIME, i])
-        course[_WALL, i] = select(sooner, select(wall < 0.0, -1.0, wall + before), course[_WALL, i])
 
 
 def _look_at_all(members, before, lanes, live):

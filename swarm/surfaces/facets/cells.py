@@ -4,26 +4,30 @@ The facets of a mesh are on a surface, so most cells are empty: a flight leaps t
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel import cache
 from ...kernel.arrays import index
-from ...kernel.jit import Array, kernel, outlined, select
+from ...kernel.jit import Array, kernel, select
 from ...kernel.record import Record
-from ...kernel.vector import Vec, vec
-from ..course import rise_time
+from ...kernel.gravity import as_vector
+from ...kernel.vector import ZERO, Vec, absolute, dot, square, total, vec
 from ..fields.grid import MARGIN
 from ..fields.members import gathered
 
 # Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
 # ones more are crossed. For each facet there are at most so many cells, which take 5 bytes each.
-_AREA, _CELLS_EACH, _MOST_CELLS = 3.0, 12.0, 40_000_000
+_AREA, _CELLS_EACH, _MOST_CELLS = 3.0, 32.0, 100_000_000
 # Cells of few facets.
 _LEAST_CELLS = 64
 # The farthest leap, in cells.
 _FARTHEST = 120
+# A plane in a cell is known by four whole numbers up to this one, and so to these parts of the cell's diagonal and of a
+# speed; so many are made at once.
+_FULL, _OFF, _OFF_SPEED, _TOGETHER = 32767.0, 6e-5, 6e-5, 1_000_000
 # So few facets are entered in plain Python.
 _SOME = 60
 
@@ -40,7 +44,8 @@ class Cells(Record):
     shape: Vec
     first: Array
     entries: Array
-    leap: Array  # int8, how many cells away the next one with facets is, 0 in such a one
+    planes: Array  # (entries, 4) int16, of each the normal and, from the middle of the cell, the offset: see `passes`
+    leap: Array  # int8, how many cells away the next one with facets is, 0 in such a one; below 0 inside of the mesh
 
 
 def cells_around(like, table: Floats, corners: Floats) -> Cells:
@@ -56,15 +61,17 @@ def cells_around(like, table: Floats, corners: Floats) -> Cells:
     count = int(shape.prod())
     numbers = (first, width, 1.0 / width, MARGIN * width, shape)
     starts, nothing = np.zeros(count + 2, np.int32), np.empty(0, np.int32)
-    grid = Cells(*(vec(row.tolist()) for row in numbers), starts, nothing, np.empty(0, np.int8))
+    flat = np.empty((0, 4), np.int16)
+    grid = Cells(*(vec(row.tolist()) for row in numbers), starts, nothing, flat, np.empty(0, np.int8))
     enter = cache.in_python(_enter) if len(table) <= _SOME else _enter
     bounds = np.ascontiguousarray(low), np.ascontiguousarray(high)
     enter(like, table, bounds, grid, starts[1:], nothing)
     np.cumsum(starts, out=starts)
     entries = np.empty(starts[-1], np.int32)
     enter(like, table, bounds, grid, starts[:-1].copy(), entries)
-    empty = np.diff(starts[:-1]) == 0
-    return grid._replace(entries=entries, leap=_leaps(empty.reshape(shape.astype(int))))
+    held = np.diff(starts[:-1])
+    grid = grid._replace(entries=entries, leap=_leaps((held == 0).reshape(shape.astype(int))))
+    return grid._replace(planes=_planes(grid, table, np.repeat(np.arange(count), held)))
 
 
 def _shape(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
@@ -89,7 +96,21 @@ def _leaps(empty: NDArray[np.bool_]) -> NDArray[np.int8]:
 
     # What is beyond the border is empty too.
     found = distance_transform_cdt(empty, "chessboard")
-    return np.minimum(found, _FARTHEST).astype(np.int8).ravel()
+    return np.append(np.minimum(found, _FARTHEST).astype(np.int8), np.int8(1))
+
+
+def _planes(grid: Cells, table: Floats, cells: NDArray[np.int64]) -> NDArray[np.int16]:
+    """The planes of all entries, each in the cell with this number."""
+    width = np.array(grid.width)
+    made = np.empty((len(cells), 4), np.int16)
+    for first in range(0, len(cells), _TOGETHER):
+        some = slice(first, first + _TOGETHER)
+        places = np.stack(np.unravel_index(cells[some], tuple(int(n) for n in grid.shape)), axis=1)
+        normal, offset = table[grid.entries[some], :3], table[grid.entries[some], 3]
+        middle = np.array(grid.low) + (places + 0.5) * width
+        made[some, :3] = np.rint(normal * _FULL)
+        made[some, 3] = np.rint((offset - (normal * middle).sum(axis=1)) * (_FULL / np.linalg.norm(width)))
+    return made
 
 
 @kernel
@@ -120,24 +141,69 @@ def _layers(begin, end, width, count):
     return int(min(max(first, 0.0), count - 1.0)), int(min(max(last, 0.0), count - 1.0)) + 1
 
 
+# --- Which planes a flight passes ------------------------------------------------------------------------
+
+
+class Here(Record):
+    """A flight in a cell: from the middle of it, its speed, half of gravity or None, and how long it is there."""
+
+    from_middle: Vec
+    v: Vec
+    half_pull: Any
+    span: float
+    near: float  # a distance, and a speed, that may be none
+    slow: float
+
+
+def here_in(gravity, cells, place, r, v, span):
+    """A flight that is at r in the cell at this place."""
+    w = cells.width
+    middle = cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z)
+    pull = None if gravity is None else 0.5 * as_vector(gravity)
+    slow = _OFF_SPEED * (total(absolute(v)) + (0.0 if pull is None else 2.0 * span * total(absolute(pull))))
+    return Here(r - middle, v, pull, span, _OFF * math.sqrt(square(w)), slow)
+
+
+def passes(cells, k, here):
+    """Whether a flight may come through the plane of an entry in its cell: most do not, and no facet is looked up."""
+    normal = Vec(float(cells.planes[k, 0]), float(cells.planes[k, 1]), float(cells.planes[k, 2])) * (1.0 / _FULL)
+    offset = float(cells.planes[k, 3]) * (here.near * (1.0 / (_FULL * _OFF)))
+    depth, rate = dot(normal, here.from_middle) - offset, dot(normal, here.v) + here.slow
+    rises = select(rate > 0.0, rate, 0.0) * here.span
+    if here.half_pull is not None:
+        bend = dot(normal, here.half_pull)
+        bend = select(bend > 0.0, bend, 0.0) * here.span
+        rate, rises = rate + 2.0 * bend, rises + (bend + here.slow) * here.span
+    return (rate > 0.0) & (depth <= here.near) & (depth + rises >= -here.near)
+
+
 # --- Where a flight leaves cells -------------------------------------------------------------------------
 
 
 def until_out(gravity, cells, place, leap, r, v):
     """When a flight from a cell has left all cells that are nearer to it than `leap`, and itself."""
     back = select(leap > 1.0, leap - 1.0, 0.0)
-    x = _along(gravity, 0, cells.low.x, cells.width.x, cells.margin.x, (place.x - back, place.x + back + 1.0), r.x, v.x)
-    y = _along(gravity, 1, cells.low.y, cells.width.y, cells.margin.y, (place.y - back, place.y + back + 1.0), r.y, v.y)
-    z = _along(gravity, 2, cells.low.z, cells.width.z, cells.margin.z, (place.z - back, place.z + back + 1.0), r.z, v.z)
-    return min(x, min(y, z))
+    pull = ZERO if gravity is None else gravity
+    straight = gravity is None
+    x = _along(straight, cells.low.x, cells.width.x, cells.margin.x, place.x, back, (r.x, v.x, pull.x))
+    y = _along(straight, cells.low.y, cells.width.y, cells.margin.y, place.y, back, (r.y, v.y, pull.y))
+    z = _along(straight, cells.low.z, cells.width.z, cells.margin.z, place.z, back, (r.z, v.z, pull.z))
+    sooner = select(y < x, y, x)
+    return select(z < sooner, z, sooner)
 
 
-def _along(gravity, axis, low, width, margin, layers, x, v):
-    """When it leaves these layers of cells."""
-    below, above = low + layers[0] * width - margin, low + layers[1] * width + margin
-    if gravity is None:
+def _along(straight, low, width, margin, place, back, flight):
+    """When a flight (x, v, pull) leaves the layers of cells up to `back` away from a place, and a margin. Branch-free."""
+    x, v, pull = flight
+    below, above = low + (place - back) * width - margin, low + (place + back + 1.0) * width + margin
+    if straight:
         return select(v == 0.0, math.inf, (select(v > 0.0, above, below) - x) / v)
-    pull = gravity.x if axis == 0 else gravity.y if axis == 1 else gravity.z
-    if pull == 0.0:
-        return math.inf if v == 0.0 else ((above if v > 0.0 else below) - x) / v
-    return min(rise_time(x - above, 0.5 * v, 0.5 * pull), rise_time(below - x, -0.5 * v, -0.5 * pull))
+    # Towards the side to which it is pulled it leaves, unless it leaves before through the other one.
+    turned = pull < 0.0
+    a, b = 0.5 * abs(pull), 0.5 * select(turned, -v, v)
+    ahead, behind = select(turned, x - below, above - x), select(turned, above - x, x - below)
+    backwards = (b < 0.0) & (b * b >= a * behind)
+    root = math.sqrt(b * b + a * select(backwards, -behind, ahead))
+    over = select(backwards, behind, select(b > 0.0, ahead, root - b))
+    under = select(backwards, root - b, select(b > 0.0, root + b, a))
+    return select(under > 0.0, over / under, math.inf)

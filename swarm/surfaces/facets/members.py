@@ -2,16 +2,13 @@
 
 import math
 
-import numpy as np
-
 from ...kernel.arrays import index
-from ...kernel.gravity import accelerated, as_vector, displacement
-from ...kernel.jit import kernel, outlined, select
-from ...kernel.vector import Vec, column, dot, put, square
+from ...kernel.gravity import accelerated, displacement
+from ...kernel.jit import outlined
 from .. import flights
 from ..fields.grid import cell_of, until_next
 from ..fields.members import Members, member
-from .cells import until_out
+from .cells import here_in, passes, until_out
 
 # So many cells and blocks of cells are crossed before a flight is said to be free so far.
 _MOST = 4000
@@ -35,7 +32,8 @@ def _first_hit(facets, gravity, r, v):
             leap = cells.leap[index(cell.number)]
             until = t + until_out(gravity, cells, cell.place, abs(float(leap)), place, pace)
             if leap == 0:
-                found = _hit_in(facets, gravity, r, v, index(cell.number), until)
+                here = here_in(gravity, cells, cell.place, place, pace, until - t)
+                found = hit_in(facets, gravity, (r, v), (index(cell.number), t), here)
                 if found.wall >= 0.0:
                     return found
         else:
@@ -46,25 +44,14 @@ def _first_hit(facets, gravity, r, v):
     return flights.Hit(t, -1.0)
 
 
-def _hit_in(facets, gravity, r, v, number, until):
-    """The first hit with a facet in a cell, which the flight leaves then."""
-    found, cells = flights.Hit(until, -1.0), facets.grid
+def hit_in(facets, gravity, flight, cell, here):
+    """The first hit in a cell with this number of a flight (r, v), which leaves it `here.span` after `cell[1]`."""
+    (r, v), (number, begin) = flight, cell
+    found, cells = flights.Hit(begin + here.span, -1.0), facets.grid
     for k in range(cells.first[number], cells.first[number + index(1)]):
-        m = index(cells.entries[k])
-        if _may_hit(facets, gravity, r, v, m, until):
-            time, _hits = flights.hit(gravity, member(facets, m), r, v)
+        if passes(cells, index(k), here):
+            m = cells.entries[k]
+            time, _hits = flights.hit(gravity, member(facets, index(m)), r, v)
             if time < found.time:
                 found = flights.Hit(time, float(m))
     return found
-
-
-def _may_hit(facets, gravity, r, v, m, until):
-    """Whether a flight comes through the plane of a facet until then: most do not, and the edges are not looked up."""
-    table = facets.table
-    normal = Vec(table[m, 0], table[m, 1], table[m, 2])
-    depth, rate = dot(normal, r) - table[m, 3], dot(normal, v)
-    if gravity is None:
-        return (rate > 0.0) & (depth <= facets.like.room.value) & (depth + rate * until >= 0.0)
-    bend = 0.5 * dot(normal, as_vector(gravity))
-    rises = select(bend < 0.0, rate > 0.0, depth + (rate + bend * until) * until >= 0.0)
-    return (depth <= facets.like.room.value) & rises

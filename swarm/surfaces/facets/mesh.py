@@ -295,7 +295,7 @@ def _with_sides(facets: Facets, mesh: Any) -> Facets:
 
     grid = facets.grid
     shape = tuple(int(n) for n in grid.shape)
-    leap = grid.leap.reshape(shape)
+    leap = grid.leap[:-1].reshape(shape)
     parts, count = label(leap > 0)
     if not count:
         return facets
@@ -308,4 +308,4 @@ def _with_sides(facets: Facets, mesh: Any) -> Facets:
     nearest(facets, mesh, np.ascontiguousarray(low + (places + 0.5) * width), found)
     sign = np.ones(count + 1, np.int8)
     sign[labels] = np.where(found[3] < 0.0, -1, 1)
-    return facets._replace(grid=grid._replace(leap=grid.leap * sign[parts.ravel()]))
+    return facets._replace(grid=grid._replace(leap=grid.leap * np.append(sign[parts.ravel()], np.int8(1))))
