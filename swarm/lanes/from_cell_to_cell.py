@@ -13,6 +13,7 @@ from ..kernel.record import Record
 from ..kernel.vector import column, put
 from ..surfaces import flights
 from ..surfaces.facets.cells import here_in, passes, until_out
+from ..surfaces.facets.room import FULL, KIND, Room, all_away, room_of
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import member
 from .table import STRIDE
@@ -33,7 +34,6 @@ class Under(Record):
     until: Array  # how far it comes in this step, up to its hit
     wall: Array  # the facet of that hit, or -1
     cell: Array  # int64
-    leap: Array  # how many cells away facets are
     inside: Array  # bool, whether it is in the grid
     owner: Array  # int64, the lane
     last: Array  # the time after which no hit counts
@@ -65,7 +65,7 @@ class Maybe(Record):
 
 
 # Of its rows
-_START, _SPEED, _PLACE, _PLACES = 0, 3, 6, 9
+_START, _SPEED, _PLACE, _BACK, _AHEAD, _PLACES = 0, 3, 6, 9, 12, 15
 
 
 @outlined
@@ -74,7 +74,7 @@ def go_through(gravity, facets, before, lanes, live):
     course = lanes.course
     under = Under(
         unwritten((_PLACES, STRIDE), np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
-        unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
+        unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64),
         unwritten(STRIDE, np.bool_), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
         unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64),
     )  # fmt: skip
@@ -106,20 +106,32 @@ def _find_cells(gravity, cells, under, n):
         cell = cell_of(cells, place)
         put(under.rows, _PLACE, i, cell.place)
         under.cell[i], under.inside[i] = cell.number, cell.inside
+    # What is outside of the grid is in the cell after its last, which holds nothing.
     for i in range(index(n)):
-        under.leap[i] = abs(float(cells.leap[index(under.cell[i])]))
+        cell = index(under.cell[i])
+        room = room_of(cells.room, cell)
+        put(under.rows, _BACK, i, room.back)
+        put(under.rows, _AHEAD, i, room.ahead)
     for i in range(index(n)):
         place, pace = under.now(gravity, i)
-        out = until_out(gravity, cells, column(under.rows, _PLACE, i), under.leap[i], place, pace)
+        room = Room(column(under.rows, _BACK, i), column(under.rows, _AHEAD, i))
+        out = until_out(gravity, cells, column(under.rows, _PLACE, i), room, place, pace)
         under.until[i], under.wall[i] = under.time[i] + out, -1.0
     for i in range(index(n)):
-        # What is outside of the grid is in the cell after its last, which holds nothing.
         cell = index(under.cell[i])
-        held = under.leap[i] == 0.0
         under.count[i] = 0
-        if held:
+        if cells.room[cell, KIND] == FULL and _may_meet(gravity, cells, under, cell, i):
             first = cells.first[cell]
             under.first[i], under.count[i] = first, cells.first[cell + index(1)] - first
+
+
+def _may_meet(gravity, cells, under, cell, i):
+    """Whether a lane may move towards a facet of its cell, at the start of its way through it or at the end."""
+    v = column(under.rows, _SPEED, i)
+    if gravity is None:
+        return not all_away(cells.room, cell, v)
+    now, then = accelerated(gravity, v, under.time[i]), accelerated(gravity, v, under.until[i])
+    return not (all_away(cells.room, cell, now) and all_away(cells.room, cell, then))
 
 
 def _look(gravity, facets, under, maybe, n):

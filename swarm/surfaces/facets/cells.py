@@ -23,8 +23,6 @@ from ..fields.members import gathered
 _AREA, _CELLS_EACH, _MOST_CELLS = 3.0, 32.0, 100_000_000
 # Cells of few facets.
 _LEAST_CELLS = 64
-# The farthest leap, in cells.
-_FARTHEST = 120
 # A plane in a cell is known by four whole numbers up to this one, and so to these parts of the cell's diagonal and of a
 # speed; so many are made at once.
 _FULL, _OFF, _OFF_SPEED, _TOGETHER = 32767.0, 6e-5, 6e-5, 1_000_000
@@ -45,7 +43,7 @@ class Cells(Record):
     first: Array
     entries: Array
     planes: Array  # (entries, 4) int16, of each the normal and, from the middle of the cell, the offset: see `passes`
-    leap: Array  # int8, how many cells away the next one with facets is, 0 in such a one; below 0 inside of the mesh
+    room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
 
 
 def cells_around(like, table: Floats, corners: Floats) -> Cells:
@@ -62,7 +60,7 @@ def cells_around(like, table: Floats, corners: Floats) -> Cells:
     numbers = (first, width, 1.0 / width, MARGIN * width, shape)
     starts, nothing = np.zeros(count + 2, np.int32), np.empty(0, np.int32)
     flat = np.empty((0, 4), np.int16)
-    grid = Cells(*(vec(row.tolist()) for row in numbers), starts, nothing, flat, np.empty(0, np.int8))
+    grid = Cells(*(vec(row.tolist()) for row in numbers), starts, nothing, flat, np.empty((0, 8), np.int8))
     enter = cache.in_python(_enter) if len(table) <= _SOME else _enter
     bounds = np.ascontiguousarray(low), np.ascontiguousarray(high)
     enter(like, table, bounds, grid, starts[1:], nothing)
@@ -70,7 +68,7 @@ def cells_around(like, table: Floats, corners: Floats) -> Cells:
     entries = np.empty(starts[-1], np.int32)
     enter(like, table, bounds, grid, starts[:-1].copy(), entries)
     held = np.diff(starts[:-1])
-    grid = grid._replace(entries=entries, leap=_leaps((held == 0).reshape(shape.astype(int))))
+    grid = grid._replace(entries=entries)
     return grid._replace(planes=_planes(grid, table, np.repeat(np.arange(count), held)))
 
 
@@ -88,15 +86,6 @@ def _shape(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, 
     middle = 0.5 * (low + high)
     width = (extent + 2.0 * room) / shape
     return shape, middle - 0.5 * shape * width, width
-
-
-def _leaps(empty: NDArray[np.bool_]) -> NDArray[np.int8]:
-    """Of every cell how many cells away the next one is that is not empty, along the axis where it is farthest."""
-    from scipy.ndimage import distance_transform_cdt
-
-    # What is beyond the border is empty too.
-    found = distance_transform_cdt(empty, "chessboard")
-    return np.append(np.minimum(found, _FARTHEST).astype(np.int8), np.int8(1))
 
 
 def _planes(grid: Cells, table: Floats, cells: NDArray[np.int64]) -> NDArray[np.int16]:
@@ -180,23 +169,23 @@ def passes(cells, k, here):
 # --- Where a flight leaves cells -------------------------------------------------------------------------
 
 
-def until_out(gravity, cells, place, leap, r, v):
-    """When a flight from a cell has left all cells that are nearer to it than `leap`, and itself."""
-    back = select(leap > 1.0, leap - 1.0, 0.0)
+def until_out(gravity, cells, place, room, r, v):
+    """When a flight from a cell has left it and the `Room` around it."""
     pull = ZERO if gravity is None else gravity
-    straight = gravity is None
-    x = _along(straight, cells.low.x, cells.width.x, cells.margin.x, place.x, back, (r.x, v.x, pull.x))
-    y = _along(straight, cells.low.y, cells.width.y, cells.margin.y, place.y, back, (r.y, v.y, pull.y))
-    z = _along(straight, cells.low.z, cells.width.z, cells.margin.z, place.z, back, (r.z, v.z, pull.z))
+    is_straight, low, width, margin = gravity is None, cells.low, cells.width, cells.margin
+    back, ahead = place - room.back, place + room.ahead
+    x = _along(is_straight, (low.x, width.x, margin.x), back.x, ahead.x, (r.x, v.x, pull.x))
+    y = _along(is_straight, (low.y, width.y, margin.y), back.y, ahead.y, (r.y, v.y, pull.y))
+    z = _along(is_straight, (low.z, width.z, margin.z), back.z, ahead.z, (r.z, v.z, pull.z))
     sooner = select(y < x, y, x)
     return select(z < sooner, z, sooner)
 
 
-def _along(straight, low, width, margin, place, back, flight):
-    """When a flight (x, v, pull) leaves the layers of cells up to `back` away from a place, and a margin. Branch-free."""
-    x, v, pull = flight
-    below, above = low + (place - back) * width - margin, low + (place + back + 1.0) * width + margin
-    if straight:
+def _along(is_straight, axis, first, last, flight):
+    """When a flight (x, v, pull) leaves these layers of cells, and a margin. Branch-free."""
+    (low, width, margin), (x, v, pull) = axis, flight
+    below, above = low + first * width - margin, low + (last + 1.0) * width + margin
+    if is_straight:
         return select(v == 0.0, math.inf, (select(v > 0.0, above, below) - x) / v)
     # Towards the side to which it is pulled it leaves, unless it leaves before through the other one.
     turned = pull < 0.0

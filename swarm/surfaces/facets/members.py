@@ -9,6 +9,7 @@ from .. import flights
 from ..fields.grid import cell_of, until_next
 from ..fields.members import Members, member
 from .cells import here_in, passes, until_out
+from .room import FULL, KIND, room_of
 
 # So many cells and blocks of cells are crossed before a flight is said to be free so far.
 _MOST = 4000
@@ -29,11 +30,11 @@ def _first_hit(facets, gravity, r, v):
     for _cell in range(_MOST):
         cell = cell_of(cells, place)
         if cell.inside:
-            leap = cells.leap[index(cell.number)]
-            until = t + until_out(gravity, cells, cell.place, abs(float(leap)), place, pace)
-            if leap == 0:
+            number = index(cell.number)
+            until = t + until_out(gravity, cells, cell.place, room_of(cells.room, number), place, pace)
+            if cells.room[number, KIND] == FULL:
                 here = here_in(gravity, cells, cell.place, place, pace, until - t)
-                found = hit_in(facets, gravity, (r, v), (index(cell.number), t), here)
+                found = hit_in(facets, gravity, (r, v), (number, t), here)
                 if found.wall >= 0.0:
                     return found
         else:

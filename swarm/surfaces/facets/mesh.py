@@ -23,6 +23,7 @@ from .cells import cells_around
 from .facet import FacetNumbers, Shared
 from .members import Facets
 from .nearest import boxes_of, nearest, within
+from .room import CLOSED, FREE, KIND, rooms_of, with_blocks
 
 # The round-off of places, as a part of the farthest coordinate: far above that of numbers, and of a hit.
 _ROOM = 2.0**-40
@@ -166,7 +167,7 @@ class Mesh(Surface):
         zero = Vec(0.0, 0.0, 0.0)
         like = FacetNumbers(zero, 0.0, 3 * ((zero, 0.0),), Shared(room))
         grid = cells_around(like, table, corners)
-        return _with_sides(Facets(like, table, grid), self._tree)
+        return _with_room(Facets(like, table, grid), self._tree, self.is_solid())
 
     @cached_property
     def _tree(self) -> tuple[Floats, Indices, Floats]:
@@ -208,10 +209,10 @@ class Mesh(Surface):
         return float((a * np.cross(b, c)).sum() / 6.0)
 
     def contain(self, points: Floats) -> NDArray[np.bool_]:
-        """Whether each of the points (3, N) is inside of the mesh: cheaper than phi."""
+        """Whether each of the points (3, N) is admissible: cheaper than phi."""
         found = np.empty(points.shape[1], np.bool_)
         within(self.members, self._tree, np.ascontiguousarray(points), found)
-        return found ^ self.is_solid()
+        return found
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """The signed distance at points (3, N): below 0 inside, above 0 outside; shape (N,)."""
@@ -289,23 +290,27 @@ def _normals(a: Floats, b: Floats, c: Floats) -> Floats:
     return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
 
 
-def _with_sides(facets: Facets, mesh: Any) -> Facets:
-    """The facets whose empty cells inside of the mesh have a leap below 0."""
+def _with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
+    """The facets with what is free around each cell."""
     from scipy.ndimage import label
 
     grid = facets.grid
     shape = tuple(int(n) for n in grid.shape)
-    leap = grid.leap[:-1].reshape(shape)
-    parts, count = label(leap > 0)
-    if not count:
-        return facets
-    # Of each part a cell next to triangles, where the nearest one is found at once
-    ones = np.flatnonzero(leap.ravel() == 1)
-    labels, first = np.unique(parts.ravel()[ones], return_index=True)
-    places = np.array(np.unravel_index(ones[first], shape), np.float64)
-    low, width = (np.array(row)[:, None] for row in (grid.low, grid.width))
-    found = np.empty((4, len(labels)))
-    nearest(facets, mesh, np.ascontiguousarray(low + (places + 0.5) * width), found)
-    sign = np.ones(count + 1, np.int8)
-    sign[labels] = np.where(found[3] < 0.0, -1, 1)
-    return facets._replace(grid=grid._replace(leap=grid.leap * np.append(sign[parts.ravel()], np.int8(1))))
+    held = np.diff(grid.first[:-1]).reshape(shape) > 0
+    rows = rooms_of(held, facets.table[grid.entries, :3], grid.first)
+    facets = facets._replace(grid=grid._replace(room=rows))
+    parts, count = label(~held)
+    if count:
+        # The middle of one cell of each part says on which side it is.
+        labels, first = np.unique(parts.ravel(), return_index=True)
+        first, labels = first[labels > 0], labels[labels > 0]
+        places = np.array(np.unravel_index(first, shape), np.float64)
+        low, width = (np.array(row)[:, None] for row in (grid.low, grid.width))
+        found = np.empty((4, len(labels)))
+        nearest(facets, mesh, np.ascontiguousarray(low + (places + 0.5) * width), found)
+        sides = np.full(count + 1, CLOSED, np.int8)
+        sides[labels] = np.where(found[3] < 0.0, FREE, CLOSED)
+        rows[:-1, KIND] = np.where(held, rows[:-1, KIND].reshape(shape), sides[parts]).ravel()
+        with_blocks(rows, held)
+    rows[-1, KIND] = FREE if is_solid else CLOSED
+    return facets

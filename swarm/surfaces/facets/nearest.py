@@ -9,6 +9,7 @@ from ...kernel.jit import kernel, outlined
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, dot, norm, put, square
 from ..fields.grid import cell_of
+from .room import FREE, FULL, KIND
 
 # Of a squared distance, the part by which those from two triangles that share a corner or an edge differ: round-off.
 _TIE = 1e-9
@@ -43,13 +44,13 @@ def nearest(facets, mesh, points, found):
 
 @kernel
 def within(facets, mesh, points, found):
-    """Whether each of the points (3, N) is inside of a mesh, into `found`; on it, it is not."""
+    """Whether each of the points (3, N) is admissible, and not on the mesh, into `found`."""
     cells = facets.grid
     for i in range(points.shape[1]):
         r = column(points, 0, i)
         cell = cell_of(cells, r)
-        leap = cells.leap[index(cell.number)] if cell.inside else 1
-        found[i] = leap < 0 if leap != 0 else _nearest(facets, mesh, r).height < 0.0
+        kind = cells.room[index(cell.number), KIND]
+        found[i] = kind == FREE if kind != FULL else _nearest(facets, mesh, r).height < 0.0
 
 
 @outlined
