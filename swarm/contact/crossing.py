@@ -6,7 +6,7 @@ from typing import Any
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.record import Record
-from ..kernel.vector import Vec, dot, highest, lowest, square
+from ..kernel.vector import Vec, dot, highest, lowest, norm, square
 from ..surfaces.fields.grid import block_of, over_block
 from ..surfaces.fields.members import member
 from ..surfaces.moving import Carried
@@ -64,7 +64,14 @@ def _meets_one(field, ends, number, active, path, near):
 
 def _meets_body(found, m, field, ends, number, active, path, near):
     m = float(m)
+    if isinstance(field, Patched) and not field.is_near(m, path.r1, _reach(path) + near):
+        return found
     return found or ((not active.has(number + m)) and _may_meet(field.wall(m), ends.wall(m), path, near))
+
+
+def _reach(path):
+    """No place of a step is farther from its end than this."""
+    return norm(path.r1 - path.r0) + path.h * (norm(path.v0) + norm(path.v1))
 
 
 def own_path(field, ends, path):
