@@ -162,7 +162,8 @@ def _first_of(members, number, active, path, near, later):
 def _sooner_body(found, m, members, number, active, path, near):
     if active.has(number + m):
         return found
-    time = _deep_after(_Still(member(members, index(m))), path, near)
+    whole = members.whole(float(m)) if isinstance(members, Patched) else member(members, index(m))
+    time = _deep_after(_Still(whole), path, near)
     if isinstance(members, Patched) and time < math.inf and not members.is_there(float(m), at_part(path, time), near):
         return found
     if time < found.time or (time == found.time and number + m < found.wall):

@@ -19,6 +19,10 @@ class Patched(Record):
         """Whether the patch of a wall reaches to a place on it, or nearer to it than `near`."""
         raise NotImplementedError
 
+    def whole(self, number):
+        """A wall without its edges."""
+        raise NotImplementedError
+
     def is_near(self, number, r, near):
         """Whether the patch of a wall may be nearer to a point than `near`."""
         return True

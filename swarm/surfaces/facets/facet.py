@@ -44,8 +44,8 @@ class FacetNumbers(Flat):
         return least
 
     def is_there(self, r, near):
-        """Whether the facet reaches as near as this to the foot of a point on its plane."""
-        return self.within(r) >= -near
+        """Whether the facet reaches as near as this to a point on its plane: to one deep behind it, it does not."""
+        return (self.within(r) >= -near) & (self.phi(r) <= self.behind())
 
     def distance(self, r):
         # Beyond its edges, or deep behind it, where other walls are, not nearer than that

@@ -10,6 +10,7 @@ from .. import flights
 from ..fields.grid import cell_of, until_next
 from ..fields.members import Members, member
 from ..patched import Patched
+from ..shapes.plane import PlaneNumbers
 from .cells import here_in, passes, until_out
 from .room import FULL, KIND, room_of
 
@@ -30,6 +31,10 @@ class Facets(Members, Patched):
 
     def is_there(self, number, r, near):
         return self.wall(number).is_there(r, near)
+
+    def whole(self, number):
+        facet = self.wall(number)
+        return PlaneNumbers(facet.normal, facet.offset)
 
     def is_near(self, number, r, near):
         return self.wall(number).distance(r) >= -near
