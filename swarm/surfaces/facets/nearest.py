@@ -7,23 +7,32 @@ import numpy as np
 from ...kernel.arrays import index, scratch
 from ...kernel.jit import kernel, outlined
 from ...kernel.record import Record
-from ...kernel.vector import Vec, column, dot, norm, put, square
+from ...kernel.vector import Vec, column, cross, dot, norm, put, square
 from ..fields.grid import cell_of
 from .room import FREE, FULL, KIND
 
-# Of a squared distance, the part by which those from two triangles that share a corner or an edge differ: round-off.
-_TIE = 1e-9
+# Of a squared distance, the part by which those from two triangles that share a corner or an edge differ, and that of
+# the distance of their feet: round-off.
+_TIE, _SAME = 1e-9, 1e-18
 # Triangles of a leaf of the tree, and how many boxes may wait at once.
 _LEAF, _DEEPEST = 8, 96
 
 
 class Near(Record):
-    """The nearest triangle so far: the squared distance, from the plane the distance, which one, and the foot."""
+    """The nearest triangle so far: the squared distance, the foot, which one it is, and its pseudonormal.
+
+    That is the sum of the normals of all triangles that meet at the foot, each times its angle there, and says on which
+    side a point is (Baerentzen and Aanaes, IEEE Trans. Vis. Comput. Graph. 11 (2005) 243).
+    """
 
     square: float
-    height: float
-    which: float
     foot: Vec
+    which: float
+    normal: Vec
+
+    def height(self, r):
+        """A number above 0 outside."""
+        return dot(self.normal, r - self.foot)
 
 
 @kernel
@@ -35,10 +44,10 @@ def nearest(facets, mesh, points, found):
     for i in range(points.shape[1]):
         r = column(points, 0, i)
         near = _nearest(facets, mesh, r)
-        normal = _normal(facets.table, index(int(near.which)))
+        normal, height = _normal(facets.table, index(int(near.which))), near.height(r)
         away = norm(r - near.foot)
-        sign = 1.0 if near.height > 0.0 else -1.0
-        put(found, 0, i, (r - near.foot) * (sign / away) if away > 0.0 and near.height != 0.0 else normal)
+        sign = 1.0 if height > 0.0 else -1.0
+        put(found, 0, i, (r - near.foot) * (sign / away) if away > 0.0 and height != 0.0 else normal)
         found[3, i] = sign * away
 
 
@@ -50,7 +59,7 @@ def within(facets, mesh, points, found):
         r = column(points, 0, i)
         cell = cell_of(cells, r)
         kind = cells.room[index(cell.number), KIND]
-        found[i] = kind == FREE if kind != FULL else _nearest(facets, mesh, r).height < 0.0
+        found[i] = kind == FREE if kind != FULL else _nearest(facets, mesh, r).height(r) < 0.0
 
 
 @outlined
@@ -58,7 +67,7 @@ def _nearest(facets, mesh, r):
     """The nearest triangle: through the tree, of two boxes the nearer one first."""
     boxes, count = mesh[2], facets.table.shape[0]
     leaves, waiting, last = boxes.shape[0] // 2, scratch(_DEEPEST, np.int64), 1
-    near = Near(math.inf, 0.0, 0.0, r)
+    near = Near(math.inf, r, 0.0, r)
     waiting[0] = 1
     while last > 0:
         last -= 1
@@ -93,17 +102,23 @@ def _normal(table, m):
 
 @outlined
 def _nearer(facets, mesh, r, m, near):
-    """The nearer one of the nearest triangle so far and this one; of two as near that which the point is higher above.
-
-    On a shared edge or corner that one says on which side the point is.
-    """
+    """The nearer one of the nearest triangle so far and this one; both, where they meet at the foot."""
     vertices, triangles = mesh[0], mesh[1]
-    foot = _foot(r, _corner(vertices, triangles[m, 0]), _corner(vertices, triangles[m, 1]), _corner(vertices, triangles[m, 2]))
-    away, height = square(r - foot), dot(_normal(facets.table, m), r) - facets.table[m, 3]
-    is_tie = abs(away - near.square) <= _TIE * near.square
-    if (is_tie and abs(height) > abs(near.height)) or (not is_tie and away < near.square):
-        return Near(away, height, float(m), foot)
-    return near
+    a, b, c = (_corner(vertices, triangles[m, k]) for k in range(3))
+    foot = _foot(r, a, b, c)
+    away, normal = square(r - foot), _normal(facets.table, m) * _angle_at(foot, a, b, c)
+    if near.square < math.inf and square(foot - near.foot) <= _SAME * near.square:
+        return Near(near.square, near.foot, near.which, near.normal + normal)
+    return Near(away, foot, float(m), normal) if away < near.square else near
+
+
+def _angle_at(foot, a, b, c):
+    """The angle of a triangle at a point of it: that at a corner, or half a turn at an edge."""
+    at_a, at_b = square(foot - a) == 0.0, square(foot - b) == 0.0
+    if not (at_a or at_b or square(foot - c) == 0.0):
+        return math.pi
+    one, other = (b - a, c - a) if at_a else ((c - b, a - b) if at_b else (a - c, b - c))
+    return np.arctan2(norm(cross(one, other)), dot(one, other))
 
 
 def _corner(vertices, k):
