@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         Ellipsoids,
         Formula,
         Intersection,
+        Mesh,
         OwnSurface,
         Paraboloid,
         Plane,
@@ -83,8 +84,8 @@ _HOMES = {
     "surfaces.doors": ("Opening",),
     "surfaces": (
         "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",
-        "Intersection", "OwnSurface", "Paraboloid", "Plane", "Polygon", "Prism", "Quadric", "Sampled", "Slab", "Sphere",
-        "Spheres", "Stadium", "Torus", "Union",
+        "Intersection", "Mesh", "OwnSurface", "Paraboloid", "Plane", "Polygon", "Prism", "Quadric", "Sampled", "Slab",
+        "Sphere", "Spheres", "Stadium", "Torus", "Union",
     ),
     "surfaces.wall_law": ("WallLaw",),
 }  # fmt: skip
@@ -93,7 +94,7 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
     "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
-    "Impact", "ImpactLog", "Intersection", "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid",
+    "Impact", "ImpactLog", "Intersection", "Mesh", "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid",
     "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled",
     "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError", "Torus", "Trajectory",
     "Translation", "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain",

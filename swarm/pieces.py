@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .contact.laws import NONE, Laws, Moves, Span, Thermal, owned_in
 from .errors import SceneError
 from .surfaces.doors import instants_of
+from .surfaces.facets.mesh import Mesh
 from .surfaces.fields.grouped import Order, order_of
 from .surfaces.fields.many import members_of
 from .surfaces.fields.members import Members
@@ -81,12 +82,15 @@ class Pieces(Volume):
 
     def laws(self) -> Laws | None:
         """The laws of every wall of the scene as kernels take them, None where no surface has one."""
+        runs = self._runs()
+        given, owners = [surface for _i, surface, _walls in runs], [self.owners_of_pieces[i] for i, *_rest in runs]
+        spans = [(k, walls) for k, (_i, _surface, walls) in enumerate(runs)]
         laws = Laws(
-            self._of_walls([piece.restitution for piece in self.pieces], 1.0),
-            self._of_walls([piece.friction for piece in self.pieces], 0.0),
-            self._of_walls([_thermal(piece) for piece in self.pieces], _NO_HEAT),
+            _of_walls([surface.restitution for surface in given], spans, 1.0),
+            _of_walls([surface.friction for surface in given], spans, 0.0),
+            _of_walls([_thermal(surface) for surface in given], spans, _NO_HEAT),
             Moves(0.0) if self.moves() else None,
-            owned_in(self.order.spans(self.pieces), self.pieces, self.owners_of_pieces),
+            owned_in(spans, given, owners),
         )
         return None if laws == NONE else laws.in_plane(self.across())
 
@@ -117,12 +121,13 @@ class Pieces(Volume):
         """The piece that each row of `owners` belongs to."""
         return np.array(self.order.owners(self.pieces))
 
-    def _of_walls(self, values: list[Any], neutral: Any) -> tuple[Any, ...] | None:
-        """The value of the piece of every wall, None where all are neutral."""
-        if all(value == neutral for value in values):
-            return None
-        spans = ((values[i], walls) for i, walls in self.order.spans(self.pieces))
-        return tuple(value if walls == 1 else Span(value, float(walls)) for value, walls in spans)
+    def _runs(self) -> list[tuple[int, Surface, int]]:
+        """The walls in a row that have the same laws: their piece, the surface that says these, and how many they are."""
+        found: list[tuple[int, Surface, int]] = []
+        for i, walls in self.order.spans(self.pieces):
+            piece = self.pieces[i]
+            found += [(i, *run) for run in (piece.runs() if isinstance(piece, Mesh) else [(piece, walls)])]
+        return found
 
     @cached_property
     def parts(self) -> tuple[tuple[int, Place], ...]:
@@ -173,6 +178,13 @@ def _pieces_of(image: Surface) -> tuple[Surface, ...]:
 
 def _places_of(image: Surface) -> tuple[Place, ...]:
     return image.places() if isinstance(image, Joined) else ((),)
+
+
+def _of_walls(values: list[Any], spans: list[tuple[int, int]], neutral: Any) -> tuple[Any, ...] | None:
+    """The value of every wall, of which so many in a row have one of these; None where all are neutral."""
+    if all(value == neutral for value in values):
+        return None
+    return tuple(values[k] if walls == 1 else Span(values[k], float(walls)) for k, walls in spans)
 
 
 def _thermal(surface: Surface) -> Thermal:

@@ -117,10 +117,9 @@ def with_arrays(table: dict[str, Any], arrays: Mapping[str, Any]) -> dict[str, A
     """
     named = {key for key, value in table.items() if isinstance(value, str) and value.startswith(_ARRAY)}
     held = {key: np.asarray(arrays[value]) if key in named else value for key, value in table.items()}
-    if isinstance(held.get("values"), str):
-        raise SceneError(
-            f"surface.values: expected the samples, got {held['values']!r:.80}; a trajectory names no file"
-        )
+    for key, what in (("values", "the samples"), ("vertices", "the corners")):
+        if isinstance(held.get(key), str):
+            raise SceneError(f"surface.{key}: expected {what}, got {held[key]!r:.80}; a trajectory names no file")
     for key in NESTED:
         if key in held:
             held[key] = [with_arrays(one, arrays) for one in held[key]]

@@ -10,6 +10,7 @@ from . import checks
 from . import motion as motions
 from .particles import Particles
 from .plane import across_of
+from .surfaces.facets.mesh import Mesh
 from .surfaces.fields.many import Many
 from .surfaces.images import Lengths, cell_of, into_cell
 from .surfaces.instant import box_of, gaps_of, gradient_of, has_room, planes_of
@@ -88,6 +89,8 @@ class Volume:
         for image in (image for images in self._images for image in images if image.is_there(0.0)):
             if isinstance(image, Many):
                 admitted[admitted] = ~image.contain(rows[:, admitted])
+            elif isinstance(image, Mesh):
+                admitted[admitted] = image.contain(rows[:, admitted])
             else:
                 admitted &= gaps_of((image,), rows, 0.0)[0] <= 0.0
         return admitted

@@ -74,6 +74,8 @@ def _meets_one(field, ends, number, active, path, near):
 
 def _meets_body(found, m, field, ends, number, active, path, near):
     m = float(m)
+    if isinstance(field, Patched) and not field.is_near(m, path.r1, _reach(path) + near):
+        return found
     return found or ((not _is_held(field, number, m, active)) and _may_meet(field.wall(m), ends.wall(m), path, near))
 
 
@@ -85,6 +87,11 @@ def _is_held(field, number, m, active):
             is_of = (one >= number) & (one < number + field.count())
             held = held | (is_of & field.goes_on(one - number, m))
     return held
+
+
+def _reach(path):
+    """No place of a step is farther from its end than this."""
+    return norm(path.r1 - path.r0) + path.h * (norm(path.v0) + norm(path.v1))
 
 
 def own_path(field, ends, path):
@@ -175,7 +182,8 @@ def _first_of(members, number, active, path, near, later):
 def _sooner_body(found, m, members, number, active, path, near):
     if _is_held(members, number, m, active):
         return found
-    time = _deep_after(_Still(member(members, index(m))), path, near)
+    whole = members.whole(float(m)) if isinstance(members, Patched) else member(members, index(m))
+    time = _deep_after(_Still(whole), path, near)
     if isinstance(members, Patched) and time < math.inf and not members.is_there(float(m), at_part(path, time), near):
         return found
     if time < found.time or (time == found.time and number + m < found.wall):

@@ -14,11 +14,13 @@ from ..kernel.record import Record
 from ..kernel.vector import column, put
 from ..surfaces import flights
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
+from ..surfaces.facets.members import Facets
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import gathered, member, width
 from ..surfaces.period import on_time
 from ..surfaces.walls import Walls
 from .arrays import Flying
+from .from_cell_to_cell import go_through
 from .table import STRIDE, marked_lanes
 
 # Safe steps are for all lanes where more than this part of them needs one.
@@ -107,7 +109,9 @@ def seek(walls, gravity, lanes, live):
 @outlined
 def _seek(gravity, members, before, lanes, live):
     """The same with one field that has so many walls before it."""
-    if members.few:
+    if isinstance(members, Facets):
+        go_through(gravity, members, before, lanes, live)
+    elif members.few:
         _look_at_all(members, before, lanes, live)
     else:
         _look_at_near(gravity, members, before, lanes, live)

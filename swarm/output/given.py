@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..particles import Floats
 from ..surfaces import Torus
-from ..surfaces.outlines.polygon import Outlined
+from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from .curves import Indices, neighbours
 from .cut import Smooth

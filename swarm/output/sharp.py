@@ -13,7 +13,7 @@ from ..kernel.vector import vec
 from ..motion import Pose, pose
 from ..particles import Floats
 from ..surfaces import Torus
-from ..surfaces.outlines.polygon import Outlined
+from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
 from . import curves, given

@@ -8,6 +8,7 @@ the run.
 
 from .contract import Smooth as Smooth
 from .data.sampled import Sampled
+from .facets.mesh import Mesh
 from .fields.bodies import Boxes, Capsules, Cylinders, Ellipsoids, Spheres
 from .fields.many import Many
 from .formulas.formula import Formula
@@ -41,6 +42,7 @@ __all__ = [
     "Ellipsoids",
     "Formula",
     "Intersection",
+    "Mesh",
     "OwnSurface",
     "Paraboloid",
     "Plane",
@@ -79,6 +81,7 @@ ALL_SURFACES: dict[str, type[Surface]] = {
     "slab": Slab,
     "formula": Formula,
     "sampled": Sampled,
+    "mesh": Mesh,
     "union": Union,
     "intersection": Intersection,
     "polygon": Polygon,

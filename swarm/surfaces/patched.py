@@ -19,6 +19,14 @@ class Patched(Record):
         """Whether the patch of a wall reaches to a place on it, or nearer to it than `near`."""
         raise NotImplementedError
 
+    def whole(self, number):
+        """A wall without its edges."""
+        return self.wall(number)  # type: ignore[attr-defined]
+
+    def is_near(self, number, r, near):
+        """Whether the patch of a wall may be nearer to a point than `near`."""
+        return True
+
     def wall_after(self, number, r, near):
         """The wall on which what slides on this one goes on beyond the end of its patch at r; -1: it flies."""
         return -1.0

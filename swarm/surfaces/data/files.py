@@ -16,6 +16,8 @@ _MESH = ("kind", "file", "spacing", "side", "scale", "weld", *(one.name for one 
 def samples_of(table: Any, where: str, path: Path) -> Any:
     """The table of a surface, with the samples of one that takes them from a file or a mesh.
 
+    A mesh without a spacing takes its triangles from the file itself.
+
     Args:
         table: as it is in the scene file.
         where: what it is called in errors, such as "surface[0]".
@@ -25,7 +27,7 @@ def samples_of(table: Any, where: str, path: Path) -> Any:
         SceneError: a file cannot be read, or a key of a mesh is unknown or missing.
     """
     kind = table.get("kind") if isinstance(table, dict) else None
-    if kind not in ("sampled", "mesh") or (kind == "sampled" and "file" not in table):
+    if kind not in ("sampled", "mesh") or ("file" not in table and ("vertices" in table or kind == "sampled")):
         return table
     name = table.get("file")
     if not isinstance(name, str):
@@ -36,11 +38,13 @@ def samples_of(table: Any, where: str, path: Path) -> Any:
             if "values" in table:
                 raise SceneError(f"values: cannot be combined with file = {name!r}; remove one of them")
             return {**given, "values": read_samples(path.parent / name)}
+        if "spacing" not in table:
+            if "vertices" in table:
+                raise SceneError(f"vertices: cannot be combined with file = {name!r}; remove one of them")
+            return {**given, "vertices": str(path.parent / name)}
         for key in table:
             if key not in _MESH:
                 raise SceneError(f"{key}: unknown key of a mesh, expected {listed(_MESH)}{closest(key, _MESH)}")
-        if "spacing" not in table:
-            raise SceneError("spacing: expected a number, got nothing; add spacing = ...")
         made = from_mesh(
             path.parent / name,
             table["spacing"],

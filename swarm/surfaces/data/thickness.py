@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...extras import needed_by
 from ..surface import shown
-from .triangles import Floats, Indices, Mesh, components, neighbours
+from .mending import components, neighbours
+from .mesh_files import Floats, Indices
+from .triangles import Mesh
 
 # The thickness that is resolved, in spacings.
 RESOLVED = 1.25

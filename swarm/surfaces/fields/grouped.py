@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from ...motion import Placed
 from ..doors import walls_then
+from ..facets.mesh import Mesh
 from ..joined import with_rooms
 from ..moving import walls_of
 from ..surface import Surface
@@ -17,6 +18,9 @@ from .members import Members, alike, can_be_member, kind_of
 # So many surfaces of one kind stay walls of their own, whose numbers are not looked up: an impact in a sphere with 6
 # balls takes 24 ns, and 31 as a field of a few. From 8 on LLVM no longer vectorises them: 112 and 38 ns.
 _FEW = 6
+
+# The surfaces that are fields.
+_FIELDS = (Many, Mesh)
 
 Thing = TypeVar("Thing")
 
@@ -74,13 +78,13 @@ class Order(NamedTuple):
     def spans(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
         """The same as (surface, how many walls in a row have its laws), several where one takes the place of many."""
         walls = [(i, 1) for i in self.alone() for _wall in surfaces[i].walls()]
-        many = [(i, len(surface)) for i in self.fields if isinstance(surface := surfaces[i], Many)]
+        many = [(i, len(surface)) for i in self.fields if isinstance(surface := surfaces[i], _FIELDS)]
         return [*many, *((group[0], len(group)) for group in self.groups), *walls]
 
     def members(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
         """The surface that each wall of the scene belongs to, and its number in the field that this is, or -1."""
         walls = [(i, -1) for i in self.alone() for _wall in surfaces[i].walls()]
-        many = [(i, m) for i in self.fields if isinstance(field := surfaces[i], Many) for m in field.numbers()]
+        many = [(i, m) for i in self.fields if isinstance(field := surfaces[i], _FIELDS) for m in field.numbers()]
         return [*many, *((i, -1) for group in self.groups for i in group), *walls]
 
     def compiled(self, surfaces: Sequence[Surface]) -> int:
@@ -96,7 +100,7 @@ def order_of(
     `unions` are those of surfaces, as of `Order`.
     """
     joined = {i for rooms in unions for room in rooms for i in room}
-    fields = [i for i, surface in enumerate(surfaces) if isinstance(surface, Many)]
+    fields = [i for i, surface in enumerate(surfaces) if isinstance(surface, _FIELDS)]
     rest = [i for i in range(len(surfaces)) if i not in fields and i not in joined]
     of_kind: dict[Any, list[int]] = defaultdict(list)
     together = together and all(surface.motion is None and not surface.reacts() for surface in surfaces)

@@ -15,6 +15,7 @@ from ...kernel.arrays import index
 from ...kernel.jit import kernel
 from ...kernel.vector import Vec, vec
 from ...rows import balls, bodies, directions, lengths, quaternions, widths
+from ..patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
 from .grid import MARGIN, Floats, Grid, cells_of, one_cell
@@ -180,6 +181,8 @@ def field_of(
 
 def in_straight_flights(members: Members, repeats: bool) -> Members:
     """A field as kernels take it where there is no gravity, and nothing moves; in a cell that repeats, or not."""
+    if isinstance(members, Patched):
+        return members
     few = _FEW_BALLS if isinstance(members.like, SphereNumbers) and not repeats else _FEW
     return members.looked_at_all() if len(members.table) <= few else members
 

@@ -12,6 +12,7 @@ from ...kernel.jit import Array, kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, put
 from .. import flights
+from ..facets.facet import Shared
 from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers
 from ..shapes.quadratic import QuadricNumbers
@@ -119,8 +120,8 @@ def gathered(like, table, m, k):
     if isinstance(like, SphereNumbers):
         # Four numbers of it are half a line of the cache; the others follow from them.
         return ball(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3])
-    if isinstance(like, AXES):
-        return type(like)(1.0)
+    if isinstance(like, (*AXES, Shared)):
+        return like if isinstance(like, Shared) else type(like)(1.0)
     if not isinstance(like, tuple):
         return None if like is None else table[m, k]
     parts: tuple[Any, ...] = ()
@@ -132,8 +133,8 @@ def gathered(like, table, m, k):
 
 def width(like):
     """The number of columns: a constant for the compiler."""
-    if isinstance(like, SphereNumbers):
-        return 4
+    if isinstance(like, (SphereNumbers, Shared)):
+        return 4 if isinstance(like, SphereNumbers) else 0
     return sum(map(width, like)) if isinstance(like, tuple) else 0 if like is None else 1
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from ...checks import Vector, number
 from ...kernel.jit import select
@@ -59,11 +60,12 @@ class Plane(Surface):
         return abs(self.offset)
 
 
-class PlaneNumbers(ExactChord):
-    """A plane as kernels take it."""
+class Flat(ExactChord):
+    """What is on a plane, with the fields of `PlaneNumbers`: the methods that know no bounds."""
 
-    normal: Vec
-    offset: float
+    if TYPE_CHECKING:
+        normal: Any
+        offset: Any
 
     side = 1.0
 
@@ -99,27 +101,6 @@ class PlaneNumbers(ExactChord):
         n = self.normal
         return Level(dot(n, seen.r) - self.offset, 0.5 * dot(n, seen.v), 0.5 * dot(n, seen.a), 1.0, 0.0)
 
-    def first_hit(self, r, v):
-        approach = dot(self.normal, v)
-        time = (self.offset - self.inner(r)) / approach
-        return select(approach > 0.0, select(time > 0.0, time, 0.0), math.inf), True
-
-    def falling_hit(self, r, v, pull):
-        c = self.inner(r) - self.offset
-        return rise_time(c, 0.5 * dot(self.normal, v), 0.5 * dot(self.normal, pull)), True
-
-    def safe_time(self, r, v, pull):
-        time, _found = self.falling_hit(r, v, pull)
-        return select(self.inner(r) > self.offset, 0.0, time)
-
-    def out_of(self, r):
-        return -self.gap_of(self.inner(r))
-
-    def reach(self, lease):
-        n = self.normal
-        rise = 0.5 * (dot(n, lease.v) + lease.width_along(n))
-        return rise_time(dot(n, lease.r) - self.offset, rise, 0.5 * dot(n, lease.a))
-
     def discrete_gradient(self, r0, r1):
         return self.normal
 
@@ -142,3 +123,31 @@ class PlaneNumbers(ExactChord):
 
     def chord_normal(self, r, p, kappa):
         return self.normal
+
+
+class PlaneNumbers(Flat):
+    """A plane as kernels take it."""
+
+    normal: Vec
+    offset: float
+
+    def first_hit(self, r, v):
+        approach = dot(self.normal, v)
+        time = (self.offset - self.inner(r)) / approach
+        return select(approach > 0.0, select(time > 0.0, time, 0.0), math.inf), True
+
+    def falling_hit(self, r, v, pull):
+        c = self.inner(r) - self.offset
+        return rise_time(c, 0.5 * dot(self.normal, v), 0.5 * dot(self.normal, pull)), True
+
+    def safe_time(self, r, v, pull):
+        time, _found = self.falling_hit(r, v, pull)
+        return select(self.inner(r) > self.offset, 0.0, time)
+
+    def out_of(self, r):
+        return -self.gap_of(self.inner(r))
+
+    def reach(self, lease):
+        n = self.normal
+        rise = 0.5 * (dot(n, lease.v) + lease.width_along(n))
+        return rise_time(dot(n, lease.r) - self.offset, rise, 0.5 * dot(n, lease.a))

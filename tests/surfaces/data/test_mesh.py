@@ -92,8 +92,6 @@ def test_bad_meshes_are_one_sentence(tmp_path):
     sphere = trimesh.creation.icosphere(2)
     whole = written(tmp_path, sphere)
     open_mesh = trimesh.Trimesh(sphere.vertices, sphere.faces[1:])
-    turned = sphere.faces.copy()
-    turned[0] = turned[0, ::-1]
     (tmp_path / "text.stl").write_text("no mesh")
     (tmp_path / "part.foo").write_text("no mesh")
     cases = [
@@ -103,12 +101,6 @@ def test_bad_meshes_are_one_sentence(tmp_path):
         (
             lambda: swarm.from_mesh(written(tmp_path, open_mesh, "open.stl"), 0.1),
             "closed .*got 3 edges of one triangle",
-        ),
-        (
-            lambda: swarm.from_mesh(
-                written(tmp_path, trimesh.Trimesh(sphere.vertices, turned, process=False), "turned.stl"), 0.1
-            ),
-            "turned the same way",
         ),
         (lambda: swarm.from_mesh(whole, 0.0), "spacing must be above 0"),
         (lambda: swarm.from_mesh(whole, 1e-6), "samples fit in memory, got 1e-06 m .* take"),
@@ -126,7 +118,9 @@ def test_bad_meshes_are_one_sentence(tmp_path):
 def test_a_missing_library_is_said(tmp_path, monkeypatch, name):
     path = written(tmp_path, trimesh.creation.icosphere(2))
     monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(swarm.SceneError, match=f"from_mesh needs the package '{name}'.*pip install trimesh libigl"):
+    with pytest.raises(
+        swarm.SceneError, match=f"(from_mesh|a mesh) needs the package '{name}'.*pip install trimesh libigl"
+    ):
         swarm.from_mesh(path, 0.2)
 
 
@@ -157,7 +151,6 @@ def test_a_mesh_in_a_scene_file(tmp_path):
     assert (surface.restitution, surface.mesh_error > 0.0, surface.spacing) == (0.9, True, (0.1, 0.1, 0.1))
     for more, said in {
         'file = "part.stl"\nspacing = 0.1': r"surface\[0\].cannot read the mesh .*part.stl",
-        'file = "parts/part.stl"': r"surface\[0\].spacing: expected a number, got nothing",
         "spacing = 0.1": r"surface\[0\].file: expected the name of a file, got nothing",
         'file = "parts/part.stl"\nspacing = "a"': r"surface\[0\].spacing must be",
         'file = "parts/part.stl"\nspacing = 0.1\norigin = [0, 0, 0]': r"surface\[0\].origin: unknown key of a mesh",

@@ -151,6 +151,26 @@ def with_number(value):
     return corners, np.concatenate([faces, [(NEW, NEW, NEW)]])
 
 
+def klein_bottle():
+    """Triangles of which each edge has two, and no side is outside."""
+    n = 12
+    u, v = np.meshgrid(*2 * [2.0 * np.pi * np.arange(n) / n], indexing="ij")
+    across = 2.0 + np.cos(0.5 * u) * np.sin(v) - np.sin(0.5 * u) * np.sin(2.0 * v)
+    points = [across * np.cos(u), across * np.sin(u), np.sin(0.5 * u) * np.sin(v) + np.cos(0.5 * u) * np.sin(2.0 * v)]
+    # Around u once v has become -v
+    number = lambda i, j: (i % n) * n + (-j if i >= n else j) % n  # noqa: E731
+    faces = [
+        corners
+        for i in range(n)
+        for j in range(n)
+        for corners in (
+            (number(i, j), number(i + 1, j), number(i, j + 1)),
+            (number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)),
+        )
+    ]
+    return np.stack(points, axis=-1).reshape(-1, 3), np.array(faces)
+
+
 HIGHEST = np.argsort(CORNERS[FACES].mean(axis=1)[:, 2])
 TOUCHING = trimesh.util.concatenate([moved(0.0), moved(0.6)])
 WRONG = {
@@ -164,9 +184,7 @@ WRONG = {
     "open at three": (lambda: torn(HIGHEST[0], HIGHEST[640], HIGHEST[-1]), r"open at .* and 2 more places;"),
     "a fin": (lambda: with_corner((A, B, NEW), point=(1.0, 1.0, 1.0)), r"1 of more than two: .*triangles meet at \("),
     "a membrane": (lambda: with_corner((C, B, A)), r"3 of more than two: three or more triangles meet at \("),
-    "turned": (
-        lambda: (CORNERS, np.concatenate([FACES[:1, ::-1], FACES[1:]])), r"turned the same way.* at 3 edges, one at \("
-    ),
+    "a Klein bottle": (klein_bottle, r"cannot all be turned the same way, .*Klein bottle: .* at \d+ edges, one at \("),
     "parts that intersect": (
         lambda: (TOUCHING.vertices, TOUCHING.faces), r"parts that do not intersect, got one with a corner at \(0\.\d"
     ),

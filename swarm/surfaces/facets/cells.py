@@ -1,0 +1,198 @@
+"""The grid of facets: what is in each cell, and how far it is from each empty one to the next that is not.
+
+The facets of a mesh are on a surface, so most cells are empty: a flight leaps through blocks of these.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernel import cache
+from ...kernel.arrays import index
+from ...kernel.jit import Array, kernel, select
+from ...kernel.record import Record
+from ...kernel.gravity import as_vector
+from ...kernel.vector import ZERO, Vec, absolute, dot, square, total, vec
+from ..fields.grid import MARGIN
+from ..fields.members import gathered
+
+# Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
+# ones more are crossed. For each facet there are at most so many cells, which take 5 bytes each.
+_AREA, _CELLS_EACH, _MOST_CELLS = 3.0, 32.0, 100_000_000
+# Cells of few facets.
+_LEAST_CELLS = 64
+# A plane in a cell is known by four whole numbers up to this one, and so to these parts of the cell's diagonal and of a
+# speed; so many are made at once.
+_FULL, _OFF, _OFF_SPEED, _TOGETHER = 32767.0, 6e-5, 6e-5, 1_000_000
+# So few facets are entered in plain Python.
+_SOME = 60
+
+Floats = NDArray[np.float64]
+
+
+class Cells(Record):
+    """A `Grid` of facets."""
+
+    low: Vec
+    width: Vec
+    inverse: Vec
+    margin: Vec
+    shape: Vec
+    first: Array
+    entries: Array
+    planes: Array  # (entries, 4) int16, of each the normal and, from the middle of the cell, the offset: see `passes`
+    room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
+
+
+def cells_around(like, table: Floats, corners: Floats) -> Cells:
+    """The cells of the facets of a table.
+
+    Args:
+        like: one of them.
+        table: their numbers, one in each row.
+        corners: of each its three (T, 3, 3) [m].
+    """
+    low, high = corners.min(axis=1).T, corners.max(axis=1).T
+    shape, first, width = _shape(corners, low.min(axis=1), high.max(axis=1))
+    count = int(shape.prod())
+    numbers = (first, width, 1.0 / width, MARGIN * width, shape)
+    starts, nothing = np.zeros(count + 2, np.int32), np.empty(0, np.int32)
+    flat = np.empty((0, 4), np.int16)
+    grid = Cells(*(vec(row.tolist()) for row in numbers), starts, nothing, flat, np.empty((0, 8), np.int8))
+    enter = cache.in_python(_enter) if len(table) <= _SOME else _enter
+    bounds = np.ascontiguousarray(low), np.ascontiguousarray(high)
+    enter(like, table, bounds, grid, starts[1:], nothing)
+    np.cumsum(starts, out=starts)
+    entries = np.empty(starts[-1], np.int32)
+    enter(like, table, bounds, grid, starts[:-1].copy(), entries)
+    held = np.diff(starts[:-1])
+    grid = grid._replace(entries=entries)
+    return grid._replace(planes=_planes(grid, table, np.repeat(np.arange(count), held)))
+
+
+def _shape(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
+    """How many cells there are along each axis, the corner of the first, and how wide they are."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / len(corners)
+    extent = high - low
+    # A flat mesh has room before and behind it.
+    extent = np.maximum(extent, 1e-3 * extent.max())
+    most = min(max(_CELLS_EACH * len(corners), _LEAST_CELLS), _MOST_CELLS)
+    side = max(math.sqrt(_AREA * area), (extent.prod() / most) ** (1.0 / 3.0))
+    shape = np.maximum(np.ceil(extent / side), 1.0)
+    room = 4.0 * MARGIN * extent
+    middle = 0.5 * (low + high)
+    width = (extent + 2.0 * room) / shape
+    return shape, middle - 0.5 * shape * width, width
+
+
+def _planes(grid: Cells, table: Floats, cells: NDArray[np.int64]) -> NDArray[np.int16]:
+    """The planes of all entries, each in the cell with this number."""
+    width = np.array(grid.width)
+    made = np.empty((len(cells), 4), np.int16)
+    for first in range(0, len(cells), _TOGETHER):
+        some = slice(first, first + _TOGETHER)
+        places = np.stack(np.unravel_index(cells[some], tuple(int(n) for n in grid.shape)), axis=1)
+        normal, offset = table[grid.entries[some], :3], table[grid.entries[some], 3]
+        middle = np.array(grid.low) + (places + 0.5) * width
+        made[some, :3] = np.rint(normal * _FULL)
+        made[some, 3] = np.rint((offset - (normal * middle).sum(axis=1)) * (_FULL / np.linalg.norm(width)))
+    return made
+
+
+@kernel
+def _enter(like, table, bounds, grid, place, entries):
+    """Write every facet to the place of each cell that it reaches into; count them where there are no `entries`."""
+    low, high = bounds
+    n, margin = grid.shape, Vec(2.0 * grid.margin.x, 2.0 * grid.margin.y, 2.0 * grid.margin.z)
+    for m in range(table.shape[0]):
+        facet = gathered(like, table, index(m), 0)
+        x, x_end = _layers(low[0, m] - margin.x - grid.low.x, high[0, m] + margin.x - grid.low.x, grid.width.x, n.x)
+        y, y_end = _layers(low[1, m] - margin.y - grid.low.y, high[1, m] + margin.y - grid.low.y, grid.width.y, n.y)
+        z, z_end = _layers(low[2, m] - margin.z - grid.low.z, high[2, m] + margin.z - grid.low.z, grid.width.z, n.z)
+        for i in range(x, x_end):
+            for j in range(y, y_end):
+                for k in range(z, z_end):
+                    near = grid.low + Vec(i * grid.width.x, j * grid.width.y, k * grid.width.z)
+                    far = grid.low + Vec((i + 1.0) * grid.width.x, (j + 1.0) * grid.width.y, (k + 1.0) * grid.width.z)
+                    if facet.may_reach(near - margin, far + margin):
+                        cell = int((i * n.y + j) * n.z + k)
+                        if entries.size > 0:
+                            entries[place[cell]] = m
+                        place[cell] += 1
+
+
+def _layers(begin, end, width, count):
+    """The layers of cells between two places, from the first to the one after the last."""
+    first, last = np.floor(begin / width), np.floor(end / width)
+    return int(min(max(first, 0.0), count - 1.0)), int(min(max(last, 0.0), count - 1.0)) + 1
+
+
+# --- Which planes a flight passes ------------------------------------------------------------------------
+
+
+class Here(Record):
+    """A flight in a cell: from the middle of it, its speed, half of gravity or None, and how long it is there."""
+
+    from_middle: Vec
+    v: Vec
+    half_pull: Any
+    span: float
+    near: float  # a distance, and a speed, that may be none
+    slow: float
+
+
+def here_in(gravity, cells, place, r, v, span):
+    """A flight that is at r in the cell at this place."""
+    w = cells.width
+    middle = cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z)
+    pull = None if gravity is None else 0.5 * as_vector(gravity)
+    slow = _OFF_SPEED * (total(absolute(v)) + (0.0 if pull is None else 2.0 * span * total(absolute(pull))))
+    return Here(r - middle, v, pull, span, _OFF * math.sqrt(square(w)), slow)
+
+
+def passes(cells, k, here):
+    """Whether a flight may come through the plane of an entry in its cell: most do not, and no facet is looked up."""
+    normal = Vec(float(cells.planes[k, 0]), float(cells.planes[k, 1]), float(cells.planes[k, 2])) * (1.0 / _FULL)
+    offset = float(cells.planes[k, 3]) * (here.near * (1.0 / (_FULL * _OFF)))
+    depth, rate = dot(normal, here.from_middle) - offset, dot(normal, here.v) + here.slow
+    rises = select(rate > 0.0, rate, 0.0) * here.span
+    if here.half_pull is not None:
+        bend = dot(normal, here.half_pull)
+        bend = select(bend > 0.0, bend, 0.0) * here.span
+        rate, rises = rate + 2.0 * bend, rises + (bend + here.slow) * here.span
+    return (rate > 0.0) & (depth <= here.near) & (depth + rises >= -here.near)
+
+
+# --- Where a flight leaves cells -------------------------------------------------------------------------
+
+
+def until_out(gravity, cells, place, room, r, v):
+    """When a flight from a cell has left it and the `Room` around it."""
+    pull = ZERO if gravity is None else gravity
+    is_straight, low, width, margin = gravity is None, cells.low, cells.width, cells.margin
+    back, ahead = place - room.back, place + room.ahead
+    x = _along(is_straight, (low.x, width.x, margin.x), back.x, ahead.x, (r.x, v.x, pull.x))
+    y = _along(is_straight, (low.y, width.y, margin.y), back.y, ahead.y, (r.y, v.y, pull.y))
+    z = _along(is_straight, (low.z, width.z, margin.z), back.z, ahead.z, (r.z, v.z, pull.z))
+    sooner = select(y < x, y, x)
+    return select(z < sooner, z, sooner)
+
+
+def _along(is_straight, axis, first, last, flight):
+    """When a flight (x, v, pull) leaves these layers of cells, and a margin. Branch-free."""
+    (low, width, margin), (x, v, pull) = axis, flight
+    below, above = low + first * width - margin, low + (last + 1.0) * width + margin
+    if is_straight:
+        return select(v == 0.0, math.inf, (select(v > 0.0, above, below) - x) / v)
+    # Towards the side to which it is pulled it leaves, unless it leaves before through the other one.
+    turned = pull < 0.0
+    a, b = 0.5 * abs(pull), 0.5 * select(turned, -v, v)
+    ahead, behind = select(turned, x - below, above - x), select(turned, above - x, x - below)
+    backwards = (b < 0.0) & (b * b >= a * behind)
+    root = math.sqrt(b * b + a * select(backwards, -behind, ahead))
+    over = select(backwards, behind, select(b > 0.0, ahead, root - b))
+    under = select(backwards, root - b, select(b > 0.0, root + b, a))
+    return select(under > 0.0, over / under, math.inf)

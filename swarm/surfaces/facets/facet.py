@@ -1,0 +1,93 @@
+"""A facet: a triangle as a wall, the part of a plane between its three edges."""
+
+import math
+from typing import Any
+
+from ...kernel.gravity import displacement
+from ...kernel.jit import select
+from ...kernel.record import Record
+from ...kernel.vector import Vec, absolute, dot
+from ..course import rise_time
+from ..shapes.plane import Flat
+
+# As deep behind a facet as this many times the round-off of places a step may end that has come through it.
+_BEHIND = 1e4
+
+
+class Shared(Record):
+    """A number that all walls of a field have in common."""
+
+    value: float
+
+
+class FacetNumbers(Flat):
+    """A facet as kernels take it.
+
+    A place is between the edges up to the round-off of places, `room`, so that neighbours overlap and no flight passes
+    between them. What is beyond the edges is nowhere hit before what is there: at a convex edge the neighbour is met
+    sooner, and at a re-entrant one the facet is so much larger.
+    """
+
+    normal: Vec
+    offset: float
+    edges: tuple[Any, ...]  # of each the unit vector in the plane into the triangle, and the least place along it
+    room: Shared
+
+    # --- Its part of the plane ---
+
+    def within(self, r):
+        """How far a place is from the nearest edge inwards, below 0 where it is beyond one."""
+        least = math.inf
+        for inwards, place in reversed(self.edges):
+            here = dot(inwards, r) - place
+            least = select(here < least, here, least)
+        return least
+
+    def is_there(self, r, near):
+        """Whether the facet reaches as near as this to a point on its plane: to one deep behind it, it does not."""
+        return (self.within(r) >= -near) & (self.phi(r) <= self.behind())
+
+    def distance(self, r):
+        # Beyond its edges, or deep behind it, where other walls are, not nearer than that
+        depth, within = self.inner(r) - self.offset, self.within(r)
+        beyond = select(within < 0.0, within, 0.0)
+        there = (beyond == 0.0) & (depth <= self.behind())
+        return select(there, depth, -math.sqrt(beyond * beyond + depth * depth))
+
+    def behind(self):
+        """How deep behind it a place is one that has come through it by a step, and none of another room."""
+        return _BEHIND * self.room.value
+
+    def may_reach(self, low, high):
+        # A box is beyond an edge, or on one side of the plane, where all of it is.
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        reach = dot(absolute(self.normal), half) + self.room.value
+        found = abs(dot(self.normal, middle) - self.offset) <= reach
+        for inwards, place in reversed(self.edges):
+            found = (dot(inwards, middle) + dot(absolute(inwards), half) >= place) & found
+        return found
+
+    # --- Flight ---
+
+    def first_hit(self, r, v):
+        depth, approach = self.inner(r) - self.offset, dot(self.normal, v)
+        time = -depth / approach
+        time = select(approach > 0.0, select(time > 0.0, time, 0.0), math.inf)
+        return self._taken(depth, time, None, r, v), True
+
+    def falling_hit(self, r, v, pull):
+        depth = self.inner(r) - self.offset
+        time = rise_time(depth, 0.5 * dot(self.normal, v), 0.5 * dot(self.normal, pull))
+        return self._taken(depth, time, pull, r, v), True
+
+    def _taken(self, depth, time, pull, r, v):
+        """The time at which its plane is met, if that is at the facet."""
+        # Where it never is, at the start, so that no place is none.
+        t = select(time < math.inf, time, 0.0)
+        place = r + displacement(pull, v, t)
+        here = (depth <= self.room.value) & (self.within(place) >= 0.0)
+        return select(here, time, math.inf)
+
+    def safe_time(self, r, v, pull):
+        time, _found = self.falling_hit(r, v, pull)
+        return time

@@ -1,0 +1,104 @@
+"""The facets of a mesh as kernels take them: which is met first, and which are near."""
+
+import math
+
+from ...kernel.arrays import index
+from ...kernel.gravity import accelerated, displacement
+from ...kernel.jit import outlined
+from ...kernel.vector import cross, dot, square
+from .. import flights
+from ..fields.grid import cell_of, until_next
+from ..fields.members import Members, member
+from ..patched import Patched
+from ..shapes.plane import PlaneNumbers
+from .cells import here_in, passes, until_out
+from .room import FULL, KIND, room_of
+
+# So many cells and blocks of cells are crossed before a flight is said to be free so far.
+_MOST = 4000
+# The sine of an angle between facets that are on one plane, and a distance from a plane that is none, by the round-off.
+_PARALLEL, _ON = 1e-9, 1.0
+
+
+class Facets(Members, Patched):
+    """The facets of a mesh: walls on one side, each between its edges; their grid is `Cells`."""
+
+    def field_hit(self, gravity, r, v):
+        return _first_hit(self, gravity, r, v)
+
+    def is_in_another(self, number, r):
+        return _is_behind_another(self, number, r)
+
+    def is_there(self, number, r, near):
+        return self.wall(number).is_there(r, near)
+
+    def whole(self, number):
+        facet = self.wall(number)
+        return PlaneNumbers(facet.normal, facet.offset)
+
+    def is_near(self, number, r, near):
+        return self.wall(number).distance(r) >= -near
+
+    def wall_after(self, number, r, near):
+        return _on_plane_of(self, number, r, near)
+
+
+@outlined
+def _is_behind_another(facets, number, r):
+    cells, cell = facets.grid, index(cell_of(facets.grid, r).number)
+    for k in range(cells.first[cell], cells.first[cell + index(1)]):
+        m = cells.entries[k]
+        if float(m) != number and member(facets, index(m)).distance(r) > 0.0:
+            return True
+    return False
+
+
+@outlined
+def _on_plane_of(facets, number, r, near):
+    """The facet that goes on with the plane of another one at a place, or -1."""
+    cells, cell = facets.grid, index(cell_of(facets.grid, r).number)
+    normal, found, widest = facets.wall(number).normal, -1.0, -near
+    for k in range(cells.first[cell], cells.first[cell + index(1)]):
+        m = cells.entries[k]
+        other = member(facets, index(m))
+        turn, within = cross(normal, other.normal), other.within(r)
+        is_flat = dot(normal, other.normal) > 0.0 and square(turn) <= _PARALLEL * _PARALLEL
+        if float(m) != number and is_flat and abs(other.phi(r)) <= _ON * facets.like.room.value and within > widest:
+            found, widest = float(m), within
+    return found
+
+
+@outlined
+def _first_hit(facets, gravity, r, v):
+    """The first hit, from cell to cell, or how far the flight is surely free."""
+    cells, t = facets.grid, 0.0
+    place, pace = r, v
+    for _cell in range(_MOST):
+        cell = cell_of(cells, place)
+        if cell.inside:
+            number = index(cell.number)
+            until = t + until_out(gravity, cells, cell.place, room_of(cells.room, number), place, pace)
+            if cells.room[number, KIND] == FULL:
+                here = here_in(gravity, cells, cell.place, place, pace, until - t)
+                found = hit_in(facets, gravity, (r, v), (number, t), here)
+                if found.wall >= 0.0:
+                    return found
+        else:
+            until = t + until_next(gravity, cells, cell, place, pace)
+        if not until < math.inf:
+            return flights.NEVER
+        t, place, pace = until, r + displacement(gravity, v, until), accelerated(gravity, v, until)
+    return flights.Hit(t, -1.0)
+
+
+def hit_in(facets, gravity, flight, cell, here):
+    """The first hit in a cell with this number of a flight (r, v), which leaves it `here.span` after `cell[1]`."""
+    (r, v), (number, begin) = flight, cell
+    found, cells = flights.Hit(begin + here.span, -1.0), facets.grid
+    for k in range(cells.first[number], cells.first[number + index(1)]):
+        if passes(cells, index(k), here):
+            m = cells.entries[k]
+            time, _hits = flights.hit(gravity, member(facets, index(m)), r, v)
+            if time < found.time:
+                found = flights.Hit(time, float(m))
+    return found

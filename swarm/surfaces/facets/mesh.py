@@ -1,0 +1,322 @@
+"""A closed mesh of triangles, each of which is a wall."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ... import checks
+from ...checks import Vector
+from ...errors import SceneError
+from ...kernel.vector import Vec
+from .. import rotation as rotations
+from ..data.mesh_files import Floats, Indices, Soup, read_soup
+from ..data.triangles import Mesh as Closed
+from ..data.triangles import closed
+from ..fields.members import aligned
+from ..surface import UNBOUNDED, Box, Surface, side_sign
+from .cells import cells_around
+from .facet import FacetNumbers, Shared
+from .members import Facets
+from .nearest import boxes_of, nearest, within
+from .room import CLOSED, FREE, KIND, rooms_of, with_blocks
+
+# The round-off of places, as a part of the farthest coordinate: far above that of numbers, and of a hit.
+_ROOM = 2.0**-40
+# What a group may have of its own.
+_LAWS = ("restitution", "friction", "temperature", "accommodation", "laws")
+# Bits of a place along each axis, by which triangles are sorted.
+_BITS = 20
+
+
+class _Made(NamedTuple):
+    """What is made of the triangles, also for a copy with other laws: where they are, and in which order."""
+
+    given: tuple[Any, ...]
+    vertices: Floats
+    triangles: Indices
+    group: Indices
+    names: tuple[str, ...]
+    weld: float
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Mesh(Surface):
+    """A closed mesh whose triangles are walls, exactly: edges, corners and thin walls are what they are in the file.
+
+    In a scene file: kind = "mesh" and file = "part.stl", relative to the scene file, without a `spacing`; laws of a
+    group in a table [surface.groups.NAME]. Files other than STL and OBJ in text need the extra `mesh`.
+
+    Args:
+        vertices: the path of a file (.stl, .obj, .ply, .3mf, .off, ...), or corners (V, 3) [m].
+        triangles: None with a path, else (T, 3) the numbers of their corners. They must enclose a volume; a part within
+            an odd number of others is a cavity, whichever way its triangles are turned.
+        side: "inside" or "outside" of the mesh, the admissible part.
+        center: where the origin of the file is, three numbers [m].
+        scale: what a unit of the file is in metres, 0.001 for millimetres.
+        weld: corners of open edges this near [m] are one, so that seams close; 0: none are. None: 1e-5 of the diagonal
+            of the mesh, or a quarter of the shortest open edge if that is less.
+        groups: laws by the names of solids (STL), groups or objects (OBJ, 3MF), or values of the property `group` of
+            faces (PLY): {"shutter": {"temperature": 2.0}}, of restitution, friction, temperature, accommodation, laws;
+            a group that is left out has those of the mesh.
+        group: None, or (T,) the number of the group of each triangle.
+        names: of the groups.
+        rotation: about the origin of the file.
+
+    Mended are: open seams, corners on the edges of others, triangles twice or without an area, and what is turned the
+    wrong way; `mesh_weld` is how far a corner was moved at most. The triangles are sorted by their groups and places.
+
+    Raises:
+        SceneError: the file is missing or holds no mesh, the mesh is not closed (with its holes), its parts intersect,
+            an argument is out of its range, a group is unknown, or a package is missing.
+
+    Cost: a grid of cells finds the next triangle; `python -m bench meshes`.
+
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).phi([[0.1, 0.5], [0.2, 0.5], [0.3, -1.0]]).round(9)
+    array([-0.1,  1. ])
+    """
+
+    vertices: Any
+    triangles: Any = None
+    side: str = "inside"
+    center: Vector = (0.0, 0.0, 0.0)
+    scale: float = field(default=1.0, kw_only=True)
+    weld: float | None = field(default=None, kw_only=True)
+    groups: Any = field(default=None, kw_only=True)
+    group: Any = field(default=None, kw_only=True)
+    names: Any = field(default=(), kw_only=True)
+    mesh_weld: float | None = field(default=None, kw_only=True)
+    _made: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for what in ("motion", "mass", "inertia"):
+            if getattr(self, what):
+                raise SceneError(
+                    f"{what} must be None for Mesh, whose triangles are at rest, got {getattr(self, what)!r}"
+                )
+        given = self.vertices, self.triangles, self.group, self.names
+        if self._made is None or any(a is not b for a, b in zip(self._made.given, given, strict=True)):
+            made = self._mended()
+            given = made.vertices, made.triangles, made.group, made.names
+            said = {"scale": 1.0, "weld": None, "mesh_weld": made.weld or self.mesh_weld or None}
+            own = dict(zip(("vertices", "triangles", "group", "names"), given, strict=True))
+            checks.assign(self, **own, **said, _made=made._replace(given=given))
+        object.__setattr__(self, "groups", self._checked_groups())
+
+    def _mended(self) -> _Made:
+        """The triangles of the file or the arrays."""
+        scale = checks.length("scale", self.scale)
+        weld = None if self.weld is None else checks.magnitude("weld", self.weld)
+        path, soup = Path("of these arrays"), None
+        if isinstance(self.vertices, (str, Path)):
+            if self.triangles is not None:
+                raise SceneError("triangles must be None with the path of a file, which holds them; leave them out")
+            path = Path(self.vertices)
+            soup = read_soup(path, scale)
+        else:
+            soup = _given(self.vertices, self.triangles, self.group, self.names, scale)
+        mesh = _sorted(closed(path, soup, weld))
+        for values in (mesh.vertices, mesh.triangles, mesh.group):
+            values.flags.writeable = False
+        return _Made((), mesh.vertices, mesh.triangles, mesh.group, mesh.names, mesh.weld)
+
+    def _checked_groups(self) -> dict[str, dict[str, Any]] | None:
+        """The argument `groups`."""
+        if self.groups is None:
+            return None
+        if not isinstance(self.groups, Mapping):
+            raise SceneError(f"groups must be a table of laws by the names of groups, got {self.groups!r:.200}")
+        there = ", ".join(map(repr, filter(None, self.names))) or "none, since the file names none"
+        for name, laws in self.groups.items():
+            if name not in self.names:
+                raise SceneError(f"groups must name groups of the mesh, got {name!r}; there are {there}")
+            if not isinstance(laws, Mapping):
+                raise SceneError(f"groups[{name!r}] must be a table of laws, got {laws!r:.200}")
+            for key in laws:
+                checks.one_of(f"groups[{name!r}]", key, dict.fromkeys(_LAWS))
+        return {name: dict(laws) for name, laws in self.groups.items()}
+
+    def __len__(self) -> int:
+        return len(self.triangles)
+
+    def __repr__(self) -> str:
+        """The number of triangles, and what is not a default."""
+        own = ("side", "center", "groups", "mesh_weld", *(one.name for one in fields(Surface)))
+        said = [one for one in fields(self) if one.name in own and getattr(self, one.name) != one.default]
+        return (
+            ", ".join([f"Mesh(<{len(self)} triangles>", *(f"{f.name}={getattr(self, f.name)!r}" for f in said)]) + ")"
+        )
+
+    # --- For kernels -------------------------------------------------------------------------------------
+
+    @cached_property
+    def corners(self) -> Floats:
+        """The vertices (V, 3) where they are in the scene [m]."""
+        turned = self.vertices @ rotations.matrix(self.rotation).T if self.rotation is not None else self.vertices
+        return np.ascontiguousarray(turned + np.array(self.center))
+
+    @cached_property
+    def members(self) -> Facets:
+        """The facets as kernels take them."""
+        corners = self.corners[self.triangles if self.side == "inside" else self.triangles[:, ::-1]]
+        room = _ROOM * float(np.abs(self.corners).max())
+        table = _table(corners, room)
+        zero = Vec(0.0, 0.0, 0.0)
+        like = FacetNumbers(zero, 0.0, 3 * ((zero, 0.0),), Shared(room))
+        grid = cells_around(like, table, corners)
+        return _with_room(Facets(like, table, grid), self._tree, self.is_solid())
+
+    @cached_property
+    def _tree(self) -> tuple[Floats, Indices, Floats]:
+        return self.corners, self.triangles, boxes_of(self.corners[self.triangles])
+
+    def walls(self) -> tuple[Facets]:
+        return (self.members,)
+
+    def numbers(self) -> list[int]:
+        """The number of every triangle."""
+        return list(range(len(self)))
+
+    def runs(self) -> list[tuple[Surface, int]]:
+        """Triangles in a row that have the same laws: (what says them, how many)."""
+        counts = np.bincount(self.group, minlength=len(self.names))
+        given = self.groups or {}
+        return [
+            (replace(self, groups=None, **given.get(name, {})), count)
+            for name, count in zip(self.names, counts.tolist(), strict=True) if count
+        ]  # fmt: skip
+
+    # --- For users ---------------------------------------------------------------------------------------
+
+    def size(self) -> float:
+        return float(0.5 * np.ptp(self.vertices, axis=0).min())
+
+    def bounds(self) -> Box:
+        if self.is_solid():
+            return UNBOUNDED
+        low, high = self.corners.min(axis=0), self.corners.max(axis=0)
+        return tuple(low.tolist()), tuple(high.tolist())
+
+    def extent(self) -> float:
+        return float(np.linalg.norm(self.corners, axis=1).max())
+
+    def volume(self) -> float:
+        """What the triangles enclose [m^3]."""
+        a, b, c = np.moveaxis((self.vertices - self.vertices[0])[self.triangles], 1, 0)
+        return float((a * np.cross(b, c)).sum() / 6.0)
+
+    def contain(self, points: Floats) -> NDArray[np.bool_]:
+        """Whether each of the points (3, N) is admissible: cheaper than phi."""
+        found = np.empty(points.shape[1], np.bool_)
+        within(self.members, self._tree, np.ascontiguousarray(points), found)
+        return found
+
+    def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+        """The signed distance at points (3, N): below 0 inside, above 0 outside; shape (N,)."""
+        return self._nearest(points)[3]
+
+    def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+        """Gradient of that phi at points (3, N); shape (3, N)."""
+        return self._nearest(points)[:3]
+
+    def _nearest(self, points: ArrayLike) -> NDArray[np.float64]:
+        rows = self._own_rows(points, 0.0)
+        flat = np.ascontiguousarray(np.array(rows).reshape(3, -1))
+        found = np.empty((4, flat.shape[1]))
+        nearest(self.members, self._tree, flat, found)
+        return side_sign(self.side) * found.reshape(4, *np.shape(rows.x))
+
+
+def _given(vertices: Any, triangles: Any, group: Any, names: Any, scale: float) -> Soup:
+    """The arguments that are arrays, checked."""
+    if triangles is None:
+        raise SceneError("triangles must be (T, 3) numbers of corners, got None; or give the path of a file alone")
+    corners = checks.array("vertices", vertices)
+    if corners.ndim != 2 or corners.shape[1] != 3 or not np.isfinite(corners).all():
+        raise SceneError(
+            f"vertices must be (V, 3) finite numbers, got shape {corners.shape}; or give the path of a file"
+        )
+    cells = np.asarray(triangles)
+    if cells.ndim != 2 or cells.shape[1] != 3 or not len(cells) or cells.dtype.kind not in "iu":
+        raise SceneError(f"triangles must be (T, 3) whole numbers, got shape {cells.shape} of {cells.dtype}")
+    if cells.min() < 0 or cells.max() >= len(corners):
+        wrong = int(np.argwhere((cells < 0) | (cells >= len(corners)))[0, 0])
+        raise SceneError(
+            f"triangles must be numbers from 0 to {len(corners) - 1}, of which each is a corner, got "
+            f"{cells[wrong].tolist()} in row {wrong}"
+        )
+    of = np.zeros(len(cells), np.int64) if group is None else np.asarray(group, np.int64)
+    known = tuple(map(str, names)) or tuple(map(str, range(int(of.max()) + 1))) if group is not None else ("",)
+    if of.shape != (len(cells),) or of.min() < 0 or of.max() >= len(known):
+        raise SceneError(
+            f"group must be (T,) numbers of {len(known)} names, one for each of the {len(cells)} triangles, got shape "
+            f"{of.shape} from {of.min()} to {of.max()}"
+        )
+    return Soup(scale * corners, cells.astype(np.int64), of, known)
+
+
+def _sorted(mesh: Closed) -> Closed:
+    """The triangles by their groups, and those near to each other near: what a cell holds is in few lines of the cache."""
+    middles = mesh.vertices[mesh.triangles].mean(axis=1)
+    low, wide = middles.min(axis=0), max(float(np.ptp(middles, axis=0).max()), np.finfo(np.float64).tiny)
+    places = ((middles - low) * ((2**_BITS - 1) / wide)).astype(np.int64)
+    keys = np.zeros(len(places), np.int64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            keys |= (places[:, axis] >> bit & 1) << (3 * bit + axis)
+    order = np.lexsort((keys, mesh.group))
+    return mesh._replace(triangles=np.ascontiguousarray(mesh.triangles[order]), group=mesh.group[order])
+
+
+def _table(corners: Floats, room: float) -> Floats:
+    """The numbers of facets with these corners (T, 3, 3), one in each row."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normal = _normals(a, b, c)
+    columns = [normal, (normal * corners.mean(axis=1)).sum(axis=1)[:, None]]
+    for p, q in ((a, b), (b, c), (c, a)):
+        inwards = np.cross(normal, q - p)
+        inwards /= np.linalg.norm(inwards, axis=1)[:, None]
+        columns += [inwards, ((inwards * p).sum(axis=1) - room)[:, None]]
+    return aligned(np.concatenate(columns, axis=1))
+
+
+def _normals(a: Floats, b: Floats, c: Floats) -> Floats:
+    """Unit normals of triangles, from the two shorter sides."""
+    sides = np.stack([b - a, c - b, a - c])
+    longest = (sides**2).sum(axis=2).argmax(axis=0)
+    every = np.arange(len(a))
+    found = np.cross(sides[(longest + 1) % 3, every], sides[(longest + 2) % 3, every])
+    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
+
+
+def _with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
+    """The facets with what is free around each cell."""
+    from scipy.ndimage import label
+
+    grid = facets.grid
+    shape = tuple(int(n) for n in grid.shape)
+    held = np.diff(grid.first[:-1]).reshape(shape) > 0
+    rows = rooms_of(held, facets.table[grid.entries, :3], grid.first)
+    facets = facets._replace(grid=grid._replace(room=rows))
+    parts, count = label(~held)
+    if count:
+        # The middle of one cell of each part says on which side it is.
+        labels, first = np.unique(parts.ravel(), return_index=True)
+        first, labels = first[labels > 0], labels[labels > 0]
+        places = np.array(np.unravel_index(first, shape), np.float64)
+        low, width = (np.array(row)[:, None] for row in (grid.low, grid.width))
+        found = np.empty((4, len(labels)))
+        nearest(facets, mesh, np.ascontiguousarray(low + (places + 0.5) * width), found)
+        sides = np.full(count + 1, CLOSED, np.int8)
+        sides[labels] = np.where(found[3] < 0.0, FREE, CLOSED)
+        rows[:-1, KIND] = np.where(held, rows[:-1, KIND].reshape(shape), sides[parts]).ravel()
+        with_blocks(rows, held)
+    rows[-1, KIND] = FREE if is_solid else CLOSED
+    return facets

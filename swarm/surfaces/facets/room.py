@@ -1,0 +1,128 @@
+"""What is free around each cell of a grid of facets: most cells are empty, and a flight leaps through blocks of these.
+
+A row of `Cells.room` are eight whole numbers. Of an empty cell: how many cells before and behind it along x, y, z are
+empty too, all together a block, and whether it is admissible. Of a cell with facets: a cone of their normals.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernel.arrays import index
+from ...kernel.jit import kernel, outlined
+from ...kernel.record import Record
+from ...kernel.vector import Vec, dot, norm
+
+# The seventh number, of cells that hold facets, that are admissible and that are not; the eighth of a cone.
+KIND, SINE = 6, 7
+FULL, FREE, CLOSED = 0, 1, -1
+_FULL = 127.0
+# A sine that no cone has: normals in all directions. Of the others a little more than they are, for whole numbers.
+_WIDEST, _MORE = 126.0, 3.0
+# The farthest leap, in cells, and the longest step of a block that grows.
+_FARTHEST, _LONGEST = 120, 64
+
+
+class Room(Record):
+    """The cells around one that a flight may leap through, along x, y, z."""
+
+    back: Vec
+    ahead: Vec
+
+
+def room_of(rows, cell):
+    """The room around a cell, none around one with facets."""
+    free = 1.0 if rows[cell, KIND] != FULL else 0.0
+    return Room(
+        free * Vec(float(rows[cell, 0]), float(rows[cell, 2]), float(rows[cell, 4])),
+        free * Vec(float(rows[cell, 1]), float(rows[cell, 3]), float(rows[cell, 5])),
+    )
+
+
+def all_away(rows, cell, v):
+    """Whether a flight surely moves away from all facets of a cell."""
+    axis = Vec(float(rows[cell, 0]), float(rows[cell, 1]), float(rows[cell, 2]))
+    return dot(axis, v) < -float(rows[cell, SINE]) * norm(v)
+
+
+def rooms_of(held: NDArray[np.bool_], normals: NDArray[np.float64], starts: NDArray[np.int32]) -> NDArray[np.int8]:
+    """The rows of a grid, those of its empty cells without their blocks, as free ones.
+
+    Args:
+        held: (nx, ny, nz) which cells hold facets.
+        normals: (E, 3) of the entries.
+        starts: where the entries of each cell begin.
+    """
+    rows = np.zeros((held.size + 1, 8), np.int8)
+    rows[:, KIND] = FREE
+    full = np.flatnonzero(held)
+    rows[full, KIND] = FULL
+    first = starts[full]
+    axis = np.add.reduceat(normals, first, axis=0)
+    length = np.linalg.norm(axis, axis=1)
+    axis /= np.maximum(length, 1e-300)[:, None]
+    counts = starts[full + 1] - first
+    cosine = np.minimum.reduceat((normals * np.repeat(axis, counts, axis=0)).sum(axis=1), first)
+    sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+    sine = np.where((cosine > 0.1) & (length > 0.1), np.minimum(np.ceil(_FULL * sine) + _MORE, _FULL), _FULL)
+    rows[full, :3] = np.rint(axis * _WIDEST)
+    rows[full, SINE] = sine
+    return rows
+
+
+def with_blocks(rows: NDArray[np.int8], held: NDArray[np.bool_]) -> None:
+    """Write the blocks of the free cells."""
+    from scipy.ndimage import distance_transform_cdt
+
+    sums = np.zeros(tuple(n + 1 for n in held.shape), np.int32)
+    sums[1:, 1:, 1:] = held.cumsum(axis=0, dtype=np.int32).cumsum(axis=1).cumsum(axis=2)
+    leaps = np.minimum(distance_transform_cdt(~held, "chessboard"), _FARTHEST).astype(np.int8)
+    if not held.any():
+        leaps[:] = 1
+    _grow(rows, sums, leaps)
+
+
+@kernel
+def _grow(rows, sums, leaps):
+    """A block around every free cell, which grows in all directions by turns."""
+    nx, ny, nz = leaps.shape
+    for x in range(nx):
+        for y in range(ny):
+            for z in range(nz):
+                cell = index((x * ny + y) * nz + z)
+                if rows[cell, KIND] == FREE:
+                    _grow_one(rows, cell, sums, (x, y, z), int(leaps[x, y, z]) - 1)
+
+
+@outlined
+def _grow_one(rows, cell, sums, place, leap):
+    x, y, z = place
+    nx, ny, nz = sums.shape[0] - 1, sums.shape[1] - 1, sums.shape[2] - 1
+    x0, x1 = max(x - leap, 0), min(x + leap, nx - 1) + 1
+    y0, y1 = max(y - leap, 0), min(y + leap, ny - 1) + 1
+    z0, z1 = max(z - leap, 0), min(z + leap, nz - 1) + 1
+    step, shrinks = 1, False
+    while step > 0:
+        low, high = max(x0 - step, max(x - _FARTHEST, 0)), min(x1 + step, min(x + _FARTHEST, nx - 1) + 1)
+        x0 = low if _sum(sums, low, x0, y0, y1, (z0, z1)) == 0 else x0
+        x1 = high if _sum(sums, x1, high, y0, y1, (z0, z1)) == 0 else x1
+        low, high = max(y0 - step, max(y - _FARTHEST, 0)), min(y1 + step, min(y + _FARTHEST, ny - 1) + 1)
+        y0 = low if _sum(sums, x0, x1, low, y0, (z0, z1)) == 0 else y0
+        y1 = high if _sum(sums, x0, x1, y1, high, (z0, z1)) == 0 else y1
+        low, high = max(z0 - step, max(z - _FARTHEST, 0)), min(z1 + step, min(z + _FARTHEST, nz - 1) + 1)
+        z0 = low if _sum(sums, x0, x1, y0, y1, (low, z0)) == 0 else z0
+        z1 = high if _sum(sums, x0, x1, y0, y1, (z1, high)) == 0 else z1
+        shrinks = shrinks or step >= _LONGEST
+        step = step // 2 if shrinks else 2 * step
+    rows[cell, 0], rows[cell, 1] = x - x0, x1 - 1 - x
+    rows[cell, 2], rows[cell, 3] = y - y0, y1 - 1 - y
+    rows[cell, 4], rows[cell, 5] = z - z0, z1 - 1 - z
+
+
+def _sum(sums, x0, x1, y0, y1, along_z):
+    """How many cells of a block hold facets."""
+    z0, z1 = along_z
+    a, b, c, d = index(x0), index(x1), index(y0), index(y1)
+    e, f = index(z0), index(z1)
+    over = int(sums[b, d, f]) - int(sums[a, d, f]) - int(sums[b, c, f]) + int(sums[a, c, f])
+    under = int(sums[b, d, e]) - int(sums[a, d, e]) - int(sums[b, c, e]) + int(sums[a, c, e])
+    return over - under
