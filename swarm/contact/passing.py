@@ -8,7 +8,7 @@ from ..kernel.vector import cross, dot, norm, square
 from ..surfaces.doors import Timed
 from ..surfaces.fields.grid import over_block
 from ..surfaces.fields.members import member
-from ..surfaces.openings import outside
+from ..surfaces.openings import Doorway, outside
 from ..surfaces.walls import Field
 from .crossing import block_of_path
 from .doorways import is_pressed, leads_on, lets_through
@@ -100,15 +100,23 @@ def _reach(path):
     return norm(path.r1 - path.r0) + path.h * (norm(path.v0) + norm(path.v1))
 
 
-def may_pass(openings, active, path):
+def may_pass(openings, walls, active, path):
     """Whether a step may come into an opening of a wall that holds the particle."""
     found, reach = False, _reach(path)
     for opening in openings or ():
         enters = False
         for volume in opening.volumes:
             enters = enters | _may_enter(volume, path, reach)
-        found = found | ((opening.is_of(active.first) | opening.is_of(active.second)) & enters)
+        for wall in active:
+            here = opening.is_of(wall) & enters
+            found = found | (here & _may_lead_on(walls, wall, path) if isinstance(opening, Doorway) else here)
     return found
+
+
+def _may_lead_on(walls, wall, path):
+    """Whether another room is behind a wall at some place of a step: a wall of its own, such as a floor, has none."""
+    middle = 0.5 * (path.r0 + path.r1)
+    return leads_on(walls, wall, path.r0) | leads_on(walls, wall, middle) | leads_on(walls, wall, path.r1)
 
 
 def _may_enter(volume, path, reach):

@@ -151,7 +151,7 @@ def _end_step(slide, i):
     met = crossing.meets(start, now, active, path, crossing.near(method, r1))
     good = (ratio <= 1.0) & (lanes.event[i] == 0)
     leaves = is_beyond(lanes.period, r1)
-    passes = may_pass(lanes.openings, active, path)
+    passes = may_pass(lanes.openings, now, active, path)
     ends = have_ends(walls) and may_end(now, active, r1, crossing.near(method, r1))
     fine = good & (not lifted) & (not met) & (not leaves) & (not passes) & (not ends)
     happened = select(lifted, LIFTED, 0) | select(met, MET, 0) | select(leaves, LEAVES, 0)
