@@ -20,6 +20,7 @@ from . import (
     stability,
     sweeps,
     throughput,
+    unions,
 )
 from .peers import race
 
@@ -50,6 +51,7 @@ def main() -> None:
     commands.add_parser(
         "fields", help="scenes of many bodies, and the log of impacts: speed, first calls, what is kept"
     )
+    commands.add_parser("unions", help="vessels of several parts: what an impact costs beside one of them, first calls")
     first = commands.add_parser("compile", help="first calls: processor time, functions compiled, and the next process")
     first.add_argument(
         "--scenes", metavar="NAME", nargs="+", choices=list(compiling.CASES),
@@ -85,6 +87,7 @@ def main() -> None:
         "bodies": bodies,
         "motion": motion,
         "fields": fields,
+        "unions": unions,
         "compile": compiling,
         "sweep": sweeps,
         "cluster": cluster,

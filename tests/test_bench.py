@@ -179,6 +179,13 @@ def test_fields_quick():
 
 
 @pytest.mark.long
+def test_unions_quick():
+    told = printed("unions")
+    for row in ("two balls, an impact", "a box, a tube, a box under gravity, an impact"):
+        assert row in told
+
+
+@pytest.mark.long
 def test_sweep_quick():
     told = printed("sweep")
     for row in ("compile once", "swarm sweep, nothing compiled before", "memory of a worker, at the end"):
