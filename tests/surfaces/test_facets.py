@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 import trimesh
+from thorny import aimed, hollow, slivered, thorny
 
 import swarm
 from swarm import scene_file, tables
 from swarm.kernel.vector import Vec
 from swarm.surfaces.facets import cells, room
-
-from thorny import aimed, hollow, slivered, thorny
 
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
 WIDTHS = (0.5, 1.0, 1.5)
@@ -35,7 +34,8 @@ def test_phi_of_a_box_is_that_of_the_box(side):
     step = 1e-6
     differences = [(mesh.phi(points + e) - mesh.phi(points - e)) / (2.0 * step) for e in step * np.eye(3)[:, :, None]]
     assert np.median(np.abs(mesh.gradient(points) - differences)) < 1e-9
-    assert mesh.volume() == pytest.approx(6.0) and mesh.size() == 0.5
+    assert mesh.volume() == pytest.approx(6.0)
+    assert mesh.size() == 0.5
 
 
 def test_the_side_of_a_thorny_vessel():
@@ -58,7 +58,10 @@ def test_the_side_of_a_thorny_vessel():
 
 def test_a_turned_and_shifted_mesh():
     turn = {"axis": (1.0, 2.0, 3.0), "angle": 0.7}
-    mesh, box = box_of_triangles(rotation=turn, center=(0.1, 0.2, 0.3)), swarm.Box(WIDTHS, (0.1, 0.2, 0.3), rotation=turn)
+    mesh, box = (
+        box_of_triangles(rotation=turn, center=(0.1, 0.2, 0.3)),
+        swarm.Box(WIDTHS, (0.1, 0.2, 0.3), rotation=turn),
+    )
     points = box.center + 0.8 * np.random.default_rng(1).uniform(-0.5, 0.5, (200, 3))
     assert np.abs(mesh.phi(points.T) - box.phi(points.T)).max() < 1e-14
     assert np.allclose(mesh.bounds(), box.bounds())
@@ -146,7 +149,8 @@ def test_nobody_passes_a_wall_of_a_millimetre():
     assert 100 < within.sum() < 900
     end = swarm.simulate(scene, start, swarm.Impact(), until=40.0, compile="always")
     there = np.abs(end.particles.position).max(axis=0)
-    assert there[within].max() <= 0.499 + 1e-12 and there[~within].min() >= 0.5 - 1e-12
+    assert there[within].max() <= 0.499 + 1e-12
+    assert there[~within].min() >= 0.5 - 1e-12
     assert end.impacts_per_particle.min() > 10
 
 
@@ -162,7 +166,8 @@ def test_a_slide_down_a_faceted_hopper_ends_at_its_apex():
     end = swarm.simulate(scene, start, swarm.Impact(), until=5.0, every=1.0, compile="always")
     energy = end.observables["total_energy"]
     assert (np.diff(energy) < 1e-12).all()
-    assert np.abs(end.particles.position).max() < 1e-9 and np.abs(end.particles.velocity).max() == 0.0
+    assert np.abs(end.particles.position).max() < 1e-9
+    assert np.abs(end.particles.velocity).max() == 0.0
     assert end.observables["max_penetration"].max() < 1e-12
 
 
@@ -203,7 +208,9 @@ def test_a_mesh_in_a_file_is_the_same_mesh():
     again = tables.scene_of([tables.with_arrays(table, arrays)], None).surfaces[0]
     for name in ("vertices", "triangles", "group"):
         assert np.array_equal(getattr(mesh, name), getattr(again, name))
-    assert again.groups == mesh.groups and again.names == mesh.names and again.friction == 0.1
+    assert again.groups == mesh.groups
+    assert again.names == mesh.names
+    assert again.friction == 0.1
     with pytest.raises(swarm.SceneError, match="a trajectory names no file"):
         tables.with_arrays({**table, "vertices": "part.stl"}, {})
 
@@ -235,19 +242,25 @@ def test_a_mesh_of_triangles_in_a_scene_file(tmp_path):
     (tmp_path / "part.obj").write_text("\n".join(lines))
     (tmp_path / "scene.toml").write_text(TEXT)
     mesh = scene_file.read(tmp_path / "scene.toml").scene.surfaces[0]
-    assert isinstance(mesh, swarm.Mesh) and mesh.volume() == pytest.approx(6.0)
+    assert isinstance(mesh, swarm.Mesh)
+    assert mesh.volume() == pytest.approx(6.0)
     assert [(one.restitution, count) for one, count in mesh.runs()] == [(0.9, 10), (0.5, 2)]
     (tmp_path / "scene.toml").write_text(TEXT.replace("groups.floor", "groups.lid"))
-    with pytest.raises(swarm.SceneError, match=r"surface\[0\].groups must name groups of the mesh, got 'lid'; there are"):
+    with pytest.raises(
+        swarm.SceneError, match=r"surface\[0\].groups must name groups of the mesh, got 'lid'; there are"
+    ):
         scene_file.read(tmp_path / "scene.toml")
 
 
 def test_an_opening_of_a_mesh():
     hole = swarm.Cylinder(0.2, (0.0, 0.0, 1.0))
     scene = swarm.Scene([box_of_triangles(openings=[hole])])
-    start = swarm.Particles(np.array([[0.0, 0.3], [0.0, 0.3], [0.0, 0.0]]), np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 1.0]]))
+    start = swarm.Particles(
+        np.array([[0.0, 0.3], [0.0, 0.3], [0.0, 0.0]]), np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 1.0]])
+    )
     end = swarm.simulate(scene, start, swarm.Impact(), until=4.0, compile="never")
-    assert end.escape_time[0] == pytest.approx(1.5) and np.isnan(end.escape_time[1])
+    assert end.escape_time[0] == pytest.approx(1.5)
+    assert np.isnan(end.escape_time[1])
 
 
 def test_memory_of_a_triangle():

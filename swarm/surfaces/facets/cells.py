@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ...kernel import cache
 from ...kernel.arrays import index
+from ...kernel.gravity import as_vector
 from ...kernel.jit import Array, kernel, select
 from ...kernel.record import Record
-from ...kernel.gravity import as_vector
 from ...kernel.vector import ZERO, Vec, absolute, dot, square, total, vec
 from ..fields.grid import MARGIN
 from ..fields.members import gathered

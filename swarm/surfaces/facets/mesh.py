@@ -98,7 +98,9 @@ class Mesh(Surface):
         super().__post_init__()
         for what in ("motion", "mass", "inertia"):
             if getattr(self, what):
-                raise SceneError(f"{what} must be None for Mesh, whose triangles are at rest, got {getattr(self, what)!r}")
+                raise SceneError(
+                    f"{what} must be None for Mesh, whose triangles are at rest, got {getattr(self, what)!r}"
+                )
         given = self.vertices, self.triangles, self.group, self.names
         if self._made is None or any(a is not b for a, b in zip(self._made.given, given, strict=True)):
             made = self._mended()
@@ -148,7 +150,9 @@ class Mesh(Surface):
         """The number of triangles, and what is not a default."""
         own = ("side", "center", "groups", "mesh_weld", *(one.name for one in fields(Surface)))
         said = [one for one in fields(self) if one.name in own and getattr(self, one.name) != one.default]
-        return ", ".join([f"Mesh(<{len(self)} triangles>", *(f"{f.name}={getattr(self, f.name)!r}" for f in said)]) + ")"
+        return (
+            ", ".join([f"Mesh(<{len(self)} triangles>", *(f"{f.name}={getattr(self, f.name)!r}" for f in said)]) + ")"
+        )
 
     # --- For kernels -------------------------------------------------------------------------------------
 
@@ -236,7 +240,9 @@ def _given(vertices: Any, triangles: Any, group: Any, names: Any, scale: float) 
         raise SceneError("triangles must be (T, 3) numbers of corners, got None; or give the path of a file alone")
     corners = checks.array("vertices", vertices)
     if corners.ndim != 2 or corners.shape[1] != 3 or not np.isfinite(corners).all():
-        raise SceneError(f"vertices must be (V, 3) finite numbers, got shape {corners.shape}; or give the path of a file")
+        raise SceneError(
+            f"vertices must be (V, 3) finite numbers, got shape {corners.shape}; or give the path of a file"
+        )
     cells = np.asarray(triangles)
     if cells.ndim != 2 or cells.shape[1] != 3 or not len(cells) or cells.dtype.kind not in "iu":
         raise SceneError(f"triangles must be (T, 3) whole numbers, got shape {cells.shape} of {cells.dtype}")

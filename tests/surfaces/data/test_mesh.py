@@ -118,7 +118,9 @@ def test_bad_meshes_are_one_sentence(tmp_path):
 def test_a_missing_library_is_said(tmp_path, monkeypatch, name):
     path = written(tmp_path, trimesh.creation.icosphere(2))
     monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(swarm.SceneError, match=f"(from_mesh|a mesh) needs the package '{name}'.*pip install trimesh libigl"):
+    with pytest.raises(
+        swarm.SceneError, match=f"(from_mesh|a mesh) needs the package '{name}'.*pip install trimesh libigl"
+    ):
         swarm.from_mesh(path, 0.2)
 
 
