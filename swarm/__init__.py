@@ -43,15 +43,19 @@ if TYPE_CHECKING:
         OwnSurface,
         Paraboloid,
         Plane,
+        Polygon,
+        Prism,
         Quadric,
         Sampled,
         Slab,
         Sphere,
         Spheres,
+        Stadium,
         Torus,
         Union,
     )  # fmt: skip
     from .surfaces.data.mesh import from_mesh
+    from .surfaces.doors import Opening
     from .surfaces.wall_law import WallLaw
 
 __version__ = VERSION
@@ -77,10 +81,11 @@ _HOMES = {
     "run.result": ("Result",),
     "run.simulation": ("simulate",),
     "surfaces.data.mesh": ("from_mesh",),
+    "surfaces.doors": ("Opening",),
     "surfaces": (
         "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",
-        "Intersection", "Mesh", "OwnSurface", "Paraboloid", "Plane", "Quadric", "Sampled", "Slab", "Sphere", "Spheres",
-        "Torus", "Union",
+        "Intersection", "Mesh", "OwnSurface", "Paraboloid", "Plane", "Polygon", "Prism", "Quadric", "Sampled", "Slab",
+        "Sphere", "Spheres", "Stadium", "Torus", "Union",
     ),
     "surfaces.wall_law": ("WallLaw",),
 }  # fmt: skip
@@ -89,11 +94,12 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
     "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
-    "Impact", "ImpactLog", "Intersection", "Mesh", "Midpoint", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path",
-    "Penalty", "Plane", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere",
-    "Spheres", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Union", "Verlet",
-    "WallLaw", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill", "from_mesh",
-    "load", "load_impacts", "place", "rigid", "simulate", "sweep", "tetrahedron",
+    "Impact", "ImpactLog", "Intersection", "Mesh", "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid",
+    "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled",
+    "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError", "Torus", "Trajectory",
+    "Translation", "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain",
+    "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate",
+    "sweep", "tetrahedron",
 ]  # fmt: skip
 
 

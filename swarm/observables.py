@@ -13,6 +13,7 @@ from .kernel.gravity import potential
 from .kernel.jit import kernel, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
 from .particles import Floats, State, has_escaped
+from .pieces import PartsOfRows
 from .scene import Scene
 from .surfaces import flights
 from .surfaces.walls import Field
@@ -28,10 +29,25 @@ _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PE
 def penetration(walls, r):
     """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
     deepest = 0.0
-    for wall in reversed(walls.each):
+    for _number, wall in reversed(walls.shared()):
         distance = wall.members.deepest_in_cell(r) if isinstance(wall, Field) else wall.distance(r)
         deepest = select(distance > deepest, distance, deepest)
+    for rooms in walls.joined():
+        distance = _out_of_all(rooms, r)
+        deepest = select(distance > deepest, distance, deepest)
     return deepest
+
+
+def _out_of_all(rooms, r):
+    """Distance outside of the nearest room of a union."""
+    least = np.inf
+    for room in rooms:
+        farthest = 0.0
+        for _number, wall, _gentle in room:
+            distance = wall.distance(r)
+            farthest = select(distance > farthest, distance, farthest)
+        least = select(farthest < least, farthest, least)
+    return least
 
 
 def _whole_fall(period, state, i, in_cell):
@@ -211,10 +227,13 @@ def _add_up(values: Floats, n: int, sums: Floats) -> None:
         np.add.reduce(values[:, whole * CHUNK :], axis=1, out=sums[:, whole])
 
 
-def summed(sums: Floats, owners: list[int], booked: int, has_heat: bool) -> dict[str, Any]:
+def summed(
+    sums: Floats, owners: list[int], booked: int, has_heat: bool, parts: PartsOfRows | None = None
+) -> dict[str, Any]:
     """The observables that are sums over particles, from those of all chunks (quantities, chunks); NumPy adds pairwise.
 
-    `owners` says which surface each wall belongs to, `booked` how many rows of impulse and work there are.
+    `owners` says which surface each wall belongs to, `parts` which part of a union, `booked` how many rows of impulse
+    and work there are.
     """
     # NumPy adds rows in an order that depends on how they lie in memory.
     totals = np.add.reduce(np.ascontiguousarray(sums), axis=1)
@@ -237,7 +256,17 @@ def summed(sums: Floats, owners: list[int], booked: int, has_heat: bool) -> dict
         "sliding_time": lasted,
         "wall_heat": np.bincount(owners, weights=heat) if has_heat else np.zeros_like(impulse),
         **moves,
+        **_of_parts(parts, pushed[: len(owners)], heat if has_heat else None),
     }
+
+
+def _of_parts(parts: PartsOfRows | None, impulse: Floats, heat: Floats | None) -> dict[str, Floats]:
+    """The impulse and the heat of the parts of unions, from those of each row of the scene."""
+    if parts is None:
+        return {}
+    given = {"part_impulse": impulse, "part_heat": np.zeros_like(impulse) if heat is None else heat}
+    added = {name: np.bincount(parts.rows, rows, parts.number + 1) for name, rows in given.items()}
+    return {name: np.asarray(values[: parts.number], np.float64) for name, values in added.items()}
 
 
 def counted(partial: Floats, state: State, lasts: bool) -> dict[str, Any]:
@@ -255,7 +284,10 @@ def counted(partial: Floats, state: State, lasts: bool) -> dict[str, Any]:
     }
 
 
-def summary(partial: Floats, state: State, owners: list[int], lasts: bool) -> dict[str, Any]:
+def summary(
+    partial: Floats, state: State, owners: list[int], lasts: bool, parts: PartsOfRows | None = None
+) -> dict[str, Any]:
     """The observables of one frame from the partial sums (chunks, ROWS); `lasts`: a contact has lasted in this run."""
     sums = chunk_sums(partial, state, lasts)
-    return {**summed(sums, owners, len(state.impulse), state.heat is not None), **counted(partial, state, lasts)}
+    added = summed(sums, owners, len(state.impulse), state.heat is not None, parts)
+    return {**added, **counted(partial, state, lasts)}

@@ -4,25 +4,33 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .contact.laws import NONE, Laws, Moves, Span, Thermal, owned_in
 from .errors import SceneError
+from .surfaces.doors import instants_of
 from .surfaces.facets.mesh import Mesh
 from .surfaces.fields.grouped import Order, order_of
 from .surfaces.fields.many import members_of
 from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, corners_of
-from .surfaces.openings import Opening, openings_in, reaches, volumes_of
-from .surfaces.surface import Surface
-from .surfaces.union import Joined
+from .surfaces.openings import Doorway, Opened, openings_in, reaches, volumes_of
+from .surfaces.surface import Surface, volume_of
+from .surfaces.union import Joined, Place
 from .volume import Volume
 
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
+
+
+class PartsOfRows(NamedTuple):
+    """The part that each row of a scene belongs to, `number` where its surface has none; how many parts there are."""
+
+    rows: tuple[int, ...]
+    number: int
 
 
 class Pieces(Volume):
@@ -30,13 +38,15 @@ class Pieces(Volume):
 
     # The volumes in which every piece is open.
     _volumes: tuple[tuple[Surface, ...], ...]
+    # Those in which it is where another room of its union is behind it.
+    _doorways: tuple[tuple[Surface, ...], ...]
 
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""
         raise NotImplementedError
 
     @cached_property
-    def _pieces(self) -> tuple[Surface, ...]:
+    def pieces(self) -> tuple[Surface, ...]:
         """The surfaces, those of which unions are made, and the images of those that reach over a face of the cell."""
         return tuple(piece for images in self._images for image in images for piece in _pieces_of(image))
 
@@ -54,20 +64,20 @@ class Pieces(Volume):
                 ends = np.cumsum([first, *map(len, image.rooms)]).tolist()
                 unions.append(tuple(tuple(range(*ends)) for ends in itertools.pairwise(ends)))
             first += len(_pieces_of(image))
-        return order_of(self._pieces, unions=unions)
+        return order_of(self.pieces, unions=unions)
 
     @cached_property
     def _groups(self) -> list[Members]:
         """The surfaces that kernels take as fields."""
         repeated = None if self.period is None else corners_of(self.period)
-        return [members_of([self._pieces[i] for i in group], repeated) for group in self.order.groups]
+        return [members_of([self.pieces[i] for i in group], repeated) for group in self.order.groups]
 
     @cached_property
     def volumes(self) -> tuple[tuple[Surface, ...], ...]:
         """The volumes in which every surface is open."""
         found: list[dict[Surface, None]] = [{} for _surface in self.surfaces]
-        for i, given in zip(self.owners_of_pieces, self._volumes, strict=True):
-            found[i].update(dict.fromkeys(given))
+        for i, *given in zip(self.owners_of_pieces, self._volumes, self._doorways, strict=True):
+            found[i].update(dict.fromkeys(itertools.chain(*given)))
         return tuple(map(tuple, found))
 
     def laws(self) -> Laws | None:
@@ -84,29 +94,90 @@ class Pieces(Volume):
         )
         return None if laws == NONE else laws.in_plane(self.across())
 
-    def openings(self) -> tuple[Opening, ...] | None:
-        """The openings of every wall of the scene as kernels take them, None where there are none."""
-        return openings_in(self.order.spans(self._pieces), self._volumes)
+    def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
+        """The openings of every wall as kernels take them in the frame that ends at a moment [s]; None: none."""
+        spans = self.order.spans(self.pieces)
+        ways = openings_in(spans, self._volumes, moment), openings_in(spans, self._doorways, moment, Doorway)
+        return None if ways == ((), ()) else (*ways[0], *ways[1])
+
+    def has_doors(self) -> bool:
+        """Whether some walls are present, or some openings open, for some times only."""
+        return any(one.present is not None for one in (*self.pieces, *self.open_volumes()))
+
+    @cached_property
+    def instants(self) -> tuple[float, ...]:
+        """The instants after 0 s at which walls come or go, or openings open or shut [s], in order."""
+        return instants_of(one.present for one in (*self.pieces, *self.open_volumes()))
+
+    def open_volumes(self) -> tuple[Surface, ...]:
+        """The volumes in which any piece is open."""
+        return tuple(itertools.chain(*self._volumes, *self._doorways))
+
+    def pieces_of_walls(self) -> NDArray[np.int64]:
+        """The piece that each wall of the scene belongs to, by its number."""
+        return np.array([i for i, _member in self.order.members(self.pieces)])
+
+    def pieces_of_rows(self) -> NDArray[np.int64]:
+        """The piece that each row of `owners` belongs to."""
+        return np.array(self.order.owners(self.pieces))
 
     def _runs(self) -> list[tuple[int, Surface, int]]:
         """The walls in a row that have the same laws: their piece, the surface that says these, and how many they are."""
         found: list[tuple[int, Surface, int]] = []
-        for i, walls in self.order.spans(self._pieces):
-            piece = self._pieces[i]
+        for i, walls in self.order.spans(self.pieces):
+            piece = self.pieces[i]
             found += [(i, *run) for run in (piece.runs() if isinstance(piece, Mesh) else [(piece, walls)])]
+        return found
+
+    @cached_property
+    def parts(self) -> tuple[tuple[int, Place], ...]:
+        """The parts of the unions and intersections of the scene: the number of the surface, and the place in that."""
+        joined = ((i, surface) for i, surface in enumerate(self.surfaces) if isinstance(surface, Joined))
+        return tuple((i, place) for i, surface in joined for place in surface.places_of_parts())
+
+    @cached_property
+    def _parts_of_pieces(self) -> list[tuple[int, Place]]:
+        """Of every piece the surface, and the place of its part in that."""
+        every = ((i, image) for i, images in enumerate(self._images) for image in images)
+        return [(i, place) for i, image in every for place in _places_of(image)]
+
+    def parts_of_rows(self) -> PartsOfRows | None:
+        """The part that each row of the scene belongs to, None where no surface has parts."""
+        if not self.parts:
+            return None
+        number = {part: k for k, part in enumerate(self.parts)}
+        of_pieces = [number.get(part, len(number)) for part in self._parts_of_pieces]
+        return PartsOfRows(tuple(of_pieces[i] for i in self.order.owners(self.pieces)), len(number))
+
+    def doorways_of_parts(self) -> dict[tuple[int, Place], list[Surface]]:
+        """The volumes in which walls of a part are open where another room is on their other side."""
+        found: dict[tuple[int, Place], list[Surface]] = {}
+        for part, volumes in zip(self._parts_of_pieces, self._doorways, strict=True):
+            found.setdefault(part, []).extend(volumes)
         return found
 
     def owners(self) -> list[int]:
         """The surface that each row of the scene belongs to, one for a field."""
-        return [self.owners_of_pieces[i] for i in self.order.owners(self._pieces)]
+        return [self.owners_of_pieces[i] for i in self.order.owners(self.pieces)]
 
     def members(self) -> NDArray[np.int64]:
-        """Of each wall of the scene its surface, and its number in the field that this is or -1: (2, walls)."""
-        return np.array([(self.owners_of_pieces[i], member) for i, member in self.order.members(self._pieces)]).T
+        """Of each wall of the scene its surface, and its number in the field or of the part, or -1: (2, walls)."""
+        number = {part: k for k, part in enumerate(self.parts)}
+        of_pieces = [number.get(part, -1) for part in self._parts_of_pieces]
+        rows = [(i, of_pieces[i] if member < 0 else member) for i, member in self.order.members(self.pieces)]
+        return np.array([(self.owners_of_pieces[i], member) for i, member in rows]).T
+
+    def _unions(self) -> list[int]:
+        """The surfaces that are unions of several rooms."""
+        return [self.owners_of_pieces[rooms[0][0]] for rooms in self.order.unions]
 
 
 def _pieces_of(image: Surface) -> tuple[Surface, ...]:
     return image.surfaces() if isinstance(image, Joined) else (image,)
+
+
+def _places_of(image: Surface) -> tuple[Place, ...]:
+    return image.places() if isinstance(image, Joined) else ((),)
 
 
 def _of_walls(values: list[Any], spans: list[tuple[int, int]], neutral: Any) -> tuple[Any, ...] | None:
@@ -140,13 +211,37 @@ def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> list[
     """Those of the surfaces of a union: what is open of the whole is open where it reaches each of them."""
     pieces = union.surfaces()
     for k, opening in enumerate(union.openings):
-        if not any(reaches(piece, opening) for piece in pieces):
+        if not any(reaches(piece, volume_of(opening)) for piece in pieces):
             raise SceneError(
                 f"{name}.openings[{k}] must reach the wall that it opens, got {opening}, in which no point of {name} "
                 f"({type(union).__name__}) is; move it, or make it larger"
             )
     found = []
     for piece in pieces:
-        open_there = [one for one in piece.openings if one not in union.openings or reaches(piece, one)]
+        open_there = [one for one in piece.openings if one not in union.openings or reaches(piece, volume_of(one))]
         found.append(volumes_of(replace(piece, openings=open_there), period, f"{name}.parts"))
     return found
+
+
+def doorways_of_pieces(
+    images: Sequence[Sequence[Surface]], volumes: Sequence[Sequence[Surface]]
+) -> tuple[tuple[Surface, ...], ...]:
+    """The volumes in which every piece is open where another room of its union is on its other side.
+
+    Those are the volumes of the other rooms, and those that open walls between rooms only.
+    """
+    found: list[tuple[Surface, ...]] = []
+    for image in (image for some in images for image in some):
+        rooms = image.rooms if isinstance(image, Joined) else ((image,),)
+        given, first = [], len(found)
+        for room in rooms:
+            given.append([one for some in volumes[first : first + len(room)] for one in some])
+            first += len(room)
+        for k, room in enumerate(rooms):
+            others = [one for j, some in enumerate(given) if j != k for one in some]
+            between = [one for piece in itertools.chain(*rooms) for one in piece.open_volumes(True)]
+            for piece in room:
+                mine = volumes[len(found)]
+                found.append(tuple(one for one in dict.fromkeys([*others, *between])
+                                   if one not in mine and reaches(piece, one)))  # fmt: skip
+    return tuple(found)

@@ -17,6 +17,7 @@ from .kernel.vector import vec
 from .motion import Guide, Oscillation, Path, Rotation, Translation, parts_of
 from .surfaces.fields.bodies import Spheres
 from .surfaces.fields.many import Many
+from .surfaces.outlines.outlined import Outlined
 from .surfaces.surface import Surface
 from .surfaces.upright import upright
 from .surfaces.wall_law import tries_of
@@ -100,6 +101,9 @@ def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> Non
     for i, surface in enumerate(surfaces):
         _require_motion(plane, f"surfaces[{i}].motion", surface)
         _require_laws(plane, f"surfaces[{i}].laws", surface)
+        if isinstance(surface, Outlined):
+            _require_upright(plane, i, surface)
+            continue
         places, part = _walls_in(surface, across, reach)
         leaning = np.flatnonzero(part)
         if leaning.size:
@@ -110,6 +114,16 @@ def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> Non
                 f"normal at {_told(places[:, k])} is {_size(part[k])} out of the plane and would send particles out "
                 f"of it; {_mended(surface, across)}"
             )
+
+
+def _require_upright(plane: str, i: int, surface: Outlined) -> None:
+    """The same of an outline, which is along the plane or not."""
+    if surface.across != PLANES[plane]:
+        raise SceneError(
+            f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got '
+            f"{type(surface).__name__} with its axis along {_told(surface.frame[:, 2])[:-2]}; give it axis = "
+            f"{tuple(float(name == plane) for name in PLANES)}, and turn it about that"
+        )
 
 
 def _size(part: float) -> str:

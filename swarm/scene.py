@@ -15,9 +15,10 @@ from . import plane as planes
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .kernel.vector import Vec
-from .pieces import Pieces, volumes_of_pieces
+from .pieces import Pieces, doorways_of_pieces, volumes_of_pieces
 from .surfaces import required
 from .surfaces import rotation as rotations
+from .surfaces.doors import was_there
 from .surfaces.fields.grouped import order_of, walls_in
 from .surfaces.fields.many import in_straight_flights
 from .surfaces.fields.members import Members
@@ -67,6 +68,7 @@ class Scene(Pieces):
     _images: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
     # The volumes in which every piece is open.
     _volumes: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
+    _doorways: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -89,10 +91,11 @@ class Scene(Pieces):
         named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
         images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
         checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, _images=images)
-        checks.assign(self, _volumes=volumes_of_pieces(surfaces, images, lengths))
+        volumes = volumes_of_pieces(surfaces, images, lengths)
+        checks.assign(self, _volumes=volumes, _doorways=doorways_of_pieces(images, volumes))
         self._require_few_walls("")
-        require_few(self._volumes)
-        for i in self._fields() if self.reacts() else ():
+        require_few((*self._volumes, *self._doorways))
+        for i in (*self._fields(), *self._unions()) if self.reacts() else ():
             raise SceneError(
                 f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where impacts move a surface, got "
                 f"{surfaces[i]}; give that surface a motion instead of a mass and an inertia, or list the bodies one "
@@ -101,7 +104,7 @@ class Scene(Pieces):
         checks.assign(self, gravity=pull if pull is not None and any(pull) else None)
         if plane is not None:
             planes.require_all(plane, surfaces, pull, lengths)
-        required.require_known(surfaces, lambda held: self._bounds(0.0, held))
+        required.require_known(surfaces, self._bounds_of_lasting)
         if not self._has_volume():
             raise SceneError(
                 f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces whose admissible sides "
@@ -124,7 +127,7 @@ class Scene(Pieces):
 
     def _require_few_walls(self, why: str) -> None:
         """Raise a `SceneError` where there are more walls than kernels can be compiled for."""
-        walls = self.order.compiled(self._pieces)
+        walls = self.order.compiled(self.pieces)
         if walls > MOST_WALLS:
             raise SceneError(
                 f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of {len(self.surfaces)} "
@@ -145,10 +148,15 @@ class Scene(Pieces):
                 f"surfaces[{i}] must not be {type(self.surfaces[i]).__name__} with {what}, got {self.surfaces[i]}; use "
                 f"Impact with contact_step = 0, or list its bodies one by one, at most {MOST_WALLS} walls"
             )
+        for i in self._unions():
+            raise SceneError(
+                f"surfaces[{i}] must not be a {type(self.surfaces[i]).__name__} of several rooms with {what}, got "
+                f"{self.surfaces[i]!r:.200}; use Impact with contact_step = 0"
+            )
         if not self.order.groups:
             return self
         made = copy.copy(self)
-        made.__dict__.update(order=order_of(self._pieces, False, self.order.unions), _groups=[])
+        made.__dict__.update(order=order_of(self.pieces, False, self.order.unions), _groups=[])
         made._require_few_walls(f" with {what}")
         return made
 
@@ -172,21 +180,29 @@ class Scene(Pieces):
         return Scene(surfaces, self.gravity, self.period, self.plane)
 
     def walls(self, moment: float = 0.0, own: Sequence[Surface] | None = None) -> Walls:
-        """The surfaces as kernels take them, by their kinds; those that move in the frame that ends at a moment [s].
+        """The surfaces as kernels take them, by their kinds, in the frame, or its piece, that ends at a moment [s].
 
         For bodies, with what is a body's `own` after them, nothing moves; None: for particles.
         """
         if self.moves():
-            fields, others = ([self._pieces[i] for i in some] for some in (self.order.fields, self.order.alone()))
-            rooms = [[[self._pieces[i] for i in room] for room in union] for union in self.order.unions]
+            fields, others = ([self.pieces[i] for i in some] for some in (self.order.fields, self.order.alone()))
+            rooms = [[[self.pieces[i] for i in room] for room in union] for union in self.order.unions]
             return self._upright(with_rooms(carried(fields, others, moment), rooms))
-        if own is None:
-            return self._walls
-        return walls_in(self.order, self._pieces, self._groups, own, lambda members: members)
+        if own is not None:
+            return walls_in(self.order, self.pieces, self._groups, own, lambda members: members)
+        there = tuple(was_there(piece.present, moment) for piece in self.pieces)
+        if there not in self._walls:
+            made = walls_in(self.order, self.pieces, self._groups, (), self._taken, moment)
+            self._walls[there] = self._upright(made)
+        return self._walls[there]
+
+    def _taken(self, members: Members) -> Members:
+        """A field as kernels take it where nothing moves."""
+        return in_straight_flights(members, self.period is not None) if self.gravity is None else members
 
     def walls_of_rows(self) -> NDArray[np.int64]:
         """The number of walls of each row of `owners`: the members of a field, else one."""
-        fields = [len(self._pieces[i]) for i in self.order.fields]  # type: ignore[arg-type]
+        fields = [len(self.pieces[i]) for i in self.order.fields]  # type: ignore[arg-type]
         return np.array([*fields, *[1] * (len(self.owners()) - len(fields))], np.int64)
 
     def cell(self) -> Period | None:
@@ -203,20 +219,16 @@ class Scene(Pieces):
 
     @cached_property
     def _moves(self) -> bool:
-        return self._reacts or any(piece.motion is not None for piece in self._pieces)
+        return self._reacts or any(piece.motion is not None for piece in self.pieces)
 
     @cached_property
     def _reacts(self) -> bool:
         return any(surface.reacts() for surface in self.surfaces)
 
     @cached_property
-    def _walls(self) -> Walls:
-        """The walls for particles where nothing moves."""
-
-        def taken(members: Members) -> Members:
-            return in_straight_flights(members, self.period is not None) if self.gravity is None else members
-
-        return self._upright(walls_in(self.order, self._pieces, self._groups, (), taken))
+    def _walls(self) -> dict[tuple[bool, ...], Walls]:
+        """The walls for particles where nothing moves, by which of the surfaces are there."""
+        return {}
 
     def _upright(self, walls: Walls) -> Walls:
         """Walls as a scene of two dimensions takes them."""

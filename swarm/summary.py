@@ -31,6 +31,8 @@ def numbers(trajectory: Path) -> dict[str, Any]:
         "link_error": float(np.max(seen.get("link_error", 0.0))),
         "work": float(seen.get("work", [0.0])[-1]),
         "wall_heat": np.array(seen.get("wall_heat", [[]])[-1]).tolist(),
+        "part_impulse": np.array(seen.get("part_impulse", [[]])[-1]).tolist(),
+        "part_heat": np.array(seen.get("part_heat", [[]])[-1]).tolist(),
         "wall_work": np.array(seen.get("wall_work", [[]])[-1]).tolist(),
         "sliding": int(seen.get("sliding", [0])[-1]),
         "sliding_time": float(seen.get("sliding_time", [0.0])[-1]),

@@ -19,6 +19,7 @@ from .methods import ALL_METHODS, Method
 from .motion import table_of as motion_table
 from .scene import Scene
 from .surfaces import ALL_SURFACES, OwnSurface, Surface
+from .surfaces.doors import Opening
 
 T = TypeVar("T")
 # What in the table of a surface are tables of surfaces.
@@ -42,8 +43,21 @@ def _surface_of(table: Any, where: str) -> Surface:
             given = table[key]
             if not isinstance(given, list):
                 raise SceneError(f"{where}.{key}: expected [[surface.{key}]] tables, got {given!r:.200}")
-            table = {**table, key: [_surface_of(one, f"{where}.{key}[{k}]") for k, one in enumerate(given)]}
+            made = _opening_of if key == "openings" else _surface_of
+            table = {**table, key: [made(one, f"{where}.{key}[{k}]") for k, one in enumerate(given)]}
     return of_kind(table, where, ALL_SURFACES)
+
+
+def _opening_of(table: Any, where: str) -> Surface | Opening:
+    """An opening from its table, in which may be what it has besides a surface."""
+    mine = {key: table[key] for key in ("times", "between") if key in table} if isinstance(table, Mapping) else {}
+    if not mine:
+        return _surface_of(table, where)
+    surface = _surface_of({key: value for key, value in table.items() if key not in mine}, where)
+    try:
+        return Opening(surface, **mine)
+    except SceneError as error:
+        raise SceneError(f"{where}.{error}") from None
 
 
 def method_of(table: Any) -> Method:
@@ -74,10 +88,17 @@ def _with_nested(table: dict[str, Any], described: Surface | Method, arrays: dic
         if described.laws:
             table["laws"] = [law if isinstance(law, str) else repr(law) for law in described.laws]
         if described.openings:
-            table["openings"] = [table_of(opening, arrays) for opening in described.openings]
+            table["openings"] = [_table_of_opening(opening, arrays) for opening in described.openings]
         if "part" in table:
             table["part"] = [table_of(part, arrays) for part in table["part"]]
     return table
+
+
+def _table_of_opening(opening: Surface | Opening, arrays: dict[str, Any] | None) -> dict[str, Any]:
+    if isinstance(opening, Surface):
+        return table_of(opening, arrays)
+    mine = {"times": opening.times, "between": opening.between or None}
+    return {**table_of(opening.surface, arrays), **{key: value for key, value in mine.items() if value is not None}}
 
 
 def _written(values: NDArray[Any], arrays: dict[str, Any] | None) -> Any:

@@ -69,17 +69,24 @@ class Volume:
         return np.asarray(particles.position + particles.image * lengths[:, None])
 
     def gaps(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """Signed gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0."""
+        """Signed gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0.
+
+        That of a surface that is not there then is minus infinity.
+        """
         rows = checks.array("points", points)
         if self.period is not None:
             rows, _image = into_cell(self.period, rows)
-        return np.array([gaps_of(images, rows, time).max(axis=0) for images in self._images])
+        away = np.full(np.shape(rows)[1:], -math.inf)
+        each = zip(self.surfaces, self._images, strict=True)
+        return np.array(
+            [gaps_of(images, rows, time).max(axis=0) if one.is_there(time) else away for one, images in each]
+        )
 
     def admits(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not."""
         rows = points if self.period is None else into_cell(self.period, points)[0]
         admitted = np.ones(rows.shape[1], np.bool_)
-        for image in (image for images in self._images for image in images):
+        for image in (image for images in self._images for image in images if image.is_there(0.0)):
             if isinstance(image, Many):
                 admitted[admitted] = ~image.contain(rows[:, admitted])
             elif isinstance(image, Mesh):
@@ -89,12 +96,18 @@ class Volume:
         return admitted
 
     def distances_outside(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside."""
+        """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside.
+
+        That of a surface that is not there at this time [s] is minus infinity.
+        """
         rows = checks.array("points", points)
         if self.period is not None:
             rows, _image = into_cell(self.period, rows)
         found = []
-        for images in self._images:
+        for surface, images in zip(self.surfaces, self._images, strict=True):
+            if not surface.is_there(time):
+                found.append(np.full(np.shape(rows)[1:], -math.inf))
+                continue
             slopes = [np.sqrt((image.gradient(rows, time) ** 2).sum(axis=0)) for image in images]
             # At the centre of a ball the slope is 0, and a point is as far inside as can be.
             with np.errstate(over="ignore"):
@@ -114,8 +127,13 @@ class Volume:
         return np.concatenate(found) if found else np.empty(0, np.intp)
 
     def is_open(self) -> bool:
-        """Whether a particle may fly to infinity."""
-        return not np.isfinite(self.bounds()).all()
+        """Whether a particle may fly to infinity, at the start or as soon as a wall has gone."""
+        at_start = np.isfinite(self.bounds()).all()
+        return not (at_start and (not self.has_doors() or np.isfinite(self._bounds_of_lasting(self.surfaces)).all()))
+
+    def has_doors(self) -> bool:
+        """Whether some walls are present, or some openings open, for some times only."""
+        raise NotImplementedError
 
     def poses(self, time: float) -> list[motions.Pose]:
         """The pose of every surface at a time [s]."""
@@ -124,7 +142,10 @@ class Volume:
     def open_faces(self, time: float = 0.0) -> NDArray[np.float64]:
         """Open faces through which gravity pulls no particle back: rows (n, offset); n.r > offset is outside."""
         faces = [
-            (*n, offset) for surface in self.surfaces for n, offset in planes_of(surface, surface.open_faces(), time)
+            (*n, offset)
+            for surface in self.surfaces
+            for n, offset in planes_of(surface, surface.open_faces(), time)
+            if surface.is_there(time)
         ]
         rows = np.array(faces, dtype=np.float64).reshape(-1, 4)
         # Through a face across the period nobody leaves.
@@ -137,8 +158,12 @@ class Volume:
 
         Across the plane of a scene of two dimensions it has no width.
         """
-        low, high = self._bounds(time, self.surfaces)
+        low, high = self._bounds(time, [surface for surface in self.surfaces if surface.is_there(time)])
         return tuple(low.tolist()), tuple(high.tolist())
+
+    def _bounds_of_lasting(self, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A box around the volume that those of the surfaces leave at the start that are always there."""
+        return self._bounds(0.0, [surface for surface in surfaces if surface.present is None])
 
     def _bounds(self, time: float, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A box around the volume that some of the surfaces leave, and the cell that repeats."""
@@ -161,7 +186,13 @@ class Volume:
         # Open directions are searched as far as the scene itself extends.
         reach = 2.0 * self.extent()
         low, high = np.maximum(low, -reach)[:, None], np.minimum(high, reach)[:, None]
-        return has_room(low, high, self.gaps, lambda i, points: gradient_of(self._images[i], points))
+        there = [i for i, surface in enumerate(self.surfaces) if surface.is_there(0.0)]
+        return not there or has_room(
+            low,
+            high,
+            lambda points: self.gaps(points)[there],
+            lambda i, points: gradient_of(self._images[there[i]], points),
+        )
 
     def extent(self) -> float:
         """Distance from the origin within which the scene's surfaces lie."""

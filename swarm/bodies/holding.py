@@ -108,9 +108,9 @@ def _smooth(name: str, surface: Any) -> Surface:
         raise SceneError(f"{name}.temperature must be None with bodies, got {surface.temperature:g}")
     if surface.laws:
         raise SceneError(f"{name}.laws must be left out with bodies, got {surface.laws}")
-    if surface.motion is not None or surface.reacts() or surface.openings:
+    if surface.motion is not None or surface.reacts() or surface.openings or surface.present is not None:
         raise SceneError(
-            f"{name} must have no motion, mass, inertia or openings, got {surface!r}; a cavity moves with its carrier, "
-            "and anchors lead points"
+            f"{name} must have no motion, mass, inertia or openings, and always be present, got {surface!r}; a "
+            "cavity moves with its carrier, and anchors lead points"
         )
     return surface

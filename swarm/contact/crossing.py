@@ -17,6 +17,8 @@ from .path import Path, at_part, bisected, members_of
 from .rooms import leaving
 
 _EPSILON = 2.220446049250313e-16
+# Of a speed, the part across a wall of what goes along it.
+_ALONG = 1e-9
 # Of a length, the part that is none.
 _NEAR = 1e-13
 # Places of a step that are looked at for another wall.
@@ -41,14 +43,22 @@ def meets(walls, ends, active, path, near):
 
 
 def _leaves_all(rooms, ends, active, path, near):
-    """Whether a step may leave every room of a union."""
+    """Whether a step may leave every room of a union that it begins in."""
     leaves = True
     for room, then in zip(rooms, ends, strict=True):
-        met = False
+        met, enters, holds = False, False, False
         for (number, wall, _gentle), (_number, end, _) in zip(room, then, strict=True):
             met = (_may_meet(wall, end, path, near) & (not active.has(number))) | met
-        leaves = met & leaves
+            enters, holds = _is_entrance(wall, path, near) | enters, active.has(number) | holds
+        # Who comes to the face of a room that does not hold it has not come in.
+        leaves = (met | (enters & (not holds))) & leaves
     return leaves
+
+
+def _is_entrance(wall, path, near):
+    """Whether a step begins at a wall of a room, and goes into that."""
+    level, rise, scale = _level(wall, path.r0, path.v0)
+    return (level > -near * scale) & (rise < -_ALONG * scale * norm(path.v0))
 
 
 @outlined
@@ -66,7 +76,17 @@ def _meets_body(found, m, field, ends, number, active, path, near):
     m = float(m)
     if isinstance(field, Patched) and not field.is_near(m, path.r1, _reach(path) + near):
         return found
-    return found or ((not active.has(number + m)) and _may_meet(field.wall(m), ends.wall(m), path, near))
+    return found or ((not _is_held(field, number, m, active)) and _may_meet(field.wall(m), ends.wall(m), path, near))
+
+
+def _is_held(field, number, m, active):
+    """Whether wall m of a field, which has so many walls before it, holds a particle, or goes on where one does."""
+    held = active.has(number + m)
+    if isinstance(members_of(field), Patched):
+        for one in active:
+            is_of = (one >= number) & (one < number + field.count())
+            held = held | (is_of & field.goes_on(one - number, m))
+    return held
 
 
 def _reach(path):
@@ -160,7 +180,7 @@ def _first_of(members, number, active, path, near, later):
 
 
 def _sooner_body(found, m, members, number, active, path, near):
-    if active.has(number + m):
+    if _is_held(members, number, m, active):
         return found
     whole = members.whole(float(m)) if isinstance(members, Patched) else member(members, index(m))
     time = _deep_after(_Still(whole), path, near)

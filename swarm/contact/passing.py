@@ -5,14 +5,17 @@ import math
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, norm, square
+from ..surfaces.doors import Timed
 from ..surfaces.fields.grid import over_block
 from ..surfaces.fields.members import member
-from ..surfaces.openings import is_open, outside
+from ..surfaces.openings import outside
 from ..surfaces.walls import Field
 from .crossing import block_of_path
+from .doorways import is_pressed, leads_on, lets_through
 from .events import TOUCH
 from .path import at_part, bisected
 from .reflection import relative, wall_velocity
+from .rooms import has_ended
 
 # Places of a step between which the distance to an opening has one least value, and steps of the search for it.
 _PLACES, _THIRDS = 16, 80
@@ -23,7 +26,7 @@ _PARALLEL = 1e-7
 @outlined
 def _lets_out(openings, rules, walls, wall, r, near):
     """Whether a wall that a particle is on lets it out: it is open there, and no closed wall lies on it."""
-    if not is_open(openings, wall, r, near):
+    if not lets_through(openings, walls, wall, r, near):
         return False
     return not _is_covered(openings, rules, walls, wall, r, near)
 
@@ -36,8 +39,8 @@ def _is_covered(openings, rules, walls, wall, r, near):
     for i in range(number.size):
         m = walls.unit_normal(number[i], r)
         alike = dot(n, m) > 0.0 and square(cross(n, m)) <= _PARALLEL * _PARALLEL
-        here = alike and abs(walls.distance(number[i], r)) <= touch
-        if here and number[i] != wall and not is_open(openings, number[i], r, near):
+        here = alike and abs(walls.distance(number[i], r)) <= touch and not has_ended(walls, number[i], r, near)
+        if here and number[i] != wall and not lets_through(openings, walls, number[i], r, near):
             return True
     return False
 
@@ -49,7 +52,7 @@ def hit_wall(openings, rules, walls, motion, wall, near):
     Of several closed ones it is the one that it reaches first.
     """
     r, v = motion
-    if not is_open(openings, wall, r, near):
+    if not lets_through(openings, walls, wall, r, near):
         return wall
     moving, touch = rules.laws.moving, TOUCH * rules.size + near
     number = walls.numbers_near(r)
@@ -59,7 +62,8 @@ def hit_wall(openings, rules, walls, motion, wall, near):
         towards, distance = dot(walls.unit_normal(number[i], r), w), walls.distance(number[i], r)
         # Reached within the distance `touch` along the way, not across it: at a corner who leaves, leaves.
         here = towards > 0.0 and distance <= touch and -distance * norm(w) <= touch * towards
-        if here and -distance < soonest * towards and not is_open(openings, number[i], r, near):
+        here = here and not has_ended(walls, number[i], r, near)
+        if here and -distance < soonest * towards and not lets_through(openings, walls, number[i], r, near):
             found, soonest = number[i], max(-distance, 0.0) / towards
     return found
 
@@ -73,13 +77,17 @@ def open_wall_of(openings, rules, walls, active, r, near):
 
 
 @outlined
-def open_wall_at(openings, rules, walls, r, near):
-    """A wall at a place that lets out there, or -1."""
+def open_wall_at(openings, rules, walls, gravity, motion, near):
+    """A wall at the place of a particle (r, v) that lets it out there, or -1; into another room if it is pressed."""
     if openings is None:
         return -1.0
+    r, v = motion
     number, touch = walls.numbers_near(r), TOUCH * rules.size
     for i in range(number.size):
-        if walls.distance(number[i], r) >= -touch and _lets_out(openings, rules, walls, number[i], r, near):
+        here = walls.distance(number[i], r) >= -touch and not has_ended(walls, number[i], r, near)
+        if not here or not _lets_out(openings, rules, walls, number[i], r, near):
+            continue
+        if is_pressed(walls, gravity, number[i], r, v) or not leads_on(walls, number[i], r):
             return number[i]
     return -1.0
 
@@ -104,6 +112,8 @@ def may_pass(openings, active, path):
 
 
 def _may_enter(volume, path, reach):
+    if isinstance(volume, Timed):
+        return volume.if_open(_may_enter(volume.volume, path, reach), False)
     if isinstance(volume, Field):
         return _may_enter_one(volume.members, path, reach)
     return outside(volume, path.r1) <= reach
@@ -129,9 +139,9 @@ def part_until_open(openings, rules, walls, active, path, near):
 
 @outlined
 def _part_uncovered(openings, rules, walls, wall, path, near):
-    """`part_until_open` of one wall. Where a closed wall lies on its opening, the step is looked at until that ends."""
+    """`part_until_open` of one wall. Where its opening lets nobody out, the step is looked at until that ends."""
     low = _part(openings, wall, path, near)
-    if not low < math.inf or not _is_covered(openings, rules, walls, wall, at_part(path, low), near):
+    if not low < math.inf or _lets_out_at(openings, rules, walls, wall, path, near, low):
         return low
     for k in range(1, _PLACES + 1):
         high = k / _PLACES
@@ -146,17 +156,18 @@ def _lets_out_at(openings, rules, walls, wall, path, near, part):
 
 
 def _part(openings, wall, path, near):
+    first = math.inf
     for opening in openings:
         if opening.first <= wall < opening.last:
-            first = math.inf
             for volume in reversed(opening.volumes):
                 first = min(_way_into(volume, path, near), first)
-            return first
-    return math.inf
+    return first
 
 
 def _way_into(volume, path, near):
     """The part of a step after which it is in a volume."""
+    if isinstance(volume, Timed):
+        return volume.if_open(_way_into(volume.volume, path, near), math.inf)
     if isinstance(volume, Field):
         return _way_into_any(volume.members, path, near)
     return _way_in(volume, path, near)

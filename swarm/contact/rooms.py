@@ -41,21 +41,26 @@ def _ends(walls, number, r, much, near):
     """
     ended = False
     for first, field in _patches(walls):
-        is_of = (number >= first) & (number < first + field.count())
-        ended = (is_of & (not field.members.is_there(number - first, r, much * near))) | ended
+        here = (number >= first) & (number < first + field.count())
+        ended = (here & (not field.members.is_there(number - first, r, much * near))) | ended
     for rooms in walls.joined():
         least, gaps = much * walls.slack, gaps_in(rooms, r)
         for k, room in enumerate(rooms):
             beyond = gaps[k] > least
             for j, gap in enumerate(gaps):
                 beyond = beyond | (gap < -least) if j != k else beyond
-            ended = (_is_of(room, number) & beyond) | ended
+            ended = (is_of(room, number) & beyond) | ended
     return ended
 
 
-def _is_of(room, number):
+def is_of(room, number):
     """Whether a wall is one of a room."""
     return (number >= room[0][0]) & (number <= room[-1][0])
+
+
+def has_ended(walls, number, r, near):
+    """Whether a wall is not there at a place on it."""
+    return have_ends(walls) and _ends(walls, number, r, _BEYOND, near)
 
 
 def may_end(walls, active, r, near):
@@ -91,7 +96,7 @@ def _wall_on(walls, rooms, number, r):
     """A wall of another room that lies on this one, where the particle is inside of none."""
     found, flies = -1.0, False
     for room in rooms:
-        if not _is_of(room, number):
+        if not is_of(room, number):
             gap = gap_in(room, r)
             flies = flies or gap < -_FLIES * walls.slack
             if gap <= _BEYOND * walls.slack:
@@ -162,12 +167,26 @@ def leaving(walls, spans, active, path, near, remaining):
 
 @outlined
 def _begin(walls, spans, active, path, near, remaining, inside):
-    """Which rooms of a union hold a particle at the start of a step; the nearest at least."""
-    nearest = math.inf
-    for span in spans:
-        nearest = min(nearest, _deepest(walls, span, active, path, remaining, 0.0)[0])
-    for k, span in enumerate(spans):
-        inside[k] = _deepest(walls, span, active, path, remaining, 0.0)[0] <= max(near, nearest)
+    """Which rooms of a union a particle is in at the start of a step: that whose wall holds it, or the nearest.
+
+    It is in another one if it is inside of that by more than `near`: rooms that touch are apart.
+    """
+    nearest, held = math.inf, False
+    for first, last in spans:
+        nearest = min(nearest, _deepest(walls, (first, last), active, path, remaining, 0.0)[0])
+        held = held or _holds(active, first, last)
+    least = -near if held else max(near, nearest)
+    for k, (first, last) in enumerate(spans):
+        depth = _deepest(walls, (first, last), active, path, remaining, 0.0)[0]
+        inside[k] = depth <= least or _holds(active, first, last)
+
+
+def _holds(active, first, last):
+    """Whether one of the walls that hold a particle is one of a room."""
+    found = False
+    for one in active:
+        found = found or first <= one <= last
+    return found
 
 
 @outlined

@@ -159,7 +159,7 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
     if lanes.period is not None:
         return_lanes(lanes.period, state, lanes, live)
     if state.openings is not None:
-        let_out_lanes(state.openings, method, walls, share, lanes, live)
+        let_out_lanes(state.openings, method, walls, gravity, share, lanes, live)
     if method.solves is not None:
         solve(method, walls, gravity, state.multipliers, lanes, live)
     for watch in watches:

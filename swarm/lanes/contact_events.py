@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..contact import crossing, events, touching
+from ..contact.doorways import leads_on, lets_through, through
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.heat import exchange
 from ..contact.hold import One, Two, drift
@@ -12,10 +13,9 @@ from ..kernel.arrays import scratch
 from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.random import Stream
-from ..kernel.vector import ZERO, column, put, square
+from ..kernel.vector import ZERO, column, norm, put, square
 from ..status import Status
 from ..surfaces.moving import Carried
-from ..surfaces.openings import is_open
 from . import log as impact_log
 from .accounts import book, book_heat, book_step, book_work, lose
 from .arrays import booked, speed2_scale
@@ -67,7 +67,7 @@ def _decide(method, walls, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     r, v, remaining = column(state.position, 0, i), column(state.velocity, 0, i), contacts.remaining[i]
     carried, walls = walls, walls.at(remaining)
-    if state.openings is not None and _let_out(method, walls, share, i, r, v, remaining):
+    if state.openings is not None and _let_out(method, walls, gravity, share, i, r, v, remaining):
         return True
     p = events.Particle(r, v, remaining, 2.0 * state.energy[i], speed2_scale(state, i))
     moved = contacts.events[0, i] - remaining
@@ -102,6 +102,7 @@ def _decide(method, walls, gravity, share, i):
     if phase == FLYING:
         v = events.off_the_wall(walls, wall, r, v, u)
     slides = phase != FLYING
+    _settle(walls, state, i, found)
     put(state.velocity, 0, i, v)
     contacts.keep[i] = found.keep
     # The step of before is a good first one where the walls are the same.
@@ -114,16 +115,43 @@ def _decide(method, walls, gravity, share, i):
     return again < _MOST
 
 
+def _settle(walls, state, i, found):
+    """A particle that begins to slide, on its wall again: where rooms touch what meets one is put inside of it."""
+    if walls.inset is not None and (found.phase == HELD or found.phase == EDGE):
+        put(state.position, 0, i, walls.project(found.wall, column(state.position, 0, i)))
+
+
 @outlined
-def _let_out(method, walls, share, i, r, v, remaining):
+def _let_out(method, walls, gravity, share, i, r, v, remaining):
     """Whether particle i has escaped, since the wall that it has met is open there."""
     openings, met, near = share.state.openings, share.state.contacts.met, crossing.near(method, r)
     # Where this one is open, a closed one at the same place.
     met[i] = hit_wall(openings, method, walls, (r, v), met[i], near)
-    if not is_open(openings, met[i], r, near):
+    if not lets_through(openings, walls, met[i], r, near):
         return False
-    _leave(share, i, met[i], r, v, remaining)
+    if leads_on(walls, met[i], r):
+        _go_through(walls, gravity, share, i, met[i], r, v)
+    else:
+        _leave(share, i, met[i], r, v, remaining)
     return True
+
+
+@outlined
+def _go_through(walls, gravity, share, i, wall, r, v):
+    """Particle i flies into the room on the other side of a wall, with the speed that it has kept across its walls."""
+    state, contacts = share.state, share.state.contacts
+    first, second, keep = contacts.walls[0, i], contacts.walls[1, i], contacts.keep[i]
+    if keep > 0.0 and first >= 0.0:
+        n = walls.unit_normal(first, r)
+        n = n + walls.unit_normal(second, r) if second >= 0.0 else n
+        v = v - (keep / norm(n)) * n
+    r, v = through(walls, gravity, wall, (r, v))
+    put(state.position, 0, i, r)
+    put(state.velocity, 0, i, v)
+    contacts.keep[i], contacts.step[i] = 0.0, 0.0
+    contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
+    contacts.phase[i] = FLYING
+    share.hand_over(i, FLYING)
 
 
 @outlined
@@ -222,7 +250,11 @@ def _step(method, walls, gravity, share, i):
     remaining = remaining if remaining > 0.0 else share.span
     now = walls.at(remaining)
     if state.openings is not None:
-        wall = open_wall_at(state.openings, method, now, r, crossing.near(method, r))
+        wall = open_wall_at(state.openings, method, now, gravity, (r, v), crossing.near(method, r))
+        if wall >= 0.0 and leads_on(now, wall, r):
+            contacts.remaining[i] = remaining
+            _go_through(now, gravity, share, i, wall, r, v)
+            return
         if wall >= 0.0:
             _leave(share, i, wall, r, v, remaining)
             return

@@ -1,6 +1,7 @@
 """Particles that reach a wall where it is open: they have escaped, and nothing is left of their frames."""
 
 from ..contact import crossing
+from ..contact.doorways import closeness, leads_on, lets_through, through
 from ..contact.passing import hit_wall, open_wall_of
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
@@ -16,17 +17,25 @@ def escape(share, p, wall, r, v, remaining):
         share.log.add_escape(share.state, p, impact_log.Struck(r, v, v, wall, remaining, 0.0))
 
 
-def let_out_lanes(openings, method, walls, share, lanes, live):
-    """The lanes whose flight has ended on a wall where it is open, if no closed one is at the same place."""
+def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
+    """The lanes whose flight has ended on a wall where it is open, if no closed one is at the same place.
+
+    Where another room is on its other side a lane is in that, and its flight goes on in the next pass.
+    """
+    near = closeness(walls)
     for i in range(index(live)):
-        lanes.marked[i] = is_open(openings, lanes.wall[i], lanes.lane(i).r, 0.0)
+        lanes.marked[i] = is_open(openings, lanes.wall[i], lanes.lane(i).r, near)
     for k in range(marked_lanes(lanes, live)):
         i = index(lanes.order[k])
         flier = lanes.lane(i)
         r, v = flier.r, flier.v
-        wall = hit_wall(openings, method, walls.at(flier.remaining), (r, v), lanes.wall[i], 0.0)
-        if not is_open(openings, wall, r, 0.0):
+        now = walls.at(flier.remaining)
+        wall = hit_wall(openings, method, now, (r, v), lanes.wall[i], near)
+        if not lets_through(openings, now, wall, r, near):
             lanes.wall[i] = wall
+            continue
+        if leads_on(now, wall, r):
+            (flier.r, flier.v), lanes.wall[i] = through(now, gravity, wall, (r, v)), -1.0
             continue
         escape(share, index(lanes.particle[i]), lanes.wall[i], r, v, flier.remaining)
         flier.remaining, lanes.wall[i] = 0.0, -1.0

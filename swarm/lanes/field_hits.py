@@ -16,7 +16,7 @@ from ..surfaces import flights
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.facets.members import Facets
 from ..surfaces.fields.grid import cell_of, until_next
-from ..surfaces.fields.members import Few, gathered, member, width
+from ..surfaces.fields.members import gathered, member, width
 from ..surfaces.period import on_time
 from ..surfaces.walls import Walls
 from .arrays import Flying
@@ -111,7 +111,7 @@ def _seek(gravity, members, before, lanes, live):
     """The same with one field that has so many walls before it."""
     if isinstance(members, Facets):
         go_through(gravity, members, before, lanes, live)
-    elif isinstance(members, Few):
+    elif members.few:
         _look_at_all(members, before, lanes, live)
     else:
         _look_at_near(gravity, members, before, lanes, live)

@@ -5,6 +5,7 @@ from ..surfaces import flights, safe, strides
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.moving import Carried, Marched, Strided
 from ..surfaces.period import cut
+from ..surfaces.rooms import at_the_end, inside_of
 from .field_hits import hit_of_lane, keep_hit, seek
 from .table import marked_lanes
 
@@ -120,7 +121,11 @@ def _flight(method, walls, gravity, lanes, i, hit):
     """A lane to its next contact, `hit` if the method lands on walls, or to the end of the frame."""
     lane = lanes.given(method, i)
     if method.lands:
+        if walls.inset is not None:
+            hit = at_the_end(walls, gravity, lane.v, lane.remaining, hit)
         end = method.land(walls, gravity, lane, cut(lanes.period, gravity, (lane.r, lane.v), lane.remaining, hit))
+        if walls.inset is not None:
+            end = end._replace(r=inside_of(walls.at(end.remaining), end.wall, end.r))
     else:
         end = method.flight(walls, gravity, lane)
     lanes.lane(i).put_end(end)

@@ -14,6 +14,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import column, put, square
 from ..status import Status
+from ..surfaces.rooms import inside_of
 from .arrays import Place, speed2_scale
 from .periodic import return_particle, return_sliding
 from .sliding import AGAIN, Slide
@@ -145,6 +146,8 @@ def _retire(slide, share, i, phase):
     if phase == FLYING:
         u = wall_velocity(slide.moving(), now, lane.first, lane.r)
         v = events.off_the_wall(now, lane.first, lane.r, v, u)
+        if now.inset is not None:
+            lane.r = inside_of(now, lane.first, lane.r)
     put(state.position, 0, p, lane.r)
     put(state.velocity, 0, p, v)
     contacts.walls[0, p] = lane.first if slid else -1.0

@@ -22,6 +22,7 @@ _WITHOUT_LAWS = {
     "mass": None,
     "inertia": None,
     "openings": (),
+    "present": None,
 }
 
 
@@ -95,7 +96,7 @@ def check_surfaces(method: Method, scene: Scene) -> None:
 
 def check_laws(name: str, scene: Scene) -> None:
     """Raise a `SceneError` if a surface has a law that a method of this name does not know: any but a given motion."""
-    for i, surface in enumerate(scene.surfaces):
+    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
         for law, without in _WITHOUT_LAWS.items():
             value = getattr(surface, law)
             if value != without:
@@ -108,7 +109,7 @@ def check_laws(name: str, scene: Scene) -> None:
 
 def check_motions(name: str, scene: Scene) -> None:
     """Raise a `SceneError` if a surface moves in a way that steps of a method of this name cannot follow."""
-    for i, surface in enumerate(scene.surfaces):
+    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
         if surface.motion is not None and drive_of(surface, 0.0).turn is not None:
             raise SceneError(
                 f"surfaces[{i}].motion must not turn the surface with {name}, got {surface.motion}: in the frame of a "
@@ -120,7 +121,7 @@ def check_motions(name: str, scene: Scene) -> None:
 
 def check_bends(scene: Scene) -> None:
     """Raise a `SceneError` if a surface moves so that it is met by safe steps, and does not bound its bend."""
-    for i, surface in enumerate(scene.surfaces):
+    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
         if lacks_bend(surface):
             raise SceneError(
                 f"surfaces[{i}] ({type(surface).__name__}) must give hessian_bounds() to move as {surface.motion} "

@@ -96,6 +96,11 @@ class Impact(base.Method):
                 f"contact_step must be 0 where a surface has a restitution below 1, friction, a temperature or a "
                 f"motion, got {self.contact_step:g}: the contact step conserves the energy"
             )
+        if self.contact_step > 0.0 and scene.has_doors():
+            raise SceneError(
+                f"contact_step must be 0 where a wall is present, or an opening open, for some times only, got "
+                f"{self.contact_step:g}: a contact step would last while they change"
+            )
         if scene.reacts():
             _require_reacting(scene)
         base.check_bends(scene)
@@ -153,6 +158,11 @@ def _require_reacting(scene: Scene) -> None:
             raise SceneError(
                 f"surfaces[{i}].openings must be left out where a wall has a mass, got {len(surface.openings)}; give "
                 "that wall a motion instead of a mass"
+            )
+        if surface.present is not None:
+            raise SceneError(
+                f"surfaces[{i}].present must be None where a wall has a mass, got {surface.present}; give that wall a "
+                "motion instead of a mass"
             )
         if surface.friction > 0.0 and surface.reacts():
             raise SceneError(

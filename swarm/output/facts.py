@@ -84,6 +84,10 @@ def of_run(seen: dict[str, Any]) -> dict[str, str]:
         given = enumerate(seen.get(f"wall_{what}", [[]])[-1])
         if told := ", ".join(f"{energy:.4g} J from surfaces[{i}]" for i, energy in given if energy):
             rows[f"wall {what}"] = told
+    for what, unit in (("impulse", "N s"), ("heat", "J")):
+        of_parts = np.array(seen.get(f"part_{what}", [[]])[-1])
+        if of_parts.any():
+            rows[f"{what} of parts"] = f"{', '.join(f'{given:.4g}' for given in of_parts)} {unit}"
     if seen.get("escaped", [0])[-1]:
         rows["escaped"] = f"{int(seen['escaped'][-1])} particles"
     return rows

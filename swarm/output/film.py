@@ -1,5 +1,6 @@
 """A trajectory as a film: particles among their walls, frame by frame, by the writers of matplotlib."""
 
+import bisect
 import contextlib
 import os
 import shutil
@@ -19,7 +20,7 @@ from ..particles import Floats
 from ..plane import shown_as
 from . import colours, drawing, paths
 from .drawn import Drawn
-from .shapes import shapes_of, since_start
+from .shapes import Shape, shapes_of, since_start
 
 _SUFFIXES = (".mp4", ".gif")
 # Pixels of a side of the film.
@@ -29,6 +30,9 @@ _LEAST, _MOST = 64, 8192
 _DPI, _ROOM = 120, 240
 # Hundredths of a second, in which a GIF counts; viewers take less than 2 for 10.
 _HUNDREDTHS, _FASTEST = 100.0, 50.0
+
+# Of each wall whether it is of a solid, and its curves.
+Wires = list[tuple[bool, list[Floats]]]
 
 
 # Matplotlib's writers draw every frame anew, twice; these take what `_Film` has drawn.
@@ -119,6 +123,10 @@ def _reason(error: Exception) -> str:
     return str(error)
 
 
+def _wires(shapes: list[Shape]) -> Wires:
+    return [(shape.solid, shape.wires) for shape in shapes]
+
+
 class _Film:
     """The picture, whose artists change from frame to frame."""
 
@@ -126,8 +134,10 @@ class _Film:
         self._trajectory, self._scene = trajectory, trajectory.scene
         self._seen, start = trajectory.observed(), trajectory.frame(numbers[0])
         self._drawn = drawn = Drawn(len(start), trajectory.body, most)
+        self._start, self._between = start.position, dict[tuple[int, float], Wires]()
+        self._changes = self._scene.moves() or self._scene.has_doors()
         self._shapes = shapes_of(self._scene, start.position)
-        self._walls = [(shape.solid, shape.wires) for shape in self._shapes]
+        self._walls = _wires(self._shapes)
         self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, start)
         # With half a pixel round-off takes none away.
         dpi = _DPI * min(1.0, min(pixels) / _ROOM)
@@ -145,8 +155,8 @@ class _Film:
         else:
             size = 0.0 if len(drawn.triangles) else 1.0
             self._dots, self._wires = drawing.particles(self._axes, at, drawing.LIGHT, self._walls, size, box)
-        # What lies in front of the dots, or moves, is drawn in every frame, and all else once.
-        self._wires = [one for one in self._wires if self._scene.moves() or one.get_zorder() > self._dots.get_zorder()]
+        # What lies in front of the dots, or changes, is drawn in every frame, and all else once.
+        self._wires = [one for one in self._wires if self._changes or one.get_zorder() > self._dots.get_zorder()]
         for artist in (*self._wires, self._dots, self._title):
             artist.set_animated(True)
         scale = self._scale
@@ -163,16 +173,26 @@ class _Film:
             boxes.append(drawing.around(points, self._walls_at(k)))
         return np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
 
-    def _walls_at(self, k: int) -> list[tuple[bool, list[Floats]]]:
+    def _walls_at(self, k: int) -> Wires:
         """The curves of every wall at frame k, which are those of the start, moved."""
+        if self._scene.has_doors() or any(shape.motion is not None for shape in self._shapes):
+            # Where doors shut, or parts of a union move, other walls are there.
+            return self._walls_then(float(self._seen["time"][k]))
         if not self._scene.moves():
             return self._walls
         moved = []
-        for i, (solid, curves) in enumerate(self._walls):
-            places = (self._seen[name][k, i] for name in ("wall_position", "wall_orientation"))
-            turn, way = since_start(self._scene, i, *places)
-            moved.append((solid, [curve @ turn.T + way for curve in curves]))
+        places = self._seen["wall_position"][k], self._seen["wall_orientation"][k]
+        for shape in self._shapes:
+            turn, way = since_start(self._scene, shape, self._seen["time"][k], places)
+            moved.append((shape.solid, [curve @ turn.T + way for curve in shape.wires]))
         return moved
+
+    def _walls_then(self, time: float) -> Wires:
+        """The curves of the walls that are there at a time [s], drawn once from one instant to the next."""
+        which = bisect.bisect_right(self._scene.instants, time), time if self._scene.moves() else 0.0
+        if which not in self._between:
+            self._between[which] = _wires(shapes_of(self._scene, self._start, time))
+        return self._between[which]
 
     def show(self, k: int) -> None:
         """Draw frame k on the canvas."""
@@ -183,7 +203,7 @@ class _Film:
         if across is None:
             self._dots.set_3d_properties(position[2], "z")
         self._dots.set_facecolor(drawing.red_green_blue(packed))
-        if self._scene.moves():
+        if self._changes:
             for artist, (_solid, curves) in zip(self._wires, self._walls_at(k), strict=True):
                 artist.set_segments(curves if across is None else [shown_as(across, curve) for curve in curves])
         ties = drawing.ties(self._axes, *drawn.ties(position.T, packed, tints)) if across is None else []

@@ -9,6 +9,7 @@ from xarray.core import indexing
 
 from ..columns import COMPONENTS
 from . import layout
+from .named import name_of, names_of_parts
 
 # Of what the file keeps of each particle: its name in the Dataset and its unit. "impacts" are those of all.
 _PARTICLES = {
@@ -50,13 +51,15 @@ class _Column(BackendArray):  # type: ignore[misc]
 
 def dataset_of(trajectory: Any) -> xr.Dataset:
     """The Dataset of a trajectory; see `Trajectory.to_xarray`."""
-    surfaces = [f"{i}_{type(surface).__name__.lower()}" for i, surface in enumerate(trajectory.scene.surfaces)]
+    surfaces = [name_of(trajectory.scene, i) for i in range(len(trajectory.scene.surfaces))]
     data: dict[str, Any] = {}
     coordinates: dict[str, Any] = {
         "time": ("time", trajectory.times, {"units": "s"}),
         "axis": list(_AXES),
         "surface": surfaces,
     }
+    if parts := names_of_parts(trajectory.scene):
+        coordinates["part"] = parts
     for name, values in trajectory.observables.items():
         if name != "time":
             unit = next((unit for end, unit in _UNITS.items() if name.endswith(end)), "1")
@@ -81,5 +84,5 @@ def dataset_of(trajectory: Any) -> xr.Dataset:
 def _dimensions(name: str, dimensions: int) -> list[str]:
     """The dimensions of an observable besides the time."""
     last = {None: [], 3: ["axis"], 4: ["quaternion"]}[len(COMPONENTS[name]) if name in COMPONENTS else None]
-    first = "cavity" if name.startswith("cavity") else "surface"
+    first = next((kind for kind in ("cavity", "part") if name.startswith(kind)), "surface")
     return [first] * (dimensions - 1 - len(last)) + last

@@ -27,16 +27,18 @@ _DENSEST = 1032
 # Bytes of the header of a heap of texts, and of each object in it; the signature of a heap.
 _HEADER, _HEAP = 16, int.from_bytes(b"GCOL", "little")
 
-# The shape of an entry of the observables of every run; None stands for one of each surface.
+# The shape of an entry of the observables of every run; None stands for one of each surface, or of each part.
 _OBSERVABLES: dict[str, tuple[int | None, ...]] = {
     **dict.fromkeys(("kinetic_energy", "potential_energy", "contact_energy", "total_energy", "dissipated_energy"), ()),
     **dict.fromkeys(("energy_error", "max_penetration", "impacts", "escaped", "unconverged"), ()),
     "impulse": (None,),
 }
+# Of each part of the unions of a scene.
+_OF_PARTS = ("part_impulse", "part_heat")
 # Likewise, but files of older versions have none of them, or only those of bodies.
 _LATER: dict[str, tuple[int | None, ...]] = {
     **dict.fromkeys(("sliding", "sliding_time", "link_error", "work"), ()),
-    **dict.fromkeys(("wall_heat", "wall_work", "wall_energy"), (None,)),
+    **dict.fromkeys(("wall_heat", "wall_work", "wall_energy", *_OF_PARTS), (None,)),
     **dict.fromkeys(("wall_position", "wall_velocity", "wall_spin"), (None, 3)),
     "wall_orientation": (None, 4),
 }
@@ -152,11 +154,12 @@ def text(dataset: Any, path: Path) -> str:
     return str(dataset.asstr()[()])
 
 
-def require_observables(seen: dict[str, NDArray[Any]], surfaces: int) -> None:
+def require_observables(seen: dict[str, NDArray[Any]], surfaces: int, parts: int) -> None:
     """Raise a ValueError if an observable of every run is missing or has another shape."""
     n = len(seen["time"])
     for name, entry in {**_OBSERVABLES, **{name: _LATER[name] for name in _LATER if name in seen}}.items():
-        shape = (n, *(surfaces if length is None else length for length in entry))
+        each = parts if name in _OF_PARTS else surfaces
+        shape = (n, *(each if length is None else length for length in entry))
         if name not in seen or seen[name].shape != shape:
             came = "nothing" if name not in seen else str(seen[name].shape)
             raise ValueError(f"expected {name} of the shape {shape}, got {came}")

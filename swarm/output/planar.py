@@ -4,17 +4,24 @@ import contourpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion import Pose
+from ..motion import Pose, pose
 from ..particles import Floats
 from ..plane import along
 from ..scene import Scene
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
+from ..surfaces.instant import box_of
 from ..surfaces.openings import are_open
+from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.surface import Surface
+from .cut import Level, Smooth
+from .parts import Part
+from .sharp import filled, smooth_walls
 
 # Points along each side of the grid on which curves are found, and of a small body on a grid of its own; of a circle.
 _POINTS, _BODY, _CIRCLE = 500, 60, 97
+# Bisections of a piece of a curve at the end of a wall.
+_BISECTIONS = 20
 # Cells of the grid beyond the walls, so that these are closed.
 _MARGIN = 2.0
 # An open area is drawn to this many times the distance of the surfaces and particles.
@@ -44,8 +51,8 @@ class PlaneWalls:
     def curves(self, i: int, pose: Pose, bodies: int) -> list[Floats]:
         """The curves (k, 3) [m] of surface i."""
         surface = self._scene.surfaces[i]
-        if hasattr(surface, "curves"):
-            return [pose.placed(curve.T).T for curve in surface.curves()]
+        if isinstance(surface, Outlined):
+            return self._of(i, surface.curves())
         if isinstance(surface, Spheres):
             angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE)
             circle = self._placed(np.stack([np.cos(angle), np.sin(angle)], axis=1))
@@ -64,6 +71,48 @@ class PlaneWalls:
         return self._of(
             i, self._curves((np.maximum(low - margin, self._box[0]), np.minimum(high + margin, self._box[1])))
         )
+
+    def of_part(self, part: Part) -> list[Floats]:
+        """The curves of a part of a surface where it is a wall, each end where it meets another one."""
+        surface, at = part.surface, pose(part.surface.motion, self._time)
+        walls = smooth_walls(surface)
+        if isinstance(surface, Outlined):
+            return self._cut(part, walls[0], [], [at.placed(curve.T).T for curve in surface.curves()], at)
+        low, high = (np.array(corner)[list(self._axes)] for corner in box_of(filled(surface), self._time))
+        low, high = np.maximum(low, self._box[0]), np.minimum(high, self._box[1])
+        margin = _MARGIN * (high - low) / (_POINTS - 1.0)
+        sides = [np.linspace(a, b, _POINTS) for a, b in zip(low - margin, high + margin, strict=True)]
+        grid, found = at.given(self._placed(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)).T).T, list[Floats]()
+        for wall in walls if (low < high).all() else ():
+            with np.errstate(all="ignore"):
+                level = np.nan_to_num(wall.phi(grid), nan=1.0).reshape(_POINTS, _POINTS)
+            lines = contourpy.contour_generator(sides[0], sides[1], level).lines(0.0)
+            curves = [self._placed(np.asarray(line)) for line in lines]
+            found += self._cut(part, wall, [other for other in walls if other is not wall], curves, at)
+        return found
+
+    def _cut(self, part: Part, wall: Smooth, others: list[Smooth], curves: list[Floats], at: Pose) -> list[Floats]:
+        """The parts of curves on a smooth wall that are a wall of the scene."""
+        size = float((self._box[1] - self._box[0]).max())
+        side = -1.0 if part.surface.is_solid() else 1.0
+
+        def level(points: Floats) -> Floats:
+            given = at.given(points.T).T
+            outwards = side * at.turned(wall.normals(given).T).T
+            found = part.level(points, outwards, size, list(part.covers))
+            return np.asarray(np.max([found, *(other.distance(given) for other in others)], axis=0))
+
+        found = []
+        for curve in curves:
+            there = level(curve) <= 0.0
+            for a, b in np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8))).reshape(
+                -1, 2
+            ):
+                first = [_end(level, curve[a], curve[a - 1])] if a else []
+                last = [_end(level, curve[b - 1], curve[b])] if b < len(curve) else []
+                if len(first) + len(last) + b - a > 1:
+                    found.append(np.array([*first, *curve[a:b], *last]))
+        return found
 
     def strip(self, curves: list[Floats]) -> Strip:
         """The ribbon on curves: vertices, triangles and normals."""
@@ -101,7 +150,7 @@ class PlaneWalls:
                 gaps = self._scene.gaps(curve.T, self._time)
             owner = np.asarray(np.nan_to_num(gaps, nan=-np.inf).argmax(axis=0))
             for k, volumes in enumerate(self._scene.volumes):
-                owner[(owner == k) & are_open(volumes, curve.T)] = -1
+                owner[(owner == k) & are_open(volumes, curve.T, self._time)] = -1
             ends = np.flatnonzero(np.diff(np.concatenate([[False], owner == i, [False]]).astype(np.int8)))
             found += [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]
         return found
@@ -124,3 +173,14 @@ class PlaneWalls:
         found = np.zeros((len(points), 3))
         found[:, list(self._axes)] = points
         return found
+
+
+def _end(level: Level, within: Floats, beyond: Floats) -> Floats:
+    """The point between two on a curve up to which a level is not above 0."""
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (within + beyond)
+        if level(middle[None])[0] <= 0.0:
+            within = middle
+        else:
+            beyond = middle
+    return within

@@ -200,9 +200,12 @@ class RecordingWriter:
 
     def _send_walls(self, numbers: Any, times: Any, walls: list[tuple[Any, Any]]) -> None:
         """Send where the surfaces that move are, (position, orientation) a frame, from where they were drawn."""
-        for i, (shape, surface) in enumerate(zip(self._shapes, self._scene.surfaces, strict=True)):
-            if surface.motion is not None or surface.reacts():
-                moves = [since_start(self._scene, i, position[i], turned[i]) for position, turned in walls]
+        for shape in self._shapes:
+            surface = self._scene.surfaces[shape.surface]
+            if shape.motion is not None or surface.motion is not None or surface.reacts():
+                moves = [
+                    since_start(self._scene, shape, moment, places) for moment, places in zip(times, walls, strict=True)
+                ]
                 turns, ways = (np.array(parts) for parts in zip(*moves, strict=True))
                 # From the centre: x1 - c = A (x0 - c) + (b + A c - c)
                 ways = ways + (turns @ self._center - self._center)

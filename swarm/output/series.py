@@ -11,6 +11,9 @@ from ..bodies.body import Body
 from ..methods import Method
 from ..particles import Floats
 from ..scene import Scene
+from ..surfaces.surface import Surface
+from ..surfaces.union import part_at
+from .named import name_of
 from .shapes import Shape
 
 # Stands for the logarithm of zero.
@@ -92,25 +95,53 @@ def lines_of(scene: Scene, method: Method, shapes: list[Shape], body: Body | Non
         lines.append(Line("/energy/work", "work of anchors", "work"))
     # The walls of an open volume are drawn in part, so they have no area.
     group = "force" if scene.is_open() else "pressure"
-    for i, shape in enumerate(shapes):
-        area = 1.0 if scene.is_open() else shape.area()
-        if area > 0.0:
-            lines.append(Line(f"/{group}/{shape.name}", shape.name, "impulse", i, per=area))
+    for wall in _walls(scene, shapes):
+        if scene.is_open() or wall.area > 0.0:
+            per = 1.0 if scene.is_open() else wall.area
+            lines.append(Line(f"/{group}/{wall.name}", wall.name, wall.observed("impulse"), wall.number, per=per))
     if method.is_rigid():
         lines.append(Line("/sliding", every, "sliding"))
     return lines + _lines_of_walls(scene, shapes)
 
 
+@dataclass(frozen=True)
+class _Wall:
+    """A surface, or a part of one, and its number among those of the observables of either."""
+
+    name: str
+    surface: Surface
+    number: int
+    area: float
+    is_part: bool
+
+    def observed(self, quantity: str) -> str:
+        """The observable that holds a quantity of it."""
+        return f"part_{quantity}" if self.is_part else {"impulse": "impulse"}.get(quantity, f"wall_{quantity}")
+
+
+def _walls(scene: Scene, shapes: list[Shape]) -> list[_Wall]:
+    """What is drawn, by its surfaces, and by the parts of those that have parts."""
+    found = []
+    for shape in shapes:
+        i, part = shape.surface, (shape.surface, shape.place)
+        number = scene.parts.index(part) if shape.place else i
+        surface = part_at(scene.surfaces[i], shape.place)
+        found.append(_Wall(shape.name, surface, number, shape.area(), bool(shape.place)))
+    return found
+
+
 def _lines_of_walls(scene: Scene, shapes: list[Shape]) -> list[Line]:
     """Of surfaces that give heat, do work, or are moved."""
     lines = []
-    for i, shape in enumerate(shapes):
-        surface, name = scene.surfaces[i], shape.name
+    for wall in _walls(scene, shapes):
+        surface, name = wall.surface, wall.name
         if surface.temperature is not None or surface.laws:
-            lines.append(Line(f"/heat/{name}", name, "wall_heat", i, per=1.0))
+            lines.append(Line(f"/heat/{name}", name, wall.observed("heat"), wall.number, per=1.0))
+    for i, surface in enumerate(scene.surfaces):
+        name = name_of(scene, i)
         if surface.reacts():
             lines.append(Line(f"/energy/{name}", f"energy of {name}", "wall_energy", i))
-        elif surface.motion is not None:
+        elif any(shape.surface == i and part_at(surface, shape.place).motion is not None for shape in shapes):
             lines.append(Line(f"/energy/work_{name}", f"work of {name}", "wall_work", i))
     return lines
 

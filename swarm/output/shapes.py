@@ -11,14 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
-from ..motion import Pose, pose
+from ..motion import Pose, WallMotion, pose
 from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
 from ..surfaces.openings import are_open
+from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
+from ..surfaces.union import Joined, Place
+from . import sharp
+from .curves import runs
+from .named import name_of
+from .parts import parts_of
 from .planar import PlaneWalls
 
 # Points along each side of the grid for the triangles. The area of a sphere is 0.07 % too small, of a box 0.6 %.
@@ -47,7 +53,9 @@ class Shape:
     """The part of one surface that is a wall of the volume.
 
     Attributes:
-        name: its number and kind, such as "0_ellipsoid".
+        name: its number and kind, such as "0_ellipsoid"; of a part of a union, "0_union_1_cylinder".
+        surface: the number of the surface in the scene; place: of a part in that.
+        motion: of a part of a union its own; else None, and it moves with the surface.
         solid: whether particles are kept out of it.
         vertices, triangles, normals: (V, 3) [m], (T, 3), (V, 3).
         wires: curves (k, 3) [m].
@@ -61,6 +69,9 @@ class Shape:
     normals: Floats
     wires: list[Floats]
     height: float | None = None
+    surface: int = 0
+    place: Place = ()
+    motion: WallMotion | None = None
 
     def area(self) -> float:
         """Of the triangles [m^2]; in a scene of two dimensions the length of the curves [m]."""
@@ -80,39 +91,81 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
     walls = _Walls(scene, positions, time)
     # On a grid around all of them the many bodies of a scene would be too small, and a grid around each too slow.
     grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
+    sharp_ones = _sharp(scene, walls.box, time)
     shapes = []
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
-        bodies = len(surface) if isinstance(surface, Many) else int(i in grouped)
+        bodies = bodies_of(surface) or int(i in grouped)
         mesh, wires = _NOTHING, list[Floats]()
-        if bodies <= most and isinstance(surface, Spheres):
+        if not bodies and sharp_ones:
+            shapes += sharp_ones[i]
+            continue
+        if not surface.is_there(time):
+            pass
+        elif bodies <= most and isinstance(surface, Spheres):
             mesh, wires = _placed(at, *_balls(surface))
         elif bodies and bodies <= most:
             mesh, wires = _placed(at, *_bodies(surface, _given(walls.box, at)))
         elif not bodies:
             mesh, wires = walls.drawn(i, at)
-        name = f"{i}_{type(surface).__name__.lower()}"
-        shapes.append(Shape(name, bodies > 0 or surface.is_solid(), *mesh, wires))
+        name = name_of(scene, i)
+        shapes.append(Shape(name, bodies > 0 or surface.is_solid(), *mesh, wires, surface=i))
     return shapes
+
+
+def bodies_of(surface: Surface) -> int:
+    """The number of bodies of a surface of many, else 0."""
+    return len(surface) if isinstance(surface, Many) and not isinstance(surface, Outlined) else 0
+
+
+def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
+    """The shapes of every surface, those of each part of unions, where one has parts or an outline; else none."""
+    if not any(isinstance(surface, (Joined, Outlined)) for surface in scene.surfaces):
+        return {}
+    found: dict[int, list[Shape]] = {}
+    for part in parts_of(scene, time):
+        whole = scene.surfaces[part.owner]
+        if not bodies_of(whole):
+            there = part.surface.is_there(time)
+            mesh, wires = sharp.drawn(part, box, time) if there else (_NOTHING, [])
+            motion = part.surface.motion if part.place else None
+            shape = Shape(
+                name_of(scene, part.owner, part.place), part.solid, *mesh, wires, None, part.owner, part.place, motion
+            )  # fmt: skip
+            found.setdefault(part.owner, []).append(shape)
+    return found
 
 
 def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) -> list[Shape]:
     walls, shapes = PlaneWalls(scene, positions, time), []
     grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
+    parts = parts_of(scene, time) if any(isinstance(surface, Joined) for surface in scene.surfaces) else []
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
-        bodies = len(surface) if isinstance(surface, Many) else int(i in grouped)
-        wires = walls.curves(i, at, bodies) if bodies <= most else []
-        name, solid = f"{i}_{type(surface).__name__.lower()}", bodies > 0 or surface.is_solid()
-        shapes.append(Shape(name, solid, *walls.strip(wires), wires, walls.height))
+        bodies = bodies_of(surface) or int(i in grouped)
+        name, solid = name_of(scene, i), bodies > 0 or surface.is_solid()
+        if parts and not bodies:
+            for part in (one for one in parts if one.owner == i):
+                wires = walls.of_part(part) if part.surface.is_there(time) else []
+                drawn = *walls.strip(wires), wires, walls.height
+                name, motion = name_of(scene, i, part.place), part.surface.motion if part.place else None
+                shapes.append(Shape(name, part.solid, *drawn, i, part.place, motion))
+            continue
+        wires = walls.curves(i, at, bodies) if bodies <= most and surface.is_there(time) else []
+        shapes.append(Shape(name, solid, *walls.strip(wires), wires, walls.height, i))
     return shapes
 
 
-def since_start(scene: Scene, i: int, position: Floats, orientation: Floats) -> tuple[Floats, Floats]:
-    """The turn and the way of surface i since the start: its point that was at x0 is at turn x0 + way.
+def since_start(scene: Scene, shape: Shape, time: float, places: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """The turn and the way of a shape since the start: its point that was at x0 is at turn x0 + way.
 
-    `position` and `orientation` are its observables at a frame, `wall_position` and `wall_orientation`.
+    `places` are the observables at a frame, `wall_position` and `wall_orientation`, and `time` is that of it [s].
     """
     # x1 = A1 A0^T (x0 - p0) + p1, with places p of the origin
-    first = pose(scene.surfaces[i].motion, 0.0)
+    if shape.motion is not None:
+        first, last = pose(shape.motion, 0.0), pose(shape.motion, time)
+        turn = last.turn @ first.turn.T
+        return turn, last.position() - turn @ first.position()
+    first = pose(scene.surfaces[shape.surface].motion, 0.0)
+    position, orientation = (of_all[shape.surface] for of_all in places)
     turn = matrix(tuple(orientation)) @ first.turn.T
     return turn, position - turn @ first.position()
 
@@ -248,7 +301,7 @@ class _Walls:
             gaps = self._scene.gaps(points, self._time)
             owner = np.asarray(np.nan_to_num(gaps, nan=-np.inf).argmax(axis=0))
             for i, volumes in enumerate(self._scene.volumes):
-                owner[(owner == i) & are_open(volumes, points)] = -1
+                owner[(owner == i) & are_open(volumes, points, self._time)] = -1
         return owner
 
     def _wires(self, i: int, vertices: Floats) -> list[Floats]:
@@ -266,11 +319,5 @@ class _Walls:
                 gap = self._gap(points.reshape(3, -1)).reshape(_FINE, _FINE)
                 for line in contourpy.contour_generator(*across, gap).lines(0.0):
                     curve = np.insert(np.asarray(line), axis, points[axis, 0, 0], axis=1)
-                    curves += _runs(curve, self._owner(curve.T) == i)
+                    curves += runs(curve, self._owner(curve.T) == i)
         return curves
-
-
-def _runs(curve: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
-    """The parts of a curve whose points are kept, two points or more each."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
-    return [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]

@@ -1,6 +1,7 @@
 """The walls of a trajectory as a VTKHDF file of triangles: at rest, or where they are in every frame.
 
-Cells have the data "surface", the place in `scene.surfaces`, and "solid", 1 where particles are kept out of it.
+Cells have the data "surface", the place in `scene.surfaces`, and "solid", 1 where particles are kept out of it; where
+there are unions also "part", the number of the part among those of all of them, or -1.
 """
 
 from pathlib import Path
@@ -29,18 +30,21 @@ def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
     with h5py.File(path, "w") as file:
         root = vtkhdf.begin(file, {"Polygons": triangles}, int(firsts[-1]))
         counts = [len(shape.triangles) for shape in drawn]
-        root["CellData/surface"] = np.repeat(np.arange(len(drawn)), counts)
+        root["CellData/surface"] = np.repeat([shape.surface for shape in drawn], counts)
         root["CellData/solid"] = np.repeat([int(shape.solid) for shape in drawn], counts)
+        if parts := chosen.trajectory.scene.parts:
+            numbers = [parts.index((shape.surface, shape.place)) if shape.place else -1 for shape in drawn]
+            root["CellData/part"] = np.repeat(numbers, counts)
         if not chosen.trajectory.scene.moves():
             root["Points"] = np.concatenate([shape.vertices for shape in drawn])
             return
         steps = vtkhdf.timed(root, chosen, int(firsts[-1]))
-        for name in ("surface", "solid"):
+        for name in root["CellData"]:
             steps[f"CellDataOffsets/{name}"] = np.zeros(len(chosen.numbers), np.int64)
         points = root.create_dataset("Points", (len(chosen.numbers) * firsts[-1], 3), np.float64)
         seen = chosen.trajectory.observables
         for done, number in enumerate(chosen.numbers):
-            for i, (shape, first) in enumerate(zip(drawn, done * firsts[-1] + firsts[:-1], strict=True)):
-                places = seen["wall_position"][number, i], seen["wall_orientation"][number, i]
-                turn, way = since_start(chosen.trajectory.scene, i, *places)
+            places = seen["wall_position"][number], seen["wall_orientation"][number]
+            for shape, first in zip(drawn, done * firsts[-1] + firsts[:-1], strict=True):
+                turn, way = since_start(chosen.trajectory.scene, shape, seen["time"][number], places)
                 points[first : first + len(shape.vertices)] = shape.vertices @ turn.T + way

@@ -65,7 +65,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     _require_precision(scene, particles, options)
     check_surfaces(method, scene)
     if options.compile != "never":
-        require_compiled([one for surface in scene.surfaces for one in (surface, *surface.openings)])
+        require_compiled([one for surface in scene.surfaces for one in (surface, *surface.open_volumes())])
     method.check(scene, particles)
     times = options.times
     assert times.every is not None
@@ -126,6 +126,11 @@ def _require_walls_of_bodies(scene: Scene) -> None:
             raise SceneError(
                 f"surfaces[{i}].openings must be left out with bodies, which escape through none, got "
                 f"{len(surface.openings)}; use particles, or a box with an open face"
+            )
+        if surface.present is not None:
+            raise SceneError(
+                f"surfaces[{i}].present must be None with bodies, which a wall that comes would cut, got "
+                f"{surface.present}; use particles, or leave it out"
             )
         if surface.reacts():
             raise SceneError(

@@ -46,7 +46,7 @@ class BaseRun:
         self, scene: Scene, method: Method, n: int, pool: ThreadPoolExecutor, tier: Tier, first: int = 0
     ) -> None:
         self._scene, self._method, self._first = scene, method, first
-        self._owners = scene.owners()
+        self._owners, self._parts = scene.owners(), scene.parts_of_rows()
         self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
         self._far = _FAR * scene.extent() if scene.is_open() else math.inf
         self._pool, self._tier, self._watch = pool, tier, Watch(n)

@@ -280,7 +280,7 @@ class Run(BaseRun):
             self._choose_tier()
 
     def seen(self) -> dict[str, Any]:
-        seen = observables.summary(self._partial, self.state, self._owners, bool(self._kinds))
+        seen = observables.summary(self._partial, self.state, self._owners, bool(self._kinds), self._parts)
         is_closed = self._far == math.inf
         escaped = 0 if is_closed else self._tier.kernel(observables.count_escaped)(*self._escaping())
         if self.state.escape_time is not None:

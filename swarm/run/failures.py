@@ -51,6 +51,18 @@ def require_admissible(
         raise RunError(f"{_failed(moment)} {first + particle}: it is {depth}")
 
 
+def sentence_of_coming(
+    scene: Scene, state: State, found: tuple[int, int], depth: float, instant: float, first: int = 0
+) -> str:
+    """The sentence about a particle that is so deep [m] in a wall that comes, `found` as (surface, particle)."""
+    wall, particle = found
+    place = ", ".join(f"{x:.6g}" for x in state.position[:, particle])
+    return (
+        f"{_named(scene, wall)} must come where nobody is: at {instant:g} s particle {first + particle} is "
+        f"{depth:.3g} m inside, at ({place}) m; let it come later or elsewhere, or start that particle elsewhere"
+    )
+
+
 def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
     """The place of a particle that does not go on, and the time, if its contacts may last: kernels leave that there."""
     remaining = 0.0 if state.contacts is None else state.contacts.remaining[particle]

@@ -14,9 +14,11 @@ from .. import interrupt
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
 from ..particles import Multipliers, Particles
+from . import overlaps
 from .base import BaseRun
 from .bodies import BodyRun
 from .compiling import Compilations
+from .doors import DoorRun
 from .engine import Run
 from .impacts import log_of
 from .options import Task
@@ -79,6 +81,8 @@ def carry_out_task(task: Task, session: Session) -> End:
     """Carry out a run that is checked."""
     if task.scene.is_open() and not task.is_shard:
         warn_open()
+    if not task.is_shard:
+        overlaps.warn(task.scene)
     until, span_of, kept = task.options.until, task.method.span, Columns()
     with _begun(task, session) as (run, writer, show, (log, tally)):
         with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
@@ -144,7 +148,8 @@ def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
         return BodyRun(task.scene, task.bodies, task.particles, task.method, *how, task.first)
     if task.scene.reacts():
         return ReactingRun(task.scene, task.particles, task.method, *how)
-    return Run(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
+    kind = DoorRun if task.scene.has_doors() else Run
+    return kind(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
 
 
 def _end(task: Task, session: Session, run: BaseRun, kept: Columns, tally: Tally | None) -> End:

@@ -171,7 +171,7 @@ class ReactingRun(BaseRun):
         self._tier.kernel(observables.observe)(*self._observing(walls))
 
     def _summary(self) -> dict[str, Any]:
-        seen = observables.summary(self._partial, self.state, self._owners, lasts=False)
+        seen = observables.summary(self._partial, self.state, self._owners, lasts=False, parts=self._parts)
         walls = self._walls
         energy = walls.kinetic + walls.potential
         return {

@@ -13,6 +13,7 @@ from .fields.bodies import Boxes, Capsules, Cylinders, Ellipsoids, Spheres
 from .fields.many import Many
 from .formulas.formula import Formula
 from .formulas.own import OwnSurface
+from .outlines.polygon import Polygon, Prism, Stadium
 from .shapes.box import Box
 from .shapes.capsule import Capsule
 from .shapes.cone import Cone
@@ -45,11 +46,14 @@ __all__ = [
     "OwnSurface",
     "Paraboloid",
     "Plane",
+    "Polygon",
+    "Prism",
     "Quadric",
     "Sampled",
     "Slab",
     "Sphere",
     "Spheres",
+    "Stadium",
     "Surface",
     "Torus",
     "Union",
@@ -80,5 +84,8 @@ ALL_SURFACES: dict[str, type[Surface]] = {
     "mesh": Mesh,
     "union": Union,
     "intersection": Intersection,
+    "polygon": Polygon,
+    "prism": Prism,
+    "stadium": Stadium,
     **ALL_FIELDS,
 }

@@ -22,6 +22,10 @@ class AtRest(Record):
         """A particle as safe steps to the wall see it after a time of its flight, `Seen`, None if none are needed."""
         return
 
+    def later(self, t):
+        """The wall after a time [s]."""
+        return self
+
     def velocity(self, r):
         """The velocity of the wall at a point of it."""
         return ZERO

@@ -14,6 +14,7 @@ from ..checks import Vector
 from ..errors import SceneError
 from ..motion import Oscillation, Path, Rotation, Translation, parts_of, unit_axis
 from .fields.many import Many
+from .outlines.outlined import Outlined
 from .surface import Box, Surface
 
 Lengths = tuple[float | None, float | None, float | None]
@@ -38,6 +39,9 @@ def images_of(surface: Surface, period: Lengths, name: str) -> list[Surface]:
             period, a cavity that is not within the cell, or it moves along the period.
     """
     _require_place(surface, period, name)
+    if isinstance(surface, Outlined):
+        _require_within(surface, period, name)
+        return [surface]
     if isinstance(surface, Many):
         return [_many_images(surface, period, name)]
     low, high = body_of(surface).bounds() if surface.is_solid() else surface.bounds()
@@ -52,6 +56,17 @@ def images_of(surface: Surface, period: Lengths, name: str) -> list[Surface]:
             "the surface to where it is within the cell"
         )
     return found
+
+
+def _require_within(surface: Outlined, period: Lengths, name: str) -> None:
+    """Raise a `SceneError` where an outline reaches over a face of the cell."""
+    low, high = (corner[:, 0] for corner in surface.corners())
+    for k, length in enumerate(period):
+        if length is not None and not (low[k] >= -_ROUND_OFF * length and high[k] <= (1.0 + _ROUND_OFF) * length):
+            raise SceneError(
+                f"{name} ({type(surface).__name__}) must be within the cell, from 0 to period[{k}] = {length:g} m, got "
+                f"one from {low[k]:.4g} to {high[k]:.4g} m; move it there"
+            )
 
 
 def _many_images(field: Many, period: Lengths, name: str) -> Many:

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..kernel.record import Record
 from ..motion import Guide
+from .doors import walls_then
 from .drive import Drive, drive_of
 from .posed import Drifting, Posed
 from .surface import Surface
@@ -60,7 +61,7 @@ class Carried(Walls):
         for wall in self.each:
             last = _during(wall.members if isinstance(wall, Field) else wall, last, remaining, after)
             made = (*made, Field(last) if isinstance(wall, Field) else last)
-        return Walls(made, self.unions, self.slack)
+        return Walls(made, self.unions, self.slack, self.inset)
 
     def in_steps(self):
         return False
@@ -107,7 +108,7 @@ def _may_stride(walls: list[Any]) -> bool:
 
 def walls_of(surface: Surface, moment: float) -> list[Any]:
     """The walls of a surface in the frame that ends at a moment [s]."""
-    first, *others = surface.walls()
+    first, *others = walls_then(surface, moment)
     if surface.motion is None:
         return [first, *others]
     drive = drive_of(surface, moment)

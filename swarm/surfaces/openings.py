@@ -17,10 +17,12 @@ from ..errors import SceneError
 from ..kernel.jit import select
 from ..kernel.record import Record
 from . import required
+from .doors import Timed, is_there, was_there
 from .fields.grouped import by_kind
 from .fields.many import Many
 from .images import Lengths, images_of
 from .instant import has_room, side_of
+from .outlines.outlined import Outlined
 from .surface import Surface
 from .walls import Field, Walls, all_walls
 
@@ -30,10 +32,10 @@ _MOST = 24
 _REACH = 2.0
 
 
-class Opening(Record):
-    """The volumes in which some walls are open, each `Walls` or a `Field`."""
+class Opened(Record):
+    """The volumes in which some walls are open."""
 
-    volumes: tuple[Any, ...]
+    volumes: tuple[Any, ...]  # each `Walls`, a `Field`, or one of these that is `Timed`
     first: float  # the number of the first of these walls
     last: float  # that of the first after them
 
@@ -42,26 +44,36 @@ class Opening(Record):
         return (wall >= self.first) & (wall < self.last)
 
 
+class Doorway(Opened):
+    """The volumes in which they are open where another room of their union is on the other side."""
+
+
 # --- From a description ----------------------------------------------------------------------------------
 
 
-def openings_in(spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]]) -> tuple[Opening, ...] | None:
-    """The openings of the walls of a scene as kernels take them, None where there are none.
+def openings_in(
+    spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]], moment: float, kind: type[Opened] = Opened
+) -> tuple[Opened, ...]:
+    """The openings of the walls of a scene as kernels take them.
 
-    `spans` are (piece, walls in a row that are of it), `volumes` what is open in each piece.
+    `spans` are (piece, walls in a row that are of it), `volumes` what is open in each piece; they are those of the
+    frame, or the piece of one, that ends at a moment [s].
     """
-    if not any(volumes):
-        return None
     runs, number = [], 0
     for given, some in itertools.groupby(spans, lambda span: volumes[span[0]]):
         first, number = number, number + sum(walls for _piece, walls in some)
-        runs += [Opening(_taken(given), float(first), float(number))] if given else []
+        runs += [kind(_taken(given, moment), float(first), float(number))] if given else []
     return tuple(reversed(by_kind(runs, lambda run: run.volumes)))
 
 
-def _taken(volumes: Sequence[Surface]) -> tuple[Any, ...]:
-    ordered = reversed(by_kind(volumes, lambda volume: volume.walls()))
-    return tuple(Field(one.members) if isinstance(one, Many) else all_walls([one]) for one in ordered)
+def _taken(volumes: Sequence[Surface], moment: float) -> tuple[Any, ...]:
+    ordered = reversed(by_kind(volumes, lambda volume: (volume.walls(), volume.present is None)))
+    return tuple(_volume(one, moment) for one in ordered)
+
+
+def _volume(surface: Surface, moment: float) -> Any:
+    volume = Field(surface.members) if isinstance(surface, Many) else all_walls([surface])
+    return volume if surface.present is None else Timed(volume, float(was_there(surface.present, moment)))
 
 
 def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
@@ -71,8 +83,13 @@ def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Sur
         SceneError: an opening has no phi, or no point of the wall in it, or it does not go with the period.
     """
     found: list[Surface] = []
-    for k, opening in enumerate(surface.openings):
+    for k, opening in enumerate(surface.open_volumes()):
         where = f"{name}.openings[{k}]"
+        if isinstance(opening, Outlined):
+            raise SceneError(
+                f"{where} must be a volume of surfaces such as swarm.Box, got {type(opening).__name__}; give boxes or "
+                "cylinders"
+            )
         required.require_description([opening], where)
         if not reaches(surface, opening):
             raise SceneError(
@@ -110,7 +127,7 @@ def require_few(volumes: Sequence[Sequence[Surface]]) -> None:
 
 def reaches(surface: Surface, opening: Surface) -> bool:
     """Whether a volume has points on both sides of a wall."""
-    both = _gap(opening, _sign(opening)), _gap(surface, side_of(surface))
+    both = _gap(opening, sign_of(opening)), _gap(surface, side_of(surface))
     reach = _REACH * max(surface.extent(), opening.extent())
     low, high = (np.array(corner)[:, None] for corner in _box_of(opening))
     # Also where the box of a flat volume has no width
@@ -132,7 +149,7 @@ def _gap(surface: Surface, sign: float) -> Any:
     return lambda points: sign * surface.phi(points), lambda points: sign * surface.gradient(points)
 
 
-def _sign(opening: Surface) -> float:
+def sign_of(opening: Surface) -> float:
     """The distance that phi gives where the volume is not."""
     return 1.0 if isinstance(opening, Many) else side_of(opening)
 
@@ -144,11 +161,12 @@ def _box_of(opening: Surface) -> Any:
     return opening.bounds()
 
 
-def are_open(volumes: Sequence[Surface], points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which of the points (3, N) are in any of the volumes."""
+def are_open(volumes: Sequence[Surface], points: NDArray[np.float64], time: float) -> NDArray[np.bool_]:
+    """Which of the points (3, N) are in any of the volumes that are open at a time [s]."""
     found = np.zeros(points.shape[1], np.bool_)
     for volume in volumes:
-        found |= _sign(volume) * volume.phi(points) <= 0.0
+        if is_there(volume.present, time):
+            found |= sign_of(volume) * volume.phi(points) <= 0.0
     return found
 
 
@@ -160,6 +178,8 @@ def outside(volume, r):
 
     What is neither `Walls` nor a `Field` is the inside of one body of a field, whose admissible side is outside of it.
     """
+    if isinstance(volume, Timed):
+        return volume.if_open(outside(volume.volume, r), math.inf)
     if isinstance(volume, Field):
         return -volume.members.deepest_in_cell(r)
     if not isinstance(volume, Walls):

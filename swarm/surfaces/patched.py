@@ -21,7 +21,7 @@ class Patched(Record):
 
     def whole(self, number):
         """A wall without its edges."""
-        raise NotImplementedError
+        return self.wall(number)  # type: ignore[attr-defined]
 
     def is_near(self, number, r, near):
         """Whether the patch of a wall may be nearer to a point than `near`."""
@@ -30,3 +30,7 @@ class Patched(Record):
     def wall_after(self, number, r, near):
         """The wall on which what slides on this one goes on beyond the end of its patch at r; -1: it flies."""
         return -1.0
+
+    def goes_on(self, number, other):
+        """Whether another wall joins this one smoothly where it ends: what slides on this one does not meet it."""
+        return False

@@ -34,6 +34,12 @@ class Posed(Framed):
         """Of a field one of its walls."""
         return self._replace(body=self.body.wall(number))
 
+    def later(self, t):
+        """The wall, or field, after a time [s]."""
+        remaining = self.remaining - t
+        pose = self.drive.pose(remaining)
+        return self._replace(pose=pose, end=pose, remaining=remaining, after=remaining)
+
     # --- The frame of the wall ---
 
     def own_place(self, r):

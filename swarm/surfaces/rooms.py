@@ -9,9 +9,11 @@ wall, 1/the steepness of its level).
 """
 
 import math
+from typing import Any
 
-from ..kernel.gravity import displacement
+from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import select
+from ..kernel.vector import square
 
 # A flight goes on into a room that it is inside of by so many times the slack.
 _INSIDE = 4.0
@@ -19,16 +21,17 @@ _INSIDE = 4.0
 _TOUCH, _OUT = 1024.0, 1e6
 
 
-def gaps_in(rooms, r):
-    """How far a point is outside of each room, about: a length, below 0 inside."""
-    return tuple(gap_in(room, r) for room in rooms)
+def gaps_in(rooms, r, t=0.0):
+    """How far a point is outside of each room after a time [s], about: a length, below 0 inside."""
+    return tuple(gap_in(room, r, t) for room in rooms)
 
 
-def gap_in(room, r):
+def gap_in(room, r, t=0.0):
     """The same of one room."""
     farthest = -math.inf
     for _number, wall, gentle in reversed(room):
-        here = wall.level_of(wall.inner(r)) * gentle
+        then = wall.later(t)
+        here = then.level_of(then.inner(r)) * gentle
         farthest = select(here <= farthest, farthest, here)
     return farthest
 
@@ -43,15 +46,27 @@ def least_of(gaps):
 
 def held_by(walls, gaps):
     """Which rooms hold a point, by its gaps: the nearest one at least."""
-    least = least_of(gaps)
-    return tuple((gap <= walls.slack) | (gap == least) for gap in gaps)
+    held: Any = ()
+    least, nearest = least_of(gaps), False
+    for gap in gaps:
+        is_nearest = (gap == least) & (not nearest)
+        nearest = is_nearest | nearest
+        # Where rooms touch, who is at the wall between two is in one.
+        most = walls.slack if walls.inset is None else -walls.slack
+        held = (*held, (gap <= most) | is_nearest)
+    return held
+
+
+def is_inside(walls, gap):
+    """Whether a flight goes on in a room, by its gap there."""
+    return gap < -_INSIDE * walls.slack
 
 
 def is_inside_any(walls, gaps):
     """Whether a flight goes on in a room, by its gaps there."""
     found = False
     for gap in reversed(gaps):
-        found = (gap < -_INSIDE * walls.slack) | found
+        found = is_inside(walls, gap) | found
     return found
 
 
@@ -70,7 +85,20 @@ def leaving(walls, rooms, leaves, gravity, flight, stops):
     if stops:
         return last, wall
     there = r + displacement(gravity, v, last)
-    return last, select(is_inside_any(walls, gaps_in(rooms, there)), -1.0, wall)
+    return last, select(is_inside_any(walls, gaps_in(rooms, there, last)), -1.0, wall)
+
+
+def at_the_end(walls, gravity, v, remaining, hit):
+    """A `Hit` that is round-off later than the end of the frame, at that: else what touches a wall may be beyond it."""
+    late, w = hit.time - remaining, accelerated(gravity, v, remaining)
+    soon = (hit.wall >= 0.0) & (late > 0.0) & (late * late * square(w) <= walls.slack * walls.slack)
+    return hit._replace(time=select(soon, remaining, hit.time))
+
+
+def inside_of(walls, number, r):
+    """A place on a wall with this number, or of none, a little inside of it if it is one of a room."""
+    is_of_room = number >= walls.joined()[0][0][0][0]
+    return r - select(is_of_room, walls.inset, 0.0) * walls.unit_normal(number, r)
 
 
 def owner_of(walls, rooms, r):

@@ -14,6 +14,7 @@ from .fields.members import member
 from .flights import NEVER, Hit, hit, sooner, soonest
 from .march import Look, Search, first_met
 from .rising import Flight, flight_of
+from .rooms import leaving
 from .walls import Field, Following, Walls
 
 _EPSILON = 2.220446049250313e-16
@@ -174,11 +175,29 @@ def _free_of(wall, gravity, r, v):
 @outlined
 def first_hit_moving(walls, gravity, r, v, remaining):
     """The first `Hit` of a free flight with walls in any motion, with so much of the frame left [s]."""
+    if walls.unions:
+        return _first_hit_in_rooms(walls, gravity, r, v, remaining)
     found = closed_hit(walls.at(remaining), gravity, r, v)
     longest = select(found.time < remaining, found.time, remaining)
     met = march_moving(walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining), longest)
     if met.wall >= 0.0 or met.time < longest:
         return met
+    return found
+
+
+def _first_hit_in_rooms(walls, gravity, r, v, remaining):
+    """`first_hit_moving` where some of the walls are those of unions."""
+    found: Any = NEVER
+    shared = tuple(wall for _number, wall in walls.shared())
+    if shared:
+        found = first_hit_moving(walls.alone(shared), gravity, r, v, remaining)
+    for rooms, now in zip(walls.joined(), walls.at(remaining).joined(), strict=True):
+        leaves: Any = ()
+        for room in rooms:
+            some = walls.alone(tuple(wall for _number, wall, _gentle in room))
+            leaves = (*leaves, soonest(first_hit_moving(some, gravity, r, v, remaining), room[0][0], NEVER))
+        left = Hit(*leaving(walls, now, leaves, gravity, (r, v), False))
+        found = soonest(left, 0.0, found)
     return found
 
 

@@ -13,6 +13,7 @@ from ..checks import Vector, array, magnitude, number, one_of, positive, vector
 from ..errors import SceneError
 from ..kernel.vector import Vec, vec
 from . import rotation as rotations
+from .doors import Opening, Spans, checked_spans, is_there
 from .wall_law import checked_laws
 
 # A tilt of an axis this small is the round-off of a rotation.
@@ -45,7 +46,9 @@ class Surface:
             above 0. With a mass as well it is a pendulum, whose weight is at its `center`; without, on the axis.
         openings: surfaces without openings, laws and motion, inside which the wall is not there (with side "outside":
             outside of which; of many bodies, such as `Spheres`: in each of them). A particle that reaches the wall
-            there has escaped, and stays as it is then. Of a wall at rest.
+            there has escaped, and stays as it is then. Of a wall at rest. An `Opening` is open for some times only.
+        present: pairs (t0, t1) [s] that ascend, from 0 s on: the wall is there from t0 on, and no longer from t1 on,
+            which is infinite in the last pair if it stays. None: it is always there.
     """
 
     rotation: Any = field(default=None, kw_only=True)
@@ -58,6 +61,7 @@ class Surface:
     mass: float | None = field(default=None, kw_only=True)
     inertia: float | None = field(default=None, kw_only=True)
     openings: Any = field(default=(), kw_only=True)
+    present: Spans = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", rotations.quaternion("rotation", self.rotation))
@@ -89,6 +93,7 @@ class Surface:
                 f"weight could be at, got {self.mass:g}"
             )
         object.__setattr__(self, "openings", _openings(self.openings))
+        object.__setattr__(self, "present", checked_spans("present", self.present))
         if self.openings and (self.motion is not None or self.reacts()):
             raise SceneError(
                 f"openings must be of a wall at rest, got {len(self.openings)} of a {type(self).__name__} with a "
@@ -108,6 +113,14 @@ class Surface:
     def walls(self) -> tuple[Any, ...]:
         """As kernels take it: one record for a smooth surface, one for each smooth part of a cavity with edges."""
         return (rotations.rotated(self.rotation, self.numbers()),)
+
+    def open_volumes(self, between: bool = False) -> tuple["Surface", ...]:
+        """The volumes of its openings, each present while that is open: those of walls between rooms, or others."""
+        return tuple(volume_of(one) for one in self.openings if (isinstance(one, Opening) and one.between) == between)
+
+    def is_there(self, time: float) -> bool:
+        """Whether the wall is there at a time [s]."""
+        return is_there(self.present, time)
 
     def reacts(self) -> bool:
         """Whether impacts move it."""
@@ -193,16 +206,27 @@ def is_along(direction: Vector, axis: Vector) -> bool:
     return bool(np.abs(np.cross(direction, axis)).max() <= TILT)
 
 
-def _openings(value: Any) -> tuple[Surface, ...]:
+def volume_of(opening: Surface | Opening) -> Surface:
+    """The volume of an opening, present while that is open."""
+    return replace(opening.surface, present=opening.times) if isinstance(opening, Opening) else opening
+
+
+def _openings(value: Any) -> tuple[Surface | Opening, ...]:
     """The argument `openings`, checked."""
-    if isinstance(value, Surface) or not isinstance(value, Iterable):
+    if isinstance(value, (Surface, Opening)) or not isinstance(value, Iterable):
         raise SceneError(f"openings must be a list of surfaces such as swarm.Sphere, got {value!r:.200}")
     given = tuple(value)
-    for k, opening in enumerate(given):
+    for k, one in enumerate(given):
+        opening = one.surface if isinstance(one, Opening) else one
         if not isinstance(opening, Surface):
             raise SceneError(f"openings[{k}] must be a surface such as swarm.Sphere, got {opening!r:.200}")
         for law in fields(Surface):
             came = getattr(opening, law.name)
+            if law.name == "present" and came is not None:
+                raise SceneError(
+                    f"openings[{k}].present must be left out, an opening is no wall, got {came!r:.200}; say when it is "
+                    "open as swarm.Opening(surface, times=...)"
+                )
             if law.name != "rotation" and came != law.default:
                 raise SceneError(f"openings[{k}].{law.name} must be left out, an opening is no wall, got {came!r:.200}")
     return given

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import motion as motions
 from ..checks import Vector
 from ..errors import SceneError
+from .fields.many import Many
 from .instant import box_of, has_room, planes_of, side_of
 from .polyhedron import polyhedron_bounds
 from .shapes.plane import Plane
@@ -25,11 +26,13 @@ from .surface import UNBOUNDED, Box, Surface
 
 Floats = NDArray[np.float64]
 Room = tuple[Surface, ...]
+# The number of a part, and of a part of this.
+Place = tuple[int, ...]
 
 # Most rooms: each is compiled into the kernels.
 _MOST_ROOMS = 64
 # What is given to the whole holds for those of its parts that leave it at its default.
-_HANDED_DOWN = ("restitution", "friction", "temperature", "accommodation", "laws", "motion")
+_HANDED_DOWN = ("restitution", "friction", "temperature", "accommodation", "laws", "motion", "present")
 # Of the extent, how far a room without end is searched for a point in it.
 _REACH = 2.0
 
@@ -69,20 +72,46 @@ class Joined(Surface):
                 f"parts must leave at most {_MOST_ROOMS} rooms, which are unions of parts taken together, got "
                 f"{len(self.rooms)}; list what they have in common as a surface of the scene"
             )
+        if len(self.rooms) > 1:
+            _require_alone(self)
         _require_room(self)
 
     @cached_property
     def rooms(self) -> tuple[Room, ...]:
         """The admissible side as a union of intersections of surfaces that are none of these, with their laws."""
-        rooms = [tuple(dict.fromkeys(room)) for room in self._rooms(self.side == "outside")]
-        # What parts have in common may be nothing.
-        return tuple(room for room in rooms if _may_have_volume(room)) if len(rooms) > 1 else tuple(rooms)
+        return tuple(map(tuple, self._places_in_rooms))
 
-    def _rooms(self, turned: bool) -> list[Room]:
-        """`rooms`, or those of what is not admissible."""
-        parts = [_handed_down(self, part) for part in self.parts]
+    def places(self) -> tuple[Place, ...]:
+        """Of each of the `surfaces` the part that it is: its number, and of a part of a part both."""
+        return tuple(place for room in self._places_in_rooms for place in room.values())
+
+    def places_of_parts(self) -> tuple[Place, ...]:
+        """The same of every part, in their order."""
+        return tuple(
+            (k, *place) for k, part in enumerate(self.parts)
+            for place in (part.places_of_parts() if isinstance(part, Joined) else ((),))
+        )  # fmt: skip
+
+    @cached_property
+    def _places_in_rooms(self) -> tuple[dict[Surface, Place], ...]:
+        """The surfaces of every room, and the places of the parts that they are."""
+        rooms: list[dict[Surface, Place]] = []
+        for room in self._rooms(self.side == "outside"):
+            rooms.append({})
+            for surface, place in room:
+                rooms[-1].setdefault(surface, place)
+        # What parts have in common may be nothing.
+        return tuple(room for room in rooms if _may_have_volume(tuple(room))) if len(rooms) > 1 else tuple(rooms)
+
+    def _rooms(self, turned: bool) -> list[tuple[tuple[Surface, Place], ...]]:
+        """The surfaces and places of rooms, or of those of what is not admissible."""
+        parts = [handed_down(self, part) for part in self.parts]
         given = [one._rooms(turned ^ (one.side == "outside")) if isinstance(one, Joined)
-                 else [(_turned(one) if turned else one,)] for one in parts]  # fmt: skip
+                 else [((_turned(one) if turned else one, ()),)] for one in parts]  # fmt: skip
+        given = [
+            [tuple((surface, (k, *place)) for surface, place in room) for room in rooms]
+            for k, rooms in enumerate(given)
+        ]
         if (self._of_gaps is np.minimum) ^ turned:
             return [room for rooms in given for room in rooms]
         if math.prod(map(len, given)) > _MOST_ROOMS:
@@ -113,7 +142,7 @@ class Joined(Surface):
             return UNBOUNDED
         # The motion of the whole is none of its bounds.
         still = [[replace(one, motion=None) if self.motion is not None else one for one in room] for room in self.rooms]
-        boxes = list(map(room_bounds, still))
+        boxes = [room_bounds(_lasting(room)) for room in still]
         low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
         return tuple(low.tolist()), tuple(high.tolist())
 
@@ -142,9 +171,10 @@ class Joined(Surface):
         return found if self.motion is None else motions.pose(self.motion, time).turned(found)
 
     def _gaps(self, rows: Floats, time: float) -> Floats:
-        """The gaps of the parts; where one has no value it is not there."""
+        """The gaps of the parts: nowhere where one has no value, and all over where its walls are not there."""
         gaps = np.array([side_of(part) * part.phi(rows, time) for part in self.parts])
-        return np.where(np.isnan(gaps), math.inf, gaps)
+        there = np.array([part.is_there(time) for part in self.parts])
+        return np.where(there.reshape(-1, *[1] * (gaps.ndim - 1)), np.where(np.isnan(gaps), math.inf, gaps), -math.inf)
 
     def _own_points(self, points: ArrayLike, time: float) -> Floats:
         rows = self._own_rows(points, time)
@@ -221,7 +251,14 @@ def _moves(part: Surface) -> bool:
     return part.motion is not None or (isinstance(part, Joined) and any(map(_moves, part.parts)))
 
 
-def _handed_down(whole: Surface, part: Surface) -> Surface:
+def part_at(surface: Surface, place: Place) -> Surface:
+    """The part at a place of a surface, with what is given to the whole; at no place the surface itself."""
+    for k in place:
+        surface = handed_down(surface, surface.parts[k])  # type: ignore[attr-defined]
+    return surface
+
+
+def handed_down(whole: Surface, part: Surface) -> Surface:
     """A part with what is given to the whole, where it leaves that at its default."""
     defaults = {one.name: one.default for one in fields(Surface)}
     given = {
@@ -258,15 +295,35 @@ def _turned(surface: Surface) -> Surface:
 
 def room_bounds(room: Sequence[Surface], time: float = 0.0) -> tuple[Floats, Floats]:
     """The corners of a box around a room at a time [s], infinite where it is open."""
-    boxes = np.array([box_of(surface, time) for surface in room])
+    boxes = np.array([box_of(surface, time) for surface in room] or [UNBOUNDED])
     low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
     planes = [plane for surface in room for plane in planes_of(surface, surface.half_spaces(), time)]
     return polyhedron_bounds(planes, low, high) if planes else (low, high)
 
 
+def _lasting(room: Sequence[Surface]) -> tuple[Surface, ...]:
+    """The surfaces of a room that are always there."""
+    return tuple(surface for surface in room if surface.present is None)
+
+
 def room_gaps(room: Sequence[Surface], points: Floats, time: float = 0.0) -> Floats:
     """The gap of every surface of a room at points (3, N)."""
     return np.array([side_of(surface) * surface.phi(points, time) for surface in room])
+
+
+def _require_alone(whole: Joined) -> None:
+    """Raise a `SceneError` for a surface that is known only where its own walls keep particles, or is many bodies."""
+    for surface in whole.surfaces():
+        if isinstance(surface, Many):
+            raise SceneError(
+                f"parts must not be {type(surface).__name__} in a {type(whole).__name__} of several rooms, got "
+                f"{surface}; list them as a surface of the scene, or their bodies one by one"
+            )
+        if surface.known_in() is not None:
+            raise SceneError(
+                f"parts must be known everywhere, got {surface!r:.200}, which reaches the border of its grid; sample "
+                "it in a larger box"
+            )
 
 
 def _require_room(whole: Joined) -> None:
@@ -290,19 +347,20 @@ def _require_room(whole: Joined) -> None:
 def _ends(room: Room) -> tuple[Floats, Floats]:
     """The corners of the box in which a room is searched for a point."""
     low, high = room_bounds(room)
-    reach = _REACH * max(surface.extent() for surface in room) or 1.0
+    reach = _REACH * max((surface.extent() for surface in room), default=0.0) or 1.0
     return np.maximum(low, -reach), np.minimum(high, reach)
 
 
 def _may_have_volume(room: Room) -> bool:
-    low, high = _ends(room)
+    low, high = _ends(_lasting(room))
     return bool((low < high).all())
 
 
 def _has_volume(room: Room) -> bool:
+    room = _lasting(room)
     low, high = _ends(room)
     gaps, gradients = _gaps_of(room), _gradients_of(room)
-    return bool((low < high).all()) and has_room(low[:, None], high[:, None], gaps, gradients)
+    return not room or (bool((low < high).all()) and has_room(low[:, None], high[:, None], gaps, gradients))
 
 
 def _gaps_of(room: Room) -> Callable[[Floats], Floats]:

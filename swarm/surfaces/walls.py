@@ -50,6 +50,7 @@ class Walls(Record):
     # Of each union its rooms, of each room its walls, of each of these 1/the steepness of its level. See rooms.py.
     unions: tuple[Any, ...] = ()
     slack: Any = None  # a distance that is round-off where rooms meet [m]
+    inset: Any = None  # where rooms touch, how far inside of its wall what meets one is put [m]
 
     if TYPE_CHECKING:
 
@@ -88,6 +89,10 @@ class Walls(Record):
     def others(self):
         """The walls that are in no field."""
         return self._replace(each=tuple(wall for wall in self.each if not isinstance(wall, Field)))
+
+    def alone(self, each):
+        """Some of the walls, with no unions."""
+        return self._replace(each=each, unions=(), slack=None, inset=None)
 
     def shared(self):
         """`numbered` of the walls that are in no union: all particles keep to them."""

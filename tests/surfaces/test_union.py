@@ -128,6 +128,16 @@ def test_bounds_hold_what_is_admissible():
             lambda: swarm.Intersection([swarm.Union([BALL, TUBE, BOX, POST]) for _k in range(4)] + [POST]),
             "parts must leave at most 64 rooms.*got 256; list what they have in common",
         ),
+        (
+            lambda: swarm.Union([BALL, swarm.Intersection([BOX, swarm.Spheres([[1.5, 0.1, 0.0]], 0.1)])]),
+            "parts must not be Spheres in a Union of several rooms",
+        ),
+        (
+            lambda: swarm.Union(
+                [BALL, swarm.Sampled(-1.0 - np.arange(5.0)[:, None, None] * np.ones((5, 5, 5)) + 2.0, 0.5, (0, 0, 0))]
+            ),
+            "parts must be known everywhere.*border of its grid",
+        ),
     ],
 )
 def test_bad_input_is_a_sentence(make, said):

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from ... import interrupt
 from ...errors import RunError, SceneError, WallTimeError
 from ...frames import Frame
+from .. import overlaps
 from ..machine import End, warn_open
 from ..options import Task
 from ..progress import Display, display
@@ -72,6 +73,7 @@ def carry_out(task: Task, session: Sharded) -> End:
     _require_shards(task)
     if task.scene.is_open():
         warn_open()
+    overlaps.warn(task.scene)
     target = Path(task.options.trajectory).absolute()
     saved = task.options.checkpoint or _SAVED
     task = dataclasses.replace(task, options=dataclasses.replace(task.options, trajectory=target, checkpoint=saved))

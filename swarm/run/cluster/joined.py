@@ -53,7 +53,7 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
     if task.bodies is None:
         laws = task.scene.laws()
         has_heat = laws is not None and laws.give_heat
-        added = observables.summed(sums, owners, booked(task.scene.walls()), has_heat)
+        added = observables.summed(sums, owners, booked(task.scene.walls()), has_heat, task.scene.parts_of_rows())
     else:
         added = energies.summed(sums, owners, len(task.scene.surfaces), len(task.bodies.body.cavities))
     seen: dict[str, Any] = {}

@@ -13,9 +13,9 @@ from ..shapes.cylinder import Cylinder
 from ..shapes.ellipsoid import Ellipsoid
 from ..shapes.sphere import Sphere, ball
 from ..surface import Surface
-from .grid import Floats
+from .grid import Floats, aligned
 from .many import Many, field_of
-from .members import Members, aligned
+from .members import Members
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -18,6 +18,9 @@ _CELLS_EACH = 1.0
 # An endless direction is one cell of this width, and a body without end has bounds beyond half of it.
 _ENDLESS = 1e200
 
+# Bytes of a line of the cache.
+_LINE = 64
+
 Floats = NDArray[np.float64]
 
 
@@ -184,3 +187,12 @@ def cells_of(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) 
 def _room_up_to(repeated: tuple[Floats, Floats], first: Floats, last: Floats, room: Floats) -> tuple[Floats, Floats]:
     """The room before and behind the bodies, none at the faces of a cell that repeats."""
     return np.where(first > repeated[0], room, 0.0), np.where(last < repeated[1], room, 0.0)
+
+
+def aligned(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A copy of a table that begins with a line of the cache."""
+    memory = np.empty(rows.nbytes + _LINE, np.uint8)
+    first = -memory.ctypes.data % _LINE
+    copy = memory[first : first + rows.nbytes].view(np.float64).reshape(rows.shape)
+    copy[:] = rows
+    return copy

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 from ...motion import Placed
+from ..doors import walls_then
 from ..facets.mesh import Mesh
 from ..joined import with_rooms
 from ..moving import walls_of
@@ -104,7 +105,12 @@ def order_of(
     of_kind: dict[Any, list[int]] = defaultdict(list)
     together = together and all(surface.motion is None and not surface.reacts() for surface in surfaces)
     for i in rest if together and len(rest) > _FEW else ():
-        if surfaces[i].is_solid() and len(surfaces[i].walls()) == 1 and can_be_member(surfaces[i].walls()[0]):
+        if (
+            surfaces[i].present is None
+            and surfaces[i].is_solid()
+            and len(surfaces[i].walls()) == 1
+            and can_be_member(surfaces[i].walls()[0])
+        ):
             of_kind[kind_of(surfaces[i].walls()[0]), _laws(surfaces[i])].append(i)
     groups = [tuple(group) for group in of_kind.values() if len(group) > _FEW]
     grouped = {i for group in groups for i in group}
@@ -116,7 +122,7 @@ def order_of(
         return one.walls() if isinstance(one.motion, Placed) else walls_of(one, 0.0), one.motion, one.mass, one.inertia
 
     def volumes(i: int) -> Any:
-        return [volume.walls() for volume in surfaces[i].openings]
+        return [(volume.walls(), volume.present is None) for volume in surfaces[i].open_volumes()]
 
     def body(group: tuple[int, ...]) -> Any:
         return alike([surfaces[i].walls()[0] for i in group])[0]
@@ -130,18 +136,23 @@ def order_of(
 
 def walls_in(
     order: Order, surfaces: Sequence[Surface], groups: Sequence[Members], own: Sequence[Surface],
-    taken: Callable[[Members], Members],
+    taken: Callable[[Members], Members], moment: float = 0.0,
 ) -> Walls:  # fmt: skip
-    """The walls of a scene in which nothing moves, and of a body's own surfaces.
+    """The walls of a scene in which nothing moves, and of a body's own surfaces, in the frame that ends at a moment.
 
-    `groups` are the order's fields, and `taken` says how kernels take a field.
+    `groups` are the order's fields, and `taken` says how kernels take a field that is always there.
     """
-    fields = (Field(taken(surfaces[i].walls()[0])) for i in order.fields)
+    fields = (Field(_field(surfaces[i], taken, moment)) for i in order.fields)
     listed = (Listed(taken(group)) for group in groups)
-    others = all_walls([*(surfaces[i] for i in order.others), *own])
-    joined = all_walls([surfaces[i] for i in order.alone()[len(order.others) :]])
+    others = (wall for i in order.others for wall in walls_then(surfaces[i], moment))
+    joined = (wall for i in order.alone()[len(order.others) :] for wall in walls_then(surfaces[i], moment))
     rooms = [[[surfaces[i] for i in room] for room in union] for union in order.unions]
-    return with_rooms(Walls((*fields, *listed, *others.each, *joined.each)), rooms)
+    return with_rooms(Walls((*fields, *listed, *others, *all_walls(own).each, *joined)), rooms)
+
+
+def _field(surface: Surface, taken: Callable[[Members], Members], moment: float) -> Members:
+    (members,) = walls_then(surface, moment)
+    return taken(members) if surface.present is None else members
 
 
 def _laws(surface: Surface) -> tuple[Any, ...]:

@@ -19,12 +19,10 @@ from ..shapes.quadratic import QuadricNumbers
 from ..shapes.slab import AXES, SlabNumbers
 from ..shapes.solid import SolidNumbers
 from ..shapes.sphere import SphereNumbers, ball
-from .grid import Grid, cell_of, until_next
+from .grid import Grid, aligned, cell_of, until_next
 
 # The rows of a rotation that turns nothing.
 _UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
-# Bytes of a line of the cache.
-_LINE = 64
 # What has fields of its own in a table, beside vectors and balls.
 _KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, Rotated, SolidNumbers)
 
@@ -48,6 +46,13 @@ class Members(Record):
         """A time in which their motion changes little [s]."""
         return math.inf
 
+    # Whether each lane looks at all of them on a straight flight.
+    few = False
+
+    def looked_at_all(self) -> Any:
+        """The same, for lanes that look at all of them: they are so few that this is faster than from cell to cell."""
+        return Few(*self)
+
     def count(self):
         """Their number."""
         return float(self.table.shape[0])
@@ -69,19 +74,19 @@ class Members(Record):
 
     def count_in_cell(self, r):
         """Their number."""
-        first, stop = _entries_at(self.grid, r)
+        first, stop = entries_at(self.grid, r)
         return int(stop - first)
 
     def list_in_cell(self, k, before, r, into):
         """Their numbers, with so many walls before them, into into[k:], and how many they are."""
-        first, stop = _entries_at(self.grid, r)
+        first, stop = entries_at(self.grid, r)
         for i in range(first, stop):
             into[k + i - first] = before + self.grid.entries[i]
         return int(stop - first)
 
     def one_in_cell(self, k, r):
         """The number of one of them."""
-        first, _stop = _entries_at(self.grid, r)
+        first, _stop = entries_at(self.grid, r)
         return self.grid.entries[first + k]
 
     def until_next_cell(self, r, v):
@@ -96,8 +101,10 @@ class Members(Record):
 class Few(Members):
     """So few bodies that each lane looks at all of them on a straight flight, faster than from cell to cell."""
 
+    few = True
 
-def _entries_at(grid, r):
+
+def entries_at(grid, r):
     """The begin and the end of the entries of the cell of a point."""
     cell = index(cell_of(grid, r).number)
     return grid.first[cell], grid.first[cell + 1]
@@ -192,21 +199,12 @@ def _written(like: Any) -> list[float]:
     return [number for part in like for number in _written(part)] if isinstance(like, tuple) else [float(like)]
 
 
-def aligned(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A copy of a table that begins with a line of the cache."""
-    memory = np.empty(rows.nbytes + _LINE, np.uint8)
-    first = -memory.ctypes.data % _LINE
-    copy = memory[first : first + rows.nbytes].view(np.float64).reshape(rows.shape)
-    copy[:] = rows
-    return copy
-
-
 # --- Outlined, of the cell of a point --------------------------------------------------------------------
 
 
 @outlined
 def _is_in_another(members, number, r):
-    first, stop = _entries_at(members.grid, r)
+    first, stop = entries_at(members.grid, r)
     for k in range(first, stop):
         m = members.grid.entries[k]
         body = member(members, index(m))
@@ -218,7 +216,7 @@ def _is_in_another(members, number, r):
 @outlined
 def _deepest(members, r):
     most = -math.inf
-    first, stop = _entries_at(members.grid, r)
+    first, stop = entries_at(members.grid, r)
     for k in range(first, stop):
         most = max(most, member(members, index(members.grid.entries[k])).distance(r))
     return most

@@ -1,0 +1,59 @@
+"""A maze: how long particles that bounce through it need to its exit.
+
+    python -m examples.maze
+
+The scene is `examples/scenes/maze.toml`: one outline of 68 sides, in a plane, with an opening in the wall of its last
+cell. All corridors are parallel to x or y, so that a particle keeps |v_x| and |v_y|, and has four directions; yet it
+wanders from cell to cell, and the times of escape of a start that fills the maze have a tail.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+import swarm
+from swarm import scene_file
+
+from .asked import Asked
+
+SCENE = Path(__file__).parent / "scenes" / "maze.toml"
+
+
+def run(count: int | None = None, until: float | None = None) -> tuple[swarm.Scene, swarm.Result]:
+    """The run of the file, or of so many particles until another time."""
+    job = scene_file.read(SCENE)
+    start = job.start() if count is None else swarm.fill(job.scene, count, speed=1.0, seed=1)
+    return job.scene, swarm.simulate(job.scene, start, job.method, until=until or job.run.times.until)
+
+
+def draw(scene: swarm.Scene, result: swarm.Result, file: Path) -> None:
+    """The maze with those who are left in it, and how many are left over time."""
+    from .paper.plotting import BLUE, GREY, RED, page
+
+    with page(file, "A maze", 1, 2, (12.0, 4.2)) as axes:
+        for curve in scene.surfaces[0].curves():
+            axes[0].plot(*curve[:, :2].T, color=GREY)
+        left = np.isnan(result.escape_time)
+        for who, color, size in ((left, BLUE, 2.0), (~left, RED, 1.0)):
+            axes[0].plot(*result.particles.position[:2, who], ".", color=color, markersize=size)
+        axes[0].set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+        axes[0].set_title("at the end: who is in it still (blue), who has left (red)", fontsize=9)
+        times = np.sort(np.nan_to_num(result.escape_time, nan=np.inf))
+        axes[1].loglog(times, 1.0 - np.arange(1, len(times) + 1) / len(times), color=BLUE)
+        axes[1].set(xlabel="time [s]", ylabel="part that is left", xlim=(1.0, None))
+
+
+def main() -> None:
+    """Run, print and draw."""
+    ask = Asked(__doc__, "maze.png", "plot")
+    ask.add_argument("--particles", type=int, default=10_000)
+    asked = ask.parse_args()
+    scene, result = run(asked.particles)
+    times = result.escape_time
+    print(f"{100.0 * np.mean(~np.isnan(times)):.1f} % have left, half of these within {np.nanmedian(times):.0f} s")
+    draw(scene, result, asked.output)
+    print(f"written {asked.output}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,112 @@
+"""Curves on triangles: where planes cut them, their edges, and those where two of them meet at an angle."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..particles import Floats
+
+Indices = NDArray[np.int64]
+
+# Planes across each axis.
+_PLANES = 5
+# Neighbours whose normals differ by more than this angle meet at an edge [rad].
+_EDGE = math.radians(30.0)
+
+
+def across(points: Floats, triangles: Indices, frame: Floats, planes: int = _PLANES) -> list[Floats]:
+    """The curves in which planes across the axes of a frame, the columns of a matrix, cut triangles."""
+    curves: list[Floats] = []
+    for axis in frame.T if len(points) else ():
+        along = points @ axis
+        for place in np.linspace(along.min(), along.max(), planes + 2)[1:-1]:
+            curves += _section(points, triangles, along - place)
+    return curves
+
+
+def _section(points: Floats, triangles: Indices, above: Floats) -> list[Floats]:
+    """The curves at which a function of points is 0."""
+    is_above = above > 0.0
+    mixed = triangles[is_above[triangles].any(axis=1) & ~is_above[triangles].all(axis=1)]
+    if not len(mixed):
+        return []
+    alone = (is_above[mixed] == (is_above[mixed].sum(axis=1) == 1)[:, None]).argmax(axis=1)
+    a, b, c = np.take_along_axis(mixed, (alone[:, None] + np.arange(3)) % 3, axis=1).T
+    sides = np.sort(np.concatenate([np.stack([a, b], axis=1), np.stack([a, c], axis=1)]), axis=1)
+    edges, places = np.unique(sides, axis=0, return_inverse=True)
+    first, last = edges.T
+    part = above[first] / (above[first] - above[last])
+    return joined(points[first] + part[:, None] * (points[last] - points[first]), places.reshape(2, -1).T)
+
+
+class _Sides(NamedTuple):
+    """The sides of triangles: the two points of each, and of those of two triangles these, and their angle."""
+
+    ends: Indices
+    is_pair: NDArray[np.bool_]
+    mine: Indices
+    other: Indices
+    cosine: Floats
+
+
+def _sides(points: Floats, triangles: Indices) -> _Sides:
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    key = sides[:, 0] * len(points) + sides[:, 1]
+    order = np.argsort(key, kind="stable")
+    begins = np.flatnonzero(np.diff(key[order], prepend=-1))
+    is_pair = np.diff(begins, append=len(order)) == 2
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.sqrt((normal**2).sum(axis=1, keepdims=True)), 1e-300)
+    mine, other = order[begins[is_pair]] // 3, order[begins[is_pair] + 1] // 3
+    return _Sides(sides[order[begins]], is_pair, mine, other, (normal[mine] * normal[other]).sum(axis=1))
+
+
+def creases(points: Floats, triangles: Indices) -> Indices:
+    """The sides (E, 2) of triangles that are on a rim, or at which two of them meet at an angle."""
+    found = _sides(points, triangles)
+    shown = ~found.is_pair
+    shown[found.is_pair] = found.cosine < math.cos(_EDGE)
+    return np.asarray(found.ends[shown])
+
+
+def neighbours(points: Floats, triangles: Indices) -> tuple[Indices, Indices]:
+    """The pairs of triangles that meet at a side, but for an angle."""
+    found = _sides(points, triangles)
+    smooth = found.cosine >= math.cos(_EDGE)
+    return found.mine[smooth], found.other[smooth]
+
+
+def joined(points: Floats, pairs: Indices) -> list[Floats]:
+    """Curves through points that are joined in pairs, each as long as it does not branch."""
+    ways: dict[int, list[int]] = {}
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    for k, (a, b) in enumerate(pairs.tolist()):
+        ways.setdefault(a, []).append(k)
+        ways.setdefault(b, []).append(k)
+    ends, left, curves = pairs.tolist(), [True] * len(pairs), []
+    # Closed curves have no end: they begin where one of the pairs does.
+    begins = [point for point, of in ways.items() if len(of) != 2]
+    for point in (*begins, *pairs[:, 0].tolist()):
+        for start in ways[point]:
+            if not left[start]:
+                continue
+            curve, at, k = [point], point, start
+            while True:
+                left[k] = False
+                at = ends[k][0] + ends[k][1] - at
+                curve.append(at)
+                onward = [other for other in ways[at] if left[other]]
+                if len(ways[at]) != 2 or not onward:
+                    break
+                k = onward[0]
+            curves.append(points[curve])
+    return curves
+
+
+def runs(curve: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
+    """The parts of a curve whose points are kept, two points or more each."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
+    return [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]

@@ -1,0 +1,124 @@
+"""The run of a scene in which walls come and go, or openings open and shut: its frames are cut at these instants."""
+
+import bisect
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.events import ARRIVED, CAREFUL, EDGE, FLYING, HELD
+from ..errors import RunError
+from ..particles import Contacts
+from .base import Arrays
+from .engine import Run
+from .failures import sentence_of_coming
+
+
+class DoorRun(Run):
+    """The run of particles, piece by piece of each frame: from one instant to the next nothing comes or goes."""
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self._instants = self._scene.instants
+        # When the frame began [s], and how many of its pieces are done.
+        self._begun, self._done = np.zeros(1), np.zeros(1, np.int64)
+
+    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+        begin = float(self._begun[0])
+        times = self._times(begin, moment)
+        for k in range(int(self._done[0]), len(times) - 1):
+            before, after = times[k], times[k + 1]
+            if not self._cut_short:
+                self._switch(before)
+            if self._impacts is not None:
+                self._impacts.begin = before
+            if not super().advance(after - before, after, writing, latest):
+                return False
+            self._done[0] = k + 1
+        self._begun[0], self._done[0] = moment, 0
+        return True
+
+    def _times(self, begin: float, end: float) -> list[float]:
+        """The times between which the pieces of a frame are."""
+        first, last = bisect.bisect_right(self._instants, begin), bisect.bisect_left(self._instants, end)
+        return [begin, *self._instants[first:last], end]
+
+    def _move_walls(self, moment: float) -> None:
+        super()._move_walls(moment)
+        if not self._scene.moves():
+            self._walls, self._faces = self._scene.walls(moment), self._scene.open_faces(moment)
+        self.state = self.state._replace(openings=self._scene.openings(moment))
+
+    def share_done(self, span: float) -> float:
+        k, end = int(self._done[0]), self._begun[0] + span
+        times = self._times(float(self._begun[0]), float(end))
+        before, after = times[k : k + 2]
+        return float((before - times[0] + super().share_done(after - before) * (after - before)) / span)
+
+    def arrays(self) -> Arrays:
+        return {**super().arrays(), "piece.begun": self._begun, "piece.done": self._done}
+
+    # --- At an instant -----------------------------------------------------------------------------------
+
+    def _switch(self, instant: float) -> None:
+        """What comes, goes, opens or shuts at an instant [s], if it is one."""
+        k = bisect.bisect_left(self._instants, instant)
+        if k == len(self._instants) or self._instants[k] != instant:
+            return
+        self._require_free(instant)
+        contacts = self.state.contacts
+        if contacts is None or not self._kinds:
+            return
+        last, pieces = self._before(instant), self._scene.pieces
+        gone = [one.is_there(last) and not one.is_there(instant) for one in pieces]
+        if any(gone):
+            self._let_go(contacts, np.array(gone))
+        if any(one.is_there(instant) and not one.is_there(last) for one in self._scene.open_volumes()):
+            _wake(contacts, contacts.phase == ARRIVED)
+
+    def _before(self, instant: float) -> float:
+        """A time before an instant and after the one before it [s]."""
+        k = bisect.bisect_left(self._instants, instant)
+        return 0.5 * ((self._instants[k - 1] if k > 0 else 0.0) + instant)
+
+    def _require_free(self, instant: float) -> None:
+        """Raise a RunError where a particle is inside a wall that comes at an instant [s]."""
+        last, owners = self._before(instant), self._scene.owners_of_pieces
+        came = np.zeros(len(self._scene.surfaces), np.bool_)
+        for i, piece in zip(owners, self._scene.pieces, strict=True):
+            came[i] |= piece.is_there(instant) and not piece.is_there(last)
+        if not came.any():
+            return
+        distances = self._scene.distances_outside(self.state.position, instant)
+        distances[~came] = -math.inf
+        if self.state.escape_time is not None:
+            distances[:, ~np.isnan(self.state.escape_time)] = -math.inf
+        # Where phi is no number is no place either.
+        inside = ~(distances <= self._deepest)
+        if inside.any():
+            particle = int(np.argmax(inside.any(axis=0)))
+            wall = int(np.argmax(inside[:, particle]))
+            depth, found = float(distances[wall, particle]), (wall, particle)
+            raise RunError(sentence_of_coming(self._scene, self.state, found, depth, instant, self._first))
+
+    def _let_go(self, contacts: Contacts, gone: NDArray[np.bool_]) -> None:
+        """Let what slides or rests on walls that have gone fly: those of the pieces that are `gone`."""
+        # Number -1 is no wall.
+        walls = np.append(gone[self._scene.pieces_of_walls()], False)
+        held = walls[contacts.walls.astype(np.int64)].any(axis=0)
+        rests, careful = contacts.phase == ARRIVED, contacts.phase == CAREFUL
+        held &= np.isin(contacts.phase, (HELD, EDGE, ARRIVED))
+        held |= careful & walls[contacts.met.astype(np.int64)]
+        held |= rests & (contacts.load[gone[self._scene.pieces_of_rows()]] != 0.0).any(axis=0)
+        contacts.phase[held] = FLYING
+        contacts.walls[:, held] = -1.0
+        contacts.step[held] = contacts.keep[held] = 0.0
+        contacts.load[:, held] = 0.0
+
+
+def _wake(contacts: Contacts, rests: NDArray[np.bool_]) -> None:
+    """Let what rests find out whether it still does: an opening may be where it is."""
+    first, second = contacts.walls[:, rests] >= 0.0
+    contacts.load[:, rests] = 0.0
+    contacts.phase[rests] = np.where(second, EDGE, np.where(first, HELD, CAREFUL))

@@ -1,0 +1,1 @@
+"""Outlines of lines and arcs: what they are, and the walls that stand on them."""

@@ -1,0 +1,260 @@
+"""The walls that stand on an outline as kernels take them: planes and round walls, each as far as its side goes."""
+
+import math
+
+from ...kernel.arrays import index
+from ...kernel.gravity import as_vector
+from ...kernel.jit import outlined, select
+from ...kernel.vector import Vec, dot, norm, square, times
+from ..course import Fall, Quartic, close, rise_time, under_way
+from ..fields.members import Members, member
+from ..frames import Framed
+from ..patched import Patched
+from ..rotation import Rotated
+from ..shapes.quadratic import QuadricNumbers, form
+
+# How often a fall may cross the whole of a round wall, and how often it may need more steps between.
+_CROSSINGS = 12
+
+
+class Side(Framed):
+    """One side: a quadric of curvature k that goes through its start, where that is within the side.
+
+    The level of the quadric, n.d + k/2 |d|^2 with d = r - start, is the distance to first order.
+    """
+
+    body: QuadricNumbers  # center: the start, b: n there, out of what is admissible, a: k/2 along the plane
+    ahead: Vec  # the tangent at the start, from there to the end; 0 where the wall has no ends
+    behind: Vec  # and at the end
+    end: Vec  # from the start
+    slack: float  # round-off of a place [m]: a hit so far beyond an end is one still
+    extent: float  # of the outline [m]
+    before: float  # 1 where there is a convex corner at the start, 0 smooth, at a re-entrant one -sin of half its wedge
+    after: float  # and at the end
+    thickness: float  # of what is behind it, at the least [m]
+    previous: float  # the number of the side that joins it smoothly at its start, or -1
+    following: float  # and at its end
+
+    def same(self, a):
+        """What is the same in the frame of the quadric, which has none of its own."""
+        return a
+
+    place_in = end_in = velocity_in = way_in = vector_in = gravity_in = same
+    place_out = end_out = normal_out = vector_out = same
+
+    # A fall is at a part of the quadric; its level alone does not say when it hits.
+    is_quartic = may_be_far = in_steps = False
+
+    def steps(self, gravity, r, v):
+        return None
+
+    def entry(self, gravity, r, v):
+        return self.first_hit(r, v) if gravity is None else self.falling_hit(r, v, as_vector(gravity))
+
+    def safe_time(self, r, v, pull):
+        return self.falling_hit(r, v, pull)[0]
+
+    def straight_hit(self, end, r0, r1):
+        return self.first_hit(r0, r1 - r0)
+
+    def is_within(self, d, near=0.0):
+        """Whether a point of the quadric, from the start of the side, is of the side, or nearer to it than that."""
+        room = self.slack + near
+        return (dot(d, self.ahead) >= -room) & (dot(d - self.end, self.behind) <= room)
+
+    def first_hit(self, r, v):
+        body = self.body
+        d = r - body.center
+        c = form(body.a, d, d) + dot(body.b, d)
+        b, a = form(body.a, d, v) + 0.5 * dot(body.b, v), form(body.a, v, v)
+        # Outside by round-off is on the wall.
+        c = select((c > 0.0) & (c <= self.slack), 0.0, c)
+        discriminant = b * b - a * c
+        root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
+        approaching = b > 0.0
+        bottom = select(approaching, b + root, a)
+        rises = (bottom > 0.0) & (discriminant >= 0.0)
+        time = select(approaching, -c, root - b) / select(rises, bottom, 1.0)
+        hits = rises & (time >= 0.0) & self.is_within(d + time * v)
+        return select(hits, time, math.inf), True
+
+    def falling_hit(self, r, v, pull):
+        return _first_fall(self, r, v, pull)
+
+    def level_of_fall(self, r, v, pull):
+        """The level of the quadric along a fall."""
+        body = self.body
+        d = r - body.center
+        c, b = form(body.a, d, d) + dot(body.b, d), form(body.a, d, v) + 0.5 * dot(body.b, v)
+        a2 = form(body.a, v, v) + form(body.a, d, pull) + 0.5 * dot(body.b, pull)
+        a3, a4 = form(body.a, v, pull), 0.25 * form(body.a, pull, pull)
+        window = 2.0 / (norm(v) / self.extent + math.sqrt(norm(pull) / self.extent))
+        c = select((c > 0.0) & (c <= self.slack), 0.0, c)
+        return Quartic(c, b, a2, a3, a4, select((a3 == 0.0) & (a4 == 0.0), math.inf, window))
+
+    # --- The distance from the side ---
+
+    def signed(self, r):
+        """The distance outside of the whole quadric, without cancellation, and the unit vector along it."""
+        body = self.body
+        d = r - body.center
+        gradient = body.gradient(r)
+        steep = norm(gradient)
+        level = form(body.a, d, d) + dot(body.b, d)
+        return 2.0 * level / (1.0 + steep), gradient * (1.0 / select(steep > 0.0, steep, 1.0))
+
+    def beside(self, r):
+        """(Signed distance outside, distance, whether the nearest point is none of its ends) of a point from the side.
+
+        At its ends corners say on which side of the outline the point is.
+        """
+        signed, out = self.signed(r)
+        d = self.along_plane(r - self.body.center)
+        at_start, at_end = norm(d), norm(d - self.end)
+        first = at_start < at_end
+        beyond, turn = select(first, at_start, at_end), select(first, self.before, self.after)
+        outside = select(turn == 0.0, select(signed < 0.0, -beyond, beyond), select(turn < 0.0, -beyond, beyond))
+        within = self.is_within(d - signed * out)
+        return select(within, signed, outside), select(within, abs(signed), beyond), within
+
+    def along_plane(self, d):
+        """A vector without its part across the plane of the outline."""
+        return dot(self.ahead, d) * self.ahead + dot(self.body.b, d) * self.body.b
+
+    def may_reach(self, low, high):
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        t, n = self.ahead, self.body.b
+        # Along the plane 1, across it 0, where boxes have no end
+        half = times(times(t, t) + times(n, n), half)
+        return self.beside(middle)[1] <= 1.000001 * norm(half)
+
+    def distance(self, r):
+        # Beside the side a point is not outside, however far it is beyond the whole quadric; nor is it where the wedge,
+        # or what is behind the side, ends: there it is in front of another side.
+        signed, away, within = self.beside(r)
+        d = self.along_plane(r - self.body.center)
+        first = select(self.before < 0.0, -self.before * norm(d), math.inf)
+        last = select(self.after < 0.0, -self.after * norm(d - self.end), math.inf)
+        behind = signed <= min(self.thickness, min(first, last))
+        return select(within & behind, signed, -away)
+
+
+class Sides(Members, Patched):
+    """The sides of an outline: a field whose bodies are walls as far as they go."""
+
+    def looked_at_all(self):
+        return FewSides(*self)
+
+    def is_in_another(self, number, r):
+        return _is_beyond(self, number, r)
+
+    def deepest_in_cell(self, r):
+        return _nearest(self, r)[0]
+
+    def is_there(self, number, r, near):
+        """Whether a side reaches to a place on its wall, or nearer to it than that."""
+        side = self.wall(number)
+        r, side = (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
+        return side.is_within(r - side.body.center, near)
+
+    def wall_after(self, number, r, near):
+        """The side on which what slides on this one goes on beyond its end at r, -1 where it has a corner there."""
+        side = self.wall(number)
+        r, side = (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
+        d = side.along_plane(r - side.body.center)
+        return select(norm(d) < norm(d - side.end), side.previous, side.following)
+
+    def goes_on(self, number, other):
+        """Whether a side joins this one smoothly: what slides on this one does not meet it, but goes on on it."""
+        side = self.wall(number)
+        side = side.body if isinstance(side, Rotated) else side
+        return (side.previous == other) | (side.following == other)
+
+
+class FewSides(Sides):
+    """So few sides that each lane looks at all of them on a straight flight."""
+
+    few = True
+
+
+@outlined
+def _first_fall(side, r, v, pull):
+    """When a fall hits a side: of all times at which its level rises through 0 the first within the side."""
+    begin, end = _near(side, r, v, pull)
+    if not begin <= end:
+        return math.inf, True
+    level = side.level_of_fall(r, v, pull)
+    if level.window == math.inf:
+        # A plane: the level is a parabola, which rises once at most.
+        comes = (level.c <= 0.0) | ((level.b < 0.0) & (level.b * level.b >= level.a2 * level.c) & (level.a2 > 0.0))
+        t = select(comes, rise_time(level.c, level.b, level.a2), math.inf)
+        return select(side.is_within(r + t * (v + 0.5 * t * pull) - side.body.center), t, math.inf), True
+    if begin > 0.0:
+        level = level.moved(begin)
+    t, sign = begin, select(level.c > 0.0, -1.0, 1.0)
+    for _crossing in range(_CROSSINGS):
+        turned = Quartic(
+            sign * level.c, sign * level.b, sign * level.a2, sign * level.a3, sign * level.a4, level.window
+        )
+        fall = Fall(turned, close(turned.window), False)
+        step, last = fall.first_step()
+        for _step in range(fall.most):
+            if not under_way(step, last) or t + step > end:
+                break
+            step, last = fall.next_step(step, last)
+        t += step
+        if not t <= end:
+            return math.inf, True
+        level = level.moved(step)
+        if not under_way(step, last):
+            if sign > 0.0 and side.is_within(r + t * (v + 0.5 * t * pull) - side.body.center):
+                return t, True
+            level = Quartic(0.0, level.b, level.a2, level.a3, level.a4, level.window)
+            sign = -sign
+    return t, False
+
+
+def _near(side, r, v, pull):
+    """The first and the last time at which a fall may be near a side: in a square around it."""
+    if square(side.end) == 0.0:
+        return 0.0, math.inf  # a wall without ends
+    # Arcs are at most half circles: all is within the circle whose diameter is the chord.
+    d, room = r - side.body.center - 0.5 * side.end, 0.500001 * norm(side.end) + side.slack
+    t, n = side.ahead, side.body.b
+    first, last = _within(dot(t, d), dot(t, v), dot(t, pull), room)
+    begin, end = _within(dot(n, d), dot(n, v), dot(n, pull), room)
+    return max(first, begin), min(last, end)
+
+
+def _within(x, u, g, room):
+    """The first and the last time at which x + u t + g t^2/2 is no farther than this from 0."""
+    sign = math.copysign(1.0, x)
+    first = select(abs(x) <= room, 0.0, rise_time(room - abs(x), -0.5 * sign * u, -0.5 * sign * g))
+    ahead = select(g == 0.0, math.copysign(1.0, u), math.copysign(1.0, g))
+    last = rise_time(ahead * x - room, 0.5 * ahead * u, 0.5 * ahead * g)
+    return first, select((g == 0.0) & (u == 0.0), math.inf, last)
+
+
+@outlined
+def _nearest(sides, r):
+    """The signed distance outside of the outline, and the number of the side that is nearest to a point."""
+    least, found, which = math.inf, -math.inf, -1.0
+    # All of them: that of the cell that is nearest may be the back of a thin wall.
+    for m in range(sides.table.shape[0]):
+        signed, away, _within = _beside(member(sides, index(m)), r)
+        # At a corner both its sides are at one distance, and it says the same of both.
+        if away < least:
+            least, found, which = away, signed, float(m)
+    return found, which
+
+
+def _beside(side, r):
+    """`beside` of a side, which may be turned."""
+    return side.body.beside(side.place_in(r)) if isinstance(side, Rotated) else side.beside(r)
+
+
+@outlined
+def _is_beyond(sides, number, r):
+    """Whether a point is outside of the outline, and nearest to another side."""
+    outside, which = _nearest(sides, r)
+    return outside > 0.0 and which != number

@@ -1,0 +1,70 @@
+"""Cavities that overlap only in part: the run says that what they have in common is meant."""
+
+import logging
+from pathlib import Path
+
+import pytest
+from test_openings import run
+
+import swarm
+from swarm import scene_file
+from swarm.run import overlaps
+
+SENTENCE = (
+    "surfaces[0] (Sphere) and surfaces[2] (Box) overlap only in part: particles are kept in what they have in common; "
+    'a vessel of both is one surface, swarm.Union([...]), in a scene file kind = "union"'
+)
+BALL = swarm.Sphere(0.5)
+APART = {
+    "two balls": ([BALL, swarm.Sphere(0.5, center=(0.6, 0.0, 0.0))], {}),
+    "two boxes": ([swarm.Box((0.5, 0.5, 0.5)), swarm.Box((0.5, 0.5, 0.5), center=(0.7, 0.0, 0.0))], {}),
+    "a rounded box": ([BALL, swarm.Box((0.4, 0.4, 0.4))], {}),
+    "two unions": ([swarm.Union([BALL, swarm.Sphere(0.5, (0.6, 0, 0))]), swarm.Sphere(0.5, (0.0, 0.3, 0.0))], {}),
+    "in the plane": ([swarm.Stadium(0.5, 1.0), swarm.Stadium(0.5, 1.0, center=(0.5, 0.5, 0.0))], {"plane": "z"}),
+}
+MEANT = {
+    "one": ([BALL], {}),
+    "a shell": ([BALL, swarm.Sphere(0.3, side="outside")], {}),
+    "one in the other": ([BALL, swarm.Sphere(0.3, center=(0.1, 0.0, 0.0))], {}),
+    "one that touches the other": ([swarm.Box((0.5, 0.5, 0.5)), BALL], {}),
+    "a tube with lids": ([swarm.Cylinder(0.5), swarm.Plane((0, 0, 1), 1.0), swarm.Plane((0, 0, -1), 1.0)], {}),
+    "a tube between planes": ([swarm.Cylinder(0.5), swarm.Slab((0, 0, 1), 1.0)], {}),
+    "a cone with a lid": ([swarm.Cone(0.7, center=(0.0, 0.0, -0.5)), swarm.Plane((0, 0, 1), 0.3)], {}),
+    "half a ball": ([BALL, swarm.Plane((0, 0, 1), 0.0)], {}),
+    "a ball in a tube": ([BALL, swarm.Cylinder(0.3)], {}),
+    "one after the other": (
+        [swarm.Box((0.5,) * 3, present=[(0, 1)]), swarm.Box((0.5,) * 3, center=(0.5, 0, 0), present=[(1, 2)])], {}
+    ),
+}  # fmt: skip
+
+
+def said(scene, caplog):
+    with caplog.at_level(logging.WARNING, "swarm"):
+        overlaps.warn(scene)
+    return [record.getMessage() for record in caplog.records]
+
+
+@pytest.mark.parametrize("name", APART)
+def test_what_is_cut_is_said(name, caplog):
+    surfaces, given = APART[name]
+    (sentence,) = said(swarm.Scene(surfaces, **given), caplog)
+    assert "surfaces[0]" in sentence
+    assert "surfaces[1]" in sentence
+
+
+@pytest.mark.parametrize("name", MEANT)
+def test_what_is_meant_is_not(name, caplog):
+    surfaces, given = MEANT[name]
+    assert said(swarm.Scene(surfaces, **given), caplog) == []
+
+
+@pytest.mark.parametrize("path", sorted(Path("examples/scenes").glob("*.toml")), ids=lambda path: path.stem)
+def test_no_scene_of_the_examples_is_cut(path, caplog):
+    assert said(scene_file.read(path).scene, caplog) == []
+
+
+def test_a_run_says_it_once_before_it_starts(caplog):
+    scene = swarm.Scene([BALL, swarm.Sphere(0.1, side="outside"), swarm.Box((0.4, 0.4, 0.4))])
+    with caplog.at_level(logging.WARNING, "swarm"):
+        run(scene, swarm.fill(scene, 3, speed=1.0, seed=1), until=1.0, frames=4)
+    assert [record.getMessage() for record in caplog.records] == [SENTENCE]
