@@ -1,4 +1,4 @@
-"""What files of triangles do wrong, made and mended: seams, corners on edges, doubles, needles, turns, groups, holes."""
+"""What files of triangles do wrong, made and mended: seams, corners on edges, doubles, needles, turns; holes; groups."""
 
 import numpy as np
 import pytest
