@@ -120,7 +120,7 @@ def _obj(text: str) -> tuple[Floats, Indices, Indices, list[str]]:
         elif kind == "f":
             corners = [int(part.split("/")[0]) for part in parts]
             corners = [c - 1 if c > 0 else len(vertices) + c for c in corners]
-            fan = [(corners[0], b, c) for b, c in itertools.pairwise(corners)]
+            fan = [(corners[0], b, c) for b, c in itertools.pairwise(corners[1:])]
             faces += fan
             group += len(fan) * [_number_of(known["g"] or known["o"], names)]
     triangles = np.array(faces, np.int64).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""What files of triangles do wrong, made and mended: seams, corners on edges, doubles, needles, turns; holes; groups."""
+"""What files of triangles do wrong, made and mended: seams, corners on edges, needles, turns. Holes, groups."""
 
 import numpy as np
 import pytest
