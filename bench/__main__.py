@@ -14,6 +14,7 @@ from . import (
     contacts,
     endurance,
     fields,
+    meshes,
     motion,
     report,
     scenes,
@@ -50,6 +51,7 @@ def main() -> None:
     commands.add_parser(
         "fields", help="scenes of many bodies, and the log of impacts: speed, first calls, what is kept"
     )
+    commands.add_parser("meshes", help="meshes of triangles: the scene, its memory, an impact, the first call")
     first = commands.add_parser("compile", help="first calls: processor time, functions compiled, and the next process")
     first.add_argument(
         "--scenes", metavar="NAME", nargs="+", choices=list(compiling.CASES),
@@ -85,6 +87,7 @@ def main() -> None:
         "bodies": bodies,
         "motion": motion,
         "fields": fields,
+        "meshes": meshes,
         "compile": compiling,
         "sweep": sweeps,
         "cluster": cluster,

@@ -20,7 +20,7 @@ from ..fields.members import gathered
 
 # Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
 # ones more are crossed. For each facet there are at most so many cells, which take 5 bytes each.
-_AREA, _CELLS_EACH, _MOST_CELLS = 3.0, 32.0, 100_000_000
+_AREA, _CELLS_EACH, _MOST_CELLS = 6.0, 32.0, 100_000_000
 # Cells of few facets.
 _LEAST_CELLS = 64
 # A plane in a cell is known by four whole numbers up to this one, and so to these parts of the cell's diagonal and of a
