@@ -14,6 +14,7 @@ from . import (
     contacts,
     endurance,
     fields,
+    meshes,
     motion,
     report,
     scenes,
@@ -52,6 +53,7 @@ def main() -> None:
         "fields", help="scenes of many bodies, and the log of impacts: speed, first calls, what is kept"
     )
     commands.add_parser("unions", help="vessels of several parts: what an impact costs beside one of them, first calls")
+    commands.add_parser("meshes", help="meshes of triangles: the scene, its memory, an impact, the first call")
     first = commands.add_parser("compile", help="first calls: processor time, functions compiled, and the next process")
     first.add_argument(
         "--scenes", metavar="NAME", nargs="+", choices=list(compiling.CASES),
@@ -88,6 +90,7 @@ def main() -> None:
         "motion": motion,
         "fields": fields,
         "unions": unions,
+        "meshes": meshes,
         "compile": compiling,
         "sweep": sweeps,
         "cluster": cluster,

@@ -122,7 +122,7 @@ class Pieces(Volume):
         return np.array(self.order.owners(self.pieces))
 
     def _runs(self) -> list[tuple[int, Surface, int]]:
-        """The walls in a row that have the same laws: their piece, the surface that says these, and how many they are."""
+        """The walls in a row that have the same laws: their piece, the surface that says these, how many they are."""
         found: list[tuple[int, Surface, int]] = []
         for i, walls in self.order.spans(self.pieces):
             piece = self.pieces[i]
