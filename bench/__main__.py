@@ -16,6 +16,7 @@ from . import (
     fields,
     meshes,
     motion,
+    plane,
     report,
     scenes,
     stability,
@@ -46,6 +47,9 @@ def main() -> None:
     commands.add_parser("peers", help="the same job by other programs, those that are installed")
     commands.add_parser("endurance", help="checkpoints, memory over many frames, reading a large trajectory")
     commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
+    commands.add_parser(
+        "plane", help="nanoseconds an impact in billiards of two dimensions: outlines of lines and arcs"
+    )
     commands.add_parser("contacts", help="sliding, resting, chattering and wedges against their bars and soft walls")
     commands.add_parser("bodies", help="a step and an impact of bodies of several points, and what they conserve")
     commands.add_parser("motion", help="walls that move and walls that are moved: exactness, conservation, speed")
@@ -85,6 +89,7 @@ def main() -> None:
         "bars": bars,
         "peers": race,
         "scenes": scenes,
+        "plane": plane,
         "contacts": contacts,
         "bodies": bodies,
         "motion": motion,

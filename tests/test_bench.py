@@ -74,6 +74,13 @@ def test_scenes_quick():
 
 
 @pytest.mark.long
+def test_plane_quick():
+    told = printed("plane")
+    assert "circle" in told
+    assert "stadium" in told
+
+
+@pytest.mark.long
 def test_contacts_quick():
     told = printed("contacts")
     for row in ("cone with a lid", "hopper, friction 0.4", "mass ratio 100^2", "composed step, ellipsoid, 2 threads"):
