@@ -10,6 +10,7 @@ from ..motion import WallMotion, pose
 from ..particles import Floats
 from ..scene import Scene
 from ..surfaces import Spheres
+from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
@@ -92,8 +93,8 @@ def bodies_of(surface: Surface) -> int:
 
 
 def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
-    """The shapes of every surface, those of each part of unions, where one has parts or an outline; else none."""
-    if not any(isinstance(surface, (Joined, Outlined)) for surface in scene.surfaces):
+    """The shapes of every surface, those of each part of unions, where one has parts, triangles or an outline."""
+    if not any(isinstance(surface, (Joined, Mesh, Outlined)) for surface in scene.surfaces):
         return {}
     found: dict[int, list[Shape]] = {}
     for part in parts_of(scene, time):
