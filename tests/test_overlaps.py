@@ -8,7 +8,7 @@ from test_openings import run
 
 import swarm
 from swarm import scene_file
-from swarm.run import overlaps
+from swarm.run.overlaps import warn_of_overlap
 
 SENTENCE = (
     "surfaces[0] (Sphere) and surfaces[2] (Box) overlap only in part: particles are kept in what they have in common; "
@@ -40,7 +40,7 @@ MEANT = {
 
 def said(scene, caplog):
     with caplog.at_level(logging.WARNING, "swarm"):
-        overlaps.warn(scene)
+        warn_of_overlap(scene)
     return [record.getMessage() for record in caplog.records]
 
 

@@ -54,8 +54,9 @@ class Under(Record):
 
 
 class Maybe(Record):
-    """The facets that lanes may meet in their cells, all looked up before they are looked at: so they are on their way
-    from memory together.
+    """The facets that lanes may meet in their cells.
+
+    All are looked up before one is looked at: so they are on their way from memory together.
     """
 
     lane: Array  # int64

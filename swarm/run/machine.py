@@ -14,7 +14,6 @@ from .. import interrupt
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
 from ..particles import Multipliers, Particles
-from . import overlaps
 from .base import BaseRun
 from .bodies import BodyRun
 from .compiling import Compilations
@@ -23,6 +22,7 @@ from .engine import Run
 from .impacts import log_of
 from .options import Task
 from .outputs import recorder_of, writer_of
+from .overlaps import warn_of_overlap
 from .progress import Display, display
 from .reacting import ReactingRun
 from .session import Session
@@ -82,7 +82,7 @@ def carry_out_task(task: Task, session: Session) -> End:
     if task.scene.is_open() and not task.is_shard:
         warn_open()
     if not task.is_shard:
-        overlaps.warn(task.scene)
+        warn_of_overlap(task.scene)
     until, span_of, kept = task.options.until, task.method.span, Columns()
     with _begun(task, session) as (run, writer, show, (log, tally)):
         with run, writer or contextlib.nullcontext(lambda *frame: None) as write:

@@ -16,7 +16,7 @@ _LOG = logging.getLogger("swarm")
 _POINTS, _CUT = 4096, 0.01
 
 
-def warn(scene: Scene) -> None:
+def warn_of_overlap(scene: Scene) -> None:
     """Warn of the first two cavities, each bounded by itself, of which neither is inside the other."""
     boxes = [_box_in(scene, one) for one in scene.surfaces]
     bounded = [(i, one) for i, one in enumerate(scene.surfaces) if _is_cavity(one) and np.isfinite(boxes[i]).all()]

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import motion as motions
 from ..checks import Vector
 from ..errors import SceneError
+from .facets.mesh import Mesh
 from .fields.many import Many
 from .instant import box_of, has_room, planes_of, side_of
 from .polyhedron import polyhedron_bounds
@@ -318,6 +319,11 @@ def _require_alone(whole: Joined) -> None:
             raise SceneError(
                 f"parts must not be {type(surface).__name__} in a {type(whole).__name__} of several rooms, got "
                 f"{surface}; list them as a surface of the scene, or their bodies one by one"
+            )
+        if isinstance(surface, Mesh):
+            raise SceneError(
+                f"parts must not be Mesh in a {type(whole).__name__} of several rooms, got {surface}; make one mesh of "
+                "what belongs together, or list it as a surface of the scene"
             )
         if surface.known_in() is not None:
             raise SceneError(

@@ -60,6 +60,30 @@ SOLIDS = {
 }
 
 
+# Vessels of several parts, of one law and one motion each.
+UNIONS = {
+    "two balls": lambda **wall: [
+        swarm.Union([swarm.Sphere(0.4, (-0.2, 0.0, 0.0)), swarm.Sphere(0.35, (0.25, 0.1, 0.0))], **wall)
+    ],
+    "ball and tube": lambda **wall: [
+        swarm.Union([swarm.Sphere(0.4), swarm.Cylinder(0.15, (0.2, 0.1, 1.0), 1.0, (0.1, 0.0, -0.4))], **wall)
+    ],
+    "boxes": lambda **wall: [
+        swarm.Union([swarm.Box((0.5, 0.3, 0.35)), swarm.Box((0.2, 0.6, 0.25), (0.2, 0.2, -0.1))], **wall)
+    ],
+    "T": lambda **wall: [
+        swarm.Union(
+            [
+                swarm.Cylinder(0.25, (1.0, 0.0, 0.0), 1.2),
+                swarm.Cylinder(0.2, (0.1, 0.1, 1.0), 0.8, (0.0, 0.0, -0.4)),
+                swarm.Capsule(0.2, 0.5, (0.0, 1.0, 0.0), (0.2, 0.3, 0.0)),
+            ],
+            **wall,
+        )
+    ],
+}
+
+
 class Rubbing(swarm.WallLaw):
     """Restitution and Coulomb's friction, as a user may write them."""
 
@@ -105,14 +129,14 @@ def with_opening(wall, times, random):
     return dataclasses.replace(wall, openings=[swarm.Opening(swarm.Sphere(0.25, tuple(r.tolist())), [tuple(times)])])
 
 
-def a_scene(seed):
+def a_scene(seed, vessels=VESSELS):
     """(scene, particles): kinds, motions, laws and gravity, all drawn."""
     random, own, doors = (np.random.default_rng([key, seed]) for key in (39, 41, 43))
-    vessel, solid = (str(random.choice(sorted(kinds))) for kinds in (VESSELS, SOLIDS))
+    vessel, solid = (str(random.choice(sorted(kinds))) for kinds in (vessels, SOLIDS))
     if vessel == "torus":
         solid = "nothing"
     surfaces = []
-    for make in (VESSELS[vessel], SOLIDS[solid]):
+    for make in (vessels[vessel], SOLIDS[solid]):
         law = {"restitution": float(random.choice([1.0, 0.9, 0.5])), "friction": float(random.choice([0.0, 0.3, 1.0]))}
         if own.random() < OWN:
             law = {"laws": [Rubbing(law["restitution"], law["friction"])]}
@@ -154,9 +178,9 @@ def compared(scene, start, frames, result):
     return states
 
 
-def holds(seed, folder):
+def holds(seed, folder, vessels=VESSELS):
     """Run the scene of a seed and look at everything; returns how many states were compared with the event loop."""
-    scene, start = a_scene(seed)
+    scene, start = a_scene(seed, vessels)
     path = folder / f"{seed}.h5"
     times = {"until": UNTIL, "every": UNTIL / FRAMES}
     try:
@@ -183,6 +207,22 @@ def holds(seed, folder):
 def test_some_scenes_that_move(seed, tmp_path, monkeypatch):
     bounded(monkeypatch, PASSES)
     holds(seed, tmp_path)
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("seed", range(8))
+def test_some_unions_that_move(seed, tmp_path, monkeypatch):
+    bounded(monkeypatch, PASSES)
+    holds(seed, tmp_path, UNIONS)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("twenty", range(10))
+def test_many_unions_that_move(twenty, tmp_path, monkeypatch):
+    count = bounded(monkeypatch, PASSES)
+    for seed in range(20 * twenty, 20 * twenty + 20):
+        count[0] = 0
+        holds(seed, tmp_path, UNIONS)
 
 
 @pytest.mark.long

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from ... import interrupt
 from ...errors import RunError, SceneError, WallTimeError
 from ...frames import Frame
-from .. import overlaps
 from ..machine import End, warn_open
 from ..options import Task
+from ..overlaps import warn_of_overlap
 from ..progress import Display, display
 from . import connection, joined, shards, worker
 from .sharded import Sharded
@@ -73,7 +73,7 @@ def carry_out(task: Task, session: Sharded) -> End:
     _require_shards(task)
     if task.scene.is_open():
         warn_open()
-    overlaps.warn(task.scene)
+    warn_of_overlap(task.scene)
     target = Path(task.options.trajectory).absolute()
     saved = task.options.checkpoint or _SAVED
     task = dataclasses.replace(task, options=dataclasses.replace(task.options, trajectory=target, checkpoint=saved))

@@ -5,6 +5,8 @@ here equal corners are one, and then only corners of edges that are still open a
 with the mesh. No feature of a surface that is closed is touched.
 """
 
+import itertools
+
 import numpy as np
 
 from .mesh_files import Floats, Indices, Soup
@@ -122,7 +124,7 @@ def _split(soup: Soup, beside: float) -> Soup | None:
             continue
         chain = [a, *near[on][np.argsort(along[on])].tolist(), b]
         gone.add(which)
-        made += [(p, q, c) for p, q in zip(chain, chain[1:], strict=False)]
+        made += [(p, q, c) for p, q in itertools.pairwise(chain)]
         from_which += (len(chain) - 1) * [which]
     if not gone:
         return None

@@ -9,9 +9,9 @@ from ... import checks
 from ...errors import SceneError
 from ...extras import needed_by
 from . import triangles
+from .mesh_files import Floats
 from .sampled import Sampled
 from .thickness import require_resolved
-from .triangles import Floats
 
 # Samples beyond the mesh on each side, in cells: the surface must not reach the border of the grid.
 _MARGIN = 3.0

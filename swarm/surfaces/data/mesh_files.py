@@ -1,5 +1,6 @@
 """The triangles of a file as they are there, with the names of its solids, objects or groups."""
 
+import itertools
 import re
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -119,7 +120,7 @@ def _obj(text: str) -> tuple[Floats, Indices, Indices, list[str]]:
         elif kind == "f":
             corners = [int(part.split("/")[0]) for part in parts]
             corners = [c - 1 if c > 0 else len(vertices) + c for c in corners]
-            fan = [(corners[0], b, c) for b, c in zip(corners[1:], corners[2:], strict=False)]
+            fan = [(corners[0], b, c) for b, c in itertools.pairwise(corners[1:])]
             faces += fan
             group += len(fan) * [_number_of(known["g"] or known["o"], names)]
     triangles = np.array(faces, np.int64).reshape(-1, 3)

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from ...kernel import cache
 from ...kernel.arrays import index
+from ...kernel.gravity import as_vector
 from ...kernel.jit import Array, kernel, select
 from ...kernel.record import Record
-from ...kernel.gravity import as_vector
 from ...kernel.vector import ZERO, Vec, absolute, dot, square, total, vec
 from ..fields.grid import MARGIN
 from ..fields.members import gathered
 
 # Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
 # ones more are crossed. For each facet there are at most so many cells, which take 5 bytes each.
-_AREA, _CELLS_EACH, _MOST_CELLS = 3.0, 32.0, 100_000_000
+_AREA, _CELLS_EACH, _MOST_CELLS = 6.0, 32.0, 100_000_000
 # Cells of few facets.
 _LEAST_CELLS = 64
 # A plane in a cell is known by four whole numbers up to this one, and so to these parts of the cell's diagonal and of a
@@ -140,8 +140,9 @@ class Here(Record):
     v: Vec
     half_pull: Any
     span: float
-    near: float  # a distance, and a speed, that may be none
+    near: float  # a distance, a speed and half an acceleration that may be none
     slow: float
+    weak: float
 
 
 def here_in(gravity, cells, place, r, v, span):
@@ -149,8 +150,9 @@ def here_in(gravity, cells, place, r, v, span):
     w = cells.width
     middle = cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z)
     pull = None if gravity is None else 0.5 * as_vector(gravity)
-    slow = _OFF_SPEED * (total(absolute(v)) + (0.0 if pull is None else 2.0 * span * total(absolute(pull))))
-    return Here(r - middle, v, pull, span, _OFF * math.sqrt(square(w)), slow)
+    weak = 0.0 if pull is None else _OFF_SPEED * total(absolute(pull))
+    slow = _OFF_SPEED * total(absolute(v)) + 2.0 * span * weak
+    return Here(r - middle, v, pull, span, _OFF * math.sqrt(square(w)), slow, weak)
 
 
 def passes(cells, k, here):
@@ -158,12 +160,13 @@ def passes(cells, k, here):
     normal = Vec(float(cells.planes[k, 0]), float(cells.planes[k, 1]), float(cells.planes[k, 2])) * (1.0 / _FULL)
     offset = float(cells.planes[k, 3]) * (here.near * (1.0 / (_FULL * _OFF)))
     depth, rate = dot(normal, here.from_middle) - offset, dot(normal, here.v) + here.slow
-    rises = select(rate > 0.0, rate, 0.0) * here.span
+    rises, is_inside = select(rate > 0.0, rate, 0.0) * here.span, depth <= here.near
     if here.half_pull is not None:
         bend = dot(normal, here.half_pull)
+        is_inside = is_inside | ((bend > -here.weak) & (rate < 2.0 * here.slow))
         bend = select(bend > 0.0, bend, 0.0) * here.span
-        rate, rises = rate + 2.0 * bend, rises + (bend + here.slow) * here.span
-    return (rate > 0.0) & (depth <= here.near) & (depth + rises >= -here.near)
+        rate, rises = rate + 2.0 * bend, rises + (bend + here.weak * here.span) * here.span
+    return (rate > 0.0) & is_inside & (depth + rises >= -here.near)
 
 
 # --- Where a flight leaves cells -------------------------------------------------------------------------

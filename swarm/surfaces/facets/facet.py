@@ -73,19 +73,22 @@ class FacetNumbers(Flat):
         depth, approach = self.inner(r) - self.offset, dot(self.normal, v)
         time = -depth / approach
         time = select(approach > 0.0, select(time > 0.0, time, 0.0), math.inf)
-        return self._taken(depth, time, None, r, v), True
+        return self._taken(depth <= self.room.value, time, None, r, v), True
 
     def falling_hit(self, r, v, pull):
         depth = self.inner(r) - self.offset
-        time = rise_time(depth, 0.5 * dot(self.normal, v), 0.5 * dot(self.normal, pull))
-        return self._taken(depth, time, pull, r, v), True
+        b, a = 0.5 * dot(self.normal, v), 0.5 * dot(self.normal, pull)
+        time = rise_time(depth, b, a)
+        # From behind the plane, beyond an edge, it falls through it, and back.
+        comes_back = (b < 0.0) & (a > 0.0) & (b * b >= a * depth)
+        return self._taken((depth <= self.room.value) | comes_back, time, pull, r, v), True
 
-    def _taken(self, depth, time, pull, r, v):
-        """The time at which its plane is met, if that is at the facet."""
+    def _taken(self, may_hit, time, pull, r, v):
+        """The time at which its plane is met from inside, if that is at the facet."""
         # Where it never is, at the start, so that no place is none.
         t = select(time < math.inf, time, 0.0)
         place = r + displacement(pull, v, t)
-        here = (depth <= self.room.value) & (self.within(place) >= 0.0)
+        here = may_hit & (self.within(place) >= 0.0)
         return select(here, time, math.inf)
 
     def safe_time(self, r, v, pull):

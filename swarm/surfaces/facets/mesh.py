@@ -14,23 +14,19 @@ from ...checks import Vector
 from ...errors import SceneError
 from ...kernel.vector import Vec
 from .. import rotation as rotations
-from ..data.mesh_files import Floats, Indices, Soup, read_soup
-from ..data.triangles import Mesh as Closed
+from ..data.mesh_files import Floats, Indices, read_soup
 from ..data.triangles import closed
-from ..fields.members import aligned
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .cells import cells_around
 from .facet import FacetNumbers, Shared
+from .made import given_arrays, sorted_by_place, table_of_facets, with_room
 from .members import Facets
 from .nearest import boxes_of, nearest, within
-from .room import CLOSED, FREE, KIND, rooms_of, with_blocks
 
 # The round-off of places, as a part of the farthest coordinate: far above that of numbers, and of a hit.
 _ROOM = 2.0**-40
 # What a group may have of its own.
 _LAWS = ("restitution", "friction", "temperature", "accommodation", "laws")
-# Bits of a place along each axis, by which triangles are sorted.
-_BITS = 20
 
 
 class _Made(NamedTuple):
@@ -114,15 +110,15 @@ class Mesh(Surface):
         """The triangles of the file or the arrays."""
         scale = checks.length("scale", self.scale)
         weld = None if self.weld is None else checks.magnitude("weld", self.weld)
-        path, soup = Path("of these arrays"), None
+        path = Path("of these arrays")
         if isinstance(self.vertices, (str, Path)):
             if self.triangles is not None:
                 raise SceneError("triangles must be None with the path of a file, which holds them; leave them out")
             path = Path(self.vertices)
             soup = read_soup(path, scale)
         else:
-            soup = _given(self.vertices, self.triangles, self.group, self.names, scale)
-        mesh = _sorted(closed(path, soup, weld))
+            soup = given_arrays(self.vertices, self.triangles, self.group, self.names, scale)
+        mesh = sorted_by_place(closed(path, soup, weld))
         for values in (mesh.vertices, mesh.triangles, mesh.group):
             values.flags.writeable = False
         return _Made((), mesh.vertices, mesh.triangles, mesh.group, mesh.names, mesh.weld)
@@ -167,11 +163,11 @@ class Mesh(Surface):
         """The facets as kernels take them."""
         corners = self.corners[self.triangles if self.side == "inside" else self.triangles[:, ::-1]]
         room = _ROOM * float(np.abs(self.corners).max())
-        table = _table(corners, room)
+        table = table_of_facets(corners, room)
         zero = Vec(0.0, 0.0, 0.0)
         like = FacetNumbers(zero, 0.0, 3 * ((zero, 0.0),), Shared(room))
         grid = cells_around(like, table, corners)
-        return _with_room(Facets(like, table, grid), self._tree, self.is_solid())
+        return with_room(Facets(like, table, grid), self._tree, self.is_solid())
 
     @cached_property
     def _tree(self) -> tuple[Floats, Indices, Floats]:
@@ -220,7 +216,7 @@ class Mesh(Surface):
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """The signed distance at points (3, N): below 0 inside, above 0 outside; shape (N,)."""
-        return self._nearest(points)[3]
+        return np.asarray(self._nearest(points)[3])
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gradient of that phi at points (3, N); shape (3, N)."""
@@ -231,92 +227,4 @@ class Mesh(Surface):
         flat = np.ascontiguousarray(np.array(rows).reshape(3, -1))
         found = np.empty((4, flat.shape[1]))
         nearest(self.members, self._tree, flat, found)
-        return side_sign(self.side) * found.reshape(4, *np.shape(rows.x))
-
-
-def _given(vertices: Any, triangles: Any, group: Any, names: Any, scale: float) -> Soup:
-    """The arguments that are arrays, checked."""
-    if triangles is None:
-        raise SceneError("triangles must be (T, 3) numbers of corners, got None; or give the path of a file alone")
-    corners = checks.array("vertices", vertices)
-    if corners.ndim != 2 or corners.shape[1] != 3 or not np.isfinite(corners).all():
-        raise SceneError(
-            f"vertices must be (V, 3) finite numbers, got shape {corners.shape}; or give the path of a file"
-        )
-    cells = np.asarray(triangles)
-    if cells.ndim != 2 or cells.shape[1] != 3 or not len(cells) or cells.dtype.kind not in "iu":
-        raise SceneError(f"triangles must be (T, 3) whole numbers, got shape {cells.shape} of {cells.dtype}")
-    if cells.min() < 0 or cells.max() >= len(corners):
-        wrong = int(np.argwhere((cells < 0) | (cells >= len(corners)))[0, 0])
-        raise SceneError(
-            f"triangles must be numbers from 0 to {len(corners) - 1}, of which each is a corner, got "
-            f"{cells[wrong].tolist()} in row {wrong}"
-        )
-    of = np.zeros(len(cells), np.int64) if group is None else np.asarray(group, np.int64)
-    known = tuple(map(str, names)) or tuple(map(str, range(int(of.max()) + 1))) if group is not None else ("",)
-    if of.shape != (len(cells),) or of.min() < 0 or of.max() >= len(known):
-        raise SceneError(
-            f"group must be (T,) numbers of {len(known)} names, one for each of the {len(cells)} triangles, got shape "
-            f"{of.shape} from {of.min()} to {of.max()}"
-        )
-    return Soup(scale * corners, cells.astype(np.int64), of, known)
-
-
-def _sorted(mesh: Closed) -> Closed:
-    """The triangles by their groups, and those near to each other near: what a cell holds is in few lines of the cache."""
-    middles = mesh.vertices[mesh.triangles].mean(axis=1)
-    low, wide = middles.min(axis=0), max(float(np.ptp(middles, axis=0).max()), np.finfo(np.float64).tiny)
-    places = ((middles - low) * ((2**_BITS - 1) / wide)).astype(np.int64)
-    keys = np.zeros(len(places), np.int64)
-    for bit in range(_BITS):
-        for axis in range(3):
-            keys |= (places[:, axis] >> bit & 1) << (3 * bit + axis)
-    order = np.lexsort((keys, mesh.group))
-    return mesh._replace(triangles=np.ascontiguousarray(mesh.triangles[order]), group=mesh.group[order])
-
-
-def _table(corners: Floats, room: float) -> Floats:
-    """The numbers of facets with these corners (T, 3, 3), one in each row."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    normal = _normals(a, b, c)
-    columns = [normal, (normal * corners.mean(axis=1)).sum(axis=1)[:, None]]
-    for p, q in ((a, b), (b, c), (c, a)):
-        inwards = np.cross(normal, q - p)
-        inwards /= np.linalg.norm(inwards, axis=1)[:, None]
-        columns += [inwards, ((inwards * p).sum(axis=1) - room)[:, None]]
-    return aligned(np.concatenate(columns, axis=1))
-
-
-def _normals(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Unit normals of triangles, from the two shorter sides."""
-    sides = np.stack([b - a, c - b, a - c])
-    longest = (sides**2).sum(axis=2).argmax(axis=0)
-    every = np.arange(len(a))
-    found = np.cross(sides[(longest + 1) % 3, every], sides[(longest + 2) % 3, every])
-    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
-
-
-def _with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
-    """The facets with what is free around each cell."""
-    from scipy.ndimage import label
-
-    grid = facets.grid
-    shape = tuple(int(n) for n in grid.shape)
-    held = np.diff(grid.first[:-1]).reshape(shape) > 0
-    rows = rooms_of(held, facets.table[grid.entries, :3], grid.first)
-    facets = facets._replace(grid=grid._replace(room=rows))
-    parts, count = label(~held)
-    if count:
-        # The middle of one cell of each part says on which side it is.
-        labels, first = np.unique(parts.ravel(), return_index=True)
-        first, labels = first[labels > 0], labels[labels > 0]
-        places = np.array(np.unravel_index(first, shape), np.float64)
-        low, width = (np.array(row)[:, None] for row in (grid.low, grid.width))
-        found = np.empty((4, len(labels)))
-        nearest(facets, mesh, np.ascontiguousarray(low + (places + 0.5) * width), found)
-        sides = np.full(count + 1, CLOSED, np.int8)
-        sides[labels] = np.where(found[3] < 0.0, FREE, CLOSED)
-        rows[:-1, KIND] = np.where(held, rows[:-1, KIND].reshape(shape), sides[parts]).ravel()
-        with_blocks(rows, held)
-    rows[-1, KIND] = FREE if is_solid else CLOSED
-    return facets
+        return np.asarray(side_sign(self.side) * found.reshape(4, *np.shape(rows.x)))

@@ -121,7 +121,7 @@ def gathered(like, table, m, k):
         # Four numbers of it are half a line of the cache; the others follow from them.
         return ball(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3])
     if isinstance(like, (*AXES, Shared)):
-        return like if isinstance(like, Shared) else type(like)(1.0)
+        return like if isinstance(like, Shared) else type(like)(1.0)  # type: ignore[call-arg]
     if not isinstance(like, tuple):
         return None if like is None else table[m, k]
     parts: tuple[Any, ...] = ()

@@ -1,0 +1,125 @@
+"""Meshes whose triangles are walls: seconds for the scene, bytes a triangle, nanoseconds an impact, the first call."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any
+
+import numpy as np
+
+import swarm
+
+from .report import ROOT, Row, in_turn, show, write
+
+DOWN = (0.0, 0.0, -1.0)
+# About 1e5 triangles, as the bars have it.
+_SPHERE, _VESSEL = 160, 40
+_COLD = """
+import sys, time
+from bench.meshes import ball, first_call
+print(first_call(*ball(160)))
+"""
+
+
+def ball(count: int) -> tuple[Any, Any]:
+    """The corners and triangles of a ball of radius 0.5: 4 count^2 of them, needles at the poles."""
+    theta, phi = np.pi * np.arange(1, count) / count, np.pi * np.arange(2 * count) / count
+    around = np.stack([np.cos(phi), np.sin(phi), np.zeros_like(phi)], axis=1)
+    rings = np.sin(theta)[:, None, None] * around + np.cos(theta)[:, None, None] * np.array([0.0, 0.0, 1.0])
+    corners = 0.5 * np.concatenate([rings.reshape(-1, 3), [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]])
+    return corners, _rings(count - 1, 2 * count)
+
+
+def vessel(count: int) -> tuple[Any, Any]:
+    """A bottle with a neck, ribs and a dimpled wall, of as many rings: what is met is near and far."""
+    rings, columns = 8 * count, 4 * count
+    z, phi = np.linspace(0.0, 1.0, rings), 2.0 * np.pi * np.arange(columns) / columns
+    outline = np.where(z < 0.7, 0.4, 0.4 - 0.3 * np.clip((z - 0.7) / 0.1, 0.0, 1.0)) + 0.01 * (np.sin(40.0 * z) > 0.0)
+    radius = outline[:, None] * (1.0 + 0.01 * np.sin(12.0 * phi) * np.sin(60.0 * z[:, None]))
+    wall = np.stack([radius * np.cos(phi), radius * np.sin(phi), np.broadcast_to(z[:, None], radius.shape)], axis=-1)
+    ends = [(0.0, 0.0, float(z[0])), (0.0, 0.0, float(z[-1]))]
+    return np.concatenate([wall.reshape(-1, 3), ends]), _rings(rings, columns)
+
+
+def _rings(rings: int, columns: int) -> Any:
+    """Triangles between rings of corners, and two fans at the ends, whose middles are the last two corners."""
+    i, j = np.meshgrid(np.arange(rings - 1), np.arange(columns), indexing="ij")
+    a, b, c, d = (p * columns + q % columns for p, q in ((i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)))
+    sides = np.concatenate([np.stack([a, c, b], axis=-1).reshape(-1, 3), np.stack([b, c, d], axis=-1).reshape(-1, 3)])
+    k, top, last = np.arange(columns), rings * columns, (rings - 1) * columns
+    after = (k + 1) % columns
+    fans = [np.stack([0 * k + top, k, after], 1), np.stack([0 * k + top + 1, last + after, last + k], 1)]
+    return np.concatenate([sides, *fans])
+
+
+def scene_of(corners: Any, triangles: Any, gravity: Any = None) -> swarm.Scene:
+    """A scene of a mesh, with all that a run makes of it."""
+    scene = swarm.Scene([swarm.Mesh(corners, triangles)], gravity=gravity)
+    scene.walls()
+    return scene
+
+
+def first_call(corners: Any, triangles: Any) -> float:
+    """Seconds of a short run that compiles."""
+    scene = scene_of(corners, triangles)
+    start = swarm.fill(scene, 10, speed=1.0, seed=1)
+    began = time.perf_counter()
+    swarm.simulate(scene, start, swarm.Impact(), until=1e-3, compile="always")
+    return time.perf_counter() - began
+
+
+def _bytes(mesh: Any) -> float:
+    """Bytes of a triangle in the arrays of a mesh."""
+    arrays = [mesh.vertices, mesh.triangles, mesh.group, mesh.members.table, *mesh.members.grid, *mesh._tree]
+    known = {one.ctypes.data: one.nbytes for one in arrays if isinstance(one, np.ndarray)}
+    return sum(known.values()) / len(mesh)
+
+
+def _nanoseconds(scene: swarm.Scene, start: swarm.Particles, until: float) -> Any:
+    def measure() -> float:
+        seconds, impacts = [], 0.0
+        for span in (1e-3 * until, until):
+            began = time.process_time()
+            end = swarm.simulate(scene, start, swarm.Impact(), until=span, threads=1, compile="always")
+            seconds.append(time.process_time() - began)
+            impacts = float(end.observables["impacts"][-1])
+        return 1e9 * (seconds[1] - seconds[0]) / impacts
+
+    return measure
+
+
+def main(quick: bool) -> None:
+    """Measure all of it."""
+    rows = []
+    for name, made in (("ball", ball(20 if quick else _SPHERE)), ("bottle", vessel(5 if quick else _VESSEL))):
+        # The first mesh compiles what makes the cells.
+        scene_of(*ball(10))
+        began = time.perf_counter()
+        scene = scene_of(*made)
+        seconds = time.perf_counter() - began
+        mesh: Any = scene.surfaces[0]
+        falls = scene_of(*made, DOWN)
+        start = swarm.fill(scene, 200 if quick else 2000, speed=1.0, seed=1)
+        until = 1.0 if quick else 100.0
+        measures = {"straight": _nanoseconds(scene, start, until), "falling": _nanoseconds(falls, start, until)}
+        figures = in_turn(measures, 1 if quick else 5)
+        size = _bytes(mesh)
+        rows += [
+            Row(f"{name} of {len(mesh)} triangles, scene", seconds, seconds, "s", "3"),
+            Row("  memory of a triangle", size, size, "bytes", "400"),
+            Row("  an impact, one thread, processor time", *figures["straight"], "ns", "250"),
+            Row("  the same under gravity", *figures["falling"], "ns"),
+        ]
+    if not quick:
+        with tempfile.TemporaryDirectory() as folder:
+            environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+            done = subprocess.run(
+                [sys.executable, "-c", _COLD], env=environment, capture_output=True, text=True, check=True, cwd=ROOT
+            )
+        seconds = float(done.stdout.split()[-1])
+        rows.append(Row("first call", seconds, seconds, "s"))
+    show(rows)
+    if not quick:
+        write(rows, "meshes")

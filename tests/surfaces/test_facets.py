@@ -1,0 +1,271 @@
+"""Triangles as walls: the same impacts as a box, nobody out at edges, corners, needles and thin walls, laws, slides."""
+
+import numpy as np
+import pytest
+import trimesh
+from thorny import aimed, hollow, slivered, thorny
+
+import swarm
+from swarm import scene_file, tables
+from swarm.kernel.vector import Vec
+from swarm.surfaces.facets import cells, room
+
+BOX = trimesh.creation.box((1.0, 2.0, 3.0))
+WIDTHS = (0.5, 1.0, 1.5)
+DOWN = (0.3, -0.2, -1.0)
+
+
+def box_of_triangles(**given):
+    return swarm.Mesh(np.array(BOX.vertices), np.array(BOX.faces), **given)
+
+
+# --- The description -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_phi_of_a_box_is_that_of_the_box(side):
+    mesh, box = box_of_triangles(side=side), swarm.Box(WIDTHS, side=side)
+    points = np.random.default_rng(1).uniform(-2.0, 2.0, (3, 500))
+    phi, exact = mesh.phi(points), box.phi(points)
+    inside = exact < 0.0
+    assert np.abs(phi - exact)[inside].max() < 1e-15
+    assert np.array_equal(phi < 0.0, inside)
+    assert np.array_equal(mesh.contain(points), inside ^ (side == "outside"))
+    step = 1e-6
+    differences = [(mesh.phi(points + e) - mesh.phi(points - e)) / (2.0 * step) for e in step * np.eye(3)[:, :, None]]
+    assert np.median(np.abs(mesh.gradient(points) - differences)) < 1e-9
+    assert mesh.volume() == pytest.approx(6.0)
+    assert mesh.size() == 0.5
+
+
+def test_the_side_of_a_thorny_vessel():
+    corners, faces = thorny()
+    mesh = swarm.Mesh(corners, faces)
+    random = np.random.default_rng(2)
+    points = random.uniform(-1.0, 1.0, (3, 400))
+    # A ray in any direction passes an odd number of triangles from inside.
+    a, b, c = np.moveaxis(mesh.corners[mesh.triangles], 1, 0)
+    way = np.array([0.3, 0.5, 0.81])
+    count = np.zeros(400, int)
+    for i, point in enumerate(points.T):
+        turns = [np.einsum("ij,j->i", np.cross(p - point, q - point), way) for p, q in ((a, b), (b, c), (c, a))]
+        ahead = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - point) * (np.cross(b - a, c - a) @ way) > 0.0
+        same = np.all(np.array(turns) > 0.0, axis=0) | np.all(np.array(turns) < 0.0, axis=0)
+        count[i] = (same & ahead).sum()
+    assert np.array_equal(mesh.contain(points), count % 2 == 1)
+    assert np.array_equal(mesh.phi(points) < 0.0, count % 2 == 1)
+
+
+def test_a_turned_and_shifted_mesh():
+    turn = {"axis": (1.0, 2.0, 3.0), "angle": 0.7}
+    mesh, box = (
+        box_of_triangles(rotation=turn, center=(0.1, 0.2, 0.3)),
+        swarm.Box(WIDTHS, (0.1, 0.2, 0.3), rotation=turn),
+    )
+    points = box.center + 0.8 * np.random.default_rng(1).uniform(-0.5, 0.5, (200, 3))
+    assert np.abs(mesh.phi(points.T) - box.phi(points.T)).max() < 1e-14
+    assert np.allclose(mesh.bounds(), box.bounds())
+
+
+def test_every_cell_has_the_facets_that_come_into_it():
+    corners, faces = thorny()
+    mesh = swarm.Mesh(corners, faces)
+    grid, random = mesh.members.grid, np.random.default_rng(5)
+    weights = random.dirichlet((1.0, 1.0, 1.0), len(faces))
+    points = (mesh.corners[mesh.triangles] * weights[:, :, None]).sum(axis=1)
+    shape = np.array(grid.shape, int)
+    places = np.minimum(((points - np.array(grid.low)) * np.array(grid.inverse)).astype(int), shape - 1)
+    for m, cell in enumerate((places[:, 0] * shape[1] + places[:, 1]) * shape[2] + places[:, 2]):
+        assert m in grid.entries[grid.first[cell] : grid.first[cell + 1]]
+    held = np.diff(grid.first[:-1]).reshape(shape) > 0
+    assert np.array_equal(grid.room[:-1, room.KIND].reshape(shape) == room.FULL, held)
+    for cell in random.choice(np.flatnonzero(grid.room[:-1, room.KIND] == room.FREE), 300):
+        x, y, z = np.unravel_index(cell, shape)
+        a, b, c, d, e, f = grid.room[cell, :6].astype(int)
+        assert not held[x - a : x + b + 1, y - c : y + d + 1, z - e : z + f + 1].any()
+
+
+@pytest.mark.parametrize("gravity", [None, Vec(0.3, -0.2, -1.0), Vec(0.0, 0.0, -2.0)])
+def test_when_a_flight_leaves_a_block(gravity):
+    corners, faces = thorny(n=8)
+    grid, random = swarm.Mesh(corners, faces).members.grid, np.random.default_rng(6)
+    for _case in range(200):
+        r, v = random.uniform(-0.5, 0.5, 3), random.normal(size=3)
+        place = np.floor((r - np.array(grid.low)) * np.array(grid.inverse))
+        free = room.Room(*(Vec(*random.integers(0, 3, 3).astype(float)) for _end in range(2)))
+        time = cells.until_out(gravity, grid, Vec(*place), free, Vec(*r), Vec(*v))
+        pull = np.zeros(3) if gravity is None else np.array(gravity)
+        low = np.array(grid.low) + (place - np.array(free.back)) * np.array(grid.width) - np.array(grid.margin)
+        high = np.array(grid.low) + (place + np.array(free.ahead) + 1.0) * np.array(grid.width) + np.array(grid.margin)
+        times = np.linspace(0.0, 1.0, 2001)[:, None] * time
+        way = r + v * times + 0.5 * pull * times**2
+        assert ((way >= low - 1e-12) & (way <= high + 1e-12)).all()
+        assert min(np.abs(way[-1] - low).min(), np.abs(way[-1] - high).min()) < 1e-12
+
+
+# --- Flights ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gravity", [None, DOWN])
+def test_a_box_of_twelve_triangles_has_the_impacts_of_a_box(gravity):
+    start = swarm.fill(swarm.Scene([swarm.Box(WIDTHS)]), 40, speed=1.0, seed=1)
+    ends = [
+        swarm.simulate(swarm.Scene([surface], gravity=gravity), start, swarm.Impact(), until=8.0)
+        for surface in (box_of_triangles(), swarm.Box(WIDTHS))
+    ]
+    assert np.abs(ends[0].particles.position - ends[1].particles.position).max() < 1e-13
+    assert np.array_equal(ends[0].impacts_per_particle, ends[1].impacts_per_particle)
+    assert ends[0].impacts_per_particle.sum() > 200
+
+
+def kept_in(mesh, start, gravity, until, **given):
+    scene = swarm.Scene([mesh], gravity=gravity)
+    end = swarm.simulate(scene, start, swarm.Impact(), until=until, every=0.5 * until, **given)
+    assert mesh.phi(end.particles.position).max() < 1e-12
+    assert np.abs(end.observables["total_energy"] / end.observables["total_energy"][0] - 1.0).max() < 1e-13
+    return end.impacts_per_particle.sum()
+
+
+@pytest.mark.parametrize("gravity", [None, DOWN])
+def test_nobody_leaves_a_thorny_vessel(gravity):
+    """Acute and obtuse edges and needles, 10^6 impacts; half of the first flights go to corners, half to edges."""
+    mesh = swarm.Mesh(*thorny())
+    start = aimed(mesh, swarm.fill(swarm.Scene([mesh]), 3000, speed=1.0, seed=1), gravity)
+    assert kept_in(mesh, start, gravity, 45.0, compile="always") > 9e5
+
+
+def test_nobody_leaves_a_vessel_of_slivers():
+    mesh = swarm.Mesh(*slivered())
+    start = aimed(mesh, swarm.fill(swarm.Scene([mesh]), 2000, speed=1.0, seed=1))
+    assert kept_in(mesh, start, None, 10.0, compile="always") > 2e4
+
+
+def test_nobody_passes_a_wall_of_a_millimetre():
+    """A hollow cube in a box: those within stay within, those around stay around."""
+    cube = swarm.Mesh(*hollow(1e-3), side="outside")
+    scene = swarm.Scene([swarm.Box((0.8, 0.8, 0.8)), cube])
+    start = swarm.fill(scene, 1000, speed=1.0, seed=1)
+    within = np.abs(start.position).max(axis=0) < 0.5
+    assert 100 < within.sum() < 900
+    end = swarm.simulate(scene, start, swarm.Impact(), until=40.0, compile="always")
+    there = np.abs(end.particles.position).max(axis=0)
+    assert there[within].max() <= 0.499 + 1e-12
+    assert there[~within].min() >= 0.5 - 1e-12
+    assert end.impacts_per_particle.min() > 10
+
+
+def test_a_slide_down_a_faceted_hopper_ends_at_its_apex():
+    n = 24
+    angle = 2.0 * np.pi * np.arange(n) / n
+    corners = np.concatenate([np.stack([np.cos(angle), np.sin(angle), np.ones(n)], 1), [(0, 0, 0), (0, 0, 1)]])
+    k = np.arange(n)
+    faces = np.concatenate([np.stack([0 * k + n, (k + 1) % n, k], 1), np.stack([0 * k + n + 1, k, (k + 1) % n], 1)])
+    hopper = swarm.Mesh(corners, faces, restitution=0.5, friction=0.1)
+    scene = swarm.Scene([hopper], gravity=(0.0, 0.0, -9.81))
+    start = swarm.fill(scene, 20, speed=0.1, seed=1)
+    end = swarm.simulate(scene, start, swarm.Impact(), until=5.0, every=1.0, compile="always")
+    energy = end.observables["total_energy"]
+    assert (np.diff(energy) < 1e-12).all()
+    assert np.abs(end.particles.position).max() < 1e-9
+    assert np.abs(end.particles.velocity).max() == 0.0
+    assert end.observables["max_penetration"].max() < 1e-12
+
+
+def test_a_slide_goes_on_over_the_diagonal_of_a_floor():
+    start = swarm.Particles(np.array([[-0.3], [-0.7], [-1.5]]), np.array([[0.4], [1.2], [0.0]]))
+    ends = [
+        swarm.simulate(
+            swarm.Scene([surface], gravity=(0.0, 0.0, -9.81)), start, swarm.Impact(), until=3.0, compile="never"
+        )
+        for surface in (box_of_triangles(friction=0.01), swarm.Box(WIDTHS, friction=0.01))
+    ]
+    assert np.abs(ends[0].particles.position - ends[1].particles.position).max() < 1e-9
+
+
+# --- Laws and files --------------------------------------------------------------------------------------
+
+
+def grouped(**given):
+    """The box, whose floor is a group of its own."""
+    floor = (np.array(BOX.vertices)[BOX.faces][:, :, 2] == -1.5).all(axis=1)
+    return swarm.Mesh(
+        np.array(BOX.vertices), np.array(BOX.faces), group=floor.astype(int), names=("rest", "floor"), **given
+    )
+
+
+def test_groups_have_laws_of_their_own():
+    mesh = grouped(groups={"floor": {"restitution": 0.0}})
+    assert [count for _one, count in mesh.runs()] == [10, 2]
+    start = swarm.Particles(np.zeros((3, 2)), np.array([[1.0, 0.0], [0.0, 0.0], [0.0, -1.0]]))
+    end = swarm.simulate(swarm.Scene([mesh]), start, swarm.Impact(), until=2.0, compile="never")
+    assert np.allclose(end.particles.velocity, [[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]], atol=1e-15)
+
+
+def test_a_mesh_in_a_file_is_the_same_mesh():
+    mesh = grouped(groups={"floor": {"restitution": 0.25}}, friction=0.1)
+    arrays = {}
+    table = tables.table_of(mesh, arrays)
+    again = tables.scene_of([tables.with_arrays(table, arrays)], None).surfaces[0]
+    for name in ("vertices", "triangles", "group"):
+        assert np.array_equal(getattr(mesh, name), getattr(again, name))
+    assert again.groups == mesh.groups
+    assert again.names == mesh.names
+    assert again.friction == 0.1
+    with pytest.raises(swarm.SceneError, match="a trajectory names no file"):
+        tables.with_arrays({**table, "vertices": "part.stl"}, {})
+
+
+TEXT = """
+[particles]
+count = 3
+speed = 1.0
+[[surface]]
+kind = "mesh"
+file = "part.obj"
+scale = 1e-3
+restitution = 0.9
+[surface.groups.floor]
+restitution = 0.5
+[method]
+kind = "impact"
+[run]
+until = 1.0
+every = 0.5
+"""
+
+
+def test_a_mesh_of_triangles_in_a_scene_file(tmp_path):
+    lines = ["g rest"] + [f"v {x} {y} {z}" for x, y, z in 1e3 * np.array(BOX.vertices)]
+    floor = (np.array(BOX.vertices)[BOX.faces][:, :, 2] == -1.5).all(axis=1)
+    for name, which in (("rest", ~floor), ("floor", floor)):
+        lines += [f"g {name}", *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in BOX.faces[which])]
+    (tmp_path / "part.obj").write_text("\n".join(lines))
+    (tmp_path / "scene.toml").write_text(TEXT)
+    mesh = scene_file.read(tmp_path / "scene.toml").scene.surfaces[0]
+    assert isinstance(mesh, swarm.Mesh)
+    assert mesh.volume() == pytest.approx(6.0)
+    assert [(one.restitution, count) for one, count in mesh.runs()] == [(0.9, 10), (0.5, 2)]
+    (tmp_path / "scene.toml").write_text(TEXT.replace("groups.floor", "groups.lid"))
+    with pytest.raises(
+        swarm.SceneError, match=r"surface\[0\].groups must name groups of the mesh, got 'lid'; there are"
+    ):
+        scene_file.read(tmp_path / "scene.toml")
+
+
+def test_an_opening_of_a_mesh():
+    hole = swarm.Cylinder(0.2, (0.0, 0.0, 1.0))
+    scene = swarm.Scene([box_of_triangles(openings=[hole])])
+    start = swarm.Particles(
+        np.array([[0.0, 0.3], [0.0, 0.3], [0.0, 0.0]]), np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 1.0]])
+    )
+    end = swarm.simulate(scene, start, swarm.Impact(), until=4.0, compile="never")
+    assert end.escape_time[0] == pytest.approx(1.5)
+    assert np.isnan(end.escape_time[1])
+
+
+def test_memory_of_a_triangle():
+    ball = trimesh.creation.icosphere(5)
+    mesh = swarm.Mesh(np.array(ball.vertices), np.array(ball.faces))
+    members = mesh.members
+    arrays = [members.table, *(one for one in members.grid if isinstance(one, np.ndarray)), *mesh._tree]
+    assert sum(one.nbytes for one in (*arrays, mesh.group)) < 400 * len(mesh)
