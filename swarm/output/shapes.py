@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
+from .. import surfaces
 from ..motion import Pose, WallMotion, pose
 from ..particles import Floats
 from ..scene import Scene
@@ -101,6 +102,8 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
             continue
         if not surface.is_there(time):
             pass
+        elif isinstance(surface, surfaces.Mesh):
+            mesh, wires = surface.drawn()
         elif bodies <= most and isinstance(surface, Spheres):
             mesh, wires = _placed(at, *_balls(surface))
         elif bodies and bodies <= most:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import motion as motions
 from ..checks import Vector
 from ..errors import SceneError
+from .facets.mesh import Mesh
 from .fields.many import Many
 from .instant import box_of, has_room, planes_of, side_of
 from .polyhedron import polyhedron_bounds
@@ -314,7 +315,7 @@ def room_gaps(room: Sequence[Surface], points: Floats, time: float = 0.0) -> Flo
 def _require_alone(whole: Joined) -> None:
     """Raise a `SceneError` for a surface that is known only where its own walls keep particles, or is many bodies."""
     for surface in whole.surfaces():
-        if isinstance(surface, Many):
+        if isinstance(surface, (Many, Mesh)):
             raise SceneError(
                 f"parts must not be {type(surface).__name__} in a {type(whole).__name__} of several rooms, got "
                 f"{surface}; list them as a surface of the scene, or their bodies one by one"

@@ -1,6 +1,6 @@
 """A closed mesh of triangles, each of which is a wall."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,7 @@ from ..data.triangles import closed
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .cells import cells_around
 from .facet import FacetNumbers, Shared
-from .made import given_arrays, sorted_by_place, table_of_facets, with_room
+from .made import drawn, given_arrays, sorted_by_place, table_of_facets, with_room
 from .members import Facets
 from .nearest import boxes_of, nearest, within
 
@@ -208,6 +208,10 @@ class Mesh(Surface):
         a, b, c = np.moveaxis((self.vertices - self.vertices[0])[self.triangles], 1, 0)
         return float((a * np.cross(b, c)).sum() / 6.0)
 
+    def drawn(self) -> tuple[tuple[Floats, Indices, Floats], list[Floats]]:
+        """Its triangles with corners of their own, each with their normal, and the edges at which it is bent."""
+        return drawn(self.corners, self.triangles)
+
     def contain(self, points: Floats) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is admissible: cheaper than phi."""
         found = np.empty(points.shape[1], np.bool_)
@@ -228,3 +232,13 @@ class Mesh(Surface):
         found = np.empty((4, flat.shape[1]))
         nearest(self.members, self._tree, flat, found)
         return np.asarray(side_sign(self.side) * found.reshape(4, *np.shape(rows.x)))
+
+
+def require_no_mesh(surfaces: Iterable[Surface]) -> None:
+    """Raise a `SceneError` where bodies would have facets for walls."""
+    for i, surface in enumerate(surfaces):
+        if isinstance(surface, Mesh):
+            raise SceneError(
+                f"surfaces[{i}] must not be a Mesh for bodies, got {surface}: its triangles are walls for particles; "
+                "make it a smooth surface with swarm.from_mesh"
+            )
