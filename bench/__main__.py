@@ -16,11 +16,13 @@ from . import (
     fields,
     meshes,
     motion,
+    plane,
     report,
     scenes,
     stability,
     sweeps,
     throughput,
+    unions,
 )
 from .peers import race
 
@@ -45,12 +47,16 @@ def main() -> None:
     commands.add_parser("peers", help="the same job by other programs, those that are installed")
     commands.add_parser("endurance", help="checkpoints, memory over many frames, reading a large trajectory")
     commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
+    commands.add_parser(
+        "plane", help="nanoseconds an impact in billiards of two dimensions: outlines of lines and arcs"
+    )
     commands.add_parser("contacts", help="sliding, resting, chattering and wedges against their bars and soft walls")
     commands.add_parser("bodies", help="a step and an impact of bodies of several points, and what they conserve")
     commands.add_parser("motion", help="walls that move and walls that are moved: exactness, conservation, speed")
     commands.add_parser(
         "fields", help="scenes of many bodies, and the log of impacts: speed, first calls, what is kept"
     )
+    commands.add_parser("unions", help="vessels of several parts: what an impact costs beside one of them, first calls")
     commands.add_parser("meshes", help="meshes of triangles: the scene, its memory, an impact, the first call")
     first = commands.add_parser("compile", help="first calls: processor time, functions compiled, and the next process")
     first.add_argument(
@@ -83,10 +89,12 @@ def main() -> None:
         "bars": bars,
         "peers": race,
         "scenes": scenes,
+        "plane": plane,
         "contacts": contacts,
         "bodies": bodies,
         "motion": motion,
         "fields": fields,
+        "unions": unions,
         "meshes": meshes,
         "compile": compiling,
         "sweep": sweeps,

@@ -9,6 +9,7 @@ N v A/(4 W) leave in a second, where v is their mean speed, A the area that is o
 weighted with that density. Needs the extra `plot`.
 """
 
+import itertools
 import math
 import tempfile
 from pathlib import Path
@@ -46,7 +47,7 @@ def solids() -> dict[str, list[np.ndarray]]:
     for k in range(SIDES):
         m = (k + 1) % SIDES
         shutter.append(np.array([(0.0, 0.0, 0.0), rings[0][m], rings[0][k]]))
-        for low, high in zip(rings, rings[1:-1], strict=False):
+        for low, high in itertools.pairwise(rings[:-1]):
             bottle += [np.array([low[k], low[m], high[m]]), np.array([low[k], high[m], high[k]])]
         bottle.append(np.array([rings[-2][k], rings[-2][m], rings[-1][0]]))
     return {"bottle": bottle, "shutter": shutter}

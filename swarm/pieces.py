@@ -131,7 +131,14 @@ class Pieces(Volume):
 
     @cached_property
     def parts(self) -> tuple[tuple[int, Place], ...]:
-        """The parts of the unions and intersections of the scene: the number of the surface, and the place in that."""
+        """The parts of the unions and intersections of the scene: the number of the surface, and the place in that.
+
+        >>> import swarm
+        >>> ball = swarm.Sphere(0.5)
+        >>> tube = swarm.Intersection([swarm.Cylinder(0.2), swarm.Plane((1.0, 0.0, 0.0), 0.1)])
+        >>> swarm.Scene([swarm.Union([ball, tube])]).parts
+        ((0, (0,)), (0, (1, 0)), (0, (1, 1)))
+        """
         joined = ((i, surface) for i, surface in enumerate(self.surfaces) if isinstance(surface, Joined))
         return tuple((i, place) for i, surface in joined for place in surface.places_of_parts())
 

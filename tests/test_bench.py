@@ -74,6 +74,13 @@ def test_scenes_quick():
 
 
 @pytest.mark.long
+def test_plane_quick():
+    told = printed("plane")
+    assert "circle" in told
+    assert "stadium" in told
+
+
+@pytest.mark.long
 def test_contacts_quick():
     told = printed("contacts")
     for row in ("cone with a lid", "hopper, friction 0.4", "mass ratio 100^2", "composed step, ellipsoid, 2 threads"):
@@ -175,6 +182,13 @@ def test_motion_quick():
 def test_fields_quick():
     told = printed("fields")
     for row in ("27 balls, an impact", "  the plain loop", "1000 balls, an impact", "  particles in a ball"):
+        assert row in told
+
+
+@pytest.mark.long
+def test_unions_quick():
+    told = printed("unions")
+    for row in ("two balls, an impact", "a box, a tube, a box under gravity, an impact"):
         assert row in told
 
 

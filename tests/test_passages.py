@@ -52,7 +52,7 @@ def test_two_rooms_with_no_wall_between_them_are_one(gravity):
     whole = run(swarm.Scene([swarm.Box((1.0, 0.4, 0.3))], gravity), start, until=2.0, frames=4)
     assert found.particles.position == pytest.approx(whole.particles.position, abs=1e-9)
     assert (found.impacts_per_particle == whole.impacts_per_particle).all()
-    assert found.observables["energy_error"].max() < 1e-13
+    assert found.observables["energy_error"].max() < 1e-12
     assert swarm.Scene([two()]).distances_outside(found.particles.position).max() < 1e-12
 
 
@@ -183,7 +183,7 @@ def test_halts_and_sessions_leave_the_bits(tmp_path, gravity):
 
 
 @pytest.mark.physics
-@pytest.mark.parametrize("gravity", [None, (0.3, 0.1, -1.0)])
+@pytest.mark.parametrize("gravity", [None, rarely((0.3, 0.1, -1.0))])
 def test_the_same_bits_compiled_and_for_threads(gravity):
     scene = doorway(gravity)
     start = swarm.fill(scene, 300, speed=0.5, seed=1)

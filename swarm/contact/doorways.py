@@ -14,7 +14,12 @@ _PRESSED = 1e-9
 
 def closeness(walls):
     """A distance from an opening that is none for a flight: round-off of where rooms meet, 0 where there are none."""
-    return walls.slack if len(walls.unions) > 0 else 0.0
+    return 2.0 * _depth(walls) if len(walls.unions) > 0 else 0.0
+
+
+def _depth(walls):
+    """How deep in the other room a particle goes on."""
+    return _THROUGH * walls.slack if walls.inset is None else walls.inset
 
 
 def leads_on(walls, wall, r):
@@ -39,7 +44,7 @@ def lets_through(openings, walls, wall, r, near):
 
 def _beyond(walls, wall, r):
     """The other side of a wall at a place on it."""
-    return r + (_THROUGH * walls.slack) * walls.unit_normal(wall, r)
+    return walls.project(wall, r) + _depth(walls) * walls.unit_normal(wall, r)
 
 
 def through(walls, gravity, wall, motion):

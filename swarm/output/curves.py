@@ -110,3 +110,11 @@ def runs(curve: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
     """The parts of a curve whose points are kept, two points or more each."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
     return [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]
+
+
+def finer(curve: Floats, step: float) -> Floats:
+    """A curve with points so near to each other [m]."""
+    pieces = np.sqrt((np.diff(curve, axis=0) ** 2).sum(axis=1))
+    many = np.maximum(1, np.ceil(pieces / step).astype(np.int64))
+    place = np.concatenate([k + np.arange(n) / n for k, n in enumerate(many.tolist())] + [[float(len(pieces))]])
+    return np.stack([np.interp(place, np.arange(len(curve)), one) for one in curve.T], axis=1)

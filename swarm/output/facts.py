@@ -6,6 +6,7 @@ import numpy as np
 
 from ..notebook import shortened
 from ..observables import drift
+from ..surfaces.facets.mesh import Mesh
 
 
 def of_trajectory(trajectory: Any) -> dict[str, str]:
@@ -54,7 +55,7 @@ def of_scene(scene: Any) -> dict[str, str]:
 
 
 def of_meshes(scene: Any) -> dict[str, str]:
-    """Distances of the surfaces of a `Scene` from the meshes that they were made from; nothing where none was."""
+    """The meshes of a `Scene`, and distances of surfaces from those that they were made from; nothing without any."""
     surfaces = () if scene is None else scene.surfaces
     made = {i: one for i, one in enumerate(surfaces) if getattr(one, "mesh_error", None) is not None}
     said = [
@@ -62,7 +63,13 @@ def of_meshes(scene: Any) -> dict[str, str]:
         + (f", whose corners were moved by up to {one.mesh_weld:.1e} m to close seams" if one.mesh_weld else "")
         for i, one in made.items()
     ]
-    return {"mesh error": "\n".join(said)} if said else {}
+    found = {"mesh error": "\n".join(said)} if said else {}
+    exact = [
+        f"surfaces[{i}]: {len(one)} triangles, {one.volume():.6g} m^3"
+        + (f", corners moved by up to {one.mesh_weld:.1e} m" if one.mesh_weld else "")
+        for i, one in enumerate(surfaces) if isinstance(one, Mesh)
+    ]  # fmt: skip
+    return found | ({"mesh": "\n".join(exact)} if exact else {})
 
 
 def of_run(seen: dict[str, Any]) -> dict[str, str]:

@@ -158,7 +158,8 @@ class ImpactLog(Stored):
 
         Returns:
             One row an impact: `time` [s], `particle`, `surface` (its place in `scene.surfaces`), `member` (the number
-            of the body in that surface if it is many, else -1), `position` (3,) [m] of the particle at the impact,
+            of the body in that surface if it is many, of the triangle in a mesh, of the part of a union among
+            `scene.parts`; else -1), `position` (3,) [m] of the particle at the impact,
             `velocity_before` and `velocity_after` (3,) [m/s], `impulse` [N s], given along the wall's normal. Where a
             surface has friction also `slip` (3,) [m/s], the tangential velocity relative to the wall, before. Where the
             scene repeats, the position is in the cell and `image` (3,) says how many cells away that is.

@@ -13,6 +13,7 @@ from ..kernel.vector import vec
 from ..motion import Pose, pose
 from ..particles import Floats
 from ..surfaces import Torus
+from ..surfaces.facets.mesh import Mesh
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
@@ -20,6 +21,8 @@ from . import curves, given
 from .cut import Indices, Smooth, cut, found_in
 from .parts import Cover, Part
 
+# Of the size of what is drawn, a step along edges of a mesh that others may cut.
+_FINE = 200
 # A wall of which this part of its box is seen is found again in the box of that, so often.
 _SEEN, _AGAIN = 0.4, 3
 
@@ -56,6 +59,8 @@ class _Placed(NamedTuple):
 
 def drawn(part: Part, box: Box, time: float) -> Walls:
     """The part of a scene in a box, at a time [s]."""
+    if isinstance(part.surface, Mesh):
+        return _facets(part, part.surface, box)
     surface, at = part.surface, pose(part.surface.motion, time)
     frame, own = _frame(surface)
     low, high = (np.array(corner) for corner in filled(own).bounds())
@@ -85,6 +90,25 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
     wires = edges + curves.across(vertices, cells, frame)
     here = at.placed(vertices.T).T, cells, at.turned(np.concatenate(normals).T).T
     return here, [at.placed(wire.T).T for wire in wires]
+
+
+def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
+    """The triangles of a mesh as they are, or what of them is a wall."""
+    frame, (low, high) = matrix(surface.rotation), box
+    placed = _Placed(part, pose(None, 0.0), frame, low, high, float((high - low).max()))
+    points, triangles = surface.corners, surface.triangles
+    edges = curves.joined(points, curves.creases(points, triangles))
+    covers = _near(placed, points)
+    if covers or part.doorways:
+        wall = Smooth(lambda points: np.zeros(len(points)), lambda points: surface.gradient(points.T).T)
+        level = placed.level(wall, covers, [])
+        fine = [curves.finer(edge, placed.size / _FINE) for edge in edges]
+        edges = [run for edge in fine for run in curves.runs(edge, level(edge) <= 0.0)]
+        points, triangles, rims = cut(wall, points, triangles, level)
+        edges += curves.joined(points, rims)
+    wires = edges + curves.across(points, triangles, frame)
+    # Triangles go round the normals out of the mesh.
+    return given.shaded(points, triangles if part.solid else triangles[:, ::-1]), wires
 
 
 def _pieces(placed: _Placed) -> Iterator[tuple[Any, Smooth]]:

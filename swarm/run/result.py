@@ -29,7 +29,8 @@ class Result:
     Attributes:
         particles: the particles at `until`.
         observables: name -> array with one entry a frame; "momentum" and "angular_momentum" (frames, 3), "impulse"
-            and "wall_heat" (frames, surfaces). Where walls move also "wall_work" (frames, surfaces) [J] and
+            and "wall_heat" (frames, surfaces). Where a surface is a union or an intersection also "part_impulse" and
+            "part_heat" (frames, parts), of each of `scene.parts`. Where walls move also "wall_work" (frames, surfaces) [J] and
             "wall_position" (frames, surfaces, 3) [m] and "wall_orientation" (frames, surfaces, 4), quaternions (w, x,
             y, z): what is given at xi is at position + orientation xi. Where walls react also "wall_energy" (frames,
             surfaces) [J], which "total_energy" includes, "wall_velocity" [m/s] and "wall_spin" [rad/s] (frames,

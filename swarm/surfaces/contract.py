@@ -233,6 +233,9 @@ class Smooth(AtRest):
         """Whether a solid may have a point in common with a box with these corners; its bounds do."""
         return True
 
+    # Whether `first_hit` of a straight flight that comes in from outside is when it leaves again.
+    leaves_once = False
+
     def passed(self, r, v):
         """Whether a straight flight surely never meets the surface again."""
         return False

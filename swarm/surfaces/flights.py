@@ -48,7 +48,8 @@ def first_hit(walls, gravity, r, v):
     first = NEVER
     for rooms in reversed(walls.joined()):
         hits = tuple(tuple(hit(gravity, wall, r, v) for _number, wall, _gentle in room) for room in rooms)
-        first = soonest(union_hit(walls, rooms, hits, gravity, (r, v)), 0.0, first)
+        left = union_hit(walls, rooms, hits, gravity, (r, v))
+        first = soonest(left, 0.0, first)
     for number, wall in reversed(walls.shared()):
         if isinstance(wall, Field):
             first = soonest(wall.members.field_hit(gravity, r, v), number, first)

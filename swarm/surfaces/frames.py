@@ -57,7 +57,17 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("is_there", (None, "place", None), None),
     ("wall_after", (None, "place", None), None),
 )
-_CONSTANTS = ("side", "flat", "is_quartic", "may_be_far", "in_steps", "has_levels", "lacks_bend", "chord_sweeps")
+_CONSTANTS = (
+    "side",
+    "flat",
+    "is_quartic",
+    "may_be_far",
+    "in_steps",
+    "has_levels",
+    "lacks_bend",
+    "chord_sweeps",
+    "leaves_once",
+)
 
 
 class Framed(Smooth):

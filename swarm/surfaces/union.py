@@ -320,6 +320,11 @@ def _require_alone(whole: Joined) -> None:
                 f"parts must not be {type(surface).__name__} in a {type(whole).__name__} of several rooms, got "
                 f"{surface}; list them as a surface of the scene, or their bodies one by one"
             )
+        if isinstance(surface, Mesh):
+            raise SceneError(
+                f"parts must not be Mesh in a {type(whole).__name__} of several rooms, got {surface}; make one mesh of "
+                "what belongs together, or list it as a surface of the scene"
+            )
         if surface.known_in() is not None:
             raise SceneError(
                 f"parts must be known everywhere, got {surface!r:.200}, which reaches the border of its grid; sample "

@@ -19,24 +19,27 @@ STEP, WINDOW = 5e-4, 400
 SHORTEST = 3e-3
 # A gap that comes so near to 0 and falls again [m]: whether it is an impact is round-off.
 GRAZES = 1e-9
+ALWAYS = ((0.0, math.inf),)
 
 
 class Wall(NamedTuple):
-    """A surface as it is at rest, and its motion."""
+    """A surface as it is at rest, its motion, when it is there, and where and when it is open."""
 
     rest: object
     parts: tuple
     sign: float
     e: float
     mu: float
+    present: tuple
+    openings: tuple
 
     @staticmethod
     def of(surface):
         sign = -1.0 if getattr(surface, "side", "inside") == "outside" else 1.0
-        rest = dataclasses.replace(surface, motion=None)
+        rest = dataclasses.replace(surface, motion=None, present=None, openings=())
         # A law of one's own is a pair of both.
         e, mu = surface.laws[0] if surface.laws else (surface.restitution, surface.friction)
-        return Wall(rest, parts_of(surface.motion), sign, e, mu)
+        return Wall(rest, parts_of(surface.motion), sign, e, mu, surface.present or ALWAYS, surface.openings)
 
     def shift(self, t):
         """Displacements (3, T) and their rates at times (T,)."""
@@ -69,7 +72,15 @@ class Wall(NamedTuple):
         return center[:, None] + turned(k, -rate * t, arm)
 
     def gap(self, r, t):
-        return self.sign * self.rest.phi(self.as_given(r, t))
+        there = np.any([(begin <= t) & (t < end) for begin, end in self.present], axis=0)
+        return np.where(there, self.sign * self.rest.phi(self.as_given(r, t)), -1.0)
+
+    def lets_out(self, r, t):
+        """Whether it is open at a point (3,) of it."""
+        return any(
+            one.surface.phi(r[:, None])[0] <= 0.0 and any(begin <= t < end for begin, end in one.times)
+            for one in self.openings
+        )
 
     def normal(self, r, t):
         """The outward unit normal at a point (3,)."""
@@ -123,6 +134,9 @@ def follow(scene, r, v, times):
         if hit > until or not clear or hit - start < SHORTEST:
             break
         r, v = place(np.array([hit]))[:, 0], v + pull * (hit - start)
+        if wall.lets_out(r, hit):
+            seen += [(r, v, count)] * (len(times) - len(seen))
+            break
         n, u = wall.normal(r, hit), wall.velocity(r, hit)
         w = v - u
         b = w @ n

@@ -59,8 +59,9 @@ def ends_of(union, r, v, longest):
         out = np.flatnonzero(gaps > 0.0)
         k = max(out[0], 1) if out.size else PLACES - 1
         peaks = np.flatnonzero((gaps[1:k] >= gaps[: k - 1]) & (gaps[1:k] >= gaps[2 : k + 1])) + 1
-        # What is out for a place or two may have been out before.
-        sure[i] = (gaps[peaks] < -2.0 * step).all() and (gaps[k : k + 2] > 0.0).all() and gaps[0] < -2.0 * step
+        # What is out for a place or two may have been out before, and an end at a grazing angle is round-off.
+        out_for_long = (gaps[k : k + 2] > 0.0).all() and gaps[k] - gaps[k - 1] > 0.2 * step
+        sure[i] = (gaps[peaks] < -4.0 * step).all() and gaps[0] < -4.0 * step and (out_for_long or not out.size)
         if out.size:
             low, high = times[k] - step, times[k]
             for _half in range(HALVINGS):

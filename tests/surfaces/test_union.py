@@ -129,6 +129,10 @@ def test_bounds_hold_what_is_admissible():
             "parts must leave at most 64 rooms.*got 256; list what they have in common",
         ),
         (
+            lambda: swarm.Union([BALL, swarm.Mesh(np.eye(4, 3), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])]),
+            "parts must not be Mesh in a Union of several rooms, got Mesh.*make one mesh",
+        ),
+        (
             lambda: swarm.Union([BALL, swarm.Intersection([BOX, swarm.Spheres([[1.5, 0.1, 0.0]], 0.1)])]),
             "parts must not be Spheres in a Union of several rooms",
         ),

@@ -6,16 +6,13 @@ import numpy as np
 
 from ... import checks
 from ...errors import SceneError
-from ..data.mending import neighbours
-from ..data.mesh_files import Floats, Indices, Soup
+from ..data.mesh_files import Floats, Soup
 from ..data.triangles import Mesh as Closed
 from ..fields.grid import aligned
 from .members import Facets
 from .nearest import nearest
 from .room import CLOSED, FREE, KIND, rooms_of, with_blocks
 
-# The cosine of the angle between triangles whose edge is drawn.
-_BENT = 0.9
 # Bits of a place along each axis, by which triangles are sorted.
 _BITS = 20
 
@@ -107,13 +104,3 @@ def with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
         with_blocks(rows, held)
     rows[-1, KIND] = FREE if is_solid else CLOSED
     return facets
-
-
-def drawn(corners: Floats, triangles: Indices) -> tuple[tuple[Floats, Indices, Floats], list[Floats]]:
-    """(vertices, triangles, normals) of a mesh for pictures, flat, and the edges at which it is bent."""
-    own = corners[triangles]
-    normals = _normals(*np.moveaxis(own, 1, 0))
-    edges, sides = neighbours(triangles)
-    bent = (normals[sides[:, 0]] * normals[sides[:, 1]]).sum(axis=1) < _BENT
-    flat = own.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), np.repeat(normals, 3, axis=0)
-    return flat, list(corners[edges[bent]])

@@ -19,7 +19,7 @@ from ..data.triangles import closed
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .cells import cells_around
 from .facet import FacetNumbers, Shared
-from .made import drawn, given_arrays, sorted_by_place, table_of_facets, with_room
+from .made import given_arrays, sorted_by_place, table_of_facets, with_room
 from .members import Facets
 from .nearest import boxes_of, nearest, within
 
@@ -207,10 +207,6 @@ class Mesh(Surface):
         """What the triangles enclose [m^3]."""
         a, b, c = np.moveaxis((self.vertices - self.vertices[0])[self.triangles], 1, 0)
         return float((a * np.cross(b, c)).sum() / 6.0)
-
-    def drawn(self) -> tuple[tuple[Floats, Indices, Floats], list[Floats]]:
-        """Its triangles with corners of their own, each with their normal, and the edges at which it is bent."""
-        return drawn(self.corners, self.triangles)
 
     def contain(self, points: Floats) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is admissible: cheaper than phi."""

@@ -104,3 +104,4 @@ class EllipsoidCavity(EllipsoidNumbers):
         return rise_time_inside(c, b, a), True
 
     may_be_far = False
+    leaves_once = True

@@ -131,6 +131,8 @@ class PlaneNumbers(Flat):
     normal: Vec
     offset: float
 
+    leaves_once = True
+
     def first_hit(self, r, v):
         approach = dot(self.normal, v)
         time = (self.offset - self.inner(r)) / approach

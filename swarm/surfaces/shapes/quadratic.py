@@ -199,6 +199,8 @@ class QuadricNumbers(contract.Smooth):
 class ConvexQuadric(QuadricNumbers):
     """A convex cavity: the level along a straight flight has no maximum."""
 
+    leaves_once = True
+
     def first_hit(self, r, v):
         c, b, a = self.parabola(r, v)
         return rise_time_inside(self.side * c, self.side * b, self.side * a), True

@@ -176,6 +176,8 @@ class SlabNumbers(Distance, ExactChord):
     def flat_normal(self):
         return self.scaled(1.0)
 
+    leaves_once = property(lambda self: self.side > 0.0)  # type: ignore[assignment]
+
     def first_hit(self, r, v):
         d, u = self.off(r), self.along(v)
         # Between the walls the one ahead, outside of them the one on the side where the flight comes from

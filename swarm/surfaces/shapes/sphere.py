@@ -195,6 +195,7 @@ class SphereCavity(SphereNumbers):
         return rise_time_inside(square(d) - self.radius2, dot(d, v), square(v)), True
 
     may_be_far = False
+    leaves_once = True
 
 
 def ball(center, radius):
