@@ -111,9 +111,7 @@ def main() -> None:
     mesh = storage.mesh
     print(f"{mesh}: {1e3 * mesh.volume():.1f} litres, groups {', '.join(mesh.names)}")
     off = np.abs(storage.part - storage.law)[storage.error > 0.0] / storage.error[storage.error > 0.0]
-    print(
-        f"{storage.part[-1]:.4f} are left, {storage.law[-1]:.4f} by the law, {off.max():.1f} errors off at most"
-    )
+    print(f"{storage.part[-1]:.4f} are left, {storage.law[-1]:.4f} by the law, {off.max():.1f} errors off at most")
     picture = pyplot.figure(figsize=(7.4, 3.8))
     shape = picture.add_subplot(1, 2, 1, projection="3d")
     for name, colour in (("bottle", (0.5, 0.6, 0.7, 0.15)), ("shutter", (0.8, 0.2, 0.2, 0.6))):

@@ -319,4 +319,3 @@ def test_the_picture_of_a_mesh_is_the_mesh():
     shapes = pytest.importorskip("swarm.output.shapes")
     (shape,) = shapes.shapes_of(swarm.Scene([box_of_triangles()]), np.zeros((3, 1)))
     assert shape.area() == pytest.approx(22.0)
-    assert len(shape.wires) == 12
