@@ -111,7 +111,7 @@ def _seek(gravity, members, before, lanes, live):
     """The same with one field that has so many walls before it."""
     if isinstance(members, Facets):
         go_through(gravity, members, before, lanes, live)
-    elif members.few:
+    elif members.few and gravity is None:
         _look_at_all(members, before, lanes, live)
     else:
         _look_at_near(gravity, members, before, lanes, live)

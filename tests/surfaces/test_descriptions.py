@@ -178,5 +178,5 @@ def test_a_turned_surface_is_made_again(name, direction, axis, angle):
 
 
 def test_every_kind_is_made_again():
-    # Whose repr leaves out long arrays: test_fields.py and data/test_sampled.py; of others: test_union.py, or test_outlines.py.
+    # Whose repr leaves out long arrays: test_fields.py and data/test_sampled.py; others: test_union.py, test_outlines.py.
     assert set(TURNED) == set(ALL_SURFACES) - set(ALL_FIELDS) - {"sampled", "union", "intersection"} - OUTLINED
