@@ -114,7 +114,7 @@ def _seek(gravity, members, before, lanes, live):
         go_through(gravity, members, before, lanes, live)
     elif isinstance(members, Foam):
         _ask_for_each(gravity, members, before, lanes, live)
-    elif members.few:
+    elif members.few and gravity is None:
         _look_at_all(members, before, lanes, live)
     else:
         _look_at_near(gravity, members, before, lanes, live)

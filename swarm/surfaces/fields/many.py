@@ -19,7 +19,7 @@ from ..patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
 from .grid import MARGIN, Floats, Grid, cells_of, one_cell
-from .members import Members, alike, gathered, nearest, table_of, within
+from .members import Few, Members, alike, gathered, nearest, table_of, within
 
 # So many bodies are looked at one after the other by all lanes together, where flights are straight: in a sphere an
 # impact among 10, 24 and 40 balls takes 18, 37 and 57 ns, from cell to cell 55, 73 and 91. Of other bodies, which take
@@ -195,7 +195,7 @@ def in_straight_flights(members: Members, repeats: bool) -> Members:
     if isinstance(members, Patched):
         return members
     few = _FEW_BALLS if isinstance(members.like, SphereNumbers) and not repeats else _FEW
-    return members.looked_at_all() if len(members.table) <= few else members
+    return Few(*members) if len(members.table) <= few else members
 
 
 def _corners_of(surfaces: Sequence[Surface]) -> tuple[Floats, Floats]:

@@ -49,10 +49,6 @@ class Members(Record):
     # Whether each lane looks at all of them on a straight flight.
     few = False
 
-    def looked_at_all(self) -> Any:
-        """The same, for lanes that look at all of them: they are so few that this is faster than from cell to cell."""
-        return Few(*self)
-
     def count(self):
         """Their number."""
         return float(self.table.shape[0])
