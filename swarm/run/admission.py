@@ -13,8 +13,10 @@ from ..output.origin import require_near
 from ..particles import Particles
 from ..plane import require_start
 from ..scene import Scene
+from ..surfaces.facets.mesh import Mesh
 from ..surfaces.formulas.own import require_compiled
 from ..surfaces.instant import gaps_of, gradient_of
+from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.shapes.cone import Cone
 from ..surfaces.shapes.quadric import Quadric
 from . import passing, workload
@@ -132,6 +134,11 @@ def _require_walls_of_bodies(scene: Scene) -> None:
             raise SceneError(
                 f"surfaces[{i}].present must be None with bodies, which a wall that comes would cut, got "
                 f"{surface.present}; use particles, or leave it out"
+            )
+        if isinstance(surface, (Mesh, Outlined)):
+            raise SceneError(
+                f"surfaces[{i}] must not be {type(surface).__name__} with bodies, got {surface!r:.200}; use particles, "
+                "or from_mesh with a spacing for a vessel of bodies"
             )
         if surface.reacts():
             raise SceneError(

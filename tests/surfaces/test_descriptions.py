@@ -16,7 +16,7 @@ from swarm.surfaces import ALL_FIELDS, ALL_SURFACES
 
 # Made of several walls: test_bodies.py, test_union.py, test_outlines.py.
 OUTLINED = {"polygon", "prism", "stadium"}
-ELSEWHERE = {"box", "cone", "union", "intersection", *OUTLINED}
+ELSEWHERE = {"box", "cone", "union", "intersection", "mesh", *OUTLINED}
 
 
 def test_the_table_holds_every_surface():
@@ -178,5 +178,6 @@ def test_a_turned_surface_is_made_again(name, direction, axis, angle):
 
 
 def test_every_kind_is_made_again():
-    # Whose repr leaves out long arrays: test_fields.py and data/test_sampled.py; others: test_union.py, test_outlines.py.
-    assert set(TURNED) == set(ALL_SURFACES) - set(ALL_FIELDS) - {"sampled", "union", "intersection"} - OUTLINED
+    # Whose repr leaves out long arrays: test_fields.py, data/test_sampled.py, test_facets.py; others:
+    # test_union.py, test_outlines.py.
+    assert set(TURNED) == set(ALL_SURFACES) - {*ALL_FIELDS, "sampled", "mesh", "union", "intersection", *OUTLINED}
