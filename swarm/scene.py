@@ -19,8 +19,9 @@ from .pieces import Pieces, doorways_of_pieces, volumes_of_pieces
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.doors import was_there
+from .surfaces.facets.mesh import require_no_mesh
 from .surfaces.fields.grouped import order_of, walls_in
-from .surfaces.fields.many import in_straight_flights
+from .surfaces.fields.many import Many, in_straight_flights
 from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, images_of, lengths_of
 from .surfaces.joined import with_rooms
@@ -104,6 +105,7 @@ class Scene(Pieces):
         checks.assign(self, gravity=pull if pull is not None and any(pull) else None)
         if plane is not None:
             planes.require_all(plane, surfaces, pull, lengths)
+        self._require_alone()
         required.require_known(surfaces, self._bounds_of_lasting)
         if not self._has_volume():
             raise SceneError(
@@ -137,6 +139,25 @@ class Scene(Pieces):
                 "always"
             )
 
+    def _require_alone(self) -> None:
+        """Raise a `SceneError` where a foam is not the only surface, or has a period."""
+        foams = [i for i, one in enumerate(self.surfaces) if isinstance(one, Many) and one.is_foam()]
+        if foams and (len(self.surfaces) > 1 or self.period is not None):
+            raise SceneError(
+                f'surfaces[{foams[0]}] must be the only surface of a scene without a period, for its side is "inside", '
+                f"got {len(self.surfaces)} surfaces and period {self.period}; leave the others out, or list the "
+                "cavities as parts of a swarm.Union"
+            )
+
+    def require_no_rooms(self, what: str) -> None:
+        """Raise a `SceneError` where a surface is a union of rooms, or a foam of them, which `what` does not know."""
+        foams = [i for i, one in enumerate(self.surfaces) if isinstance(one, Many) and one.is_foam()]
+        for i in (*self._unions(), *foams):
+            raise SceneError(
+                f"surfaces[{i}] must not be a {type(self.surfaces[i]).__name__} of several rooms with {what}, got "
+                f"{self.surfaces[i]!r:.200}; use Impact with contact_step = 0, for particles"
+            )
+
     def apart(self, what: str) -> "Scene":
         """The scene with every wall compiled by itself, for `what` knows no fields.
 
@@ -148,11 +169,7 @@ class Scene(Pieces):
                 f"surfaces[{i}] must not be {type(self.surfaces[i]).__name__} with {what}, got {self.surfaces[i]}; use "
                 f"Impact with contact_step = 0, or list its bodies one by one, at most {MOST_WALLS} walls"
             )
-        for i in self._unions():
-            raise SceneError(
-                f"surfaces[{i}] must not be a {type(self.surfaces[i]).__name__} of several rooms with {what}, got "
-                f"{self.surfaces[i]!r:.200}; use Impact with contact_step = 0"
-            )
+        self.require_no_rooms(what)
         if not self.order.groups:
             return self
         made = copy.copy(self)
@@ -189,6 +206,7 @@ class Scene(Pieces):
             rooms = [[[self.pieces[i] for i in room] for room in union] for union in self.order.unions]
             return self._upright(with_rooms(carried(fields, others, moment), rooms))
         if own is not None:
+            require_no_mesh(self.surfaces)
             return walls_in(self.order, self.pieces, self._groups, own, lambda members: members)
         there = tuple(was_there(piece.present, moment) for piece in self.pieces)
         if there not in self._walls:

@@ -88,7 +88,7 @@ class Volume:
         admitted = np.ones(rows.shape[1], np.bool_)
         for image in (image for images in self._images for image in images if image.is_there(0.0)):
             if isinstance(image, Many):
-                admitted[admitted] = ~image.contain(rows[:, admitted])
+                admitted[admitted] = image.contain(rows[:, admitted]) == image.is_foam()
             elif isinstance(image, Mesh):
                 admitted[admitted] = image.contain(rows[:, admitted])
             else:

@@ -7,6 +7,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, highest, lowest, norm, square
+from ..surfaces.fields.foam import Foam
 from ..surfaces.fields.grid import block_of, over_block
 from ..surfaces.fields.members import member
 from ..surfaces.moving import Carried
@@ -34,7 +35,9 @@ def meets(walls, ends, active, path, near):
     for rooms, rooms_then in zip(walls.joined(), ends.joined(), strict=True):
         found = _leaves_all(rooms, rooms_then, active, path, near) | found
     for (number, wall), (_number, end) in zip(walls.shared(), ends.shared(), strict=True):
-        if isinstance(wall, Field):
+        if isinstance(wall, Field) and isinstance(wall.members, Foam):
+            here = False  # all its edges are re-entrant
+        elif isinstance(wall, Field):
             here = _meets_one(wall.members, end.members, number, active, path, near)
         else:
             here = _may_meet(wall, end, path, near) & (not active.has(number))
@@ -152,6 +155,8 @@ def arrival(walls, active, path, near, remaining):
         return _arrival_later(walls, active, path, near, remaining)
     found = _out_of_unions(walls, active, path, near, remaining)
     for number, wall in reversed(walls.shared()):
+        if isinstance(wall, Field) and isinstance(wall.members, Foam):
+            continue
         if isinstance(wall, Field):
             found = _first_of(wall.members, number, active, path, near, found)
         elif not active.has(number):

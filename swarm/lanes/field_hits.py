@@ -15,6 +15,7 @@ from ..kernel.vector import column, put
 from ..surfaces import flights
 from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.facets.members import Facets
+from ..surfaces.fields.foam import Foam
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import gathered, member, width
 from ..surfaces.period import on_time
@@ -111,10 +112,20 @@ def _seek(gravity, members, before, lanes, live):
     """The same with one field that has so many walls before it."""
     if isinstance(members, Facets):
         go_through(gravity, members, before, lanes, live)
-    elif members.few:
+    elif isinstance(members, Foam):
+        _ask_for_each(gravity, members, before, lanes, live)
+    elif members.few and gravity is None:
         _look_at_all(members, before, lanes, live)
     else:
         _look_at_near(gravity, members, before, lanes, live)
+
+
+def _ask_for_each(gravity, members, before, lanes, live):
+    """The hit of every lane by itself, as a whole."""
+    for i in range(index(live)):
+        lane, found = lanes.lane(i), hit_of_lane(lanes, i)
+        hit = flights.soonest(members.field_hit(gravity, lane.r, lane.v), before, found)
+        lanes.course[_TIME, i], lanes.course[_WALL, i] = hit.time, hit.wall
 
 
 def _look_at_all(members, before, lanes, live):

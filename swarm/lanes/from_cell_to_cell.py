@@ -22,6 +22,8 @@ from .table import STRIDE
 _TIME, _WALL = 0, 1
 # So many facets are looked at together; the column of one in the second line of the cache.
 _ROOM, _SECOND = 1024, 8
+# Entries of a cell in a line of the cache, and lines of a cell that are looked up together.
+_PER_LINE, _LINES = 4, 4
 # Steps of a lane after which its flight is said to be free so far.
 _MOST = 4000
 
@@ -138,9 +140,11 @@ def _may_meet(gravity, cells, under, cell, i):
 def _look(gravity, facets, under, maybe, n):
     """Every lane at the facets in its cell, by their planes first."""
     cells, some = facets.grid, 0
-    for i in range(index(n)):
-        if under.count[i] > 0:
-            maybe.seen[i] = float(cells.planes[index(under.first[i]), 0])
+    for line in range(_LINES):
+        for i in range(index(n)):
+            ahead = line * _PER_LINE
+            if under.count[i] > ahead:
+                maybe.seen[i] = float(cells.planes[index(under.first[i] + ahead), 0])
     for i in range(index(n)):
         if under.count[i] > 0:
             place, pace = under.now(gravity, i)

@@ -39,6 +39,11 @@ def log_static(stream: Any, drawn: Drawn, shapes: list[Shape], center: Floats) -
         stream.log(LINES, rr.LineStrips3D.from_fields(radii=width, colors=[_EDGE]), static=True)
     elif len(drawn.lines):
         stream.log(LINES, rr.LineStrips3D.from_fields(radii=width), static=True)
+    log_walls(stream, shapes, center)
+
+
+def log_walls(stream: Any, shapes: list[Shape], center: Floats, static: bool = True) -> None:
+    """Log the walls, or those from the time of the stream on."""
     for shape in shapes:
         face, wire = (_SOLID, _SOLID_WIRE) if shape.solid else (_CAVITY, _CAVITY_WIRE)
         if len(shape.vertices):
@@ -46,11 +51,13 @@ def log_static(stream: Any, drawn: Drawn, shapes: list[Shape], center: Floats) -
                 vertex_positions=shape.vertices - center, triangle_indices=shape.triangles,
                 vertex_normals=shape.normals, albedo_factor=face,
             )  # fmt: skip
-            stream.log(f"{path_of(shape)}/mesh", mesh, static=True)
-        if shape.wires:
+            stream.log(f"{path_of(shape)}/mesh", mesh, static=static)
+        elif not static:
+            stream.log(f"{path_of(shape)}/mesh", rr.Clear(recursive=False))
+        if shape.wires or not static:
             wires = [curve - center for curve in shape.wires]
             lines = rr.LineStrips3D(wires, colors=[wire], radii=rr.Radius.ui_points(0.5))
-            stream.log(f"{path_of(shape)}/wires", lines, static=True)
+            stream.log(f"{path_of(shape)}/wires", lines, static=static)
 
 
 def log_series(stream: Any, lines: list[series.Line]) -> None:

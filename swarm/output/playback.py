@@ -30,6 +30,9 @@ _TRIANGLES, _PAINT = "Mesh3D:triangle_indices", "Mesh3D:vertex_colors"
 
 Colours = NDArray[np.uint32]
 
+# Where walls are.
+_SURFACES, _SOLIDS = "/scene/surfaces/", "/scene/solids/"
+
 
 class Playback:
     """A recording of swarm, read completely.
@@ -112,9 +115,9 @@ class Playback:
         }
         strips = {entity: kept for (entity, name), kept in self._static.items() if name == _STRIPS}
         self._walls = [entity.rpartition("/")[0] for entity in strips]
+        self._changing = sorted(e for e, name in self._rows if name == _STRIPS and e.startswith((_SURFACES, _SOLIDS)))
         self.wires: list[tuple[bool, list[Floats]]] = [
-            (entity.startswith("/scene/solids/"), [np.array(strip) for strip in kept.as_py()])
-            for entity, kept in strips.items()
+            (entity.startswith(_SOLIDS), [np.array(strip) for strip in kept.as_py()]) for entity, kept in strips.items()
         ]
         triangles = self._static.get((MESH, _TRIANGLES))
         self._triangles = np.array([] if triangles is None else triangles.as_py(), np.int64).reshape(-1, 3)
@@ -128,7 +131,13 @@ class Playback:
                 # Rerun keeps matrices column by column: this is the transpose.
                 curves = [curve @ turn.reshape(3, 3) + way for curve in curves]
             found.append((solid, [curve + self.center for curve in curves]))
-        return found
+        return found + [self._wires_then(entity, number) for entity in self._changing]
+
+    def _wires_then(self, entity: str, number: int) -> tuple[bool, list[Floats]]:
+        """The curves of a surface that comes and goes at the frame of this number."""
+        latest = max((k for k in self._rows[entity, _STRIPS] if k <= number), default=-1)
+        strips = self._row(entity, _STRIPS, latest)
+        return entity.startswith(_SOLIDS), [np.array(strip) + self.center for strip in strips]
 
     def frame(self, number: int) -> tuple[Floats, Colours]:
         """Positions (n, 3) and colours (n,), 0xRRGGBBAA, of the frame of this number."""

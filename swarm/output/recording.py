@@ -3,7 +3,8 @@
 /scene/particles              Points3D, a frame's; coloured; of bodies, their points
 /scene/bodies/lines, .../mesh LineStrips3D and Mesh3D of bodies, a frame's; which points a triangle has is static
 /scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise; of one that moves
-                              also Transform3D, a frame's, from where it is at the start
+                              also Transform3D, a frame's, from where it is at the start; where there are doors not
+                              static, but from each frame on in which others are there
 /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
 /time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
 /about                        meaning of the colours, as text and as values, and the origin; static
@@ -12,6 +13,7 @@ Rerun's positions are float32. Those of a scene that is far from the origin are 
 """
 
 import atexit
+import bisect
 import ctypes
 import math
 import os
@@ -109,6 +111,8 @@ class RecordingWriter:
         self._rows: list[tuple[int, float, dict[str, Any]]] = []
         self._before: list[tuple[int, float, dict[str, Any]]] = []
         self._due = 0.0
+        # Where walls come and go they are sent from each instant on, of which this is the number.
+        self._has_doors, self._instant = scene.has_doors() and not scene.moves(), -1
         self._failed = False
         self._url = viewer.live_url(settings.live) if settings.live else None
 
@@ -136,7 +140,7 @@ class RecordingWriter:
         except RuntimeError as error:
             raise FileError(f"cannot write the recording {self._path}: {error}") from error
         self.stream.set_log_time_enabled(False)
-        looks.log_static(self.stream, self._drawn, self._shapes, self._center)
+        looks.log_static(self.stream, self._drawn, [] if self._has_doors else self._shapes, self._center)
         looks.log_series(self.stream, self._series)
         looks.log_about(self.stream, self._drawn, self._scale, self._stride, self._center, self._scene.plane)
         return self._write
@@ -168,6 +172,8 @@ class RecordingWriter:
         points = rows(shown, np.float32)
         try:
             self._send_points(numbers, times, points, np.array(colour), np.array(lines))
+            if self._has_doors:
+                self._send_doors(numbers, times)
             if self._scene.moves():
                 walls = [(seen["wall_position"], seen["wall_orientation"]) for *_, seen in chosen]
                 self._send_walls(numbers, times, walls)
@@ -197,6 +203,18 @@ class RecordingWriter:
         if len(drawn.triangles):
             columns = rr.Mesh3D.columns(vertex_positions=points.reshape(-1, 3), vertex_colors=colour.ravel())
             self._send(MESH, numbers, times, columns.partition([n] * frames))
+
+    def _send_doors(self, numbers: list[int], times: list[float]) -> None:
+        """Send the walls that are there where these are others than before."""
+        for number, moment in zip(numbers, times, strict=True):
+            instant = bisect.bisect_right(self._scene.instants, moment)
+            if instant != self._instant:
+                self._instant = instant
+                self.stream.set_time("frame", sequence=number)
+                self.stream.set_time("sim_time", duration=min(moment, _LATEST))
+                shapes = shapes_of(self._scene, self._at_start, moment)
+                looks.log_walls(self.stream, shapes, self._center, static=False)
+                self.stream.reset_time()
 
     def _send_walls(self, numbers: Any, times: Any, walls: list[tuple[Any, Any]]) -> None:
         """Send where the surfaces that move are, (position, orientation) a frame, from where they were drawn."""

@@ -44,6 +44,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     if isinstance(particles, Bodies):
         _require_no_log("of particles, not of bodies, whose points meet walls together", options)
         # Of springs each point may be in every wall at once.
+        scene.require_no_rooms("bodies")
         known = scene if isinstance(method, Impact) else scene.apart("bodies and soft walls")
         return _task_of_bodies(known, particles.copy(), method, options)
     if not isinstance(method, Impact):

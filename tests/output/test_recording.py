@@ -335,3 +335,26 @@ def test_the_viewer_draws(run, tmp_path):
     held = playback.Playback(run[0] / "run.rrd")
     assert sheet.draw_sheet(held, tmp_path / "sheet.png", None, True) == "the Rerun viewer"
     assert os.stat(tmp_path / "sheet.png").st_size > 20_000
+
+
+def test_walls_that_come_and_go_are_recorded_from_each_instant_on(tmp_path):
+    """A post that is there for a while, and a hole that is open for a while."""
+    hole = swarm.Opening(swarm.Sphere(0.2, (0.0, 0.0, 0.5)), times=[(0.15, 0.45)])
+    post = swarm.Sphere(0.1, side="outside", present=[(0.25, 0.35)])
+    scene = swarm.Scene([swarm.Sphere(0.5, openings=[hole]), post])
+    start = swarm.Particles([[0.3], [0.0], [0.0]], [[0.0], [0.1], [0.0]])
+    path = tmp_path / "doors.rrd"
+    swarm.simulate(scene, start, swarm.Impact(), until=0.5, every=0.1, recording=path)
+    held = playback.Playback(path)
+    seen = [[curves for _solid, curves in held.wires_at(number)] for number in range(6)]
+    assert [len(ball) > 0 for ball, _post in map(sorted_by_size, seen)] == 6 * [True]
+    assert [len(of_post) > 0 for _ball, of_post in map(sorted_by_size, seen)] == [k == 3 for k in range(6)]
+    for number, walls in enumerate(seen):
+        points = np.vstack(sorted_by_size(walls)[0])
+        in_hole = np.sqrt(((points - [0.0, 0.0, 0.5]) ** 2).sum(axis=1)) < 0.19
+        assert in_hole.any() == (number not in (2, 3, 4))
+
+
+def sorted_by_size(walls):
+    """The curves of the ball, whose points are farther out, and those of the post."""
+    return sorted(walls, key=lambda curves: max((np.abs(curve).max() for curve in curves), default=0.0))[::-1]

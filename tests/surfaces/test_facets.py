@@ -269,3 +269,53 @@ def test_memory_of_a_triangle():
     members = mesh.members
     arrays = [members.table, *(one for one in members.grid if isinstance(one, np.ndarray)), *mesh._tree]
     assert sum(one.nbytes for one in (*arrays, mesh.group)) < 400 * len(mesh)
+
+
+# --- What else a scene has -------------------------------------------------------------------------------
+
+
+def test_what_a_mesh_does_not_go_with_is_one_sentence():
+    mesh = box_of_triangles()
+    scene, body = swarm.Scene([mesh]), swarm.dumbbell(0.1, 1.0)
+    start = swarm.fill(scene, 3, speed=1.0, seed=1)
+    cases = [
+        (
+            lambda: swarm.Union([mesh, swarm.Box((0.2, 0.2, 3.0))]),
+            r"parts must not be Mesh in a Union of several rooms",
+        ),
+        (lambda: swarm.simulate(scene, start, swarm.Penalty(1e-3, 1e5), until=1.0), r"must not be Mesh with Penalty"),
+        (lambda: swarm.simulate(scene, start, swarm.Impact(contact_step=1e-3), until=1.0), r"Mesh with a contact_step"),
+        (
+            lambda: swarm.simulate(scene, swarm.place(scene, body, 2, speed=1.0), swarm.Impact(dt=1e-2), until=1.0),
+            r"surfaces\[0\] must not be a Mesh for bodies",
+        ),
+    ]
+    for make, said in cases:
+        with pytest.raises(swarm.SceneError, match=said) as caught:
+            make()
+        assert "\n" not in str(caught.value)
+
+
+def test_a_mesh_beside_a_ball_that_moves():
+    mesh = swarm.Mesh(*thorny())
+    ball = swarm.Sphere(0.1, side="outside", motion=swarm.Oscillation((0.1, 0.0, 0.0), 1.0))
+    scene = swarm.Scene([mesh, ball])
+    start = swarm.fill(scene, 10, speed=1.0, seed=1)
+    end = swarm.simulate(scene, start, swarm.Impact(), until=1.0, compile="never")
+    assert end.observables["impacts"][-1] > 30
+    assert mesh.phi(end.particles.position).max() < 1e-12
+
+
+def test_a_solid_that_reaches_over_a_face_of_a_cell_that_repeats():
+    corners, faces = thorny(n=8)
+    scene = swarm.Scene([swarm.Mesh(0.3 * corners, faces, "outside", (0.05, 0.5, 0.5))], period=(1.0, 1.0, 1.0))
+    start = swarm.fill(scene, 20, speed=1.0, seed=1)
+    end = swarm.simulate(scene, start, swarm.Impact(), until=8.0, compile="never")
+    assert end.observables["impacts"][-1] > 30
+    assert scene.gaps(end.particles.position).max() < 1e-12
+
+
+def test_the_picture_of_a_mesh_is_the_mesh():
+    shapes = pytest.importorskip("swarm.output.shapes")
+    (shape,) = shapes.shapes_of(swarm.Scene([box_of_triangles()]), np.zeros((3, 1)))
+    assert shape.area() == pytest.approx(22.0)

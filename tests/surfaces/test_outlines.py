@@ -1,14 +1,17 @@
 """Outlines of lines and arcs: what they are, flights between their sides, slides along them, and bad input."""
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
+import tomli_w
 
 import swarm
+from swarm import tables
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import vec
-from swarm.surfaces import flights
+from swarm.surfaces import ALL_SURFACES, flights
 from swarm.surfaces.outlines.outline import Outline
 
 L = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
@@ -113,6 +116,23 @@ def test_phi_is_the_distance_and_its_gradient_a_unit_vector():
         assert np.quantile(np.abs(slope - 1.0), 0.999) < 1e-8
     inside = (points[:2] > 0.0).all(axis=0) & (points[:2] < 2.0).all(axis=0) & ~(points[:2] > 1.0).all(axis=0)
     assert ((swarm.Polygon(L).phi(points) < 0.0) == inside).all()
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        swarm.Polygon(CURVED, axis=(1, 2, 3), center=(0.1, 0.2, 0.3), side="outside", restitution=0.5),
+        swarm.Prism(L, 2.0, rotation={"axis": (1, 0, 2), "angle": 0.3}, temperature=1.0),
+        swarm.Stadium(0.3, 1.0, axis=(0, 1, 0), friction=0.2),
+    ],
+    ids=lambda surface: type(surface).__name__,
+)
+def test_a_surface_is_made_again_by_its_repr_and_by_its_table(surface):
+    table = tomllib.loads(tomli_w.dumps(tables.table_of(surface)))
+    for again in (eval(repr(surface), vars(swarm)), tables.of_kind(table, "surface", ALL_SURFACES)):
+        assert again == surface
+        assert hash(again) == hash(surface)
+        assert (again.members.table == surface.members.table).all()
 
 
 @pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 2, 3)])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...kernel import cache
 from ...kernel.arrays import index
-from ...kernel.gravity import as_vector
+from ...kernel.gravity import as_vector, displacement
 from ...kernel.jit import Array, kernel, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec, absolute, dot, square, total, vec
@@ -26,6 +26,10 @@ _LEAST_CELLS = 64
 # A plane in a cell is known by four whole numbers up to this one, and so to these parts of the cell's diagonal and of a
 # speed; so many are made at once.
 _FULL, _OFF, _OFF_SPEED, _TOGETHER = 32767.0, 6e-5, 6e-5, 1_000_000
+# A ball around a facet is known where its middle and its radius are within so many diagonals.
+_REACH = 2.0
+# How far beside the true place a flight may seem to come through a plane, by a distance and a speed that may be none.
+_BESIDE = 4.0 / _OFF_SPEED
 # So few facets are entered in plain Python.
 _SOME = 60
 
@@ -42,7 +46,7 @@ class Cells(Record):
     shape: Vec
     first: Array
     entries: Array
-    planes: Array  # (entries, 4) int16, of each the normal and, from the middle of the cell, the offset: see `passes`
+    planes: Array  # (entries, 8) int16, of each the normal, and from the middle of the cell: see `passes`
     room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
 
 
@@ -59,7 +63,7 @@ def cells_around(like, table: Floats, corners: Floats) -> Cells:
     count = int(shape.prod())
     numbers = (first, width, 1.0 / width, MARGIN * width, shape)
     starts, nothing = np.zeros(count + 2, np.int32), np.empty(0, np.int32)
-    flat = np.empty((0, 4), np.int16)
+    flat = np.empty((0, 8), np.int16)
     grid = Cells(*(vec(row.tolist()) for row in numbers), starts, nothing, flat, np.empty((0, 8), np.int8))
     enter = cache.in_python(_enter) if len(table) <= _SOME else _enter
     bounds = np.ascontiguousarray(low), np.ascontiguousarray(high)
@@ -69,7 +73,7 @@ def cells_around(like, table: Floats, corners: Floats) -> Cells:
     enter(like, table, bounds, grid, starts[:-1].copy(), entries)
     held = np.diff(starts[:-1])
     grid = grid._replace(entries=entries)
-    return grid._replace(planes=_planes(grid, table, np.repeat(np.arange(count), held)))
+    return grid._replace(planes=_planes(grid, table, corners, np.repeat(np.arange(count), held)))
 
 
 def _shape(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
@@ -88,17 +92,24 @@ def _shape(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, 
     return shape, middle - 0.5 * shape * width, width
 
 
-def _planes(grid: Cells, table: Floats, cells: NDArray[np.int64]) -> NDArray[np.int16]:
-    """The planes of all entries, each in the cell with this number."""
+def _planes(grid: Cells, table: Floats, corners: Floats, cells: NDArray[np.int64]) -> NDArray[np.int16]:
+    """The planes and the balls of all entries, each in the cell with this number."""
     width = np.array(grid.width)
-    made = np.empty((len(cells), 4), np.int16)
+    diagonal = float(np.linalg.norm(width))
+    made = np.empty((len(cells), 8), np.int16)
+    middles = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
+    radii = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
     for first in range(0, len(cells), _TOGETHER):
         some = slice(first, first + _TOGETHER)
         places = np.stack(np.unravel_index(cells[some], tuple(int(n) for n in grid.shape)), axis=1)
         normal, offset = table[grid.entries[some], :3], table[grid.entries[some], 3]
         middle = np.array(grid.low) + (places + 0.5) * width
         made[some, :3] = np.rint(normal * _FULL)
-        made[some, 3] = np.rint((offset - (normal * middle).sum(axis=1)) * (_FULL / np.linalg.norm(width)))
+        made[some, 3] = np.rint((offset - (normal * middle).sum(axis=1)) * (_FULL / diagonal))
+        away, radius = middles[grid.entries[some]] - middle, radii[grid.entries[some]]
+        near = (np.abs(away).max(axis=1) < _REACH * diagonal) & (radius < 0.9 * _REACH * diagonal)
+        made[some, 4:7] = np.where(near[:, None], np.rint(away * (_FULL / (_REACH * diagonal))), 0.0)
+        made[some, 7] = np.where(near, np.ceil(radius * (_FULL / (_REACH * diagonal))) + 2.0, _FULL)
     return made
 
 
@@ -144,6 +155,10 @@ class Here(Record):
     slow: float
     weak: float
 
+    def pull(self):
+        """Gravity, or None."""
+        return None if self.half_pull is None else 2.0 * self.half_pull
+
 
 def here_in(gravity, cells, place, r, v, span):
     """A flight that is at r in the cell at this place."""
@@ -156,17 +171,36 @@ def here_in(gravity, cells, place, r, v, span):
 
 
 def passes(cells, k, here):
-    """Whether a flight may come through the plane of an entry in its cell: most do not, and no facet is looked up."""
-    normal = Vec(float(cells.planes[k, 0]), float(cells.planes[k, 1]), float(cells.planes[k, 2])) * (1.0 / _FULL)
-    offset = float(cells.planes[k, 3]) * (here.near * (1.0 / (_FULL * _OFF)))
-    depth, rate = dot(normal, here.from_middle) - offset, dot(normal, here.v) + here.slow
-    rises, is_inside = select(rate > 0.0, rate, 0.0) * here.span, depth <= here.near
+    """Whether a flight may come through the plane of an entry in its cell, and there through a ball around the facet.
+
+    Most do not, and no facet is looked up. What is known of the entry is round-off of whole numbers.
+    """
+    normal = _row(cells.planes, k, 0, 1.0 / _FULL)
+    depth = dot(normal, here.from_middle) - float(cells.planes[k, 3]) * (here.near * (1.0 / (_FULL * _OFF)))
+    rate, bend = dot(normal, here.v), 0.0 if here.half_pull is None else dot(normal, here.half_pull)
+    faster = rate + here.slow
+    rises, is_inside = select(faster > 0.0, faster, 0.0) * here.span, depth <= here.near
     if here.half_pull is not None:
-        bend = dot(normal, here.half_pull)
-        is_inside = is_inside | ((bend > -here.weak) & (rate < 2.0 * here.slow))
-        bend = select(bend > 0.0, bend, 0.0) * here.span
-        rate, rises = rate + 2.0 * bend, rises + (bend + here.weak * here.span) * here.span
-    return (rate > 0.0) & is_inside & (depth + rises >= -here.near)
+        more = select(bend > 0.0, bend, 0.0)
+        is_inside = is_inside | ((bend > -here.weak) & (faster < 2.0 * here.slow))
+        faster, rises = faster + 2.0 * more * here.span, rises + (more + here.weak) * here.span * here.span
+    if not ((faster > 0.0) & is_inside & (depth + rises >= -here.near)):
+        return False
+    radius = float(cells.planes[k, 7])
+    # Where it comes through the plane, at the speed 2 root along the normal
+    b = 0.5 * rate
+    below = b * b - bend * depth
+    root = math.sqrt(select(below > 0.0, below, 0.0))
+    if radius == _FULL or b <= here.slow or below <= here.slow * here.slow:
+        return True
+    away = here.from_middle + displacement(here.pull(), here.v, -depth / (b + root))
+    scale = here.near * (_REACH / (_FULL * _OFF))
+    beside = radius * scale + _BESIDE * here.near * here.slow / root
+    return not square(away - _row(cells.planes, k, 4, scale)) > beside * beside
+
+
+def _row(rows, k, first, scale):
+    return Vec(float(rows[k, first]), float(rows[k, first + 1]), float(rows[k, first + 2])) * scale
 
 
 # --- Where a flight leaves cells -------------------------------------------------------------------------

@@ -11,8 +11,9 @@ from ..shapes.box import Box
 from ..shapes.capsule import Capsule
 from ..shapes.cylinder import Cylinder
 from ..shapes.ellipsoid import Ellipsoid
-from ..shapes.sphere import Sphere, ball
+from ..shapes.sphere import Sphere, ball, cavity
 from ..surface import Surface
+from .foam import Foam
 from .grid import Floats, aligned
 from .many import Many, field_of
 from .members import Members
@@ -20,16 +21,17 @@ from .members import Members
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Spheres(Many):
-    """Many solid balls, one surface; the space outside of all of them.
+    """Many balls, one surface: the space outside of all of them, or a foam of cavities.
 
-    They may overlap one another, and reach through other walls.
+    Solid ones may overlap one another, and reach through other walls. With side="inside" particles are in any of them,
+    and go on from one into another where both overlap: bubbles of a foam, pores; the only surface of a scene.
 
     In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius.
 
     Args:
         centers: (n, 3) [m], one row a ball.
         radii: (n,) or one number for all, above 0 [m].
-        side: "outside".
+        side: "outside" or "inside".
 
     Raises:
         SceneError: an argument is out of its range.
@@ -41,6 +43,7 @@ class Spheres(Many):
     """
 
     kind: ClassVar[type[Surface]] = Sphere
+    may_be_foam: ClassVar[bool] = True
     centers: Any
     radii: Any
     side: str = "outside"
@@ -58,7 +61,9 @@ class Spheres(Many):
     def members(self) -> Members:
         """The field as kernels take it."""
         table = aligned(np.column_stack([self.centers, self.radii]))
-        return field_of(ball(vec(table[0, :3]), table[0, 3]), table, self.corners, self.repeated)
+        made = ball if self.is_solid() else cavity
+        field = field_of(made(vec(table[0, :3]), table[0, 3]), table, self.corners, self.repeated)
+        return field if self.is_solid() else Foam(*field)
 
 
 @dataclass(frozen=True, repr=False, eq=False)

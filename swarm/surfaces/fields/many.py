@@ -19,7 +19,7 @@ from ..patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
 from .grid import MARGIN, Floats, Grid, cells_of, one_cell
-from .members import Members, alike, gathered, nearest, table_of, within
+from .members import Few, Members, alike, gathered, nearest, table_of, within
 
 # So many bodies are looked at one after the other by all lanes together, where flights are straight: in a sphere an
 # impact among 10, 24 and 40 balls takes 18, 37 and 57 ns, from cell to cell 55, 73 and 91. Of other bodies, which take
@@ -57,14 +57,18 @@ class Many(Surface):
     kind: ClassVar[type[Surface]]
     # The corners of the cell that repeats, in a scene in which one does.
     repeated: ClassVar[tuple[Floats, Floats] | None] = None
+    # Whether they may be cavities, in any of which particles live.
+    may_be_foam: ClassVar[bool] = False
     # Of images, the bodies that they are of.
     which: ClassVar[NDArray[np.int64] | None] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         side, name = getattr(self, "side", "outside"), type(self).__name__
-        if side != "outside":
+        if side != "outside" and not (self.may_be_foam and side == "inside"):
             raise SceneError(f'side must be "outside" for {name}, which are solids, got {side!r}')
+        if self.is_foam() and (self.motion is not None or self.openings):
+            raise SceneError(f'motion and openings must be left out for {name} with side="inside", got {self}')
         for what in ("rotation", "mass", "inertia"):
             if getattr(self, what) is not None:
                 raise SceneError(f"{what} must be None for {name}, got {getattr(self, what)!r}")
@@ -72,6 +76,10 @@ class Many(Surface):
         for what in [field.name for field in fields(self) if field.name in _ROWS and field.name != "centers"]:
             if (value := getattr(self, what)) is not None:
                 object.__setattr__(self, what, _ROWS[what].checked(what, value, len(self)))
+
+    def is_foam(self) -> bool:
+        """Whether particles live in any of the bodies, not outside of all."""
+        return self.may_be_foam and getattr(self, "side", "outside") == "inside"
 
     def __len__(self) -> int:
         return len(self.centers)
@@ -138,7 +146,10 @@ class Many(Surface):
     # --- For users ---------------------------------------------------------------------------------------
 
     def bounds(self) -> Box:
-        return UNBOUNDED
+        if not self.is_foam():
+            return UNBOUNDED
+        low, high = self.corners()
+        return tuple(low.min(axis=1).tolist()), tuple(high.max(axis=1).tolist())
 
     def size(self) -> float:
         return min(solid.size() for solid in self.solids())
@@ -184,7 +195,7 @@ def in_straight_flights(members: Members, repeats: bool) -> Members:
     if isinstance(members, Patched):
         return members
     few = _FEW_BALLS if isinstance(members.like, SphereNumbers) and not repeats else _FEW
-    return members.looked_at_all() if len(members.table) <= few else members
+    return Few(*members) if len(members.table) <= few else members
 
 
 def _corners_of(surfaces: Sequence[Surface]) -> tuple[Floats, Floats]:

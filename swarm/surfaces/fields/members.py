@@ -18,7 +18,7 @@ from ..shapes.capsule import CapsuleNumbers
 from ..shapes.quadratic import QuadricNumbers
 from ..shapes.slab import AXES, SlabNumbers
 from ..shapes.solid import SolidNumbers
-from ..shapes.sphere import SphereNumbers, ball
+from ..shapes.sphere import SphereCavity, SphereNumbers, ball, cavity
 from .grid import Grid, aligned, cell_of, until_next
 
 # The rows of a rotation that turns nothing.
@@ -48,10 +48,6 @@ class Members(Record):
 
     # Whether each lane looks at all of them on a straight flight.
     few = False
-
-    def looked_at_all(self) -> Any:
-        """The same, for lanes that look at all of them: they are so few that this is faster than from cell to cell."""
-        return Few(*self)
 
     def count(self):
         """Their number."""
@@ -119,7 +115,8 @@ def gathered(like, table, m, k):
     """Numbers of one kind with `like`, from row m of a table, from column k on."""
     if isinstance(like, SphereNumbers):
         # Four numbers of it are half a line of the cache; the others follow from them.
-        return ball(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3])
+        made = cavity if isinstance(like, SphereCavity) else ball
+        return made(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3])
     if isinstance(like, (*AXES, Shared)):
         return like if isinstance(like, Shared) else type(like)(1.0)  # type: ignore[call-arg]
     if not isinstance(like, tuple):

@@ -10,7 +10,7 @@ from ...errors import SceneError
 Floats = NDArray[np.float64]
 
 
-class Sides(NamedTuple):
+class Edges(NamedTuple):
     """The sides of an outline, counter-clockwise, arcs of at most half a circle: arrays with an entry a side."""
 
     start: Floats  # (n, 2)
@@ -28,11 +28,11 @@ def along(a: Floats, b: Floats) -> Floats:
     return np.asarray((a * b).sum(axis=-1))
 
 
-def require_apart(name: str, sides: Sides, nothing: float) -> None:
+def require_apart(name: str, sides: Edges, nothing: float) -> None:
     """Raise a `SceneError` where two sides cross or touch other than at the vertex that they share."""
     n = len(sides.start)
     i, j = np.triu_indices(n, 1)
-    a, b = (Sides._make(part[k] for part in sides) for k in (i, j))
+    a, b = (Edges._make(part[k] for part in sides) for k in (i, j))
     for point in _common(a, b):
         on = np.isfinite(point).all(axis=1)
         for one in (a, b):
@@ -48,7 +48,7 @@ def require_apart(name: str, sides: Sides, nothing: float) -> None:
             )
 
 
-def _common(a: Sides, b: Sides) -> list[Floats]:
+def _common(a: Edges, b: Edges) -> list[Floats]:
     """The two points that each pair of lines or circles has in common, NaN where there is none."""
     with np.errstate(all="ignore"):
         ka, kb = a.curvature, b.curvature

@@ -2,7 +2,7 @@
 
 It is given as in DXF: a vertex is x and y, and a third number says how the side that begins there bulges: tan(angle/4)
 of the arc, 0 a line, 1 a half circle; above 0 it turns to the left, which is outwards where the vertices go round
-counter-clockwise. Sides are written with n, the unit normal out of the outline at their start a, and a curvature k:
+counter-clockwise. Edges are written with n, the unit normal out of the outline at their start a, and a curvature k:
 they are where n.d + k/2 |d|^2 = 0 with d = r - a, whose value is the distance to first order.
 """
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...checks import LARGEST, number, shown
 from ...errors import SceneError
-from .apart import Sides, along, require_apart
+from .apart import Edges, along, require_apart
 
 Floats = NDArray[np.float64]
 Row = tuple[float, ...]
@@ -219,7 +219,7 @@ def _reversed(rows: tuple[Row, ...]) -> list[Row]:
     return [(x, y, -turned[(k + 1) % len(turned)][2]) for k, (x, y, _bulge) in enumerate(turned)]
 
 
-def _sides_of(rows: Floats) -> Sides:
+def _sides_of(rows: Floats) -> Edges:
     """The sides; an arc of more than half a circle is two of them."""
     start, end, bulge = rows[:, :2], np.roll(rows[:, :2], -1, axis=0), rows[:, 2]
     pieces = []
@@ -243,7 +243,7 @@ def _sides_of(rows: Floats) -> Sides:
     normal = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1)
     bent = sine != 0.0
     length = np.where(bent, 2.0 * np.arctan(u) * width / np.where(bent, sine, 1.0), width)
-    return Sides(a, b, normal, 2.0 * sine / width, ahead, behind, length, which)
+    return Edges(a, b, normal, 2.0 * sine / width, ahead, behind, length, which)
 
 
 def _turned(vectors: Floats, cosine: Floats, sine: Floats) -> Floats:
@@ -251,7 +251,7 @@ def _turned(vectors: Floats, cosine: Floats, sine: Floats) -> Floats:
     return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
 
 
-def _area(sides: Sides) -> float:
+def _area(sides: Edges) -> float:
     (x0, y0), (x1, y1), k = sides.start.T, sides.end.T, sides.curvature
     # Of an arc, what is between it and its chord: (angle - sin(angle))/(2 k^2)
     angle = k * sides.length

@@ -19,10 +19,10 @@ from ..rotation import Rotated
 from ..shapes.quadratic import QuadricNumbers
 from ..surface import UNBOUNDED, Box, HalfSpace, Surface, side_sign
 from .outline import Floats, Outline
-from .sides import Side, Sides
+from .sides import FewSides, Side, Sides
 
-# Of so few sides all are in one cell of a grid.
-_IN_ONE_CELL = 8
+# At so few sides each lane looks on a straight flight; under gravity so few are in one cell of a grid.
+_FEW, _IN_ONE_CELL = 24, 8
 # Of a coordinate, round-off of a place on a wall; of a matrix, what is none of an axis.
 _SLACK, _ALIGNED = 256.0 * 2.220446049250313e-16, 1e-15
 # The axes x, y, z of the scene along which the plane's axes to the right, upwards and the axis across it are.
@@ -178,9 +178,8 @@ class Outlined(Many):
         """The walls as kernels take them."""
         table = table_of([self._side(k) for k in range(len(self))])
         like = self._side(0)
-        if len(self) <= _IN_ONE_CELL:
-            return Sides(like, table, one_cell(len(self)))
-        return Sides(like, table, grid_of(like, table, self._boxes()))
+        grid = one_cell(len(self)) if len(self) <= _IN_ONE_CELL else grid_of(like, table, self._boxes())
+        return (FewSides if len(self) <= _FEW else Sides)(like, table, grid)
 
     def _boxes(self) -> tuple[Floats, Floats]:
         """The lowest and the highest corners (3, n) of boxes around all walls, infinite across an endless outline."""

@@ -57,9 +57,8 @@ class Side(Framed):
     def straight_hit(self, end, r0, r1):
         return self.first_hit(r0, r1 - r0)
 
-    def is_within(self, d, near=0.0):
+    def is_within(self, d, room):
         """Whether a point of the quadric, from the start of the side, is of the side, or nearer to it than that."""
-        room = self.slack + near
         return (dot(d, self.ahead) >= -room) & (dot(d - self.end, self.behind) <= room)
 
     def first_hit(self, r, v):
@@ -75,7 +74,7 @@ class Side(Framed):
         bottom = select(approaching, b + root, a)
         rises = (bottom > 0.0) & (discriminant >= 0.0)
         time = select(approaching, -c, root - b) / select(rises, bottom, 1.0)
-        hits = rises & (time >= 0.0) & self.is_within(d + time * v)
+        hits = rises & (time >= 0.0) & self.is_within(d + time * v, self.slack)
         return select(hits, time, math.inf), True
 
     def falling_hit(self, r, v, pull):
@@ -114,7 +113,7 @@ class Side(Framed):
         first = at_start < at_end
         beyond, turn = select(first, at_start, at_end), select(first, self.before, self.after)
         outside = select(turn == 0.0, select(signed < 0.0, -beyond, beyond), select(turn < 0.0, -beyond, beyond))
-        within = self.is_within(d - signed * out)
+        within = self.is_within(d - signed * out, self.slack)
         return select(within, signed, outside), select(within, abs(signed), beyond), within
 
     def along_plane(self, d):
@@ -142,9 +141,6 @@ class Side(Framed):
 class Sides(Members, Patched):
     """The sides of an outline: a field whose bodies are walls as far as they go."""
 
-    def looked_at_all(self):
-        return FewSides(*self)
-
     def is_in_another(self, number, r):
         return _is_beyond(self, number, r)
 
@@ -155,13 +151,13 @@ class Sides(Members, Patched):
         """Whether a side reaches to a place on its wall, or nearer to it than that."""
         side = self.wall(number)
         r, side = (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
-        return side.is_within(r - side.body.center, near)
+        return side.is_within(r - side.body.center, side.slack + near)
 
     def wall_after(self, number, r, near):
         """The side on which what slides on this one goes on beyond its end at r, -1 where it has a corner there."""
         side = self.wall(number)
         r, side = (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
-        d = side.along_plane(r - side.body.center)
+        d = side.along_plane(r - side.body.center, side.slack)
         return select(norm(d) < norm(d - side.end), side.previous, side.following)
 
     def goes_on(self, number, other):
@@ -188,7 +184,7 @@ def _first_fall(side, r, v, pull):
         # A plane: the level is a parabola, which rises once at most.
         comes = (level.c <= 0.0) | ((level.b < 0.0) & (level.b * level.b >= level.a2 * level.c) & (level.a2 > 0.0))
         t = select(comes, rise_time(level.c, level.b, level.a2), math.inf)
-        return select(side.is_within(r + t * (v + 0.5 * t * pull) - side.body.center), t, math.inf), True
+        return select(side.is_within(r + t * (v + 0.5 * t * pull) - side.body.center, side.slack), t, math.inf), True
     if begin > 0.0:
         level = level.moved(begin)
     t, sign = begin, select(level.c > 0.0, -1.0, 1.0)
@@ -207,7 +203,7 @@ def _first_fall(side, r, v, pull):
             return math.inf, True
         level = level.moved(step)
         if not under_way(step, last):
-            if sign > 0.0 and side.is_within(r + t * (v + 0.5 * t * pull) - side.body.center):
+            if sign > 0.0 and side.is_within(r + t * (v + 0.5 * t * pull) - side.body.center, side.slack):
                 return t, True
             level = Quartic(0.0, level.b, level.a2, level.a3, level.a4, level.window)
             sign = -sign

@@ -201,3 +201,8 @@ class SphereCavity(SphereNumbers):
 def ball(center, radius):
     """The numbers of a solid sphere."""
     return SphereNumbers(center, radius, radius * radius, -1.0 / radius, -1.0)
+
+
+def cavity(center, radius):
+    """The numbers of a cavity that is a sphere."""
+    return SphereCavity(center, radius, radius * radius, 1.0 / radius, 1.0)

@@ -1,0 +1,93 @@
+"""Many cavities as one vessel: a foam, or pores. A particle is in any of them, and its flight leaves the last."""
+
+import math
+
+from ...kernel.arrays import index
+from ...kernel.gravity import displacement
+from ...kernel.jit import outlined
+from ...kernel.vector import absolute, total
+from .. import flights
+from ..patched import Patched
+from .grid import cell_of, until_next
+from .members import Members, entries_at, member
+
+# Round-off of a distance, in units of the last place of coordinates; by so many times that is a flight inside of
+# another cavity where it goes on.
+_ROUND_OFF, _INSIDE = 512.0 * 2.220446049250313e-16, 4.0
+
+
+class Foam(Members, Patched):
+    """Cavities, in any of which is admissible; the wall of each is there where it is in no other."""
+
+    def looked_at_all(self):
+        return self
+
+    def field_hit(self, gravity, r, v):
+        return _leaving(self, gravity, r, v)
+
+    def is_in_another(self, number, r):
+        return _nearest(self, r)[1] > 0.0
+
+    def deepest_in_cell(self, r):
+        """The distance outside of the nearest one."""
+        return _nearest(self, r)[1]
+
+    # What is near a point is the wall of the cavity that it is deepest in.
+
+    def count_in_cell(self, r):
+        return 1
+
+    def list_in_cell(self, k, before, r, into):
+        into[k] = before + _nearest(self, r)[0]
+        return 1
+
+    def one_in_cell(self, k, r):
+        return _nearest(self, r)[0]
+
+    def is_there(self, number, r, near):
+        return not _is_in_other(self, number, r, near)
+
+
+@outlined
+def _nearest(foam, r):
+    """The cavity that a point is deepest in, or nearest to, of those of its cell, and the distance outside of it."""
+    first, stop = entries_at(foam.grid, r)
+    which, least = 0.0, math.inf
+    for k in range(first, stop):
+        m = foam.grid.entries[k]
+        distance = member(foam, index(m)).distance(r)
+        if distance < least:
+            which, least = float(m), distance
+    return which, least
+
+
+@outlined
+def _is_in_other(foam, number, r, near):
+    """Whether a point is inside of another cavity than this one, by more than `near`."""
+    first, stop = entries_at(foam.grid, r)
+    for k in range(first, stop):
+        m = foam.grid.entries[k]
+        if float(m) != number and member(foam, index(m)).distance(r) < -near:
+            return True
+    return False
+
+
+@outlined
+def _leaving(foam, gravity, r, v):
+    """When a flight leaves the last of the cavities that hold it, or its cell, or goes on in another cavity."""
+    first, stop = entries_at(foam.grid, r)
+    nearest, slack = _nearest(foam, r), _ROUND_OFF * total(absolute(r))
+    last, wall = -1.0, -1.0
+    for k in range(first, stop):
+        m = foam.grid.entries[k]
+        cavity = member(foam, index(m))
+        if cavity.distance(r) <= slack or float(m) == nearest[0]:
+            time, _found = flights.hit(gravity, cavity, r, v)
+            if time > last:
+                last, wall = time, float(m)
+    until = until_next(gravity, foam.grid, cell_of(foam.grid, r), r, v)
+    if wall < 0.0 or last >= until:
+        return flights.Hit(until, -1.0)
+    if _is_in_other(foam, wall, r + displacement(gravity, v, last), _INSIDE * slack):
+        return flights.Hit(last, -1.0)
+    return flights.Hit(last, wall)
