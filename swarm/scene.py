@@ -19,7 +19,6 @@ from .pieces import Pieces, doorways_of_pieces, volumes_of_pieces
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.doors import was_there
-from .surfaces.facets.mesh import require_no_mesh
 from .surfaces.fields.grouped import order_of, walls_in
 from .surfaces.fields.many import Many, in_straight_flights
 from .surfaces.fields.members import Members
@@ -206,7 +205,6 @@ class Scene(Pieces):
             rooms = [[[self.pieces[i] for i in room] for room in union] for union in self.order.unions]
             return self._upright(with_rooms(carried(fields, others, moment), rooms))
         if own is not None:
-            require_no_mesh(self.surfaces)
             return walls_in(self.order, self.pieces, self._groups, own, lambda members: members)
         there = tuple(was_there(piece.present, moment) for piece in self.pieces)
         if there not in self._walls:

@@ -1,6 +1,6 @@
 """A closed mesh of triangles, each of which is a wall."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -228,13 +228,3 @@ class Mesh(Surface):
         found = np.empty((4, flat.shape[1]))
         nearest(self.members, self._tree, flat, found)
         return np.asarray(side_sign(self.side) * found.reshape(4, *np.shape(rows.x)))
-
-
-def require_no_mesh(surfaces: Iterable[Surface]) -> None:
-    """Raise a `SceneError` where bodies would have facets for walls."""
-    for i, surface in enumerate(surfaces):
-        if isinstance(surface, Mesh):
-            raise SceneError(
-                f"surfaces[{i}] must not be a Mesh for bodies, got {surface}: its triangles are walls for particles; "
-                "make it a smooth surface with swarm.from_mesh"
-            )
