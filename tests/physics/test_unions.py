@@ -53,8 +53,9 @@ def ends_of(union, r, v, longest):
     """
     step = longest / PLACES
     times = step * np.arange(1, PLACES + 1)
-    ends, sure = np.full(r.shape[1], math.inf), np.zeros(r.shape[1], bool)
-    for i in range(r.shape[1]):
+    count = r.shape[1]
+    ends, sure, before = np.full(count, math.inf), np.zeros(count, bool), np.zeros(count)
+    for i in range(count):
         gaps = gap(union, r[:, i : i + 1] + v[:, i : i + 1] * times)
         out = np.flatnonzero(gaps > 0.0)
         k = max(out[0], 1) if out.size else PLACES - 1
@@ -63,12 +64,14 @@ def ends_of(union, r, v, longest):
         out_for_long = (gaps[k : k + 2] > 0.0).all() and gaps[k] - gaps[k - 1] > 0.2 * step
         sure[i] = (gaps[peaks] < -4.0 * step).all() and gaps[0] < -4.0 * step and (out_for_long or not out.size)
         if out.size:
-            low, high = times[k] - step, times[k]
-            for _half in range(HALVINGS):
-                middle = 0.5 * (low + high)
-                outside = gap(union, r[:, i] + v[:, i] * middle) > 0.0
-                low, high = (low, middle) if outside else (middle, high)
-            ends[i] = high
+            ends[i], before[i] = times[k], times[k] - step
+    met = ends < math.inf
+    low, high = before[met], ends[met]
+    for _half in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        outside = gap(union, r[:, met] + v[:, met] * middle) > 0.0
+        low, high = np.where(outside, low, middle), np.where(outside, middle, high)
+    ends[met] = high
     return ends, sure
 
 
