@@ -205,6 +205,8 @@ def test_nobody_is_lost_in_a_maze_of_rooms(gravity):
     rooms = [swarm.Box((0.5, 0.5, 0.25), center=(x, y, 0.0)) for x in (-0.5, 0.5, 1.5) for y in (-0.5, 0.5)]
     doors = [swarm.Sphere(0.2, center=(x, y, 0.0)) for x in (0.0, 1.0) for y in (-0.5, 0.5)]
     doors += [swarm.Sphere(0.2, center=(x, 0.0, -0.1)) for x in (-0.5, 0.5, 1.5)]
+    # They reach the floor.
+    doors = [swarm.Opening(one, between=True) for one in doors]
     scene = swarm.Scene([swarm.Union(rooms, openings=doors)], gravity)
     found = run(scene, swarm.fill(scene, 2000, speed=1.0, seed=1), until=300.0, frames=3, compile="always", threads=2)
     assert found.observables["escaped"][-1] == 0

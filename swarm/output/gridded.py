@@ -19,6 +19,7 @@ from ..surfaces.fields.many import Many
 from ..surfaces.openings import are_open
 from ..surfaces.surface import Surface
 from .curves import runs
+from .cut import Smooth, cut
 
 # Points along each side of the grid for the triangles. The area of a sphere is 0.07 % too small, of a box 0.6 %.
 _POINTS = 48
@@ -30,6 +31,8 @@ _END = 0.01
 _COARSE, _MOST_WIRES = 10, 2_000
 # Of each of many bodies of another kind, the points along each side of its grid.
 _BODY = 16
+# Of balls that are cavities, so many more; and what is no depth in another one, as a part of the size of all.
+_FOAM, _ROUND_OFF = 100_000, 1e-9
 # Cells of the grid beyond the walls, so that these are closed.
 _MARGIN = 2.0
 # An open volume is drawn to this many times the distance of the surfaces and particles.
@@ -68,10 +71,26 @@ def _mesh(values: Floats, box: Corners) -> Triangles:
     return vertices + low, triangles.astype(np.int64), normals.astype(np.float64)
 
 
-def balls(spheres: Spheres) -> tuple[Triangles, list[Floats]]:
+def foam(spheres: Spheres) -> tuple[Triangles, list[Floats]]:
+    """Many balls that are cavities, where these are in no other one."""
+    (vertices, triangles, _normals), wires = balls(spheres, max(_COARSE, int((_FOAM / len(spheres)) ** 0.5)))
+    size = float(np.ptp(vertices, axis=0).max())
+
+    def level(points: Floats) -> Floats:
+        """How deep a point of a ball is in another one, to first order."""
+        return np.asarray(-spheres.phi(points.T) - _ROUND_OFF * size)
+
+    # Points on a ball stay on it: between two of them no others are made that matter.
+    wall = Smooth(lambda points: np.zeros(len(points)), lambda points: spheres.gradient(points.T).T)
+    points, triangles, _rims = cut(wall, vertices, triangles, level)
+    inwards = -wall.normals(points)
+    return (points, triangles, inwards), [run for wire in wires for run in runs(wire, level(wire) <= 0.0)]
+
+
+def balls(spheres: Spheres, count: int = _COARSE) -> tuple[Triangles, list[Floats]]:
     """Many balls: coarse, so that thousands can be drawn."""
     box = np.full(3, -1.3), np.full(3, 1.3)
-    grid = np.array(np.meshgrid(*_axes(box, _COARSE), indexing="ij"))
+    grid = np.array(np.meshgrid(*_axes(box, count), indexing="ij"))
     unit, triangles, _normals = _mesh(np.sqrt((grid**2).sum(axis=0)) - 1.0, box)
     normals = unit / np.sqrt((unit**2).sum(axis=1))[:, None]
     center, radius = spheres.centers[:, None, :], spheres.radii[:, None, None]

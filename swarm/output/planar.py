@@ -14,6 +14,7 @@ from ..surfaces.instant import box_of
 from ..surfaces.openings import are_open
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.surface import Surface
+from .curves import runs
 from .cut import Level, Smooth
 from .parts import Part
 from .sharp import filled, smooth_walls
@@ -57,6 +58,9 @@ class PlaneWalls:
             angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE)
             circle = self._placed(np.stack([np.cos(angle), np.sin(angle)], axis=1))
             found = [c + r * circle for c, r in zip(surface.centers, surface.radii, strict=True)]
+            if surface.is_foam():
+                nothing = 1e-9 * float((self._box[1] - self._box[0]).max())
+                found = [run for curve in found for run in runs(curve, surface.phi(curve.T) >= -nothing)]
             return [pose.placed(curve.T).T for curve in found]
         if bodies:
             solids = surface.solids() if isinstance(surface, Many) else [surface]

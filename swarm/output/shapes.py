@@ -17,7 +17,7 @@ from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
 from ..surfaces.union import Joined, Place
 from . import sharp
-from .gridded import NOTHING, Corners, Grids, balls, each_body, given_box, placed
+from .gridded import NOTHING, Corners, Grids, balls, each_body, foam, given_box, placed
 from .named import name_of
 from .parts import parts_of
 from .planar import PlaneWalls
@@ -77,13 +77,14 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
         if not surface.is_there(time):
             pass
         elif bodies <= most and isinstance(surface, Spheres):
-            mesh, wires = placed(at, *balls(surface))
+            mesh, wires = placed(at, *(foam(surface) if surface.is_foam() else balls(surface)))
         elif bodies and bodies <= most:
             mesh, wires = placed(at, *each_body(surface, given_box(walls.box, at)))
         elif not bodies:
             mesh, wires = walls.drawn(i, at)
         name = name_of(scene, i)
-        shapes.append(Shape(name, bodies > 0 or surface.is_solid(), *mesh, wires, surface=i))
+        solid = surface.is_solid() or i in grouped
+        shapes.append(Shape(name, solid, *mesh, wires, surface=i))
     return shapes
 
 
@@ -116,7 +117,7 @@ def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) 
     parts = parts_of(scene, time) if any(isinstance(surface, Joined) for surface in scene.surfaces) else []
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
         bodies = bodies_of(surface) or int(i in grouped)
-        name, solid = name_of(scene, i), bodies > 0 or surface.is_solid()
+        name, solid = name_of(scene, i), surface.is_solid() or i in grouped
         if parts and not bodies:
             for part in (one for one in parts if one.owner == i):
                 wires = walls.of_part(part) if part.surface.is_there(time) else []

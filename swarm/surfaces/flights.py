@@ -121,20 +121,23 @@ def step(walls, gravity, course, row, lane, r, v):
 
 def end(walls, gravity, course, row, lane, flight, stops=False):
     """`first_hit` from the course of a flight (r, v); if it `stops` with none that goes on in another room."""
-    found: Any = ()
-    for k, _wall in enumerate(walls.each):
-        at = row + k * COURSE
-        found = (*found, (course[at + _TIME, lane], course[at + _LAST, lane] == 0.0))
     first, k = NEVER, len(walls.shared())
     for rooms in walls.joined():
         hits: Any = ()
         for room in rooms:
-            hits = (*hits, found[k : k + len(room)])
+            hits = (*hits, tuple(_known(course, row, k + i, lane) for i in range(len(room))))
             k += len(room)
         first = soonest(union_hit(walls, rooms, hits, gravity, flight, stops), 0.0, first)
-    for k, (time, hits) in reversed(tuple(enumerate(found[: len(walls.shared())]))):
-        first = sooner(time, hits, float(k), first)
+    for k, _wall in reversed(tuple(enumerate(walls.shared()))):
+        time, found = _known(course, row, k, lane)
+        first = sooner(time, found, float(k), first)
     return first
+
+
+def _known(course, row, k, lane):
+    """What the course knows of the hit with wall k: (time, whether it is one)."""
+    at = row + k * COURSE
+    return course[at + _TIME, lane], course[at + _LAST, lane] == 0.0
 
 
 # --- Of one wall, and of all but one ---------------------------------------------------------------------

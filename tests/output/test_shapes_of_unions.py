@@ -244,3 +244,16 @@ def test_parts_in_a_plane():
     for shape in shapes:
         for curve in shape.wires:
             assert np.abs(scene.gaps(curve.T).max(axis=0)).max() < 1e-3
+
+
+def test_a_foam_is_drawn_where_its_balls_are_in_no_other():
+    foam = swarm.Spheres([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0]], 0.5, side="inside")
+    (shape,) = shapes_of(swarm.Scene([foam]), NOWHERE)
+    assert (shape.name, shape.solid) == ("0_spheres", False)
+    assert shape.area() == pytest.approx(2.0 * (math.pi - CAP), rel=0.005)
+    assert foam.phi((shape.vertices + 0.1 * shape.normals).T).max() < -0.05
+    for points in (shape.vertices, *shape.wires):
+        assert np.abs(foam.phi(points.T)).max() < 5e-3
+    (flat,) = shapes_of(swarm.Scene([foam], plane="z"), NOWHERE)
+    # Of each circle an arc is in the other, cos(angle) = 0.3/0.5.
+    assert flat.area() == pytest.approx(2.0 * (math.pi - math.acos(0.6)), rel=0.05)

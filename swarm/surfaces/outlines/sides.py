@@ -32,8 +32,8 @@ class Side(Framed):
     before: float  # 1 where there is a convex corner at the start, 0 smooth, at a re-entrant one -sin of half its wedge
     after: float  # and at the end
     thickness: float  # of what is behind it, at the least [m]
-    previous: float  # the number of the side that joins it smoothly at its start, or -1
-    following: float  # and at its end
+    joined_before: float  # the number of the side that joins it smoothly at its start, or -1
+    joined_after: float  # and at its end
 
     def same(self, a):
         """What is the same in the frame of the quadric, which has none of its own."""
@@ -157,14 +157,14 @@ class Sides(Members, Patched):
         """The side on which what slides on this one goes on beyond its end at r, -1 where it has a corner there."""
         side = self.wall(number)
         r, side = (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
-        d = side.along_plane(r - side.body.center, side.slack)
-        return select(norm(d) < norm(d - side.end), side.previous, side.following)
+        d = side.along_plane(r - side.body.center)
+        return select(norm(d) < norm(d - side.end), side.joined_before, side.joined_after)
 
     def goes_on(self, number, other):
         """Whether a side joins this one smoothly: what slides on this one does not meet it, but goes on on it."""
         side = self.wall(number)
         side = side.body if isinstance(side, Rotated) else side
-        return (side.previous == other) | (side.following == other)
+        return (side.joined_before == other) | (side.joined_after == other)
 
 
 class FewSides(Sides):
