@@ -26,7 +26,8 @@ class Particles:
         image: (3, N) whole numbers, or None: in a scene with a period, how many cells away each particle is.
         radius: None: particles are points and do not meet one another.
 
-    The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], or None. Arrays that are
+    The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], in a plane the area [m^2], or
+    None. Arrays that are
     assigned later are checked and converted in the same way when a run starts.
 
     Raises:
