@@ -315,7 +315,7 @@ def room_gaps(room: Sequence[Surface], points: Floats, time: float = 0.0) -> Flo
 def _require_alone(whole: Joined) -> None:
     """Raise a `SceneError` for a surface that is known only where its own walls keep particles, or is many bodies."""
     for surface in whole.surfaces():
-        if isinstance(surface, (Many, Mesh)):
+        if isinstance(surface, Many):
             raise SceneError(
                 f"parts must not be {type(surface).__name__} in a {type(whole).__name__} of several rooms, got "
                 f"{surface}; list them as a surface of the scene, or their bodies one by one"
