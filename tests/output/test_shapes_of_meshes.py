@@ -4,12 +4,15 @@ import math
 import time
 
 import h5py
+import numba
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
 import swarm
 from swarm.output.shapes import shapes_of
+
+pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: minutes for phi")
 
 NOWHERE = np.full((3, 1), 0.5)
 CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])

@@ -3,6 +3,7 @@
 import math
 
 import h5py
+import numba
 import numpy as np
 import pytest
 
@@ -246,6 +247,7 @@ def test_parts_in_a_plane():
             assert np.abs(scene.gaps(curve.T).max(axis=0)).max() < 1e-3
 
 
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: minutes for phi")
 def test_a_foam_is_drawn_where_its_balls_are_in_no_other():
     foam = swarm.Spheres([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0]], 0.5, side="inside")
     (shape,) = shapes_of(swarm.Scene([foam]), NOWHERE)
