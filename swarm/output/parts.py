@@ -11,8 +11,9 @@ from ..scene import Scene
 from ..surfaces.fields.many import Many
 from ..surfaces.instant import box_of, side_of
 from ..surfaces.openings import sign_of
+from ..surfaces.part import handed_down
 from ..surfaces.surface import Surface
-from ..surfaces.union import Joined, Place, Union, handed_down
+from ..surfaces.union import Joined, Place, Union
 
 # Of the size of what is drawn, what is no distance, and how far beside a wall it is asked which of two is there.
 _NOTHING, _BESIDE = 1e-8, 2e-8

@@ -4,23 +4,21 @@ import numpy as np
 
 from ..bodies.state import Bodies
 from ..errors import SceneError
-from ..methods import AugmentedLagrangian, Impact, Penalty
-from ..methods.base import Method, check_laws, check_surfaces
-from ..methods.fixed_step import check_solids
+from ..methods import Impact
+from ..methods.base import Method, check_surfaces
 from ..motion import Path, parts_of
 from ..motion.given import require_angles
 from ..output.origin import require_near
 from ..particles import Particles
 from ..plane import require_start
 from ..scene import Scene
-from ..surfaces.facets.mesh import Mesh
 from ..surfaces.formulas.own import require_compiled
 from ..surfaces.instant import gaps_of, gradient_of
-from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.shapes.cone import Cone
 from ..surfaces.shapes.quadric import Quadric
 from . import passing, workload
 from .options import RunOptions, Task
+from .with_bodies import require_method_of_bodies, require_walls_of_bodies
 
 # A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
 _ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
@@ -83,7 +81,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
 
 
 def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
-    _require_method_of_bodies(scene, bodies, method, options)
+    require_method_of_bodies(scene, bodies, method, options)
     if scene.period is not None:
         raise SceneError(
             f"period must be None with bodies, whose points would be torn apart by the faces, got {scene.period}; use "
@@ -93,7 +91,7 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
         raise SceneError(
             f'plane must be None with bodies, which turn in space, got "{scene.plane}"; use particles, or leave it out'
         )
-    _require_walls_of_bodies(scene)
+    require_walls_of_bodies(scene)
     if options.frames not in ("all", "none"):
         raise SceneError(
             f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
@@ -112,85 +110,6 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
     points = bodies.particles()
     _require_precision(scene, points, options)
     return Task(scene, points, method, options, bodies)
-
-
-def _require_walls_of_bodies(scene: Scene) -> None:
-    for i, surface in enumerate(scene.surfaces):
-        if surface.temperature is not None:
-            raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
-        if surface.laws:
-            raise SceneError(f"surfaces[{i}].laws must be left out with bodies, got {surface.laws}")
-        if surface.motion is not None:
-            raise SceneError(
-                f"surfaces[{i}].motion must be None with bodies, got {surface.motion}; lead a point of the body, by "
-                "anchors, in the frame of the wall"
-            )
-        if surface.openings:
-            raise SceneError(
-                f"surfaces[{i}].openings must be left out with bodies, which escape through none, got "
-                f"{len(surface.openings)}; use particles, or a box with an open face"
-            )
-        if surface.present is not None:
-            raise SceneError(
-                f"surfaces[{i}].present must be None with bodies, which a wall that comes would cut, got "
-                f"{surface.present}; use particles, or leave it out"
-            )
-        if isinstance(surface, (Mesh, Outlined)):
-            raise SceneError(
-                f"surfaces[{i}] must not be {type(surface).__name__} with bodies, got {surface!r:.200}; use particles, "
-                "or from_mesh with a spacing for a vessel of bodies"
-            )
-        if surface.reacts():
-            raise SceneError(
-                f"surfaces[{i}] must have no mass and no inertia with bodies, got {surface}; make it a body, whose "
-                "cavities= are walls that it carries"
-            )
-
-
-def _require_method_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> None:
-    if not isinstance(method, (Impact, Penalty, AugmentedLagrangian)) or method.dt is None:
-        raise SceneError(
-            f"bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {method}; give "
-            "Impact(dt=...) [s]"
-        )
-    if isinstance(method, Impact):
-        if method.contact_step > 0.0:
-            raise SceneError(f"contact_step must be 0 with bodies, whose blows are exact, got {method.contact_step:g}")
-        return
-    _require_of_soft(scene, bodies, method)
-    if isinstance(method, Penalty):
-        if len(bodies.body.contacts):
-            velocity = np.tensordot(bodies.body.contacts, bodies.velocity, axes=(1, 1)).transpose(1, 0, 2)
-            touching = Particles(bodies.contact_points().reshape(3, -1), velocity.reshape(3, -1))
-            check_solids(scene, touching, method.dt)
-        method.span("until", options.times.until)
-        assert options.times.every is not None
-        method.span("every", options.times.every)
-
-
-def _require_of_soft(scene: Scene, bodies: Bodies, method: Penalty | AugmentedLagrangian) -> None:
-    """Raise a `SceneError` where an argument of the method, or a wall, is none for bodies."""
-    name = type(method).__name__
-    for argument, value in (("gradient", "composite"), ("acceleration", "none")):
-        given = getattr(method, argument, value)
-        if given != value:
-            raise SceneError(f'{argument} of {name} must be "{value}" with bodies, got "{given}"')
-    if isinstance(method, AugmentedLagrangian) and method.exponent != 1.0:
-        raise SceneError(
-            f"exponent of AugmentedLagrangian must be 1 with bodies, got {method.exponent:g}: its loop has no limit "
-            "for others; such walls are for Penalty"
-        )
-    if isinstance(method, AugmentedLagrangian) and not method.adaptive:
-        raise SceneError(
-            "adaptive of AugmentedLagrangian must be True with bodies, got False: a loop that does not start from the "
-            "wall has no limit, and its multiplier would tear the links"
-        )
-    if getattr(method, "on_unconverged", "raise") == "impact":
-        raise SceneError('on_unconverged must be "raise" or "count" with bodies, got "impact"; use Impact(dt=...)')
-    check_laws(name, scene)
-    for k, (surface, _carrier, _point) in enumerate(bodies.body.cavities):
-        if surface.restitution != 1.0 or surface.friction != 0.0:
-            raise SceneError(f"cavities[{k}] must be elastic with {name}, got {surface}; use Impact(dt=...)")
 
 
 def _require_motions(scene: Scene, until: float) -> None:

@@ -7,35 +7,28 @@ that of the whole the least gap of its rooms.
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .. import motion as motions
 from ..checks import Vector
 from ..errors import SceneError
 from .facets.mesh import Mesh
 from .fields.many import Many
-from .instant import box_of, has_room, planes_of, side_of
-from .polyhedron import polyhedron_bounds
-from .shapes.plane import Plane
+from .instant import side_of
+from .part import checked_parts, handed_down, other_side
+from .room import Floats, Room, has_volume, lasting, may_have_volume, room_bounds
 from .surface import UNBOUNDED, Box, Surface
 
-Floats = NDArray[np.float64]
-Room = tuple[Surface, ...]
 # The number of a part, and of a part of this.
 Place = tuple[int, ...]
 
 # Most rooms: each is compiled into the kernels.
 _MOST_ROOMS = 64
-# What is given to the whole holds for those of its parts that leave it at its default.
-_HANDED_DOWN = ("restitution", "friction", "temperature", "accommodation", "laws", "motion", "present")
-# Of the extent, how far a room without end is searched for a point in it.
-_REACH = 2.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -51,7 +44,7 @@ class Joined(Surface):
     def __post_init__(self) -> None:
         super().__post_init__()
         name = type(self).__name__
-        object.__setattr__(self, "parts", _parts(self.parts, name))
+        object.__setattr__(self, "parts", checked_parts(self.parts, name))
         for what in ("rotation", "mass", "inertia"):
             if getattr(self, what) is not None:
                 raise SceneError(
@@ -102,13 +95,13 @@ class Joined(Surface):
             for surface, place in room:
                 rooms[-1].setdefault(surface, place)
         # What parts have in common may be nothing.
-        return tuple(room for room in rooms if _may_have_volume(tuple(room))) if len(rooms) > 1 else tuple(rooms)
+        return tuple(room for room in rooms if may_have_volume(tuple(room))) if len(rooms) > 1 else tuple(rooms)
 
     def _rooms(self, turned: bool) -> list[tuple[tuple[Surface, Place], ...]]:
         """The surfaces and places of rooms, or of those of what is not admissible."""
         parts = [handed_down(self, part) for part in self.parts]
         given = [one._rooms(turned ^ (one.side == "outside")) if isinstance(one, Joined)
-                 else [((_turned(one) if turned else one, ()),)] for one in parts]  # fmt: skip
+                 else [((other_side(one) if turned else one, ()),)] for one in parts]  # fmt: skip
         given = [
             [tuple((surface, (k, *place)) for surface, place in room) for room in rooms]
             for k, rooms in enumerate(given)
@@ -143,7 +136,7 @@ class Joined(Surface):
             return UNBOUNDED
         # The motion of the whole is none of its bounds.
         still = [[replace(one, motion=None) if self.motion is not None else one for one in room] for room in self.rooms]
-        boxes = [room_bounds(_lasting(room)) for room in still]
+        boxes = [room_bounds(lasting(room)) for room in still]
         low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
         return tuple(low.tolist()), tuple(high.tolist())
 
@@ -235,19 +228,6 @@ class Intersection(Joined):
 # --- Their parts -----------------------------------------------------------------------------------------
 
 
-def _parts(value: Any, name: str) -> tuple[Surface, ...]:
-    """The argument `parts`, checked."""
-    if isinstance(value, (Surface, str, bytes)) or not isinstance(value, Iterable):
-        raise SceneError(f"parts must be a list of surfaces such as swarm.Sphere, got {value!r:.200}")
-    given = tuple(value)
-    if not given:
-        raise SceneError(f"parts must hold at least one surface of the {name}, got none")
-    for k, part in enumerate(given):
-        if not isinstance(part, Surface):
-            raise SceneError(f"parts[{k}] must be a surface such as swarm.Sphere, got {part!r:.200}")
-    return given
-
-
 def _moves(part: Surface) -> bool:
     return part.motion is not None or (isinstance(part, Joined) and any(map(_moves, part.parts)))
 
@@ -259,57 +239,7 @@ def part_at(surface: Surface, place: Place) -> Surface:
     return surface
 
 
-def handed_down(whole: Surface, part: Surface) -> Surface:
-    """A part with what is given to the whole, where it leaves that at its default."""
-    defaults = {one.name: one.default for one in fields(Surface)}
-    given = {
-        name: getattr(whole, name)
-        for name in _HANDED_DOWN
-        if getattr(part, name) == defaults[name] != getattr(whole, name)
-    }
-    if part.temperature is not None:
-        given.pop("accommodation", None)
-    if whole.openings:
-        given["openings"] = (*part.openings, *whole.openings)
-    return replace(part, **given) if given else part
-
-
-def _turned(surface: Surface) -> Surface:
-    """The same wall, admissible on its other side."""
-    if isinstance(surface, Plane):
-        x, y, z = surface.normal
-        return replace(surface, normal=(-x, -y, -z), offset=-surface.offset)
-    if not hasattr(surface, "side"):
-        raise SceneError(
-            f'side must be "inside" for parts of which one has no other side, got "outside" and {surface!r:.200}'
-        )
-    try:
-        return replace(surface, side="inside" if surface.is_solid() else "outside")  # type: ignore[call-arg]
-    except SceneError as error:
-        raise SceneError(
-            f"parts must have an other side where the whole is turned, got {surface!r:.200}: {error}"
-        ) from None
-
-
 # --- Their rooms -----------------------------------------------------------------------------------------
-
-
-def room_bounds(room: Sequence[Surface], time: float = 0.0) -> tuple[Floats, Floats]:
-    """The corners of a box around a room at a time [s], infinite where it is open."""
-    boxes = np.array([box_of(surface, time) for surface in room] or [UNBOUNDED])
-    low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
-    planes = [plane for surface in room for plane in planes_of(surface, surface.half_spaces(), time)]
-    return polyhedron_bounds(planes, low, high) if planes else (low, high)
-
-
-def _lasting(room: Sequence[Surface]) -> tuple[Surface, ...]:
-    """The surfaces of a room that are always there."""
-    return tuple(surface for surface in room if surface.present is None)
-
-
-def room_gaps(room: Sequence[Surface], points: Floats, time: float = 0.0) -> Floats:
-    """The gap of every surface of a room at points (3, N)."""
-    return np.array([side_of(surface) * surface.phi(points, time) for surface in room])
 
 
 def _require_alone(whole: Joined) -> None:
@@ -335,9 +265,9 @@ def _require_alone(whole: Joined) -> None:
 def _require_room(whole: Joined) -> None:
     """Raise a `SceneError` where a part, or the whole, has no volume."""
     for k, part in enumerate(whole.parts):
-        if not isinstance(part, Joined) and not _has_volume((part,)):
+        if not isinstance(part, Joined) and not has_volume((part,)):
             raise SceneError(f"parts[{k}] must have a volume, got {part!r:.200}, of which no point is admissible")
-    if not any(map(_has_volume, whole.rooms)):
+    if not any(map(has_volume, whole.rooms)):
         came = ", ".join(f"{part!r:.80}" for part in whole.parts)
         if whole._of_gaps is np.maximum and not whole.is_solid():
             raise SceneError(
@@ -348,30 +278,3 @@ def _require_room(whole: Joined) -> None:
             f'parts must leave an inside of a {type(whole).__name__} with side="{whole.side}", got {came}, of which no '
             "point is admissible; check their `side`"
         )
-
-
-def _ends(room: Room) -> tuple[Floats, Floats]:
-    """The corners of the box in which a room is searched for a point."""
-    low, high = room_bounds(room)
-    reach = _REACH * max((surface.extent() for surface in room), default=0.0) or 1.0
-    return np.maximum(low, -reach), np.minimum(high, reach)
-
-
-def _may_have_volume(room: Room) -> bool:
-    low, high = _ends(_lasting(room))
-    return bool((low < high).all())
-
-
-def _has_volume(room: Room) -> bool:
-    room = _lasting(room)
-    low, high = _ends(room)
-    gaps, gradients = _gaps_of(room), _gradients_of(room)
-    return not room or (bool((low < high).all()) and has_room(low[:, None], high[:, None], gaps, gradients))
-
-
-def _gaps_of(room: Room) -> Callable[[Floats], Floats]:
-    return lambda points: room_gaps(room, points)
-
-
-def _gradients_of(room: Room) -> Callable[[int, Floats], Floats]:
-    return lambda i, points: side_of(room[i]) * room[i].gradient(points)

@@ -1,0 +1,57 @@
+"""The parts of a union or an intersection: checked, with what is given to the whole, and turned inside out."""
+
+from collections.abc import Iterable
+from dataclasses import fields, replace
+from typing import Any
+
+from ..errors import SceneError
+from .shapes.plane import Plane
+from .surface import Surface
+
+# What is given to the whole holds for those of its parts that leave it at its default.
+_HANDED_DOWN = ("restitution", "friction", "temperature", "accommodation", "laws", "motion", "present")
+
+
+def checked_parts(value: Any, name: str) -> tuple[Surface, ...]:
+    """The argument `parts`, checked."""
+    if isinstance(value, (Surface, str, bytes)) or not isinstance(value, Iterable):
+        raise SceneError(f"parts must be a list of surfaces such as swarm.Sphere, got {value!r:.200}")
+    given = tuple(value)
+    if not given:
+        raise SceneError(f"parts must hold at least one surface of the {name}, got none")
+    for k, part in enumerate(given):
+        if not isinstance(part, Surface):
+            raise SceneError(f"parts[{k}] must be a surface such as swarm.Sphere, got {part!r:.200}")
+    return given
+
+
+def handed_down(whole: Surface, part: Surface) -> Surface:
+    """A part with what is given to the whole, where it leaves that at its default."""
+    defaults = {one.name: one.default for one in fields(Surface)}
+    given = {
+        name: getattr(whole, name)
+        for name in _HANDED_DOWN
+        if getattr(part, name) == defaults[name] != getattr(whole, name)
+    }
+    if part.temperature is not None:
+        given.pop("accommodation", None)
+    if whole.openings:
+        given["openings"] = (*part.openings, *whole.openings)
+    return replace(part, **given) if given else part
+
+
+def other_side(surface: Surface) -> Surface:
+    """The same wall, admissible on its other side."""
+    if isinstance(surface, Plane):
+        x, y, z = surface.normal
+        return replace(surface, normal=(-x, -y, -z), offset=-surface.offset)
+    if not hasattr(surface, "side"):
+        raise SceneError(
+            f'side must be "inside" for parts of which one has no other side, got "outside" and {surface!r:.200}'
+        )
+    try:
+        return replace(surface, side="inside" if surface.is_solid() else "outside")  # type: ignore[call-arg]
+    except SceneError as error:
+        raise SceneError(
+            f"parts must have an other side where the whole is turned, got {surface!r:.200}: {error}"
+        ) from None
