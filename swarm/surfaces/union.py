@@ -218,8 +218,8 @@ class Intersection(Joined):
 
     >>> import swarm
     >>> post = swarm.Cylinder(0.1, side="outside")
-    >>> Intersection([swarm.Sphere(0.5), post]).phi([[0.3, 0.05], [0.0, 0.0], [0.0, 0.0]]).round(3)
-    array([-0.2  ,  0.037])
+    >>> Intersection([swarm.Sphere(0.5), post]).phi([[0.3, 0.05], [0.0, 0.0], [0.0, 0.0]]).round(4)
+    array([-0.2   ,  0.0375])
     """
 
     _of_gaps: ClassVar[Any] = np.maximum
