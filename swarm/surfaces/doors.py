@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +20,6 @@ from ..kernel.record import Record
 from .course import Fall, Quartic, close
 from .frames import Framed
 from .rising import Step
-
-if TYPE_CHECKING:
-    from .surface import Surface
 
 # The distance at which a particle is from a wall that is not there, and the level of such a wall.
 _AWAY = -1e150
@@ -50,7 +47,7 @@ class Opening:
     ((1.0, 2.5),)
     """
 
-    surface: "Surface"
+    surface: Any
     times: Any = None
     between: bool = False
 
@@ -204,9 +201,9 @@ class Timed(Record):
         return select(self.open > 0.0, value, other)
 
 
-def walls_then(surface: "Surface", moment: float) -> tuple[Any, ...]:
+def walls_then(surface: Any, moment: float) -> tuple[Any, ...]:
     """The walls of a surface as kernels take them in the frame, or the piece of one, that ends at a moment [s]."""
-    walls = surface.walls()
+    walls: tuple[Any, ...] = surface.walls()
     if surface.present is None:
         return walls
     there = was_there(surface.present, moment)

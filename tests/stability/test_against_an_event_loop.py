@@ -145,7 +145,7 @@ def a_scene(seed, vessels=VESSELS):
         if doors.random() < DOORS and make is SOLIDS[solid]:
             law["present"] = [(0.0, times[0]), *([(times[1], np.inf)] if doors.random() < DOORS else [])]
         made = make(motion=motion, **law)
-        if doors.random() < DOORS and make is VESSELS[vessel] and motion is None:
+        if doors.random() < DOORS and make is vessels[vessel] and motion is None:
             made[0] = with_opening(made[0], times, doors)
         surfaces += made
     gravity = [None, (0.0, 0.0, -9.81), (-1.0, 2.0, -3.0)][random.integers(3)]

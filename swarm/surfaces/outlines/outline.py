@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import LARGEST, number, shown
+from ...checks import magnitude, number, shown
 from ...errors import SceneError
 from .apart import Edges, along, require_apart
 
@@ -197,8 +197,7 @@ def _checked(name: str, rows: Any) -> tuple[Row, ...]:
         if len(parts) not in (2, 3):
             raise SceneError(f"{name}[{k}] must be (x, y) or (x, y, bulge), got {shown(row)}")
         values = [number(f"{name}[{k}][{i}]", part) for i, part in enumerate(parts)]
-        if max(map(abs, values)) > LARGEST:
-            raise SceneError(f"{name}[{k}] must be of numbers from -{LARGEST:g} to {LARGEST:g}, got {shown(row)}")
+        magnitude(f"|{name}[{k}]|", max(map(abs, values)))
         found.append((*values, 0.0)[:3])
     if len(found) < 2 or (len(found) == 2 and not any(bulge for _x, _y, bulge in found)):
         raise SceneError(f"{name} must have at least three vertices, or two and an arc, got {len(found)}")
