@@ -186,7 +186,14 @@ def passes(cells, k, here):
         faster, rises = faster + 2.0 * more * here.span, rises + (more + here.weak) * here.span * here.span
     if not ((faster > 0.0) & is_inside & (depth + rises >= -here.near)):
         return False
-    radius = float(cells.planes[k, 7])
+    radius, scale = float(cells.planes[k, 7]), here.near * (_REACH / (_FULL * _OFF))
+    if here.half_pull is None:
+        # All lengths times the speed along the normal, so that nothing is divided: a third of such tests.
+        if radius == _FULL or rate <= 2.0 * here.slow:
+            return True
+        away = rate * (here.from_middle - _row(cells.planes, k, 4, scale)) - depth * here.v
+        beside = radius * scale * rate + 2.0 * _BESIDE * here.near * here.slow
+        return not square(away) > beside * beside
     # Where it comes through the plane, at the speed 2 root along the normal
     b = 0.5 * rate
     below = b * b - bend * depth
@@ -194,7 +201,6 @@ def passes(cells, k, here):
     if radius == _FULL or b <= here.slow or below <= here.slow * here.slow:
         return True
     away = here.from_middle + displacement(here.pull(), here.v, -depth / (b + root))
-    scale = here.near * (_REACH / (_FULL * _OFF))
     beside = radius * scale + _BESIDE * here.near * here.slow / root
     return not square(away - _row(cells.planes, k, 4, scale)) > beside * beside
 
