@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel import cache
-from ...kernel.arrays import index
 from ...kernel.gravity import as_vector, displacement
-from ...kernel.jit import Array, kernel, select
+from ...kernel.jit import Array, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec, absolute, dot, square, total, vec
 from ..fields.grid import MARGIN
-from ..fields.members import gathered
+from ..fields.many import enter_bodies
 
 # Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
 # ones more are crossed. For each facet there are at most so many cells, which take 5 bytes each.
@@ -65,7 +64,7 @@ def cells_around(like, table: Floats, corners: Floats) -> Cells:
     starts, nothing = np.zeros(count + 2, np.int32), np.empty(0, np.int32)
     flat = np.empty((0, 8), np.int16)
     grid = Cells(*(vec(row.tolist()) for row in numbers), starts, nothing, flat, np.empty((0, 8), np.int8))
-    enter = cache.in_python(_enter) if len(table) <= _SOME else _enter
+    enter = cache.in_python(enter_bodies) if len(table) <= _SOME else enter_bodies
     bounds = np.ascontiguousarray(low), np.ascontiguousarray(high)
     enter(like, table, bounds, grid, starts[1:], nothing)
     np.cumsum(starts, out=starts)
@@ -111,34 +110,6 @@ def _planes(grid: Cells, table: Floats, corners: Floats, cells: NDArray[np.int64
         made[some, 4:7] = np.where(near[:, None], np.rint(away * (_FULL / (_REACH * diagonal))), 0.0)
         made[some, 7] = np.where(near, np.ceil(radius * (_FULL / (_REACH * diagonal))) + 2.0, _FULL)
     return made
-
-
-@kernel
-def _enter(like, table, bounds, grid, place, entries):
-    """Write every facet to the place of each cell that it reaches into; count them where there are no `entries`."""
-    low, high = bounds
-    n, margin = grid.shape, Vec(2.0 * grid.margin.x, 2.0 * grid.margin.y, 2.0 * grid.margin.z)
-    for m in range(table.shape[0]):
-        facet = gathered(like, table, index(m), 0)
-        x, x_end = _layers(low[0, m] - margin.x - grid.low.x, high[0, m] + margin.x - grid.low.x, grid.width.x, n.x)
-        y, y_end = _layers(low[1, m] - margin.y - grid.low.y, high[1, m] + margin.y - grid.low.y, grid.width.y, n.y)
-        z, z_end = _layers(low[2, m] - margin.z - grid.low.z, high[2, m] + margin.z - grid.low.z, grid.width.z, n.z)
-        for i in range(x, x_end):
-            for j in range(y, y_end):
-                for k in range(z, z_end):
-                    near = grid.low + Vec(i * grid.width.x, j * grid.width.y, k * grid.width.z)
-                    far = grid.low + Vec((i + 1.0) * grid.width.x, (j + 1.0) * grid.width.y, (k + 1.0) * grid.width.z)
-                    if facet.may_reach(near - margin, far + margin):
-                        cell = int((i * n.y + j) * n.z + k)
-                        if entries.size > 0:
-                            entries[place[cell]] = m
-                        place[cell] += 1
-
-
-def _layers(begin, end, width, count):
-    """The layers of cells between two places, from the first to the one after the last."""
-    first, last = np.floor(begin / width), np.floor(end / width)
-    return int(min(max(first, 0.0), count - 1.0)), int(min(max(last, 0.0), count - 1.0)) + 1
 
 
 # --- Which planes a flight passes ------------------------------------------------------------------------

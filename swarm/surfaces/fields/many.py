@@ -224,7 +224,7 @@ def grid_of(
     )
     first, nothing = np.zeros(int(shape.prod()) + 2, np.int32), np.empty(0, np.int32)
     grid = Grid(low, wide, inverse, margin, along, first, nothing)
-    enter = cache.in_python(_enter) if len(table) <= _SOME else _enter
+    enter = cache.in_python(enter_bodies) if len(table) <= _SOME else enter_bodies
     # Each body counts in the cell after its own, so that the sums are where the entries of a cell begin.
     enter(like, table, bounds, grid, first[1:], nothing)
     np.cumsum(first, out=first)
@@ -234,7 +234,7 @@ def grid_of(
 
 
 @kernel
-def _enter(like, table, bounds, grid, place, entries):
+def enter_bodies(like, table, bounds, grid, place, entries):
     """Write every body to the place of each cell that it reaches into; count them where there are no `entries`."""
     low, high = bounds
     n, margin = grid.shape, Vec(2.0 * grid.margin.x, 2.0 * grid.margin.y, 2.0 * grid.margin.z)
