@@ -94,6 +94,13 @@ def test_bounds_hold_what_is_admissible():
     assert swarm.Union([BALL], "outside").bounds()[1] == (np.inf,) * 3
 
 
+class Nowhere(swarm.Sphere):
+    """A surface without an inside."""
+
+    def phi(self, points, time=0.0):
+        return super().phi(points, time) + 1.0
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [
@@ -108,6 +115,8 @@ def test_bounds_hold_what_is_admissible():
             lambda: swarm.Union([swarm.Plane((1.0, 0.0, 0.0), 1.0), swarm.Plane((-1.0, 0.0, 0.0), 1.0)], "outside"),
             'parts must leave an inside of a Union with side="outside", got Plane.*no point is admissible',
         ),
+        (lambda: swarm.Union([BALL, Nowhere(0.5)]), r"parts\[1\] must have a volume, got .*no point is admissible"),
+        (lambda: swarm.Union([BALL, swarm.Formula("x**2 + y**2 + z**2")]), "phi must be 0 somewhere, got above 0"),
         (lambda: swarm.Union([BALL], rotation=(1.0, 0.0, 0.0, 0.1)), "rotation must be None for Union.*its parts"),
         (lambda: swarm.Union([BALL], mass=1.0), "mass must be None for Union"),
         (
