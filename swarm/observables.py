@@ -164,7 +164,7 @@ def count_escaped(walls, gravity, far, faces, state):
     that hits them there still leaves.
     """
     position, velocity, count = state.position, state.velocity, 0
-    for i in range(position.shape[1]):
+    for i in range(state.mass.size):
         r, v = column(position, 0, i), column(velocity, 0, i)
         out = square(r) > far * far
         for k in range(faces.shape[0]):
@@ -224,7 +224,7 @@ def _add_up(values: Floats, n: int, sums: Floats) -> None:
     if whole:
         np.add.reduce(values[:, : whole * CHUNK].reshape(-1, whole, CHUNK), axis=2, out=sums[:, :whole])
     if whole * CHUNK < n:
-        np.add.reduce(values[:, whole * CHUNK :], axis=1, out=sums[:, whole])
+        np.add.reduce(values[:, whole * CHUNK : n], axis=1, out=sums[:, whole])
 
 
 def summed(

@@ -39,6 +39,8 @@ class Particles:
     """
 
     volume: float | None = None
+    # Of a run with sources: who comes when.
+    births: "Births | None" = None
 
     def __init__(
         self,
@@ -88,6 +90,22 @@ class Particles:
             [columns[name] for name in _COLUMNS[3:]],
             columns.get("mass", 1.0),
         )
+
+
+class Births(NamedTuple):
+    """The particles of a run that come while it lasts: behind those of the start, in the order in which they come.
+
+    Attributes:
+        time: (N,) when each comes [s], 0 of those of the start.
+        source: (N,) the number of its source, -1 of those of the start.
+    """
+
+    time: Floats
+    source: NDArray[np.int32]
+
+    def there(self, moment: float) -> int:
+        """The number of those, the first ones, that are there at a time [s]."""
+        return int(np.searchsorted(self.time, moment, side="right"))
 
 
 class Multipliers(NamedTuple):
@@ -160,6 +178,8 @@ class State(NamedTuple):
     # Where a wall has openings:
     escape_time: Floats | None = None  # (N,) when each has passed one [s], NaN of those that are inside
     openings: Any = None  # None, or each `Opening` of the walls
+    # Where particles come during the run, or wait on a wall:
+    starts: Floats | None = None  # (N,) the time from which each flies [s]
 
 
 def has_escaped(escape_time, i):

@@ -114,7 +114,11 @@ class BaseRun:
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
         """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""
-        failures.require_admissible(self._scene, self.state, seen, self._deepest, moment, self._first)
+        failures.require_admissible(self._scene, self._seen_state(), seen, self._deepest, moment, self._first)
+
+    def _seen_state(self) -> State:
+        """The state as observers of the last frame know it."""
+        return self.state
 
     def _called(self, kernel: Any, calls: Iterable[tuple[Any, ...]], latest: float) -> list[Any]:
         """The results of a kernel of this tier for each of these arguments, in a thread each, halted at `latest`."""

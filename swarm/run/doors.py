@@ -44,8 +44,8 @@ class DoorRun(Run):
         first, last = bisect.bisect_right(self._instants, begin), bisect.bisect_left(self._instants, end)
         return [begin, *self._instants[first:last], end]
 
-    def _move_walls(self, moment: float) -> None:
-        super()._move_walls(moment)
+    def _reach(self, moment: float) -> None:
+        super()._reach(moment)
         if not self._scene.moves():
             self._walls, self._faces = self._scene.walls(moment), self._scene.open_faces(moment)
         self.state = self.state._replace(openings=self._scene.openings(moment))

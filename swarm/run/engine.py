@@ -19,13 +19,14 @@ from ..lanes import block as blocks
 from ..lanes import contact_events, slide, sliding, table
 from ..lanes import log as impact_log
 from ..methods.base import Method
-from ..particles import Contacts, Multipliers, Particles
+from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
 from ..status import Status
 from . import failures
 from .base import Arrays, BaseRun, result_of
 from .impacts import Page
-from .state import Seeding, begin, state_of
+from .present import Present
+from .state import Seeding, begin, have_lasted, state_of
 from .tally import Watched
 from .tiers import Tier
 from .turns import End, Turns, left_behind
@@ -64,18 +65,17 @@ class Run(BaseRun):
         self._moment, self._faces = 0.0, scene.open_faces()
         # Whole chunks, so that a thread observes what it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
-        self._draws = math.ceil(n / self._size)
+        self._present = Present(particles.births, n, self._size)
         self._ticket = np.zeros(1, np.int64)
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._phase = np.zeros(n, np.int8)
         # Kernels have signed numbers, of the same 64 bits.
         self._seed = seeding.seed - 2**64 if seeding.seed >= 2**63 else seeding.seed
-        self._order = np.arange(self._draws)
         self._kinds: set[int] = set()  # the phases that are no flight and that this run has met
         self._halted = lanes.none_halted(self._booked)
         self._lanes: list[lanes.Lanes] = []  # of threads that do not advance now
         self._hard = None if method.may_slide() or method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
-        self._threads = min(threads, self._draws)
+        self._threads = min(threads, len(self._present.order))
         self._choose_tier()
 
     def __exit__(self, *error: object) -> None:
@@ -84,9 +84,9 @@ class Run(BaseRun):
         super().__exit__(*error)
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
-        self._move_walls(moment)
+        self._reach(moment)
         if not self._cut_short:
-            begin(self.state, self._phase, span, bool(self._kinds))
+            begin(self.state, self._present.of(self._phase), (span, self._moment), bool(self._kinds))
         again = True
         while again:
             until = self._limit(latest)
@@ -135,7 +135,7 @@ class Run(BaseRun):
             end = self._part(span, draws, mine, page)
         else:
             # Who flies first would have drawn everything when the others are ready to slide.
-            some, end = max(1, self._draws // (_PARTS * self._threads)), _DONE
+            some, end = max(1, len(self._present.order) // (_PARTS * self._threads)), _DONE
             while end[0] == Status.DONE and (order := lanes.take(draws, some)).size:
                 end = self._part(span, _again(draws, order), mine, page)
         if page is not None:
@@ -178,16 +178,17 @@ class Run(BaseRun):
         return chosen if page is None else functools.partial(page.call, chosen)
 
     def observe(self) -> None:
-        """Observe the start: every particle is there."""
-        self._move_walls(0.0)
+        """Observe the start: nobody flies."""
+        self._reach(0.0)
         self._phase.fill(ARRIVED)
         self._ticket[0] = 0
         began = time.perf_counter()
         self._share(0.0)
         self._tier.spend(time.perf_counter() - began)
 
-    def _move_walls(self, moment: float) -> None:
-        """The walls of the frame that ends at a moment [s]."""
+    def _reach(self, moment: float) -> None:
+        """The walls and the particles of the frame that ends at a moment [s]."""
+        self._present.reach(moment)
         self._moment = moment = self._method.instant(moment)
         if self._scene.moves():
             self._walls, self._faces = self._scene.walls(moment), self._scene.open_faces(moment)
@@ -211,7 +212,8 @@ class Run(BaseRun):
 
     def _drawing(self) -> lanes.Draws:
         """The draws of one thread."""
-        return lanes.Draws(self._ticket, self._order, self._size, np.empty(self._draws, np.int64))
+        order = self._present.order
+        return lanes.Draws(self._ticket, order, self._size, np.empty(len(order), np.int64))
 
     def _empty_lanes(self) -> lanes.Lanes:
         made = lanes.empty(len(self._owners), self._booked, self.state.period)
@@ -221,7 +223,8 @@ class Run(BaseRun):
     def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
         """The share of a thread, with the arrays of all, and its counts."""
         return lanes.Share(
-            self.state, self._phase, np.zeros(PHASES, np.int64), self._halted, draws, self._watch.passes, span,
+            self._present.flying(self.state), self._present.of(self._phase), np.zeros(PHASES, np.int64), self._halted,
+            draws, self._watch.passes, span,
             self._seed, self._first, self._moment, None if self._impacts is None else self._impacts.example,
             None if self._tally is None else self._tally.counts(),
         )  # fmt: skip
@@ -239,11 +242,11 @@ class Run(BaseRun):
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
         """Arguments of `observe`."""
-        return self._law, self._walls, self._gravity, self.state, drawn, self._size, self._partial
+        return self._law, self._walls, self._gravity, self._seen_state(), drawn, self._size, self._partial
 
     def _escaping(self) -> tuple[Any, ...]:
         """Arguments of `count_escaped`."""
-        return self._walls, self._gravity, self._far, self._faces, self.state
+        return self._walls, self._gravity, self._far, self._faces, self._seen_state()
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         draws, mine = self._drawing(), self._empty_lanes()
@@ -274,13 +277,12 @@ class Run(BaseRun):
         super().restore(arrays, cut_short)
         if self._tally is not None:
             self._tally.restore(arrays["member_impacts"])
-        contacts = self.state.contacts
-        if contacts is not None and (contacts.phase.any() or (contacts.remaining > 0.0).any()):
+        if have_lasted(self.state.contacts, self._phase):
             self._kinds = set(_KINDS)
             self._choose_tier()
 
     def seen(self) -> dict[str, Any]:
-        seen = observables.summary(self._partial, self.state, self._owners, bool(self._kinds), self._parts)
+        seen = observables.summary(self._partial, self._seen_state(), self._owners, bool(self._kinds), self._parts)
         is_closed = self._far == math.inf
         escaped = 0 if is_closed else self._tier.kernel(observables.count_escaped)(*self._escaping())
         if self.state.escape_time is not None:
@@ -292,7 +294,10 @@ class Run(BaseRun):
         return {**seen, "escaped": int(escaped)}
 
     def chunk_sums(self) -> NDArray[np.float64]:
-        return observables.chunk_sums(self._partial, self.state, bool(self._kinds))
+        return observables.chunk_sums(self._partial, self._seen_state(), bool(self._kinds))
+
+    def _seen_state(self) -> State:
+        return self._present.seen(self.state)
 
 
 def _again(draws: lanes.Draws, order: NDArray[Any]) -> lanes.Draws:

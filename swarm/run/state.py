@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..contact.events import ARRIVED, FLYING
 from ..methods.base import Method
-from ..particles import Contacts, Multipliers, Particles, State
+from ..particles import Contacts, Floats, Multipliers, Particles, State
 from ..scene import Scene
 
 
@@ -43,24 +43,51 @@ def state_of(scene: Scene, particles: Particles, method: Method, booked: int) ->
         period,
         None if openings is None else np.full(n, math.nan),
         openings,
+        None if particles.births is None else particles.births.time.copy(),
     )
 
 
-def begin(state: State, phase: NDArray[np.int8], span: float, lasts: bool) -> None:
-    """Set whether each particle begins a frame in flight, along its walls or at rest; `lasts`: a contact has lasted."""
+def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], lasts: bool) -> None:
+    """Set whether each particle begins a frame in flight, along its walls or at rest; `lasts`: a contact has lasted.
+
+    The frame is (its length, in the method's unit, its end [s]); who is not there has no phase.
+    """
+    span, end = frame
     contacts = state.contacts
     if contacts is None or not lasts:
         phase.fill(FLYING)
     else:
         contacts.short_steps.fill(0.0)
-        phase[:] = contacts.phase
+        phase[:] = contacts.phase[: len(phase)]
         rests = contacts.phase == ARRIVED
         if rests.any():
             # What is at rest costs this much.
             state.impulse[: len(contacts.load)] += contacts.load * (span * state.mass)
             contacts.sliding[:] += span * rests
     if state.escape_time is not None:
-        phase[~np.isnan(state.escape_time)] = ARRIVED
+        phase[~np.isnan(state.escape_time[: len(phase)])] = ARRIVED
+    if state.starts is not None:
+        _begin_late(state.starts[: len(phase)], state.contacts, phase, span, end)
+
+
+def _begin_late(starts: Floats, contacts: Contacts | None, phase: NDArray[np.int8], span: float, end: float) -> None:
+    """Who starts at the end of a frame or later has arrived; who starts within it flies for what is left then."""
+    left = end - starts
+    phase[left <= 0.0] = ARRIVED
+    late = np.flatnonzero((left < span) & (phase == FLYING))
+    if late.size:
+        assert contacts is not None
+        contacts.remaining[late] = left[late]
+
+
+def have_lasted(contacts: Contacts | None, phase: NDArray[np.int8]) -> bool:
+    """Whether a contact of a run has lasted, or is about to.
+
+    Not whether something is left of the frame: a particle that starts within it may have met no wall yet.
+    """
+    if contacts is None:
+        return False
+    return bool(contacts.phase.any() or contacts.sliding.any() or ((phase != FLYING) & (phase != ARRIVED)).any())
 
 
 def _no_contacts(walls: int, n: int) -> Contacts:
