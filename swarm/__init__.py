@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .run.result import Result
     from .run.simulation import simulate
     from .scene import Scene
+    from .sources.source import Source
     from .surfaces import (
         Box,
         Boxes,
@@ -78,6 +79,7 @@ _HOMES = {
     "output.trajectory": ("Trajectory", "load"),
     "particles": ("Particles",),
     "scene": ("Scene",),
+    "sources.source": ("Source",),
     "run.result": ("Result",),
     "run.simulation": ("simulate",),
     "surfaces.data.mesh": ("from_mesh",),
@@ -96,8 +98,8 @@ __all__ = [
     "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
     "Impact", "ImpactLog", "Intersection", "Mesh", "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid",
     "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled",
-    "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError", "Torus", "Trajectory",
-    "Translation", "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain",
+    "Scene", "SceneError", "Slab", "Source", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError", "Torus",
+    "Trajectory", "Translation", "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain",
     "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate",
     "sweep", "tetrahedron",
 ]  # fmt: skip

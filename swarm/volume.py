@@ -161,6 +161,10 @@ class Volume:
         low, high = self._bounds(time, [surface for surface in self.surfaces if surface.is_there(time)])
         return tuple(low.tolist()), tuple(high.tolist())
 
+    def bounds_of(self, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As `bounds`, around the volume that some of the surfaces leave, at 0 s."""
+        return self._bounds(0.0, surfaces)
+
     def _bounds_of_lasting(self, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A box around the volume that those of the surfaces leave at the start that are always there."""
         return self._bounds(0.0, [surface for surface in surfaces if surface.present is None])

@@ -96,7 +96,8 @@ _NAMES = {
 def digest_of(particles: Particles, body: str = "") -> str:
     """A digest that identifies particles, or the points of bodies together with the text of the body."""
     digest = hashlib.sha256(body.encode())
-    for array in (particles.position, particles.velocity, particles.mass, particles.image):
+    born = None if particles.births is None else particles.births.time
+    for array in (particles.position, particles.velocity, particles.mass, particles.image, born):
         if array is not None:
             digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()[:16]

@@ -12,6 +12,7 @@ from ..output.origin import require_near
 from ..particles import Particles
 from ..plane import require_start
 from ..scene import Scene
+from ..sources.births import with_births
 from ..surfaces.formulas.own import require_compiled
 from ..surfaces.instant import gaps_of, gradient_of
 from ..surfaces.shapes.cone import Cone
@@ -31,16 +32,17 @@ _LONG_AGO = 1e12
 _MOST_CELLS = 2.0**53
 
 
-def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options: RunOptions) -> Task:
-    """The run, checked, with its own copy of the particles.
+def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, options: RunOptions) -> Task:
+    """The run, checked, with its own copy of the particles, and behind them those that come.
 
     Raises:
         SceneError: an argument is wrong, or the arguments do not go together.
     """
     kinds = ("scene", scene, (Scene,)), ("particles", particles, (Particles, Bodies)), ("method", method, (Method,))
     for name, value, allowed in kinds:
-        if not isinstance(value, allowed):
+        if not isinstance(value, allowed) and not (name == "particles" and value is None and options.sources):
             raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
+    _require_births(scene, particles, method, options)
     if isinstance(particles, Bodies):
         _require_no_log("of particles, not of bodies, whose points meet walls together", options)
         # Of springs each point may be in every wall at once.
@@ -55,27 +57,30 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
         raise SceneError(
             f"dt of Impact is the step of bodies, got {method.dt:g} for particles, which need none; leave it out"
         )
-    _require_instants(scene, particles, method, options)
     # The arrays of Particles may have been changed since it checked them.
-    particles = _in_the_cell(scene, particles.copy(), options.times.until)
+    start = None if particles is None else _in_the_cell(scene, particles.copy(), options.times.until)
     if scene.period is not None and not method.knows_period():
         raise SceneError(
             f"period must be None with {method}, whose steps do not end where a particle leaves the cell, got "
             f"{scene.period}; use Impact() with contact_step = 0"
         )
-    _require_precision(scene, particles, options)
     check_surfaces(method, scene)
     if options.compile != "never":
         require_compiled([one for surface in scene.surfaces for one in (surface, *surface.open_volumes())])
-    method.check(scene, particles)
     times = options.times
+    _require_motions(scene, times.until)
+    particles = with_births(scene, start, options.sources, options.seed, times.until)
+    _require_instants(scene, particles, method, options)
+    _require_precision(scene, particles, options)
+    method.check(scene, particles)
     assert times.every is not None
     method.span("until", times.until)
     method.span("every", times.every)
-    _require_motions(scene, times.until)
     require_start(scene, particles)
-    _require_inside(scene, particles)
-    _require_normals(scene, particles)
+    # Who comes later is born inside the walls as they are then.
+    if start is not None:
+        _require_inside(scene, start)
+        _require_normals(scene, start)
     workload.require_few_impacts(scene, particles, method, times.until, times.every)
     return Task(scene, particles, method, options)
 
@@ -110,6 +115,23 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
     points = bodies.particles()
     _require_precision(scene, points, options)
     return Task(scene, points, method, options, bodies)
+
+
+def _require_births(scene: Scene, particles: Particles | Bodies | None, method: Method, options: RunOptions) -> None:
+    """Raise a `SceneError` where particles cannot come during a run, and are to."""
+    if not options.sources:
+        return
+    expected = "sources must be left out here, particles come during a run"
+    if isinstance(particles, Bodies):
+        raise SceneError(f"{expected} of particles, not of bodies; use particles")
+    if not isinstance(method, Impact) or method.contact_step > 0.0:
+        raise SceneError(
+            f"{expected} with Impact() with contact_step = 0, whose flights may begin at any time, got {method!r:.200}"
+        )
+    if scene.reacts():
+        raise SceneError(
+            f"{expected} where impacts move no wall, got a scene with a mass or an inertia; give that wall a motion"
+        )
 
 
 def _require_motions(scene: Scene, until: float) -> None:

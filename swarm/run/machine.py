@@ -50,6 +50,7 @@ class End(NamedTuple):
     impacts: NDArray[np.int64]
     escape_time: NDArray[np.float64]
     members: list[NDArray[np.int64]] | None
+    birth_time: NDArray[np.float64]
 
 
 class Columns:
@@ -163,7 +164,13 @@ def _end(task: Task, session: Session, run: BaseRun, kept: Columns, tally: Tally
         state.impacts,
         np.full(len(task.particles), np.nan) if state.escape_time is None else state.escape_time,
         None if tally is None else tally.of_members(),
+        birth_times(task.particles),
     )
+
+
+def birth_times(particles: Particles) -> NDArray[np.float64]:
+    """When each of the particles comes [s], 0 of those of the start."""
+    return np.zeros(len(particles)) if particles.births is None else particles.births.time
 
 
 def warn_open() -> None:

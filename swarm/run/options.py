@@ -16,6 +16,7 @@ from ..output import paths
 from ..output.storage import Storage
 from ..particles import Particles
 from ..scene import Scene
+from ..sources.source import checked_sources
 from .tiers import CHOICES
 
 # At shorter intervals [s] a run would do little but save checkpoints.
@@ -63,6 +64,7 @@ class RunOptions:
     seed: int = 0
     cluster: Any = field(default=None, metadata=_OF_A_SESSION)
     shards: int | None = field(default=None, metadata=_OF_A_SESSION)
+    sources: Any = field(default=None, metadata=_OF_A_SESSION)
 
     def __post_init__(self) -> None:
         for name in ("trajectory", "recording", "impacts"):
@@ -84,6 +86,7 @@ class RunOptions:
         checks.flag("member_impacts", self.member_impacts)
         self._check_impacts()
         object.__setattr__(self, "seed", checks.seed("seed", self.seed))
+        object.__setattr__(self, "sources", checked_sources(self.sources))
         _ = self.storage
 
     def _check_impacts(self) -> None:

@@ -46,6 +46,7 @@ class Result:
             repeats all images of a body are one. Else None. No file holds it.
         bodies: the bodies at `until`, or None; then `particles` are all their points.
         scene, method: as they were run.
+        birth_time: (N,) when each came [s], 0 of those of the start.
     """
 
     particles: Particles
@@ -59,6 +60,7 @@ class Result:
     bodies: Bodies | None = None
     scene: Scene | None = None
     method: Method | None = None
+    birth_time: NDArray[np.float64] | None = None
 
     def __repr__(self) -> str:
         seen, frames = self.observables, len(self.observables["time"])

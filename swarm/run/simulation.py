@@ -9,6 +9,7 @@ from ..frames import Frame
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
+from ..sources.source import Source
 from . import machine
 from .admission import task_of
 from .options import RunOptions, Task
@@ -18,7 +19,7 @@ from .session import Session
 
 def simulate(  # noqa: PLR0913  the keywords are the public interface
     scene: Scene,
-    particles: Particles | Bodies,
+    particles: Particles | Bodies | None,
     method: Method,
     *,
     until: float,
@@ -47,6 +48,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     seed: int = 0,
     cluster: Any = None,
     shards: int | None = None,
+    sources: Sequence[Source] | None = None,
 ) -> Result:
     """Advance particles in a scene and observe them at frames.
 
@@ -60,7 +62,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
 
     Args:
         scene: the walls and gravity.
-        particles: the start, particles or bodies; it is not changed.
+        particles: the start, particles or bodies; it is not changed. None: `sources` give all.
         method: how to advance; bodies by Impact with a dt, Penalty, or AugmentedLagrangian with adaptive=True.
         until: end of the run [s], above 0.
         every: time between frames [s], at most `until`; None: only the first and the last.
@@ -97,6 +99,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             trajectory needs; results have the same bits as without. A worker that dies is replaced, and its shard goes
             on from its checkpoint, by default of every 60 s.
         shards: their number, of a cluster; None: one for each thread of its workers.
+        sources: `Source`s of particles that come during the run, by Impact with contact_step = 0 where no wall has a
+            mass; None: no one comes. All births are drawn before the run, from `seed`.
 
     Returns:
         A `Result`.
@@ -119,7 +123,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     return carry_out(scene, particles, method, RunOptions(**keywords))
 
 
-def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, options: RunOptions) -> Result:
+def carry_out(scene: Scene, particles: Particles | Bodies | None, method: Method, options: RunOptions) -> Result:
     """`simulate` with its keywords as `RunOptions`."""
     carried: Callable[[Task, Any], machine.End] = machine.carry_out_task
     session: Session
@@ -134,5 +138,5 @@ def carry_out(scene: Scene, particles: Particles | Bodies, method: Method, optio
     bodies = None if task.bodies is None else task.bodies.moved(end.particles)
     return Result(
         end.particles, end.observables, end.wall_time, options.trajectory, end.multipliers, end.impacts,
-        end.escape_time, end.members, bodies, scene, method,
+        end.escape_time, end.members, bodies, scene, method, end.birth_time,
     )  # fmt: skip

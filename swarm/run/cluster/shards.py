@@ -24,7 +24,7 @@ from ...observables import CHUNK
 from ...output import paths
 from ...particles import Multipliers, Particles
 from ...scene import Scene
-from ..machine import End
+from ..machine import End, birth_times
 from ..options import RunOptions, Task
 
 _SUFFIX = ".shards"
@@ -197,5 +197,5 @@ def joined_end(folder: Path, task: Task, bounds: list[int]) -> End:
     loops = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("multipliers.")}
     return End(
         particles, {}, 0.0, Multipliers(**loops) if loops else None, flat["impacts"], flat["escape_time"],
-        members or None,
+        members or None, birth_times(particles),
     )  # fmt: skip

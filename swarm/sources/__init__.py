@@ -1,0 +1,1 @@
+"""Sources: particles that come during a run, where they are born, when, and with which velocity."""

@@ -1,0 +1,174 @@
+"""All births of a run, drawn before it from its seed: each source has streams of its own."""
+
+import math
+
+import numpy as np
+
+from .. import checks
+from ..errors import SceneError
+from ..particles import Births, Particles
+from ..scene import Scene
+from .pieces import Floats, Random
+from .places import Points, place_of
+from .source import Source
+from .velocities import from_surface, from_volume, leads_in
+
+# Streams of a source.
+_TIMES, _PLACES, _VELOCITIES = range(3)
+# Bytes of a particle in a run, its frames not counted.
+_PARTICLE = 500
+# So many standard deviations more births than are expected are reckoned with.
+_SIGMAS = 6.0
+# A birth this part of the scene's extent outside of a wall that moves is none.
+_OUTSIDE = 1e-9
+# Of the numbers of a Poisson process that are drawn at a time.
+_BATCH = 4096
+
+
+def with_births(
+    scene: Scene, particles: Particles | None, sources: tuple[Source, ...], seed: int, until: float
+) -> Particles:
+    """The particles of a run with sources: those of the start, and behind them those that come, in order of time.
+
+    Raises:
+        SceneError: a source does not go with the scene, too many come, or nobody is there and none comes.
+    """
+    if particles is not None and not sources:
+        return particles
+    given = 0 if particles is None else len(particles)
+    _require_room(sources, given, until)
+    drawn = [_drawn(scene, one, f"sources[{k}]", k, seed, until) for k, one in enumerate(sources)]
+    times = np.concatenate([time for time, _r, _v in drawn])
+    if not len(times) + given:
+        raise SceneError(
+            f"sources must give at least one particle where there are none at the start, got none until {until:g} s; "
+            "give a higher rate, or a later until"
+        )
+    order = np.argsort(times, kind="stable")
+    number = np.repeat(np.arange(len(sources), dtype=np.int32), [len(time) for time, _r, _v in drawn])[order]
+    position, velocity = (np.concatenate([one[k] for one in drawn], axis=1)[:, order] for k in (1, 2))
+    mass = np.array([one.mass for one in sources])[number]
+    image = None if scene.period is None else np.zeros((3, len(times)), np.int64)
+    if particles is not None:
+        position = np.concatenate([particles.position, position], axis=1)
+        velocity = np.concatenate([particles.velocity, velocity], axis=1)
+        mass = np.concatenate([particles.mass, mass])
+        if image is not None:
+            before = np.zeros((3, given), np.int64) if particles.image is None else particles.image
+            image = np.concatenate([before, image], axis=1)
+    made = Particles(position, velocity, mass, image)
+    made.births = Births(
+        np.append(np.zeros(given), times[order]), np.append(np.full(given, -1, np.int32), number).astype(np.int32)
+    )
+    return made
+
+
+def _require_room(sources: tuple[Source, ...], given: int, until: float) -> None:
+    """Raise a `SceneError` where more particles come than this machine has memory for."""
+    most = float(given)
+    for k, one in enumerate(sources):
+        come = _most(one, until)
+        most += come
+        checks.require_memory(
+            f"sources[{k}]", f" with all particles that come until {until:g} s, got {come:.6g}, which take",
+            _PARTICLE * come,
+        )  # fmt: skip
+    checks.require_memory("sources", f" with all particles of the run, got {most:.6g}, which take", _PARTICLE * most)
+
+
+def _most(source: Source, until: float) -> float:
+    """The number of births of a source that is reckoned with."""
+    if source.times is not None:
+        return float(len(source.times))
+    if source.rate is None:
+        return float(source.count or 0)
+    mean = source.rate * max(0.0, _end(source, until) - source.start)
+    most = mean + (0.0 if source.even else _SIGMAS * math.sqrt(mean))
+    return most if source.count is None else min(most, float(source.count))
+
+
+def _end(source: Source, until: float) -> float:
+    return until if source.stop is None else min(until, source.stop)
+
+
+def _stream(seed: int, k: int, what: int) -> Random:
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(k, what))))
+
+
+def _drawn(scene: Scene, source: Source, name: str, k: int, seed: int, until: float) -> tuple[Floats, Floats, Floats]:
+    """Times (n,), positions and velocities (3, n) of the births of a source."""
+    place = place_of(scene, source, name)
+    points, across = Points(scene, place, name), scene.across()
+    if across is not None and source.beam is not None and source.beam[across] != 0.0:
+        raise SceneError(
+            f'{name}.beam[{across}] must be 0 where plane = "{scene.plane}", got {source.beam[across]:g} m/s: it would '
+            "lead out of the plane"
+        )
+    times = times_of(source, _stream(seed, k, _TIMES), until)
+    # A source without births is looked at too.
+    position, normals = points.draw(_stream(seed, k, _PLACES), max(1, len(times)))
+    position, normals = position[:, : len(times)], normals[:, : len(times)]
+    random = _stream(seed, k, _VELOCITIES)
+    if place.volume:
+        velocity = from_volume(source, random, len(times), across)
+    else:
+        if source.beam is not None and not (good := leads_in(source, normals)).all():
+            i = int(np.argmin(good))
+            raise SceneError(
+                f"{name}.beam must lead from its surface to the admissible side, got {source.beam} at "
+                f"{tuple(position[:, i].tolist())}, where the normal out of that side is "
+                f"{tuple(normals[:, i].round(6).tolist())}; turn it, or give within= for a part of the surface"
+            )
+        velocity = from_surface(source, random, normals, across)
+    if across is not None:
+        position[across] = velocity[across] = 0.0
+    _require_free(scene, name, times, position)
+    return times, position, velocity
+
+
+def times_of(source: Source, random: Random, until: float) -> Floats:
+    """The times of the births of a source in a run, in order [s]."""
+    if source.times is not None:
+        times = np.array(source.times)
+        return times[times <= until]
+    end = _end(source, until)
+    if source.rate is None:
+        stop = until if source.stop is None else source.stop
+        times = source.start + (stop - source.start) * np.sort(random.random(source.count or 0))
+        return np.asarray(times[times <= until])
+    if source.even:
+        number = math.floor(max(0.0, end - source.start) * source.rate) + 1
+        times = source.start + np.arange(number) / source.rate
+    else:
+        parts, last = [np.empty(0)], source.start
+        while last < end:
+            parts.append(last + np.cumsum(random.standard_exponential(_BATCH)) / source.rate)
+            last = float(parts[-1][-1])
+        times = np.concatenate(parts)
+    times = times[times < end]
+    return np.asarray(times if source.count is None else times[: source.count])
+
+
+def _require_free(scene: Scene, name: str, times: Floats, position: Floats) -> None:
+    """Raise a `SceneError` where a wall that moves, or comes and goes, is where a particle is born."""
+    changing = [i for i, one in enumerate(scene.surfaces) if one.motion is not None or one.present is not None]
+    if not changing:
+        return
+    deepest = _OUTSIDE * scene.extent()
+    alone = Scene([scene.surfaces[i] for i in changing], None, scene.period, scene.plane) if changing else scene
+    moves = any(scene.surfaces[i].motion is not None for i in changing)
+    # Between instants what does not move is as it is.
+    edges = np.array([0.0, *scene.instants, math.inf])
+    groups = np.arange(len(times)) if moves else np.searchsorted(edges, times, side="right")
+    for group in np.unique(groups):
+        some = np.flatnonzero(groups == group) if not moves else np.array([group])
+        depths = alone.distances_outside(position[:, some], float(times[some[0]]))
+        if not (depths <= deepest).all():
+            wall, which = np.unravel_index(int(np.argmax(np.where(np.isnan(depths), np.inf, depths))), depths.shape)
+            i = some[which]
+            raise SceneError(
+                f"{name} must be free when particles come, got a birth at {times[i]:g} s at "
+                f"{tuple(position[:, i].tolist())}, {depths[wall, which]:.3g} m inside surfaces[{changing[wall]}] "
+                f"({type(scene.surfaces[changing[wall]]).__name__}) as it is then; move the source, or say with start "
+                "and stop when it is free"
+            )

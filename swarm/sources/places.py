@@ -1,0 +1,248 @@
+"""The places at which particles of a source are born, uniform in the area, or the volume, of the source."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..scene import Scene
+from ..surfaces.doors import Opening
+from ..surfaces.instant import gaps_of, side_of
+from ..surfaces.surface import Surface, volume_of
+from ..surfaces.union import Joined
+from .pieces import Floats, Piece, Random, pieces_of, points_of
+from .source import Source
+
+# Points that are tried at a time, so that a longer run has the same first births; and in all, as long as fewer than one
+# in a million is a place of a birth.
+_BATCH, _TRIES = 1 << 14, 20_000_000
+# Round-off of a point of a surface, as a part of the scene's extent.
+_ROUND_OFF = 16.0 * np.finfo(np.float64).eps
+# Steps of a point onto its surface.
+_STEPS = 3
+# Of the extent, a way out of a wall on which no other part of a union is in that place.
+_BESIDE = 1e-8
+
+
+class Place(NamedTuple):
+    """The points of a source in a scene.
+
+    Attributes:
+        surface: on which particles are born, or in whose volume.
+        number: of the surface of the scene that it is, None where it is none of them.
+        volume: whether they are born in its volume.
+        only: the surfaces on whose admissible sides births are.
+        holes: in which they are not.
+    """
+
+    surface: Surface
+    number: int | None
+    volume: bool
+    only: tuple[Surface, ...]
+    holes: tuple[Surface, ...]
+
+
+def place_of(scene: Scene, source: Source, name: str) -> Place:
+    """The points of a source, as far as they are known without drawing any.
+
+    Raises:
+        SceneError: there is no such surface, or it is not at rest, or comes and goes.
+    """
+    only = () if source.within is None else (_volume(source.within),)
+    where = source.where
+    if isinstance(where, int):
+        if where >= len(scene.surfaces):
+            raise SceneError(
+                f"{name}.where must be the number of a surface of the scene, from 0 to {len(scene.surfaces) - 1}, got "
+                f"{where}"
+            )
+        return _of_wall(scene, where, source.volume, only, name)
+    for i, surface in enumerate(scene.surfaces):
+        if _is_same(surface, where):
+            return _of_wall(scene, i, source.volume, only, name)
+        if not source.volume and any(_is_same(opening, where) for opening in surface.openings):
+            found = _of_wall(scene, i, False, (*only, _volume(where)), name)
+            return found._replace(holes=())
+    if isinstance(where, Opening):
+        raise SceneError(f"{name}.where must be one of the openings of the scene's surfaces, got {where!r:.200}")
+    _require_at_rest(where, name)
+    return Place(where, None, source.volume, only, ())
+
+
+def _volume(given: Surface | Opening) -> Surface:
+    return given.surface if isinstance(given, Opening) else given
+
+
+def _is_same(one: Any, other: Any) -> bool:
+    if one is other or type(one) is not type(other):
+        return one is other
+    try:
+        return bool(one == other)
+    except ValueError:  # of arrays
+        return False
+
+
+def _of_wall(scene: Scene, i: int, volume: bool, only: tuple[Surface, ...], name: str) -> Place:
+    surface = scene.surfaces[i]
+    _require_at_rest(surface, f"{name}.where = surfaces[{i}]")
+    holes = () if volume else tuple(volume_of(one) for one in surface.openings if not getattr(one, "between", False))
+    return Place(surface, i, volume, only, holes)
+
+
+def _require_at_rest(surface: Surface, name: str) -> None:
+    if surface.motion is not None or surface.reacts() or surface.present is not None:
+        raise SceneError(
+            f"{name} must be at rest and always there, got {surface!r:.200}; leave its motion, mass, inertia and "
+            "present out, or let particles come from another surface beside it"
+        )
+
+
+class Points:
+    """The points of a source, drawn one batch after the other.
+
+    Args:
+        scene: the vessel.
+        place: the points of the source.
+        name: of the source, for errors.
+    """
+
+    def __init__(self, scene: Scene, place: Place, name: str) -> None:
+        self._scene, self._place, self._name = scene, place, name
+        self._low, self._high = self._box()
+        self._extent = max(scene.extent(), place.surface.extent())
+        self._pieces: list[Piece] = []
+        # Walls that move, or come and go, are looked at when a particle is born.
+        self._lasting = [i for i, one in enumerate(scene.surfaces) if one.motion is None and one.present is None]
+        if not place.volume:
+            self._pieces = self._of_surface()
+
+    def draw(self, random: Random, n: int) -> tuple[Floats, Floats]:
+        """So many points (3, n), and there the unit normals (3, n) out of the admissible side; in a volume they are 0.
+
+        Raises:
+            SceneError: there is none, or far fewer than places that are tried.
+        """
+        found: list[Floats] = []
+        count = tried = 0
+        while count < n:
+            some = self._volume(random) if self._place.volume else self._surface(random)
+            found.append(some[:, : n - count])
+            count, tried = count + found[-1].shape[1], tried + _BATCH
+            if tried >= _TRIES and count < 1e-6 * tried:
+                raise SceneError(self._sentence(count, tried))
+        points, normals = np.concatenate(found, axis=1).reshape(2, 3, n)
+        return points, normals
+
+    def _sentence(self, count: int, tried: int) -> str:
+        return (
+            f"{self._name}.where must be in the vessel, got {self._place.surface!r:.200}, of which {count} of {tried} "
+            f"points are in it{' and within= ' * bool(self._place.only)}; move it, or make it larger"
+        )
+
+    def _box(self) -> tuple[Floats, Floats]:
+        """The corners of a box that all points are in."""
+        scene = self._scene
+        at_rest = [one for one in scene.surfaces if one.motion is None and one.present is None]
+        low, high = scene.bounds_of(at_rest)
+        for one in (*self._place.only, *[self._place.surface] * self._place.volume):
+            least, most = (np.array(corner, np.float64) for corner in one.bounds())
+            low, high = np.maximum(low, least), np.minimum(high, most)
+        if (across := scene.across()) is not None:
+            low[across] = high[across] = 0.0
+        return low, high
+
+    def _of_surface(self) -> list[Piece]:
+        scene, surface = self._scene, self._place.surface
+        bounds = self._low, self._high
+        if scene.period is not None and surface.is_solid():
+            # It may reach over the faces.
+            bounds = np.full(3, -2.0 * self._extent), np.full(3, 2.0 * self._extent)
+        try:
+            pieces = pieces_of(surface, bounds, scene.across())
+        except SceneError as error:
+            raise SceneError(f"{self._name}.{error}") from None
+        if not sum(piece.area for piece in pieces) > 0.0:
+            raise SceneError(self._sentence(0, 0))
+        return pieces
+
+    # --- Batches ---
+
+    def _volume(self, random: Random) -> Floats:
+        axes, low, high = self._scene.axes(), self._low[:, None], self._high[:, None]
+        if not np.isfinite(high - low)[axes].all():
+            raise SceneError(
+                f"{self._name}.where must be bounded, got {self._place.surface!r:.200} in a scene that is open to "
+                "infinity; give within=, a surface that bounds the part of it in which particles come"
+            )
+        points = np.zeros((3, _BATCH))
+        points[axes] = low[axes] + (high - low)[axes] * random.random((len(axes), _BATCH))
+        kept = (self._gap(self._place.surface, points) <= 0.0) & self._is_wanted(points)
+        points = points[:, kept]
+        points = points[:, self._admits(points, 0.0)]
+        return np.concatenate([points, np.zeros_like(points)])
+
+    def _surface(self, random: Random) -> Floats:
+        surface, points = self._place.surface, points_of(self._pieces, random, _BATCH)
+        points = self._on(surface, points)
+        # Of an edge, a tip or a part that another one cuts off
+        points = points[:, np.abs(self._distance(surface, points)) <= _ROUND_OFF * self._extent]
+        points = points[:, self._is_wanted(points)]
+        if self._place.holes:
+            shut = [self._gap(hole, points) > 0.0 for hole in self._place.holes]
+            points = points[:, np.logical_and.reduce(shut)]
+        normals = self._normals(surface, points)
+        if isinstance(surface, Joined):
+            once = self._is_wall_once(surface, points, normals, random)
+            points, normals = points[:, once], normals[:, once]
+        if self._scene.period is not None:
+            points, _image = self._scene.wrapped(points)
+        return np.concatenate([points, normals])[:, self._admits(points, _ROUND_OFF * self._extent)]
+
+    def _is_wall_once(self, surface: Joined, points: Floats, normals: Floats, random: Random) -> NDArray[np.bool_]:
+        """Which points of a union are on its walls, not where two parts touch, and each as often as if by one part."""
+        beyond = self._gap(surface, points + _BESIDE * self._extent * normals) > 0.0
+        parts = dict.fromkeys(surface.surfaces())
+        near = [np.abs(self._distance(part, points)) <= _ROUND_OFF * self._extent for part in parts]
+        return np.asarray(beyond & (random.random(points.shape[1]) * np.sum(near, axis=0) < 1.0))
+
+    def _on(self, surface: Surface, points: Floats) -> Floats:
+        """Points near a surface, moved onto it."""
+        for _ in range(_STEPS):
+            slopes = surface.gradient(points)
+            with np.errstate(all="ignore"):
+                points = points - surface.phi(points) / np.maximum((slopes**2).sum(axis=0), 1e-300) * slopes
+        return points
+
+    def _is_wanted(self, points: Floats) -> NDArray[np.bool_]:
+        wanted = np.ones(points.shape[1], np.bool_)
+        for one in self._place.only:
+            wanted &= self._gap(one, points) <= 0.0
+        return wanted
+
+    def _admits(self, points: Floats, distance: float) -> NDArray[np.bool_]:
+        """Which points are inside all walls that are at rest, to so much [m]."""
+        admitted = np.ones(points.shape[1], np.bool_)
+        if points.shape[1] and self._lasting:
+            outside = self._scene.outside(points, distance)
+            if len(self._lasting) < len(self._scene.surfaces) and outside.size:
+                far = self._scene.distances_outside(points[:, outside])[self._lasting] > distance
+                outside = outside[far.any(axis=0)]
+            admitted[outside] = False
+        return admitted
+
+    @staticmethod
+    def _gap(surface: Surface, points: Floats) -> Floats:
+        """Where phi is no number is no place."""
+        found = gaps_of((surface,), points, 0.0)[0]
+        return np.asarray(np.where(np.isnan(found), np.inf, found))
+
+    @staticmethod
+    def _distance(surface: Surface, points: Floats) -> Floats:
+        slopes = np.sqrt((surface.gradient(points) ** 2).sum(axis=0))
+        return np.asarray(surface.phi(points) / np.maximum(slopes, np.finfo(np.float64).tiny))
+
+    @staticmethod
+    def _normals(surface: Surface, points: Floats) -> Floats:
+        slopes = side_of(surface) * surface.gradient(points)
+        return np.asarray(slopes / np.sqrt((slopes**2).sum(axis=0)))

@@ -1,0 +1,170 @@
+"""The description of a source for users, checked."""
+
+from dataclasses import MISSING, dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from .. import checks
+from ..errors import SceneError
+from ..surfaces.doors import Opening
+from ..surfaces.surface import Surface
+
+_HALF_TURN = np.pi
+
+
+@dataclass(frozen=True, repr=False)
+class Source:
+    """A source of particles that come during a run; `simulate(..., sources=[...])` has a list of them.
+
+    All births are drawn before the run, from its seed, each source by itself: the same bits for any threads, blocks,
+    resumes and shards. The particles that come are numbered behind those of the start, in the order in which they come.
+
+    Args:
+        where: a surface of the scene, or its number: births on it, uniform in its area, into the vessel. Or one of the
+            openings of a surface: births on that surface where it is open. Or any other surface: births on it as far as
+            it is in the vessel, to its admissible side.
+        volume: True: births uniform in the part of the vessel on the admissible side of `where`.
+        within: a surface on whose admissible side births are, so that a part of a wall is a source; None: everywhere.
+        rate: births a second, a Poisson process from `start` to `stop`. Or
+        times: the times of all births [s], from 0 s on, in any order; those after the end of the run do not come. Or
+        count: alone so many births, at independent times uniform from `start` to `stop`; with `rate` the most of them.
+        even: True: births of a `rate` are evenly spaced, the first one at `start`.
+        start: when births of a rate or a count begin [s].
+        stop: when they end [s], not before `start`; None: at the end of the run.
+        temperature: k_B T [J] of the gas that comes. From a surface it is effusive: the velocities are those of what
+            passes a hole in the wall of a vessel with that gas; from a volume they are Maxwellian. Or
+        speed: |v| of all [m/s]; from a surface in the directions of the cosine law, from a volume in any. Or
+        beam: the velocity of all, three numbers [m/s].
+        divergence: of a beam the half angle of a cone about it in which directions are uniform [rad], below pi; those
+            into a wall on which particles are born do not occur.
+        mass: of each [kg].
+
+    Raises:
+        SceneError: an argument is out of its range, or they do not go together. What does not go with the scene (a
+            source outside the vessel, on a wall that moves) is found when a run starts.
+
+    >>> Source(0, rate=1e4, temperature=1.0)
+    Source(where=0, rate=10000.0, temperature=1.0)
+    """
+
+    where: Any
+    volume: bool = False
+    within: Any = None
+    rate: float | None = None
+    times: Any = None
+    count: int | None = None
+    even: bool = False
+    start: float = 0.0
+    stop: float | None = None
+    temperature: float | None = None
+    speed: float | None = None
+    beam: Any = None
+    divergence: float = 0.0
+    mass: float = 1.0
+
+    def __post_init__(self) -> None:
+        self._check_place()
+        self._check_times()
+        self._check_velocity()
+        checks.assign(self, mass=_mass(self.mass))
+
+    def __repr__(self) -> str:
+        """The call that makes it, omitting defaults."""
+        said = [f for f in fields(self) if f.default is MISSING or getattr(self, f.name) is not f.default]
+        return f"Source({', '.join(f'{f.name}={_said(getattr(self, f.name))}' for f in said)})"
+
+    def _check_place(self) -> None:
+        checks.flag("volume", self.volume)
+        if isinstance(self.where, (int, np.integer)) and not isinstance(self.where, bool):
+            checks.assign(self, where=checks.count("where", self.where, least=0))
+        elif not isinstance(self.where, (Surface, Opening)):
+            raise SceneError(
+                f"where must be a surface, one of the openings of a surface, or the number of a surface of the scene, "
+                f"got {self.where!r:.200}"
+            )
+        if self.volume and isinstance(self.where, Opening):
+            raise SceneError("volume must be False at an opening, got True; give the surface that is its volume")
+        if self.within is not None and not isinstance(self.within, (Surface, Opening)):
+            raise SceneError(f"within must be a surface, or None, got {self.within!r:.200}")
+
+    def _check_times(self) -> None:
+        given = [name for name in ("rate", "times") if getattr(self, name) is not None]
+        if len(given) == 2 or (self.count is not None and given == ["times"]):
+            raise SceneError(
+                f"a source needs one of rate, times and count (count may go with a rate), got "
+                f"{' and '.join([*given, *['count'] * (self.count is not None)])}"
+            )
+        if not given and self.count is None:
+            raise SceneError("a source needs one of rate, times and count, got none")
+        if self.rate is not None:
+            checks.assign(self, rate=checks.positive("rate", self.rate))
+        if self.count is not None:
+            checks.assign(self, count=checks.count("count", self.count))
+        if checks.flag("even", self.even) and self.rate is None:
+            raise SceneError("even must go with a rate, got True without one; give rate=, or the times themselves")
+        self._check_span()
+        if self.times is not None:
+            self._check_list()
+
+    def _check_span(self) -> None:
+        checks.assign(self, start=checks.at_least("start", self.start, 0.0))
+        if self.stop is not None:
+            checks.assign(self, stop=checks.number("stop", self.stop))
+            if not self.stop >= self.start:
+                raise SceneError(f"stop must be at start = {self.start:g} s or later, got {self.stop:g}")
+
+    def _check_list(self) -> None:
+        if self.start != 0.0 or self.stop is not None:
+            raise SceneError(f"start and stop must be left out with times, got {self.start:g} and {self.stop}")
+        times = checks.array("times", self.times)
+        if times.ndim != 1 or not len(times):
+            raise SceneError(f"times must be a list of at least one time [s], got shape {times.shape}")
+        bad = np.flatnonzero(~(np.isfinite(times) & (times >= 0.0)))
+        if bad.size:
+            raise SceneError(f"times[{bad[0]}] must be a finite time of 0 s or later, got {times[bad[0]]:g}")
+        checks.assign(self, times=tuple(np.sort(times).tolist()))
+
+    def _check_velocity(self) -> None:
+        given = [name for name in ("temperature", "speed", "beam") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise SceneError(f"a source needs one of temperature, speed and beam, got {' and '.join(given) or 'none'}")
+        for name in ("temperature", "speed"):
+            if getattr(self, name) is not None:
+                checks.assign(self, **{name: checks.magnitude(name, getattr(self, name))})
+        if self.beam is not None:
+            beam = checks.vector("beam", self.beam)
+            checks.magnitude("|beam|", float(np.sqrt(np.sum(np.square(beam)))))
+            if not any(beam):
+                raise SceneError("beam must be a velocity, three numbers that are not all 0, got (0, 0, 0)")
+            checks.assign(self, beam=beam)
+        divergence = checks.at_least("divergence", self.divergence, 0.0)
+        if divergence >= _HALF_TURN:
+            raise SceneError(f"divergence must be below pi, the half angle of a cone [rad], got {divergence:g}")
+        if divergence > 0.0 and self.beam is None:
+            raise SceneError(f"divergence must go with a beam, got {divergence:g} without one; give beam=")
+        checks.assign(self, divergence=divergence)
+
+
+def checked_sources(value: Any) -> tuple[Source, ...]:
+    """The argument `sources` of a run, checked."""
+    if value is None:
+        return ()
+    given = [value] if isinstance(value, Source) else list(value) if isinstance(value, (list, tuple)) else None
+    if given is None:
+        raise SceneError(f"sources must be a list of swarm.Source, got {value!r:.200}")
+    for k, one in enumerate(given):
+        if not isinstance(one, Source):
+            raise SceneError(f"sources[{k}] must be a swarm.Source, got {one!r:.200}")
+    return tuple(given)
+
+
+def _mass(value: Any) -> float:
+    mass = checks.number("mass", value)
+    if not checks.SMALLEST <= mass <= checks.LARGEST:
+        raise SceneError(f"mass must be from {checks.SMALLEST:g} to {checks.LARGEST:g} kg, got {mass:g}")
+    return mass
+
+
+def _said(value: Any) -> str:
+    return checks.shown(value) if isinstance(value, tuple) and len(value) > 3 else repr(value)
