@@ -186,14 +186,17 @@ def _escapes(period, gravity, walls, r, v):
 def drift(seen: dict[str, Any]) -> float:
     """Change of the total energy over a run that nothing caused; relative, if there was any at the start.
 
-    Walls may take or give energy, and anchors that are led give their work.
+    Walls may take or give energy, particles that come bring theirs, and anchors that are led give their work.
     """
     energy, lost = seen["total_energy"], seen["dissipated_energy"]
     # Files of older versions have no heat, and those of particles no work.
     given = np.sum(seen.get("wall_heat", [0.0])[-1]) + seen.get("work", [0.0])[-1]
     given += np.sum(seen.get("wall_work", [0.0])[-1])
-    change = abs(energy[-1] + lost[-1] - given - energy[0])
-    return float(change / abs(energy[0]) if energy[0] else change)
+    # Those that are there at the first frame are in its energy.
+    brought = seen.get("source_energy", [0.0])
+    come = brought[-1] - brought[0]
+    change, scale = abs(energy[-1] + lost[-1] - given - come - energy[0]), abs(energy[0]) + abs(come)
+    return float(change / scale if scale else change)
 
 
 def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
@@ -209,16 +212,16 @@ def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
     sums = np.zeros((booked + more, len(partial)))
     sums[:_ENERGY_ERROR] = partial.T[:_ENERGY_ERROR]
     if state.dissipated.size:
-        _add_up(state.dissipated[None], n, sums[_ENERGY_ERROR, None])
+        add_up(state.dissipated[None], n, sums[_ENERGY_ERROR, None])
     if contacts is not None:
-        _add_up(contacts.sliding[None], n, sums[_ENERGY_ERROR + 1, None])
-    _add_up(state.impulse, n, sums[_ENERGY_ERROR + 2 : booked])
+        add_up(contacts.sliding[None], n, sums[_ENERGY_ERROR + 1, None])
+    add_up(state.impulse, n, sums[_ENERGY_ERROR + 2 : booked])
     if heat is not None:
-        _add_up(heat, n, sums[booked:])
+        add_up(heat, n, sums[booked:])
     return sums
 
 
-def _add_up(values: Floats, n: int, sums: Floats) -> None:
+def add_up(values: Floats, n: int, sums: Floats) -> None:
     """Sums of values (rows, n) over chunks into sums (rows, chunks)."""
     whole = n // CHUNK
     if whole:

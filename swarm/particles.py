@@ -74,7 +74,26 @@ class Particles:
 
     def fastest(self) -> float:
         """The largest speed [m/s]."""
-        return float(np.sqrt((self.velocity**2).sum(axis=0).max()))
+        return float(np.sqrt(np.nanmax((self.velocity**2).sum(axis=0), initial=0.0)))
+
+    def born(self) -> "Particles":
+        """Those that are there: without those of a frame of a run with sources that come later, whose rows are NaN.
+
+        Raises:
+            SceneError: nobody is there.
+        """
+        there = ~np.isnan(self.position[0])
+        image = None if self.image is None else self.image[:, there]
+        return Particles(self.position[:, there], self.velocity[:, there], self.mass[there], image)
+
+    @classmethod
+    def of_frame(
+        cls, position: Floats, velocity: Floats, mass: Floats, image: NDArray[Any] | None, there: NDArray[np.bool_]
+    ) -> "Particles":
+        """Those of a frame, checked; who is not there yet is at NaN."""
+        made = cls(np.where(there, position, 0.0), np.where(there, velocity, 0.0), mass, image)
+        made.position[:, ~there] = made.velocity[:, ~there] = np.nan
+        return made
 
     @classmethod
     def from_csv(cls, path: str | Path) -> "Particles":
@@ -98,10 +117,12 @@ class Births(NamedTuple):
     Attributes:
         time: (N,) when each comes [s], 0 of those of the start.
         source: (N,) the number of its source, -1 of those of the start.
+        sources: how many there are.
     """
 
     time: Floats
     source: NDArray[np.int32]
+    sources: int
 
     def there(self, moment: float) -> int:
         """The number of those, the first ones, that are there at a time [s]."""
@@ -230,8 +251,11 @@ def _rows(name: str, value: ArrayLike) -> Floats:
     if not (rows.max() <= checks.LARGEST and rows.min() >= -checks.LARGEST):
         good = (np.abs(rows) <= checks.LARGEST).all(axis=0)
         first = int(np.argmin(good))
+        late = "; of a frame of a run with sources take those that are there: .born()" * bool(
+            np.isnan(rows[:, first]).all()
+        )
         raise SceneError(
             f"{name} must be finite and at most {checks.LARGEST:g}, got {tuple(rows[:, first].tolist())} for particle "
-            f"{first} ({int((~good).sum())} such particles)"
+            f"{first} ({int((~good).sum())} such particles){late}"
         )
     return rows

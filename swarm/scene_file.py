@@ -112,7 +112,7 @@ def _read(file: Path, table: ParticlesTable | BodiesFile) -> "Particles | Bodies
             return trajectory.bodies(frame)
         if trajectory.body is not None:
             raise SceneError(f"from: {file} holds bodies, which are not particles; write [body] in place of it")
-        return trajectory.frame(frame)
+        return trajectory.frame(frame).born() if trajectory.has_births() else trajectory.frame(frame)
 
 
 def read(path: str | Path) -> Job:

@@ -17,7 +17,7 @@ def started(scene, times, n=0, speed=1.0):
     """Particles of which the last ones come at these times."""
     particles = swarm.fill(scene, n + len(times), speed=speed, seed=3)
     at = np.append(np.zeros(n), times)
-    particles.births = Births(at, np.where(np.arange(len(at)) < n, -1, 0).astype(np.int32))
+    particles.births = Births(at, np.where(np.arange(len(at)) < n, -1, 0).astype(np.int32), 1)
     return particles
 
 

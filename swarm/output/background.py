@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..particles import State
 from .layout import KEPT
@@ -79,11 +80,15 @@ class Background:
     """A context that gives a function which queues a copy of a frame; a thread writes all queued frames at once.
 
     When the context ends, every frame is written. An error of the writer is raised at the next frame, or at the end. Of
-    the n particles only the `kept` ones are copied.
+    the n particles only the `kept` ones are copied. Where they are `born` during the run [s], in this order, those that
+    come later are at NaN.
     """
 
-    def __init__(self, writer: Writer, n: int, kept: slice = slice(None)) -> None:
+    def __init__(
+        self, writer: Writer, n: int, kept: slice = slice(None), born: NDArray[np.float64] | None = None
+    ) -> None:
         self._writer, self._kept = writer, kept
+        self._born = None if born is None else born[kept]
         n = max(1, len(range(n)[kept]))
         # An event is set when all frames before it are written, a function is called; None is the end.
         self._frames: queue.SimpleQueue[Written | threading.Event | Job | None] = queue.SimpleQueue()
@@ -121,6 +126,9 @@ class Background:
             copy = some._replace(**{name: np.empty_like(getattr(some, name)) for name in _copied(some)})
         for name in _copied(some):
             np.copyto(getattr(copy, name), getattr(some, name))
+        if self._born is not None:
+            there = int(np.searchsorted(self._born, moment, side="right"))
+            copy.position[:, there:] = copy.velocity[:, there:] = np.nan
         self._frames.put((number, moment, copy, seen))
 
     def do(self, job: Job) -> None:

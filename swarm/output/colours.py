@@ -44,10 +44,13 @@ class Scale:
     high: float
 
     def colours(self, values: Floats) -> Colours:
-        """0xRRGGBBAA of each value."""
+        """0xRRGGBBAA of each value; of NaN, of who is not there, nothing is to be seen."""
         steps = (values - self.low) * (_STEPS / (self.high - self.low))
+        nobody = np.isnan(steps)
+        if nobody.any():
+            steps = np.where(nobody, 0.0, steps)
         places: NDArray[np.intp] = np.clip(steps, 0.0, _STEPS - 1.0).astype(np.intp)
-        return _PACKED[places]  # type: ignore[no-any-return]
+        return np.where(nobody, np.uint32(0), _PACKED[places])
 
 
 def table() -> Floats:
@@ -70,7 +73,8 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
     at_start = observables.energies(scene, law, start.mass, start.position, start.velocity)
     scale = observables.energy_scale(scene, at_start)
     if by == "speed":
-        fastest = _FASTER * math.sqrt(2.0 * scale.mean()) or 1.0
+        there = scale[~np.isnan(scale)]
+        fastest = (_FASTER * math.sqrt(2.0 * there.mean()) if there.size else 0.0) or 1.0
         # Two digits are enough on a legend.
         fastest = float(f"{fastest:.1e}")
         return Scale("speed [m/s]", 0.0, fastest), lambda _position, velocity: np.sqrt((velocity**2).sum(axis=0))
@@ -78,6 +82,11 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
         raise SceneError(
             "record_color must be 'speed' where a surface has a restitution below 1, friction, a temperature, a motion "
             "or a mass, got 'energy-error': energy that walls dissipate or give is not an error"
+        )
+    if np.isnan(scale).any():
+        raise SceneError(
+            "record_color must be 'speed' of a trajectory with sources, got 'energy-error': its first frame lacks the "
+            "energy of those that come later; record during the run"
         )
     before, inverse = at_start.total(), 1.0 / np.maximum(scale, np.finfo(np.float64).tiny)
 

@@ -190,6 +190,9 @@ def flat(
 def around(points: Floats, wires: list[tuple[bool, list[Floats]]]) -> tuple[Floats, Floats]:
     """The corners of the box around points (N, 3) and wires."""
     corners = np.vstack([points, *(curve for _solid, curves in wires for curve in curves)])
+    corners = corners[~np.isnan(corners[:, 0])]
+    if not len(corners):
+        return np.zeros(3), np.zeros(3)
     return corners.min(axis=0), corners.max(axis=0)
 
 

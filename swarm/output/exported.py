@@ -23,6 +23,8 @@ class Moment(NamedTuple):
     velocity: NDArray[Any]  # (n, 3) [m/s]
     # Further columns by their names, (n,) or (n, 3): "impacts"; where there are some, "image" and "escape_time".
     more: dict[str, NDArray[Any]]
+    ids: NDArray[np.int64]  # (n,) numbers of the particles
+    mass: NDArray[np.float64]  # (n,) [kg]
 
 
 class Exported:
@@ -60,11 +62,19 @@ class Exported:
         """Number of particles of a frame."""
         return len(self.ids)
 
-    def moments(self) -> Iterator[Moment]:
-        """The frames one after the other, each of which is written when the next is asked for."""
+    def moments(self, absent: bool = False) -> Iterator[Moment]:
+        """The frames one after the other, each of which is written when the next is asked for.
+
+        Those that come later in a run with sources are left out, or with `absent` at NaN.
+        """
         for done, (number, time) in enumerate(zip(self.numbers, self.times.tolist(), strict=True)):
             held = {name: column[self._rows] for name, column in self.trajectory.columns(number).items()}
-            yield Moment(number, time, held.pop("position"), held.pop("velocity"), held)
+            there = ~np.isnan(held["position"][:, 0])
+            if not absent and not there.all():
+                held = {name: column[there] for name, column in held.items()}
+            rows = slice(None) if absent else there
+            position, velocity = held.pop("position"), held.pop("velocity")
+            yield Moment(number, time, position, velocity, held, self.ids[rows], self.mass[rows])
             if self._progress is not None:
                 self._progress(done + 1, len(self.numbers))
 

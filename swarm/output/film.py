@@ -138,7 +138,9 @@ class _Film:
         self._changes = self._scene.moves() or self._scene.has_doors()
         self._shapes = shapes_of(self._scene, start.position)
         self._walls = _wires(self._shapes)
-        self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, start)
+        # Of those that come during the run nobody may be there at the start.
+        shown = trajectory.frame(numbers[-1]) if np.isnan(start.position[0]).any() else start
+        self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, shown)
         # With half a pixel round-off takes none away.
         dpi = _DPI * min(1.0, min(pixels) / _ROOM)
         self.picture = drawing.picture((pixels[0] + 0.5) / dpi, (pixels[1] + 0.5) / dpi)

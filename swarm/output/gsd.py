@@ -34,9 +34,9 @@ def write(chosen: Exported, path: Path) -> None:
 def _frame(
     chosen: Exported, moment: Moment, center: NDArray[np.float64], needed: NDArray[np.float64]
 ) -> gsd.hoomd.Frame:
-    n, bonds = len(chosen), chosen.bonds
+    n, bonds = len(moment.ids), chosen.bonds
     position = (moment.position - center).astype(np.float32)
-    edges = np.maximum(needed, 2.0 * abs(position).max(axis=0)).astype(np.float32)
+    edges = np.maximum(needed, 2.0 * abs(position).max(axis=0, initial=0.0)).astype(np.float32)
     # Particles that have no room in a direction, as in a plane, get some.
     edges[edges == 0.0] = edges.max() or 1.0
     edges = np.where(chosen.periods > 0.0, chosen.periods.astype(np.float32), edges)
@@ -47,13 +47,13 @@ def _frame(
     of.N, of.types, of.typeid = n, ["A"], np.zeros(n, np.uint32)
     # Rounded to float32 what is at the edge of the cell may be beyond it.
     of.position, of.velocity = position.clip(-0.5 * edges, 0.5 * edges), moment.velocity.astype(np.float32)
-    of.mass = chosen.mass.astype(np.float32)
+    of.mass = moment.mass.astype(np.float32)
     if "image" in moment.more:
         of.image = _in_32_bits(moment.more["image"], moment.number)
     if len(bonds):
         frame.bonds.N, frame.bonds.types, frame.bonds.group = len(bonds), ["bond"], bonds.astype(np.int32)
         frame.bonds.typeid = np.zeros(len(bonds), np.uint32)
-    frame.log = {"time": np.array([moment.time]), "center": center, "particles/id": chosen.ids}
+    frame.log = {"time": np.array([moment.time]), "center": center, "particles/id": moment.ids}
     frame.log |= {f"particles/{name}": column for name, column in moment.more.items() if name != "image"}
     return frame
 

@@ -72,6 +72,9 @@ def dataset_of(trajectory: Any) -> xr.Dataset:
             coordinates["particle"] = everything["id"][()]
             data["mass"] = ("particle", everything["mass"][()], {"units": "kg"})
             kept = [name for name in _PARTICLES if name in everything]
+            for name, unit in zip(layout.BIRTHS, ("s", "1"), strict=True):
+                if name in everything:
+                    data[name] = ("particle", everything[name][()], {"units": unit})
         for name in kept:
             column = _Column(trajectory, f"particles/all/{name}/value")
             label, unit = _PARTICLES[name]
@@ -85,4 +88,5 @@ def _dimensions(name: str, dimensions: int) -> list[str]:
     """The dimensions of an observable besides the time."""
     last = {None: [], 3: ["axis"], 4: ["quaternion"]}[len(COMPONENTS[name]) if name in COMPONENTS else None]
     first = next((kind for kind in ("cavity", "part") if name.startswith(kind)), "surface")
+    first = "source" if name == "born" else first
     return [first] * (dimensions - 1 - len(last)) + last

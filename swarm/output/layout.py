@@ -18,6 +18,8 @@ _ELEMENTS: dict[str, tuple[str, tuple[int, ...]]] = {
     **dict.fromkeys(PARTS, (_REAL, (3,))), COUNTS: (_INTEGER, ()), IMAGES: (_INTEGER, (3,)), ESCAPES: (_REAL, ()),
 }  # fmt: skip
 KEPT = tuple(_ELEMENTS)
+# Of each particle of a run with sources: when it came [s], and the number of its source, -1 of those of the start.
+BIRTHS = "birth_time", "birth_source"
 # Long arrays of the scene, by their digests.
 ARRAYS = "arrays"
 _TEXTS = ("scene", "method", "storage")
@@ -37,7 +39,7 @@ _OBSERVABLES: dict[str, tuple[int | None, ...]] = {
 _OF_PARTS = ("part_impulse", "part_heat")
 # Likewise, but files of older versions have none of them, or only those of bodies.
 _LATER: dict[str, tuple[int | None, ...]] = {
-    **dict.fromkeys(("sliding", "sliding_time", "link_error", "work"), ()),
+    **dict.fromkeys(("sliding", "sliding_time", "link_error", "work", "source_energy"), ()),
     **dict.fromkeys(("wall_heat", "wall_work", "wall_energy", *_OF_PARTS), (None,)),
     **dict.fromkeys(("wall_position", "wall_velocity", "wall_spin"), (None, 3)),
     "wall_orientation": (None, 4),
@@ -111,6 +113,9 @@ def _require_particles(file: Any, n: int, count: int, path: Path) -> None:
     require_fits(kept, len(kept), path)
     if (ids := dataset(file, "particles/all/id", _INTEGER, (None,))).shape != kept.shape:
         raise ValueError(f"particles/all/id must have {len(kept)} entries, got {ids.shape}")
+    for name, kind in zip(BIRTHS, (_REAL, _INTEGER), strict=True):
+        if f"particles/all/{name}" in file:
+            dataset(file, f"particles/all/{name}", kind, kept.shape)
     for name, (kinds, width) in _ELEMENTS.items():
         if name in PARTS or f"particles/all/{name}" in file:
             require_fits(dataset(file, f"particles/all/{name}/value", kinds, (n, len(kept), *width)), n, path)

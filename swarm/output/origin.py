@@ -16,7 +16,10 @@ def origin_of(scene: Scene, start: Particles) -> Floats:
     In a direction in which it is open, its centre is that of the particles at the start.
     """
     low, high = (np.array(corner) for corner in scene.bounds())
-    first, last = start.position.min(axis=1), start.position.max(axis=1)
+    there = start.position[:, ~np.isnan(start.position[0])]
+    if not there.size:
+        there = np.zeros((3, 1))
+    first, last = there.min(axis=1), there.max(axis=1)
     bounded = np.isfinite(low) & np.isfinite(high)
     low, high = np.where(bounded, low, first), np.where(bounded, high, last)
     width = float((high - low).max()) or scene.finite_size()

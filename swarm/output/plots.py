@@ -123,6 +123,8 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     """The particles, or the bodies, at the end."""
     drawn = Drawn(len(end), content.body, most)
     start = content.frames.get("start", end)
+    # Of those that come during the run nobody may be there at the start.
+    start = end if np.isnan(start.position[0]).any() else start
     scale, values = colours.colouring("speed", content.scene, content.method, start)
     position, packed, tints = drawn.coloured(end, scale, values)
     across = content.scene.across()
@@ -141,10 +143,11 @@ def _speeds(axes: Any, content: Content) -> None:
     top = 1.05 * max(frame.fastest() for frame in content.frames.values()) or 1.0
     for name, frame in content.frames.items():
         speeds = np.sqrt((frame.velocity**2).sum(axis=0))
+        speeds = speeds[~np.isnan(speeds)]
         counts, edges = np.histogram(speeds, bins=_BINS, range=(0.0, top))
         style: dict[str, Any] = {"fill": True, "alpha": 0.25} if name == "start" else {"linewidth": 1.4}
         colour = drawing.LINES[name == "end"]
-        axes.stairs(100.0 * counts / len(frame), edges, color=colour, label=name, **style)
+        axes.stairs(100.0 * counts / max(1, len(speeds)), edges, color=colour, label=name, **style)
     axes.set_yscale("log")  # at the start all may be in one bin
     whose = "speeds" if content.body is None else "speeds of points"
     axes.set_title(f"{whose}, % in each of {_BINS} bins", fontsize=10)

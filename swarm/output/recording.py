@@ -101,7 +101,10 @@ class RecordingWriter:
         self._drawn = drawn = Drawn(len(start), body, settings.particles)
         self._at_start, self._center = drawn.points(start.position), origin_of(scene, start)
         if body is None:
-            start = Particles(self._at_start, drawn.points(start.velocity), drawn.points(start.mass[None])[0])
+            there = ~np.isnan(self._at_start[0])
+            start = Particles.of_frame(
+                self._at_start, drawn.points(start.velocity), drawn.points(start.mass[None])[0], None, there
+            )
         elif settings.color != "speed":
             raise SceneError(
                 f"record_color must be 'speed' for bodies, got {settings.color!r}: their points exchange energy"

@@ -56,11 +56,20 @@ class Shape:
         return float(0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum())
 
 
+def those_there(positions: Floats) -> Floats:
+    """The positions (3, N) of particles that are there, not NaN; the origin if nobody is."""
+    there = ~np.isnan(positions[0])
+    if there.all():
+        return positions
+    return positions[:, there] if there.any() else np.zeros((3, 1))
+
+
 def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = math.inf) -> list[Shape]:
     """A shape for every surface at a time [s]; where the volume is open, as far as surfaces and particles (3, N) go.
 
     That of a surface of more than `most` bodies is empty.
     """
+    positions = those_there(positions)
     if scene.plane is not None:
         return _shapes_in_plane(scene, positions, time, most)
     walls = Grids(scene, positions, time)

@@ -2,7 +2,8 @@
 
 particles/all/{position,velocity,impacts}/{step,time,value}, value (frames, N, 3), of impacts (frames, N), since the
 start; where the scene repeats also particles/all/image, (frames, N, 3), and particles/all/box/edges, (frames, 3); where
-walls have openings particles/all/escape_time, (frames, N) [s], NaN of those inside; particles/all/{mass,id} (N,);
+walls have openings particles/all/escape_time, (frames, N) [s], NaN of those inside; particles/all/{mass,id} (N,), and
+of a run with sources particles/all/{birth_time,birth_source} (N,), where who comes later is at NaN;
 observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
 number that were run, parameters/start, a digest of them at the start, and parameters/seed, of thermal walls. Of bodies:
 parameters/body, the table of one as TOML text, parameters/copies, their number n, and connectivity/bonds (B n, 2);
@@ -11,6 +12,7 @@ writes it.
 """
 
 import functools
+import math
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -100,12 +102,15 @@ class Trajectory(Presented):
             layout.require_index(file)
 
     def frame(self, k: int) -> Particles:
-        """The particles at frame k; negative k count from the end."""
+        """The particles at frame k; negative k count from the end. Who comes later is at NaN: see `born`."""
         k = self._number(k)
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
             position, velocity = (everything[f"{name}/value"][k].T for name in layout.PARTS)
             image = everything[f"{layout.IMAGES}/value"][k].T if layout.IMAGES in everything else None
+            there = self._there(file, k)
+            if there is not None:
+                return Particles.of_frame(position, velocity, everything["mass"][()], image, there)
             return Particles(position, velocity, everything["mass"][()], image)
 
     def columns(self, k: int) -> dict[str, NDArray[Any]]:
@@ -114,7 +119,10 @@ class Trajectory(Presented):
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
             held = {name: everything[f"{name}/value"][k] for name in layout.KEPT if name in everything}
-            return held | {name: finite(held[name], "particle") for name in layout.PARTS}
+            there = self._there(file, k)
+            for name in layout.PARTS:
+                finite(held[name] if there is None else held[name][there], "particle")
+            return held
 
     def bodies(self, k: int) -> "Bodies":
         """The bodies at frame k; negative k count from the end.
@@ -178,10 +186,43 @@ class Trajectory(Presented):
                 f"got {i}"
             )
         with self._reading(f"particle {i}") as file:
-            position, velocity = (
-                finite(file[f"particles/all/{name}/value"][: self._frames, column]).T for name in layout.PARTS
-            )
-        return position, velocity
+            position, velocity = (file[f"particles/all/{name}/value"][: self._frames, column] for name in layout.PARTS)
+            born = file[f"particles/all/{layout.BIRTHS[0]}"][column] if self._comes(file) else -math.inf
+            there = self.times >= born
+            for values in (position, velocity):
+                finite(values[there])
+        return position.T, velocity.T
+
+    @staticmethod
+    def _comes(file: Any) -> bool:
+        return f"particles/all/{layout.BIRTHS[0]}" in file
+
+    def _there(self, file: Any, k: int) -> NDArray[np.bool_] | None:
+        """Who is there at frame k; None where no one comes."""
+        if not self._comes(file):
+            return None
+        return np.asarray(file[f"particles/all/{layout.BIRTHS[0]}"][()] <= float(file["parameters/time"][k]))
+
+    def has_births(self) -> bool:
+        """Whether particles come during the run."""
+        with self._reading("the births of its particles") as file:
+            return self._comes(file)
+
+    @property
+    def birth_time(self) -> NDArray[np.float64]:
+        """When each of the particles that the file keeps comes [s], (N,); 0 of those of the start."""
+        with self._reading("the births of its particles") as file:
+            if not self._comes(file):
+                return np.zeros(len(file["particles/all/mass"]))
+            return finite(file[f"particles/all/{layout.BIRTHS[0]}"][()], "particle")
+
+    @property
+    def birth_source(self) -> NDArray[np.int64]:
+        """The number of the source of each of them, (N,); -1 of those of the start."""
+        with self._reading("the sources of its particles") as file:
+            if not self._comes(file):
+                return np.full(len(file["particles/all/mass"]), -1)
+            return np.asarray(file[f"particles/all/{layout.BIRTHS[1]}"][()].astype(np.int64))
 
     @property
     def ids(self) -> NDArray[np.int64]:

@@ -27,7 +27,7 @@ def write(chosen: Exported, path: Path) -> None:
         root = begin(file, {"Vertices": np.arange(n)[:, None], "Lines": chosen.bonds}, n)
         steps = timed(root, chosen, n)
         values: dict[str, Any] = {}
-        for done, moment in enumerate(chosen.moments()):
+        for done, moment in enumerate(chosen.moments(absent=True)):
             columns = {"position": moment.position, "velocity": moment.velocity, **moment.more}
             for name, column in columns.items():
                 if name not in values:

@@ -16,7 +16,7 @@ from ..scene import Scene
 from ..version import VERSION
 from . import paths
 from .appended import AppendedFile, put
-from .layout import ARRAYS, COUNTS, ESCAPES, IMAGES, KEPT, PARTS
+from .layout import ARRAYS, BIRTHS, COUNTS, ESCAPES, IMAGES, KEPT, PARTS
 from .storage import Storage
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class TrajectoryWriter(AppendedFile):
         particles = particles if isinstance(particles, Particles) else particles.particles()
         self._kept = storage.kept(identity.get("first", 0))
         self._count, self._mass, self._text = len(particles), particles.mass[self._kept], scene_text
-        self._identity = identity
+        self._identity, self._births = identity, particles.births
         self._edges: Any = None
 
     def __enter__(self) -> WriteFrames:
@@ -110,6 +110,10 @@ class TrajectoryWriter(AppendedFile):
             self._edges = self._element("particles/all/box/edges", (3,), np.float64, (1024, 3))
         everything["mass"] = self._mass
         everything["id"] = np.arange(self._count)[self._kept]
+        if self._births is not None:
+            everything[BIRTHS[0]], everything[BIRTHS[1]] = (
+                values[self._kept] for values in (self._births.time, self._births.source)
+            )
         if self._bodies is not None:
             bonds = file.create_dataset("connectivity/bonds", data=self._bodies.bonds())
             bonds.attrs["particles_group"] = everything.ref

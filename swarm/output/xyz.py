@@ -4,6 +4,7 @@ Species are X. Lattice and Origin are there where the scene repeats: in a direct
 the length of the scene. Numbers have as many digits as give the same bits again.
 """
 
+import math
 from pathlib import Path
 
 import msgspec
@@ -23,17 +24,19 @@ def write(chosen: Exported, path: Path) -> None:
     encode = msgspec.json.Encoder().encode
     with open(path, "wb") as file:
         for moment in chosen.moments():
-            columns = {"position": moment.position, "velocity": moment.velocity, "id": chosen.ids, **moment.more}
-            columns |= {} if alike else {"mass": chosen.mass}
+            columns = {"position": moment.position, "velocity": moment.velocity, "id": moment.ids, **moment.more}
+            columns |= {} if alike else {"mass": moment.mass}
             about = [cell, "Properties=species:S:1"]
             for name, column in columns.items():
-                about[1] += f":{_NAMES.get(name, name)}:{_KINDS[column.dtype.kind]}:{column[0].size}"
+                about[1] += f":{_NAMES.get(name, name)}:{_KINDS[column.dtype.kind]}:{math.prod(column.shape[1:])}"
             about += [f"Time={moment.time!r}", f"frame={moment.number}"]
             about += [f"mass={float(chosen.mass[0])!r}"] if alike else []
-            file.write(f"{len(chosen)}\n{' '.join(filter(None, about))}\n".encode())
+            file.write(f"{len(moment.ids)}\n{' '.join(filter(None, about))}\n".encode())
             numbers = [part for column in columns.values() for part in np.atleast_2d(column.T).tolist()]
             # A writer of JSON is three times as fast as formatting by Python, with the same digits: [[1.5,2],[...]].
             rows = encode(list(zip(*numbers, strict=True)))
+            if not len(moment.ids):
+                continue
             file.write(b"X " + rows[2:-2].replace(b"],[", b"\nX ").replace(b",", b" ").replace(b"null", b"nan") + b"\n")
 
 

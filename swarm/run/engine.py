@@ -66,6 +66,7 @@ class Run(BaseRun):
         # Whole chunks, so that a thread observes what it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
         self._present = Present(particles.births, n, self._size)
+        self._present.start(self.state)
         self._ticket = np.zeros(1, np.int64)
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._phase = np.zeros(n, np.int8)
@@ -291,10 +292,10 @@ class Run(BaseRun):
             poses = self._scene.poses(self._moment)
             seen["wall_position"] = np.array([pose.position() for pose in poses])
             seen["wall_orientation"] = np.array([pose.quaternion for pose in poses])
-        return {**seen, "escaped": int(escaped)}
+        return {**seen, **self._present.observed(), "escaped": int(escaped)}
 
     def chunk_sums(self) -> NDArray[np.float64]:
-        return observables.chunk_sums(self._partial, self._seen_state(), bool(self._kinds))
+        return self._present.sums(observables.chunk_sums(self._partial, self._seen_state(), bool(self._kinds)))
 
     def _seen_state(self) -> State:
         return self._present.seen(self.state)

@@ -48,7 +48,9 @@ def writer_of(task: Task, session: Session, recorder: "Writer | None", log: Impa
     from ..output.background import Background, Several
 
     n = len(task.particles)
-    made = Background(Several(used), n) if len(used) > 1 else Background(used[0][0], n, used[0][1])
+    born = None if task.particles.births is None else task.particles.births.time
+    writer, kept = used[0] if len(used) == 1 else (Several(used), slice(None))
+    made = Background(writer, n, kept, born)
     if log is not None:
         log.queue = made.do
     return made

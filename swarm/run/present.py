@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..particles import Births, State
+from ..observables import CHUNK, add_up
+from ..particles import Births, Floats, State
 
 
 class Present:
@@ -25,6 +26,12 @@ class Present:
     def __init__(self, births: Births | None, n: int, size: int) -> None:
         self._births, self._size = births, size
         self.count, self.order = n, np.arange(math.ceil(n / size))
+        self._energy = np.empty(0)
+
+    def start(self, state: State) -> None:
+        """Take what each that comes brings, from the state at the start."""
+        if self._births is not None:
+            self._energy = np.where(self._births.source >= 0, state.mass * state.energy, 0.0)
 
     def reach(self, moment: float) -> None:
         """Those of the frame that ends at a moment [s]."""
@@ -42,6 +49,29 @@ class Present:
             return state
         return state._replace(mass=self.of(state.mass), starts=None)
 
+    def sums(self, sums: Floats) -> Floats:
+        """The sums over chunks (quantities, chunks), and behind them what those of each that have come have brought."""
+        if self._births is None:
+            return sums
+        brought = np.zeros((1, sums.shape[1]))
+        add_up(self._energy[None], self.count, brought)
+        return np.concatenate([sums, brought])
+
+    def observed(self) -> dict[str, Any]:
+        """How many have come from each source, and the energy that they have brought."""
+        if self._births is None:
+            return {}
+        source = self._births.source[: self.count]
+        chunks = math.ceil(len(self._births.time) / CHUNK)
+        brought = total_of(self.sums(np.zeros((0, chunks))))
+        born = np.bincount(source[source >= 0], minlength=self._births.sources)
+        return {"born": born.astype(np.int64), **brought}
+
     def flying(self, state: State) -> State:
         """The state as kernels know it that do not ask when particles start."""
         return state if state.starts is None else state._replace(starts=None)
+
+
+def total_of(sums: Floats) -> dict[str, Any]:
+    """What those that have come have brought, from the sums over all chunks of `Present.sums`."""
+    return {"source_energy": float(np.add.reduce(np.ascontiguousarray(sums[-1])))}

@@ -57,9 +57,8 @@ def with_births(
             before = np.zeros((3, given), np.int64) if particles.image is None else particles.image
             image = np.concatenate([before, image], axis=1)
     made = Particles(position, velocity, mass, image)
-    made.births = Births(
-        np.append(np.zeros(given), times[order]), np.append(np.full(given, -1, np.int32), number).astype(np.int32)
-    )
+    number = np.append(np.full(given, -1, np.int32), number).astype(np.int32)
+    made.births = Births(np.append(np.zeros(given), times[order]), number, len(sources))
     return made
 
 

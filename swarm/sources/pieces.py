@@ -5,6 +5,7 @@ drawn as they are. Any other piece is a quadric or a plane: lines that are unifo
 plane in a disc, meet every piece of an area equally often (Crofton), however it is turned.
 """
 
+import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -34,6 +35,8 @@ from ..surfaces.union import Joined
 Floats = NDArray[np.float64]
 Random = np.random.Generator
 Bounds = tuple[Floats, Floats]
+Draw = Callable[[Random, int], Floats]
+Placed = Callable[[Floats, Floats], Floats]
 
 
 class Piece(NamedTuple):
@@ -45,7 +48,7 @@ class Piece(NamedTuple):
     """
 
     area: float
-    draw: Callable[[Random, int], Floats]
+    draw: Draw
 
 
 def pieces_of(surface: Surface, bounds: Bounds, across: int | None) -> list[Piece]:
@@ -109,11 +112,11 @@ def _of_capsule(surface: Capsule) -> Iterator[Piece]:
 
     def ends(random: Random, n: int) -> Floats:
         out = directions(random, n)
-        return center + radius * out + 0.5 * length * axis * np.sign((out * axis).sum(axis=0))
+        return np.asarray(center + radius * out + 0.5 * length * axis * np.sign((out * axis).sum(axis=0)))
 
     def around(random: Random, n: int) -> Floats:
         angle, along_it = 2.0 * math.pi * random.random(n), length * (random.random(n) - 0.5)
-        return center + frame @ np.array([radius * np.cos(angle), radius * np.sin(angle), along_it])
+        return np.asarray(center + frame @ np.array([radius * np.cos(angle), radius * np.sin(angle), along_it]))
 
     yield Piece(4.0 * math.pi * radius**2, ends)
     yield Piece(2.0 * math.pi * radius * length, around)
@@ -165,19 +168,19 @@ def _of_outline(surface: Outlined, bounds: Bounds, across: int | None) -> Iterat
 
     for begin, end in zip(rows, np.roll(rows, -1, axis=0), strict=True):
         length, path = _side(begin, end)
-        yield Piece(
-            length * width,
-            lambda random, n, path=path: placed(path(random.random(n)), low + (high - low) * random.random(n)),
-        )
+        yield Piece(length * width, _on_side(path, placed, low, high))
     if isinstance(surface, Prism) and across is None:
         least, most = (np.array(corner) for corner in surface.boundary.corners())
         for height in (middle - 0.5 * surface.height, middle + 0.5 * surface.height):
-            yield Piece(
-                float(np.prod(most - least)),
-                lambda random, n, at=height: placed(
-                    least[:, None] + (most - least)[:, None] * random.random((2, n)), np.full(n, at)
-                ),
-            )
+            yield Piece(float(np.prod(most - least)), _on_lid(least[:, None], most[:, None], placed, height))
+
+
+def _on_side(path: Callable[[Floats], Floats], placed: Placed, low: float, high: float) -> Draw:
+    return lambda random, n: placed(path(random.random(n)), low + (high - low) * random.random(n))
+
+
+def _on_lid(least: Floats, most: Floats, placed: Placed, height: float) -> Draw:
+    return lambda random, n: placed(least + (most - least) * random.random((2, n)), np.full(n, height))
 
 
 def _side(begin: Floats, end: Floats) -> tuple[float, Callable[[Floats], Floats]]:
@@ -229,10 +232,7 @@ def _of_lines(surface: Surface, bounds: Bounds, across: int | None) -> Iterator[
             )
         roots = 1 if isinstance(wall, PlaneNumbers) else 2
         half = roots * (math.pi * radius if across is not None else 2.0 * math.pi * radius**2)
-        yield Piece(
-            half,
-            lambda random, n, levels=levels, roots=roots: _met(levels, roots, (center, radius, across), random, n),
-        )
+        yield Piece(half, functools.partial(_met, levels, roots, (center, radius, across)))
 
 
 def _smooth(surface: Surface) -> list[Any]:

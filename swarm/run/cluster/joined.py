@@ -18,10 +18,13 @@ from ...output.writer import TrajectoryWriter
 from .. import energies
 from ..machine import CHUNK_SUMS, Columns
 from ..options import Task
+from ..present import total_of
 from . import shards
 
 # The largest value of any shard is that of all; the other observables, whole numbers, add up exactly.
 _LARGEST = ("energy_error", "max_penetration", "link_error")
+# Whole numbers of each of some.
+_OF_EACH = ("born",)
 # The same of every shard.
 _COMMON = ("wall_position", "wall_orientation")
 # Frames that are read at a time.
@@ -50,12 +53,16 @@ def seen_of(folder: Path, task: Task, bounds: list[int], first: int = 0) -> Iter
 def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
     """The observables of a frame, from those of all shards."""
     sums, owners = np.hstack([part[CHUNK_SUMS] for part in parts]), task.scene.owners()
+    brought = {}
+    if task.particles.births is not None:
+        sums, brought = sums[:-1], total_of(sums)
     if task.bodies is None:
         laws = task.scene.laws()
         has_heat = laws is not None and laws.give_heat
         added = observables.summed(sums, owners, booked(task.scene.walls()), has_heat, task.scene.parts_of_rows())
     else:
         added = energies.summed(sums, owners, len(task.scene.surfaces), len(task.bodies.body.cavities))
+    added |= brought
     seen: dict[str, Any] = {}
     # In the order of a run on one machine.
     for name in (name for name in parts[0] if name != CHUNK_SUMS):
@@ -65,7 +72,10 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
             seen[name] = parts[0][name]
         else:
             values = [part[name] for part in parts]
-            seen[name] = max(values).item() if name in _LARGEST else int(sum(values))
+            if name in _LARGEST:
+                seen[name] = max(values).item()
+            else:
+                seen[name] = np.sum(values, axis=0) if name in _OF_EACH else int(sum(values))
     return seen
 
 

@@ -22,13 +22,14 @@ from ...errors import SceneError
 from ...methods.base import Method
 from ...observables import CHUNK
 from ...output import paths
-from ...particles import Multipliers, Particles
+from ...particles import Births, Multipliers, Particles
 from ...scene import Scene
 from ..machine import End, birth_times
 from ..options import RunOptions, Task
 
 _SUFFIX = ".shards"
 _ARRAYS = ("position", "velocity", "mass", "image")
+_BIRTHS = ("birth_time", "birth_source")
 
 
 class Whole(NamedTuple):
@@ -83,6 +84,9 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
         array = getattr(task.particles, name)
         if array is not None and not (name == "mass" and body):
             _replace(folder / f"{name}.npy", functools.partial(_save, array))
+    if task.particles.births is not None:
+        for name, array in zip(_BIRTHS, task.particles.births, strict=False):
+            _replace(folder / f"{name}.npy", functools.partial(_save, array))
 
 
 def _save(*arrays_and_file: Any) -> None:
@@ -120,7 +124,7 @@ def clear(folder: Path) -> None:
 def _names(name: str) -> set[str]:
     """The first words of our files; those of locks and of parts begin with a point."""
     word = name.partition(".")[0]
-    return {"", "whole", *_ARRAYS, *([word] if word.isdigit() else [])}
+    return {"", "whole", *_ARRAYS, *_BIRTHS, *([word] if word.isdigit() else [])}
 
 
 def tidy(folder: Path, count: int) -> None:
@@ -141,11 +145,15 @@ def task_of(folder: Path, k: int) -> tuple[Task, int]:
     with open(folder / "whole.pickle", "rb") as file:
         whole: Whole = cloudpickle.load(file)
     first, last = whole.bounds[k : k + 2]
-    files = {name: folder / f"{name}.npy" for name in _ARRAYS}
+    files = {name: folder / f"{name}.npy" for name in (*_ARRAYS, *_BIRTHS)}
     arrays = {name: np.load(file, mmap_mode="r") for name, file in files.items() if file.exists()}
     bodies = None
     if whole.body is None:
-        particles = Particles(**{name: array[..., first:last] for name, array in arrays.items()})
+        some = {name: array[..., first:last] for name, array in arrays.items()}
+        born = [np.array(some.pop(name)) for name in _BIRTHS if name in some]
+        particles = Particles(**some)
+        if born:
+            particles.births = Births(born[0], born[1], len(whole.options.sources))
     else:
         shape = 3, len(whole.body), -1
         position, velocity = (np.array(arrays[name].reshape(shape)[..., first:last], order="C") for name in _ARRAYS[:2])
