@@ -22,6 +22,7 @@ class Snapshot:
         read: gives "position", "velocity", "mass", "impacts", and "image" and "escape_time" or None for either.
         gravity: [m/s^2], or None.
         period: of the scene [m], or None.
+        there: how many of them, the first ones, are there; None for all.
         copies: whether what is read is copied, so that it stays as it is.
     """
 
@@ -30,9 +31,11 @@ class Snapshot:
         read: Read | None,
         gravity: Vector | None = None,
         period: tuple[float | None, ...] | None = None,
+        there: int | None = None,
         copies: bool = False,
     ) -> None:
         self._read, self._gravity, self._period, self._copies = read, gravity, period, copies
+        self._there = slice(there)
         self._known: dict[str, Any] = {}
         self._views: dict[str, NDArray[Any]] = {}
 
@@ -51,12 +54,13 @@ class Snapshot:
             )
         if name == "energy":
             self._known[name] = self._energy(frame)
-        elif name == "escape_time" and self._read(name) is None:
-            self._known[name] = np.broadcast_to(np.nan, len(self._read("mass")))
-        elif (given := self._read(name)) is None or self._copies:
-            self._known[name] = None if given is None else _locked(np.array(given))
+        elif (given := self._read(name)) is None:
+            n = len(self._read("mass")[self._there])
+            self._known[name] = np.broadcast_to(np.nan, n) if name == "escape_time" else None
+        elif self._copies:
+            self._known[name] = _locked(np.array(given[..., self._there]))
         else:
-            self._views[name] = _view_of(given)
+            self._views[name] = _view_of(given[..., self._there])
         return self._known.get(name, self._views.get(name))
 
     def _energy(self, frame: str) -> NDArray[np.float64]:

@@ -1,6 +1,7 @@
 """A run on this machine: the loop over frames, and their observers."""
 
 import contextlib
+import functools
 import logging
 import time
 from collections.abc import Iterator
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 from .. import interrupt
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
-from ..particles import Multipliers, Particles, State
-from ..snapshot import Snapshot
+from ..particles import Multipliers, Particles
+from ..snapshot import Read, Snapshot
 from .base import BaseRun
 from .bodies import BodyRun
 from .compiling import Compilations
@@ -100,7 +101,8 @@ def carry_out_task(task: Task, session: Session) -> End:
                         session.look(run, writer, number - 1, before, moment)
                 seen = {"time": moment, **run.seen()}
                 run.require_admissible(seen, moment)
-                seen |= measures.of(number, moment, snapshot_of(task, run.state))
+                read = functools.partial(getattr, run.state)
+                seen |= measures.of(number, moment, _snapshot_of(task, read, moment))
                 # Those of a shard are joined to those of the others.
                 if task.is_shard:
                     seen[CHUNK_SUMS] = run.chunk_sums()
@@ -109,7 +111,7 @@ def carry_out_task(task: Task, session: Session) -> End:
                 if log is not None:
                     log.ends[number] = log.total
                 write(number, moment, run.state, seen)
-                shown = snapshot_of(task, run.state, copies=True)
+                shown = _snapshot_of(task, read, moment, copies=True)
                 show.frame(Frame(number, moment, until, seen, writer.written if writer else 0, shown))
                 shown.end()
                 if moment < until:
@@ -163,12 +165,14 @@ def start_of(task: Task) -> Snapshot:
     """The particles of a run at its start."""
     arrays: dict[str, Any] = {name: getattr(task.particles, name) for name in ("position", "velocity", "mass", "image")}
     arrays["impacts"] = np.zeros(len(task.particles), np.int64)
-    return Snapshot(arrays.get, task.scene.gravity, task.scene.period)
+    return _snapshot_of(task, arrays.get, 0.0)
 
 
-def snapshot_of(task: Task, state: State, copies: bool = False) -> Snapshot:
-    """The particles of a run as they are now."""
-    return Snapshot(lambda name: getattr(state, name), task.scene.gravity, task.scene.period, copies)
+def _snapshot_of(task: Task, read: Read, moment: float, copies: bool = False) -> Snapshot:
+    """The particles of a run that are there at a moment [s]."""
+    scene, births = task.scene, task.particles.births
+    there = None if births is None else births.there(moment)
+    return Snapshot(read, scene.gravity, scene.period, there, copies)
 
 
 def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
