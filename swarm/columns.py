@@ -20,6 +20,16 @@ _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*")
 # Columns of numbers above 0.
 _POSITIVE = {"mass", "radius", "length", "half_x", "half_y", "half_z", "a", "b", "c"}
 
+# The names of all that runs have, which functions of one's own cannot take.
+NAMES = frozenset((
+    "absorbed", "angular_momentum", "born", "cavity_impulse", "chunk_sums", "contact_energy", "crossed_energy",
+    "crossed_momentum", "crossings", "dissipated_energy", "energy_error", "escaped", "impacts", "impulse",
+    "kinetic_energy", "link_error", "max_penetration", "member_absorbed", "member_heat", "member_impacts",
+    "member_residence", "momentum", "part_heat", "part_impulse", "potential_energy", "sliding", "sliding_time",
+    "source_energy", "sweeps", "time", "total_energy", "unconverged", "wall_energy", "wall_heat",
+    "wall_orientation", "wall_position", "wall_spin", "wall_velocity", "wall_work", "work",
+))  # fmt: skip
+
 # What the last axis of an observable, or of a column of a log, is where it is neither a surface nor a cavity.
 COMPONENTS = dict.fromkeys(
     (

@@ -1,16 +1,20 @@
-"""The frames of a run: their times, their size, and the record of each for progress displays."""
+"""The frames of a run: their times, their size, and the record of each for progress displays and functions."""
 
 import copy
 import logging
 import math
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from . import checks
 from .errors import SceneError
+from .snapshot import NOTHING, Snapshot
 
 _LOG = logging.getLogger("swarm")
 # A frame nearer to `until` than this fraction of `every` is the last one.
@@ -21,15 +25,75 @@ _MOST = 1e300
 _NUMBERS, _OBJECTS, _SURFACE = 200, 3000, 16
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
-    """A finished frame, for progress displays."""
+    """A finished frame: what `progress` and the functions of `observables` are called with, and `Result.frames` gives.
+
+    The arrays of particles cannot be written. In a function of `observables` they are the run's own, which the next
+    frame changes: what it returns is copied. Anywhere else they are copies, made when they are first read; `progress`
+    reads them during its call. Of bodies the particles are all points, of a trajectory those that it keeps.
+
+    Attributes:
+        number, time: of the frame, from 0 on, and [s].
+        until: the end of the run [s].
+        observables: those of this frame, by their names; in a function of `observables` not yet there.
+        written: number of frames in the trajectory.
+
+    >>> import swarm
+    >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    >>> def mean_radius(frame):
+    ...     return (frame.position**2).sum(axis=0).mean() ** 0.5
+    >>> start = swarm.fill(cavity, 1000, speed=1.0, seed=1)
+    >>> run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, observables={"mean_radius": mean_radius})
+    >>> run.observables["mean_radius"].round(2)
+    array([0.38, 0.39])
+    """
 
     number: int
     time: float
     until: float
     observables: dict[str, Any]
-    written: int = 0  # number of frames in the trajectory
+    written: int = 0
+    arrays: Snapshot = field(default=NOTHING, repr=False)
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """(3, N) [m]; where the scene repeats, in the cell."""
+        return np.asarray(self._read("position"))
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """(3, N) [m/s]."""
+        return np.asarray(self._read("velocity"))
+
+    @property
+    def mass(self) -> NDArray[np.float64]:
+        """(N,) [kg]."""
+        return np.asarray(self._read("mass"))
+
+    @property
+    def energy(self) -> NDArray[np.float64]:
+        """(N,) kinetic energy and that in gravity [J]."""
+        return np.asarray(self._read("energy"))
+
+    @property
+    def impacts(self) -> NDArray[np.int64]:
+        """(N,) how many each has had since 0 s."""
+        return np.asarray(self._read("impacts"))
+
+    @property
+    def escape_time(self) -> NDArray[np.float64]:
+        """(N,) when each has passed an opening of a wall [s]; NaN of those inside."""
+        return np.asarray(self._read("escape_time"))
+
+    @property
+    def image(self) -> NDArray[np.int64] | None:
+        """(3, N) how many cells away each is where the scene repeats, else None."""
+        found: NDArray[np.int64] | None = self._read("image")
+        return found
+
+    def _read(self, name: str) -> Any:
+        return self.arrays.read(name, f"frame {self.number}")
 
     def apart(self) -> "Frame":
         """A copy with its own observables, which the receiver may change."""
@@ -77,7 +141,9 @@ class FrameTimes:
             before = number * self.every
         yield self.count - 1, before, self.until
 
-    def require_room(self, first: int, target: Path | None, numbers: int, surfaces: int, packed: bool) -> None:
+    def require_room(
+        self, first: int, target: Path | None, numbers: int, surfaces: int, packed: bool, more: int = 0
+    ) -> None:
         """Raise a SceneError if the frames from `first` on do not fit on the disk or, without a file, in memory.
 
         Args:
@@ -86,13 +152,14 @@ class FrameTimes:
             numbers: bytes of the particles in a frame.
             surfaces: their number.
             packed: whether these are compressed, so that their size is unknown; observables never are.
+            more: bytes of the observables of a frame that not every run has.
         """
         frames = self.count - first
         if target is None:
-            size = least = frames * (_OBJECTS + _SURFACE * surfaces)
+            size = least = frames * (_OBJECTS + _SURFACE * surfaces + more)
             room, where = checks.memory(), "this machine's memory"
         else:
-            least = frames * (_NUMBERS + _SURFACE * surfaces)
+            least = frames * (_NUMBERS + _SURFACE * surfaces + more)
             size = least + frames * numbers
             least = least if packed else size
             there = target.stat().st_size if target.exists() else 0

@@ -60,8 +60,11 @@ def dataset_of(trajectory: Any) -> xr.Dataset:
     }
     if parts := names_of_parts(trajectory.scene):
         coordinates["part"] = parts
+    own = trajectory.own_observables
     for name, values in trajectory.observables.items():
-        if name != "time":
+        if name in own:
+            data[name] = (("time", *(f"{name}_{axis}" for axis in range(values.ndim - 1))), values)
+        elif name != "time":
             unit = next((unit for end, unit in _UNITS.items() if name.endswith(end)), "1")
             data[name] = (("time", *_dimensions(name, values.ndim)), values, {"units": unit})
     if any("quaternion" in dimensions for dimensions, *_rest in data.values()):

@@ -56,7 +56,7 @@ def frames(file: Any, path: Path) -> int:
 
     While a file is being written, a dataset may have more entries than there are complete frames, never fewer.
     """
-    for name in (f"parameters/{text}" for text in (*_TEXTS, "scene_file", "start", "body")):
+    for name in (f"parameters/{text}" for text in (*_TEXTS, "scene_file", "start", "body", "observables")):
         if name in file and (h5py.check_string_dtype(dataset(file, name).dtype) is None or file[name].shape != ()):
             raise ValueError(f"{name} must be a text")
     for name in ("parameters/seed", "parameters/copies"):
@@ -70,7 +70,7 @@ def frames(file: Any, path: Path) -> int:
     if "observables" in file:
         for name in file["observables"]:
             value = dataset(file, f"observables/{name}/value", _NUMBER)
-            if value.ndim not in (1, 2, 3) or value.shape[0] < n:
+            if value.ndim not in (1, 2, 3, 4) or value.shape[0] < n:
                 raise ValueError(f"observables/{name} must have {n} frames, got the shape {value.shape}")
             require_fits(value, n, path)
     if "particles/all" in file:

@@ -5,7 +5,8 @@ start; where the scene repeats also particles/all/image, (frames, N, 3), and par
 walls have openings particles/all/escape_time, (frames, N) [s], NaN of those inside; particles/all/{mass,id} (N,), and
 of a run with sources particles/all/{birth_time,birth_source} (N,), where who comes later is at NaN;
 observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
-number that were run, parameters/start, a digest of them at the start, and parameters/seed, of thermal walls. Of bodies:
+number that were run, parameters/start, a digest of them at the start, parameters/seed, of thermal walls, and
+parameters/observables, the names of those of one's own, if there are any. Of bodies:
 parameters/body, the table of one as TOML text, parameters/copies, their number n, and connectivity/bonds (B n, 2);
 point p of copy i is particle p n + i. All elements share one step and one time dataset by hard links. writer.py
 writes it.
@@ -76,13 +77,19 @@ class Trajectory(Presented):
 
     def observables_of(self, some: slice) -> dict[str, NDArray[Any]]:
         """All observables of some frames but their times."""
-        seen = {}
+        seen, own = {}, self.own_observables
         with self._reading("its observables") as file:
             group = file.get("observables", {})
             for name in group:
                 with self._reading(f"its observable {name}"):
-                    seen[name] = finite(group[name]["value"][some])
+                    read = group[name]["value"][some]
+                    seen[name] = read if name in own else finite(read)
         return seen
+
+    @property
+    def own_observables(self) -> list[str]:
+        """The names of the observables of one's own; these may be NaN."""
+        return self._text("observables").split(", ") if self._has("parameters/observables") else []
 
     def observed(self) -> dict[str, NDArray[Any]]:
         """The observables, checked to include those of every run."""

@@ -1,6 +1,7 @@
 """A run on this machine: the loop over frames, and their observers."""
 
 import contextlib
+import functools
 import logging
 import time
 from collections.abc import Iterator
@@ -14,12 +15,14 @@ from .. import interrupt
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
 from ..particles import Multipliers, Particles
+from ..snapshot import Read, Snapshot
 from .base import BaseRun
 from .bodies import BodyRun
 from .compiling import Compilations
 from .doors import DoorRun
 from .engine import Run
 from .impacts import log_of
+from .measures import Measures
 from .options import Task
 from .outputs import recorder_of, writer_of
 from .overlaps import warn_of_overlap
@@ -85,7 +88,7 @@ def carry_out_task(task: Task, session: Session) -> End:
     if not task.is_shard:
         warn_of_overlap(task.scene)
     until, span_of, kept = task.options.until, task.method.span, Columns()
-    with _begun(task, session) as (run, writer, show, (log, tally)):
+    with _begun(task, session) as (run, writer, show, (log, tally), measures):
         with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
             for number, before, moment in session.frames(task.options.times):
                 if number == 0:
@@ -98,16 +101,20 @@ def carry_out_task(task: Task, session: Session) -> End:
                         show.within(before + run.share_done(span) * (moment - before), until)
                         session.look(run, writer, number - 1, before, moment)
                 seen = {"time": moment, **run.seen()}
+                run.require_admissible(seen, moment)
+                read = functools.partial(getattr, run.state)
+                seen |= measures.of(number, moment, _snapshot_of(task, read, moment))
                 # Those of a shard are joined to those of the others.
                 if task.is_shard:
                     seen[CHUNK_SUMS] = run.chunk_sums()
                 else:
                     kept.add(seen)
-                run.require_admissible(seen, moment)
                 if log is not None:
                     log.ends[number] = log.total
                 write(number, moment, run.state, seen)
-                show.frame(Frame(number, moment, until, seen, writer.written if writer else 0))
+                shown = _snapshot_of(task, read, moment, copies=True)
+                show.frame(Frame(number, moment, until, seen, writer.written if writer else 0, shown))
+                shown.end()
                 if moment < until:
                     session.look(run, writer, number, moment, None)
         session.finish()
@@ -115,7 +122,7 @@ def carry_out_task(task: Task, session: Session) -> End:
 
 
 @contextlib.contextmanager
-def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display, Watched]]:
+def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display, Watched, Measures]]:
     """A run at its start or its checkpoint, its `Background` writer or None, and who else observes it.
 
     Until the context ends signals stop the run, and its files are locked.
@@ -134,11 +141,39 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
     shown, compilations = display(task.options.progress), Compilations()
     with session, interrupt.taken_by(stop), shown as show, kernels_compiled(show.compiling, compilations.sentence):
         session.prepare(task, watched.log)
-        _require_room(task, session)
+        measures = _measures_of(task, session)
+        _require_room(task, session, measures.size())
         runs.append(run := run_of(task, watched))
         compilations.calls = run.calls
         session.restore(run)
-        yield run, writer_of(task, session, recorder, watched.log), show, watched
+        yield run, writer_of(task, session, recorder, watched.log), show, watched, measures
+
+
+def _measures_of(task: Task, session: Session) -> Measures:
+    """The functions of one's own of a run, tried with its start, or with the shapes that its trajectory holds."""
+    made = Measures(task.options.observables, task.options.until)
+    if made and session.first == 0:
+        made.begin(0, 0.0, start_of(task))
+    elif made:
+        from ..output.trajectory import load
+
+        with load(task.options.trajectory) as written:
+            made.expect({name: values.shape[1:] for name, values in written.observables_of(slice(1)).items()})
+    return made
+
+
+def start_of(task: Task) -> Snapshot:
+    """The particles of a run at its start."""
+    arrays: dict[str, Any] = {name: getattr(task.particles, name) for name in ("position", "velocity", "mass", "image")}
+    arrays["impacts"] = np.zeros(len(task.particles), np.int64)
+    return _snapshot_of(task, arrays.get, 0.0)
+
+
+def _snapshot_of(task: Task, read: Read, moment: float, copies: bool = False) -> Snapshot:
+    """The particles of a run that are there at a moment [s]."""
+    scene, births = task.scene, task.particles.births
+    there = None if births is None else births.there(moment)
+    return Snapshot(read, scene.gravity, scene.period, there, copies)
 
 
 def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
@@ -183,11 +218,11 @@ def _meanwhile(session: Session, writer: "Background | None", show: Display) -> 
     return writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
 
 
-def _require_room(task: Task, session: Session) -> None:
+def _require_room(task: Task, session: Session, more: int) -> None:
     """Raise a SceneError if the frames do not fit on the disk or in memory."""
     options, storage = task.options, task.options.storage
     numbers, packed = storage.bytes_of(len(task.particles)), storage.compression != "none"
-    options.times.require_room(session.first, options.trajectory, numbers, len(task.scene.surfaces), packed)
+    options.times.require_room(session.first, options.trajectory, numbers, len(task.scene.surfaces), packed, more)
 
 
 def read_back(trajectory: Path) -> dict[str, NDArray[Any]]:

@@ -17,6 +17,7 @@ from ..output.storage import Storage
 from ..particles import Particles
 from ..scene import Scene
 from ..sources.source import checked_sources
+from . import measures
 from .tiers import CHOICES
 
 # At shorter intervals [s] a run would do little but save checkpoints.
@@ -45,6 +46,7 @@ class RunOptions:
     impacts: Any = None
     impact_particles: Any = "all"
     member_impacts: bool = field(default=False, metadata=_OF_A_SESSION)
+    observables: Any = field(default=None, metadata=_OF_A_SESSION)  # then functions by their names
     record_particles: int = 5000
     record_color: str = "speed"
     record_megabytes: float = 100.0
@@ -84,6 +86,7 @@ class RunOptions:
             raise SceneError(f"shards must be None without a cluster, got {self.shards}; give cluster=")
         checks.one_of("compile", self.compile, CHOICES)
         checks.flag("member_impacts", self.member_impacts)
+        object.__setattr__(self, "observables", measures.checked(self.observables))
         self._check_impacts()
         object.__setattr__(self, "seed", checks.seed("seed", self.seed))
         object.__setattr__(self, "sources", checked_sources(self.sources))

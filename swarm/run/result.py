@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from ..output.sequence import Frames
+
 
 @dataclass(frozen=True, repr=False)
 class Result:
@@ -90,6 +92,23 @@ class Result:
             SceneError: pandas is not installed.
         """
         return frame_of(self.observables)
+
+    @property
+    def frames(self) -> "Frames":
+        """The frames of the trajectory: a sequence of `Frame`, whose particles are read when they are asked for.
+
+        Raises:
+            SceneError: the run has no trajectory, or it is gone or damaged.
+        """
+        if self.trajectory is None:
+            raise SceneError(
+                "frames are those of the trajectory, and this run has written none; give trajectory=, or take what is "
+                "needed of each frame by progress= or observables="
+            )
+        from ..output.sequence import Frames
+        from ..output.trajectory import load
+
+        return Frames(load(self.trajectory))
 
     def plot(self, *, particles: int = 5000, figsize: tuple[float, float] = (12.0, 6.0)) -> "Figure":
         """Draw the run in one picture; see `Trajectory.plot`.

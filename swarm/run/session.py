@@ -90,6 +90,7 @@ class Session:
         body = "" if task.bodies is None else body_text(task.bodies.body)
         self.identity = {"start": task.start or checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
         self.identity |= {"first": task.first} if task.is_shard else {}
+        self.identity |= {"observables": ", ".join(task.options.observables)} if task.options.observables else {}
         self._log = log
         if log is not None:
             paths.check_target(impacts, overwrite or self._resumes, "impacts")
@@ -128,6 +129,7 @@ class Session:
         with load(trajectory) as before:
             texts: dict[str, Any] = before.descriptions
             identity: dict[str, Any] = {"particles": before.count, "start": before.start, "seed": before.seed}
+            identity["observables"] = ", ".join(before.own_observables)
             there = dataclasses.replace(self._job, **texts, **identity)
             frames, last = len(before), before.times[-1:]
         if not there.start:

@@ -1,7 +1,7 @@
 """From a scene to frames, on this machine or on a cluster."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..bodies.state import Bodies
@@ -29,6 +29,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     impacts: str | os.PathLike[str] | None = None,
     impact_particles: str | int | Sequence[int] = "all",
     member_impacts: bool = False,
+    observables: Mapping[str, Callable[[Frame], Any]] | None = None,
     record_particles: int = 5000,
     record_color: str = "speed",
     record_megabytes: float = 100.0,
@@ -71,12 +72,17 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         impacts: HDF5 file for a log of every impact, by Impact; see `load_impacts`. Its folder must exist.
         impact_particles: those whose impacts it has, "all", k for every k-th one, or a list of their numbers.
         member_impacts: True to count the impacts on each member of each surface, by Impact; see `Result`.
+        observables: functions of one's own by their names, each called with every `Frame`: what they return, a number,
+            or an array of the same shape at every frame, is an observable as the others are, in float64; NaN says that
+            there is none. They are tried with the start before anything is compiled, and are given all particles, also
+            on a cluster, where the client calls them when the shards have ended.
         record_particles: the most particles recorded, evenly chosen.
         record_color: what their colour shows, "speed" or "energy-error".
         record_megabytes: largest size of the recording, above 0; of too many frames every k-th is recorded.
         live: True to show the run in a Rerun viewer on this machine, or the URL of a viewer.
         threads: number of threads; None: all cores this process may use. Results have the same bits for any number.
-        progress: True for a progress bar, or a function that is called with every `Frame`.
+        progress: True for a progress bar, or a function that is called with every `Frame`, which has the
+            particles.
         overwrite: replace an existing recording, and an existing trajectory as soon as the first frame is complete.
         scene_text: the scene file's text, kept in the trajectory; None: it is written from the objects.
         block_size: particles that a thread takes at a time. Results do not depend on it.

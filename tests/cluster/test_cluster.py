@@ -273,6 +273,9 @@ REFUSED = {
     "no trajectory": ({"trajectory": None}, "trajectory must be given with a cluster"),
     "a recording": ({"recording": "run.rrd"}, "recording and live must be left out with a cluster"),
     "a log": ({"impacts": "log.h5"}, "impacts must be None with a cluster"),
+    "float32": ({"observables": {"one": lambda frame: 1.0}, "precision": "float32"}, "observables need all particles"),
+    "some frames": ({"observables": {"one": lambda frame: 1.0}, "frames": 2}, "observables need all particles"),
+    "a function": ({"observables": {"one": lambda frame: "1"}}, r"observables\['one'\] must return a number"),
     "no cluster": ({"cluster": "local:0"}, "cluster must be"),
     "another type": ({"cluster": 4}, "cluster must be"),
     "no answer": ({"cluster": "tcp://127.0.0.1:9"}, "must answer within 0.3 s"),
@@ -322,6 +325,23 @@ def test_storage_that_is_not_shared_is_named(client, tmp_path, monkeypatch):
         connection.require_shared(Elsewhere(), tmp_path)
     connection.require_shared(client, tmp_path)
     assert not list(tmp_path.glob(".swarm-storage.*"))
+
+
+def test_functions_of_frames_are_given_the_particles_of_all_shards(client, tmp_path):
+    def spread(frame):
+        return (frame.position * frame.velocity).sum(axis=1)
+
+    ends, shown = [], []
+    for where, path in ((None, tmp_path / "one.h5"), (client, tmp_path / "many.h5")):
+        ends.append(
+            swarm.simulate(
+                *cavity(), until=2.0, every=0.5, compile="never", trajectory=path, cluster=where,
+                observables={"spread": spread}, progress=lambda frame: shown.append(spread(frame)),
+            )
+        )  # fmt: skip
+    one, many = (end.observables["spread"] for end in ends)
+    assert one.shape == (5, 3)
+    assert one.tobytes() == many.tobytes() == np.array(shown[:5]).tobytes() == np.array(shown[5:]).tobytes()
 
 
 def test_lines_of_progress_come_from_a_cluster_too(client, tmp_path, capsys):

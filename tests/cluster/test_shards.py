@@ -11,6 +11,7 @@ from swarm.output import paths
 from swarm.run import machine
 from swarm.run.admission import task_of
 from swarm.run.cluster import Sharded, joined, shards, worker
+from swarm.run.measures import Measures
 from swarm.run.options import RunOptions
 from swarm.run.session import Session
 
@@ -74,6 +75,12 @@ def bodies():
     return scene, start, swarm.Impact(dt=0.05)
 
 
+# Sums whose last bits depend on the order of the particles.
+OWN = {
+    "energy": lambda frame: (frame.energy * frame.position).sum(axis=1),
+    "late": lambda frame: np.nansum(frame.escape_time) + (frame.impacts[1:] * frame.mass[:-1]).sum(),
+    "cells": lambda frame: 0.0 if frame.image is None else frame.image @ frame.mass,
+}
 CASES = {
     "sphere": (sphere, {}),
     "every seventh in float32": (sphere, {"frames": 7, "precision": "float32", "compression": "gzip"}),
@@ -84,9 +91,10 @@ CASES = {
     "sliding": (sliding, {}),
     "penalty": (penalty, {"until": 0.2, "every": 0.1}),
     "loops": (loops, {"until": 0.1, "every": 0.05}),
-    "openings": (openings, {}),
+    "openings": (openings, {"observables": OWN}),
+    "a cell": (periodic, {"observables": OWN}),
     "moving": (moving, {}),
-    "bodies": (bodies, {"until": 0.1, "every": 0.05}),
+    "bodies": (bodies, {"until": 0.1, "every": 0.05, "observables": OWN}),
 }
 
 
@@ -103,7 +111,8 @@ def on_a_cluster(monkeypatch):
             folder, bounds = session.begin(task, count)
             for k in range(len(bounds) - 1):
                 assert worker.advance(folder, k) == ("complete", "")
-            observables = joined.join(folder, task, bounds, session.identity)
+            measures = Measures(options.observables, options.until)
+            observables = joined.join(folder, task, bounds, session.identity, measures)
             end = shards.joined_end(folder, task, bounds)
             session.finish()
         written = machine.read_back(options.trajectory)

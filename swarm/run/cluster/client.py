@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from ... import interrupt
 from ...errors import RunError, SceneError, WallTimeError
 from ...frames import Frame
-from ..machine import End, warn_open
+from ..machine import End, start_of, warn_open
+from ..measures import Measures
 from ..options import Task
 from ..overlaps import warn_of_overlap
 from ..progress import Display, display
@@ -54,6 +55,12 @@ def _require_shards(task: Task) -> None:
             f"impacts must be None with a cluster, whose shards keep no common log, got {options.impacts}; run without "
             "a cluster"
         )
+    if options.observables and (options.frames, options.precision) != ("all", "float64"):
+        raise SceneError(
+            "observables need all particles with a cluster, which are read from the files of its shards: frames must "
+            f'be "all" and precision "float64", got {options.frames!r} and {options.precision!r}; or run without a '
+            "cluster"
+        )
     for i in (i for i, surface in enumerate(task.scene.surfaces) if surface.reacts()):
         raise SceneError(
             f"surfaces[{i}] must not react with a cluster: through a wall that has a mass or an inertia every particle "
@@ -80,11 +87,13 @@ def carry_out(task: Task, session: Sharded) -> End:
     stopped = threading.Event()
     with session, interrupt.taken_by(stopped.set):
         session.prepare_shards(task)
+        measures = Measures(task.options.observables, task.options.until)
+        measures.begin(0, 0.0, start_of(task))
         with connection.connected(task.options.cluster, stopped) as client, display(task.options.progress) as show:
             connection.require_same_versions(client)
             connection.require_shared(client, target.parent)
             one = _Run(task, session, client, stopped, show)
-            observables = one.wait()
+            observables = one.wait(measures)
         end = shards.joined_end(one.folder, task, one.bounds)
         session.finish()
         return end._replace(observables=observables, wall_time=session.wall_time())
@@ -119,7 +128,7 @@ class _Run:
         else:
             self._shares[said["shard"]] = said["share"]
 
-    def wait(self) -> dict[str, NDArray[Any]]:
+    def wait(self, measures: Measures) -> dict[str, NDArray[Any]]:
         """The observables of all frames, when all shards have ended: they are joined also where some were stopped."""
         failed, stops, told = "", False, -math.inf
         try:
@@ -140,7 +149,7 @@ class _Run:
         finally:
             self._client.unsubscribe_topic(self._token)
             self._client.cancel(list(self._left))
-        seen = joined.join(self.folder, self._task, self.bounds, self._session.identity)
+        seen = joined.join(self.folder, self._task, self.bounds, self._session.identity, measures)
         self._follow()
         frames = len(seen["time"]) if seen else 0
         moment = float(seen["time"][-1]) if seen else 0.0
@@ -187,6 +196,6 @@ class _Run:
         if not self._task.options.progress:
             return  # to read them takes time from workers of this machine
         until = self._task.options.times.until
-        for count, seen in joined.seen_of(self.folder, self._task, self.bounds, self._seen):
-            self._show.frame(Frame(self._seen, seen["time"], until, seen, count))
+        for count, seen, particles in joined.seen_of(self.folder, self._task, self.bounds, self._seen):
+            self._show.frame(Frame(self._seen, seen["time"], until, seen, count, particles))
             self._seen += 1

@@ -3,6 +3,7 @@
 It is read as that of one run. The shards are named relative to it: it can be moved together with their folder.
 """
 
+import functools
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,10 +14,13 @@ from numpy.typing import NDArray
 
 from ... import observables
 from ...lanes.arrays import booked
-from ...output.trajectory import load
+from ...output.sequence import values_of
+from ...output.trajectory import Trajectory, load
 from ...output.writer import TrajectoryWriter
+from ...snapshot import Snapshot
 from .. import energies
 from ..machine import CHUNK_SUMS, Columns
+from ..measures import NONE, Measures
 from ..options import Task
 from ..present import total_of
 from . import shards
@@ -31,8 +35,10 @@ _COMMON = ("wall_position", "wall_orientation")
 _AT_ONCE = 256
 
 
-def seen_of(folder: Path, task: Task, bounds: list[int], first: int = 0) -> Iterator[tuple[int, dict[str, Any]]]:
-    """The frames that every shard holds, from number `first` on: how many there are, and the observables of each."""
+def seen_of(
+    folder: Path, task: Task, bounds: list[int], first: int = 0
+) -> Iterator[tuple[int, dict[str, Any], Snapshot]]:
+    """The frames that every shard holds, from number `first` on: how many there are, the observables and particles."""
     files = [shards.file_of(folder, k) for k in range(len(bounds) - 1)]
     if not all(file.exists() for file in files):
         return
@@ -44,10 +50,27 @@ def seen_of(folder: Path, task: Task, bounds: list[int], first: int = 0) -> Iter
             parts = [one.observables_of(some) for one in of_shards]
             for k in range(some.stop - begin):
                 joined = _joined(task, [{name: values[k] for name, values in part.items()} for part in parts])
-                yield len(times), {"time": float(times[begin + k]), **joined}
+                read = functools.partial(_gathered, of_shards, task, begin + k)
+                particles = Snapshot(read, task.scene.gravity, task.scene.period, copies=True)
+                yield len(times), {"time": float(times[begin + k]), **joined}, particles
+                particles.end()
     finally:
         for one in of_shards:
             one.close()
+
+
+def _gathered(of_shards: list[Trajectory], task: Task, k: int, name: str) -> Any:
+    """An array of the particles of frame k, of all shards."""
+    if name == "mass":
+        return task.particles.mass
+    parts = [values_of(one, k, name) for one in of_shards]
+    if any(part is None for part in parts):
+        return None
+    # Of bodies point p of copy i is particle p n + i.
+    points = 1 if task.bodies is None else len(task.bodies.body)
+    apart = [part.reshape(*part.shape[:-1], points, -1) for part in parts]
+    joined = np.concatenate(apart, axis=-1)
+    return joined.reshape(*joined.shape[:-2], -1)
 
 
 def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
@@ -128,12 +151,25 @@ class JoinedWriter(TrajectoryWriter):
         group.create_virtual_dataset("value", layout)
 
 
-def join(folder: Path, task: Task, bounds: list[int], identity: dict[str, Any]) -> dict[str, NDArray[Any]]:
-    """Write the frames that every shard holds in place of an earlier file: their observables.
+def _measured(
+    seen: Iterator[tuple[int, dict[str, Any], Snapshot]], measures: Measures
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """The frames with what functions of one's own return for them."""
+    for k, (frames, one, particles) in enumerate(seen):
+        yield frames, one | measures.of(k, one["time"], particles)
+
+
+def join(
+    folder: Path, task: Task, bounds: list[int], identity: dict[str, Any], measures: Measures = NONE
+) -> dict[str, NDArray[Any]]:
+    """Write the frames that every shard holds in place of an earlier file: their observables, with those of one's own.
 
     If there is none nothing is written.
+
+    Raises:
+        RunError: a function of one's own fails.
     """
-    seen, kept = seen_of(folder, task, bounds), Columns()
+    seen, kept = _measured(seen_of(folder, task, bounds), measures), Columns()
     head = list(itertools.islice(seen, 1))
     if head:
         with JoinedWriter(folder, task, bounds, head[0][0], identity) as put:

@@ -77,7 +77,7 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     import cloudpickle
 
     body = None if task.bodies is None else task.bodies.body
-    options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None)
+    options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None, observables=None)
     whole = Whole(task.scene, task.method, options, body, bounds, start)
     _replace(folder / "whole.pickle", lambda file: cloudpickle.dump(whole, file))
     for name in _ARRAYS:

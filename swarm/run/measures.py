@@ -1,0 +1,151 @@
+"""Observables of one's own: functions of a frame, called when it is whole."""
+
+import re
+import traceback
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checks import shown
+from ..columns import NAMES
+from ..errors import RunError, SceneError
+from ..frames import Frame
+from ..snapshot import Snapshot
+
+Function = Callable[[Frame], Any]
+# What a file has of an observable are numbers, vectors and matrices, and tables of these.
+_MOST_AXES = 3
+# The end of the name of a column of a table, that of a part of an observable.
+_COLUMN = re.compile("(_([0-9]+|[wxyz]))+$")
+
+
+class _NotYet(dict[str, Any]):
+    """The observables of a frame whose functions are called."""
+
+    def __missing__(self, name: str) -> Any:
+        raise KeyError(
+            f"{name}: functions of observables are called with the particles alone; take it from result.observables"
+        )
+
+
+def checked(given: Any) -> dict[str, Function]:
+    """The argument `observables`: functions by their names.
+
+    Raises:
+        SceneError: it is no dict of functions, or a name cannot be that of an observable.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise SceneError(f"observables must be a dict of functions of a frame by their names, got {shown(given)}")
+    for name, function in given.items():
+        if not (isinstance(name, str) and name.isidentifier()):
+            raise SceneError(f"observables must have names such as mean_radius, got {shown(name)}")
+        column = _COLUMN.sub("", name)
+        if name in NAMES or (column != name and (column in NAMES or column in given)):
+            raise SceneError(f"observables[{name!r}] must have another name: {name} is that of another observable")
+        if not callable(function):
+            raise SceneError(f"observables[{name!r}] must be a function of a frame, got {shown(function)}")
+    return dict(given)
+
+
+class Measures:
+    """The functions of a run, and the shapes of what they return.
+
+    Args:
+        functions: by their names, checked.
+        until: the end of the run [s].
+    """
+
+    def __init__(self, functions: Mapping[str, Function], until: float) -> None:
+        self._functions, self._until = functions, until
+        self._shapes: dict[str, tuple[int, ...]] = {}
+        self._first: tuple[int, dict[str, Any]] = -1, {}
+
+    def __bool__(self) -> bool:
+        return bool(self._functions)
+
+    def expect(self, shapes: Mapping[str, tuple[int, ...]]) -> None:
+        """Take the shapes of the frames before, of a run that goes on."""
+        self._shapes |= {name: shapes[name] for name in self._functions if name in shapes}
+
+    def size(self) -> int:
+        """Bytes of what is known of a frame."""
+        return sum(8 * int(np.prod(shape)) for shape in self._shapes.values())
+
+    def begin(self, number: int, time: float, arrays: Snapshot) -> None:
+        """Try all functions with a frame before kernels are compiled; what they return is that of this frame.
+
+        Raises:
+            SceneError: one fails.
+        """
+        self._first = number, self._called(number, time, arrays, SceneError)
+
+    def of(self, number: int, time: float, arrays: Snapshot) -> dict[str, Any]:
+        """What the functions return for a frame.
+
+        Raises:
+            RunError: one fails.
+        """
+        known, seen = self._first
+        return seen.copy() if known == number else self._called(number, time, arrays, RunError)
+
+    def _called(
+        self, number: int, time: float, arrays: Snapshot, failure: type[SceneError | RunError]
+    ) -> dict[str, Any]:
+        frame, seen = Frame(number, time, self._until, _NotYet(), arrays=arrays), {}
+        for name, function in self._functions.items():
+            try:
+                given = function(frame)
+            except Exception as error:
+                raise failure(
+                    f"observables[{name!r}] failed at frame {number}, {time:g} s: {type(error).__name__}: "
+                    f"{' '.join(str(error).split())}{_place_of(error)}"
+                ) from error
+            try:
+                value = _numbers(given)
+                self._require_shape(name, value)
+            except ValueError as error:
+                raise failure(f"observables[{name!r}] must return {error}, at frame {number}, {time:g} s") from None
+            del given
+            if held := arrays.let_go():
+                raise failure(
+                    f"observables[{name!r}] must keep no array of a frame, which the next one changes; it has kept "
+                    f"{' and '.join(held)} of frame {number}: keep a copy, frame.{held[0]}.copy()"
+                )
+            seen[name] = value if value.ndim else value.item()
+        return seen
+
+    def _require_shape(self, name: str, value: NDArray[np.float64]) -> None:
+        before = self._shapes.setdefault(name, value.shape)
+        if value.shape != before:
+            raise ValueError(f"the same shape at every frame, {before} as at those before, got {value.shape}")
+
+
+# Of a run that has none.
+NONE = Measures({}, 0.0)
+
+
+def _numbers(given: Any) -> NDArray[np.float64]:
+    """What a function has returned, as float64 of its own; a ValueError says what was expected and came."""
+    expected = "a number or an array of numbers"
+    if isinstance(given, np.ma.MaskedArray):
+        raise ValueError(f"{expected}, got a masked array; fill it")
+    try:
+        array = np.asarray(given)
+    except (TypeError, ValueError):
+        raise ValueError(f"{expected}, got {shown(given)}") from None
+    if array.dtype.kind not in "biuf" or array.size == 0:
+        came = f"an array of {array.dtype}" if array.ndim and array.size else shown(given)
+        raise ValueError(f"{expected}, got {came}")
+    if array.ndim > _MOST_AXES:
+        raise ValueError(f"{expected} with at most {_MOST_AXES} axes, got the shape {array.shape}")
+    return np.array(array, np.float64)
+
+
+def _place_of(error: Exception) -> str:
+    """The file and the line in which an error was raised, if that is known."""
+    calls = [call for call in traceback.extract_tb(error.__traceback__) if call.filename != __file__]
+    return f" ({calls[-1].filename}, line {calls[-1].lineno})" if calls else ""
