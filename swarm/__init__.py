@@ -57,7 +57,8 @@ if TYPE_CHECKING:
     )  # fmt: skip
     from .surfaces.data.mesh import from_mesh
     from .surfaces.doors import Opening
-    from .surfaces.wall_law import WallLaw
+    from .surfaces.laws import Absorb, CercignaniLampis, Lambert, Sticky
+    from .surfaces.wall_law import Leave, WallLaw
 
 __version__ = VERSION
 
@@ -89,19 +90,20 @@ _HOMES = {
         "Intersection", "Mesh", "OwnSurface", "Paraboloid", "Plane", "Polygon", "Prism", "Quadric", "Sampled", "Slab",
         "Sphere", "Spheres", "Stadium", "Torus", "Union",
     ),
-    "surfaces.wall_law": ("WallLaw",),
+    "surfaces.laws": ("Absorb", "CercignaniLampis", "Lambert", "Sticky"),
+    "surfaces.wall_law": ("Leave", "WallLaw"),
 }  # fmt: skip
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
-    "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
-    "Impact", "ImpactLog", "Intersection", "Mesh", "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid",
-    "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled",
-    "Scene", "SceneError", "Slab", "Source", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError", "Torus",
-    "Trajectory", "Translation", "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain",
-    "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate",
-    "sweep", "tetrahedron",
+    "Absorb", "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CercignaniLampis",
+    "CompleteError", "Cone", "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError",
+    "Formula", "Frame", "Guide", "Impact", "ImpactLog", "Intersection", "Lambert", "Leave", "Mesh", "Midpoint",
+    "Opening", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism",
+    "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Source", "Sphere", "Spheres",
+    "Stadium", "Sticky", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Union",
+    "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill",
+    "from_mesh", "load", "load_impacts", "place", "rigid", "simulate", "sweep", "tetrahedron",
 ]  # fmt: skip
 
 

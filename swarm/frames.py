@@ -87,6 +87,11 @@ class Frame:
         return np.asarray(self._read("escape_time"))
 
     @property
+    def absorbed_time(self) -> NDArray[np.float64]:
+        """(N,) when a law of a wall has absorbed each [s]; NaN of the others."""
+        return np.asarray(self._read("absorbed_time"))
+
+    @property
     def image(self) -> NDArray[np.int64] | None:
         """(3, N) how many cells away each is where the scene repeats, else None."""
         found: NDArray[np.int64] | None = self._read("image")

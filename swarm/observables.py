@@ -12,7 +12,7 @@ from .kernel.arrays import scratch
 from .kernel.gravity import potential
 from .kernel.jit import kernel, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
-from .particles import Floats, State, has_escaped
+from .particles import Floats, State, is_gone
 from .pieces import PartsOfRows
 from .scene import Scene
 from .surfaces import flights
@@ -130,7 +130,7 @@ def observe(law, walls, gravity, state, drawn, size, partial):
                     e = _energies(law, walls.at(0.0), gravity, m, r, v)
                     p = m * v
                     error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
-                    depth = select(has_escaped(state.escape_time, i), 0.0, penetration(walls.at(0.0), r))
+                    depth = select(is_gone(state, i), 0.0, penetration(walls.at(0.0), r))
                     sums[_KINETIC, j] += m * e.kinetic
                     sums[_POTENTIAL, j] += m * _whole_fall(state.period, state, i, e.fall)
                     sums[_CONTACT, j] += m * e.stored
@@ -171,7 +171,7 @@ def count_escaped(walls, gravity, far, faces, state):
             n = Vec(faces[k, 0], faces[k, 1], faces[k, 2])
             out |= (dot(n, r) > faces[k, 3]) & (dot(n, v) > 0.0)
         leaves = out or _escapes(state.period, gravity, walls, r, v)
-        count += leaves and not has_escaped(state.escape_time, i)
+        count += leaves and not is_gone(state, i)
     return count
 
 

@@ -175,6 +175,18 @@ class Contacts(NamedTuple):
     sliding: Floats
 
 
+class Absorbed(NamedTuple):
+    """The particles that walls have absorbed.
+
+    Attributes:
+        time: (N,) when each was [s], NaN of those that are not.
+        wall: (N,) int32, the number of that wall in the scene; -1 of those that are not.
+    """
+
+    time: Floats
+    wall: NDArray[np.int32]
+
+
 class State(NamedTuple):
     """The arrays that kernels advance.
 
@@ -201,11 +213,31 @@ class State(NamedTuple):
     openings: Any = None  # None, or each `Opening` of the walls
     # Where particles come during the run, or wait on a wall:
     starts: Floats | None = None  # (N,) the time from which each flies [s]
+    # Where a wall may absorb any, as in `Absorbed`:
+    absorbed_time: Floats | None = None
+    absorbed_wall: NDArray[np.int32] | None = None
+
+    @property
+    def absorbed(self) -> Any:
+        """`Absorbed`, or None where no wall absorbs any."""
+        time, wall = self.absorbed_time, self.absorbed_wall
+        return None if time is None or wall is None else Absorbed(time, wall)
+
+    def gone(self) -> NDArray[np.bool_]:
+        """(N,) whether each has escaped or was absorbed: where it is then it stays, whatever the walls do."""
+        found = np.zeros(self.mass.size, np.bool_)
+        for time in (self.escape_time, self.absorbed_time):
+            if time is not None:
+                found |= ~np.isnan(time[: found.size])
+        return found
 
 
-def has_escaped(escape_time, i):
-    """Whether particle i has passed an opening, and is no more among the walls."""
-    return False if escape_time is None else not math.isnan(escape_time[i])
+def is_gone(state, i):
+    """Whether particle i has passed an opening, or was absorbed, and is no more among the walls."""
+    escaped = False if state.escape_time is None else not math.isnan(state.escape_time[i])
+    if state.absorbed is None:
+        return escaped
+    return (not math.isnan(state.absorbed.time[i])) | escaped
 
 
 def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple[Floats, Floats, Floats]:

@@ -94,6 +94,11 @@ class Pieces(Volume):
         )
         return None if laws == NONE else laws.in_plane(self.across())
 
+    def may_absorb(self) -> bool:
+        """Whether a law of a wall may absorb particles."""
+        laws = self.laws()
+        return laws is not None and laws.may_end
+
     def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
         """The openings of every wall as kernels take them in the frame that ends at a moment [s]; None: none."""
         spans = self.order.spans(self.pieces)

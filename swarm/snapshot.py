@@ -19,7 +19,8 @@ class Snapshot:
     """The arrays of particles at a frame by their names, each read once and never to be written.
 
     Args:
-        read: gives "position", "velocity", "mass", "impacts", and "image" and "escape_time" or None for either.
+        read: gives "position", "velocity", "mass", "impacts", and "image",
+            "escape_time" and "absorbed_time" or None for each.
         gravity: [m/s^2], or None.
         period: of the scene [m], or None.
         there: how many of them, the first ones, are there; None for all.
@@ -56,7 +57,7 @@ class Snapshot:
             self._known[name] = self._energy(frame)
         elif (given := self._read(name)) is None:
             n = len(self._read("mass")[self._there])
-            self._known[name] = np.broadcast_to(np.nan, n) if name == "escape_time" else None
+            self._known[name] = np.broadcast_to(np.nan, n) if name in ("escape_time", "absorbed_time") else None
         elif self._copies:
             self._known[name] = _locked(np.array(given[..., self._there]))
         else:

@@ -37,6 +37,7 @@ def numbers(trajectory: Path) -> dict[str, Any]:
         "sliding": int(seen.get("sliding", [0])[-1]),
         "sliding_time": float(seen.get("sliding_time", [0.0])[-1]),
         "escaped": int(seen["escaped"][-1]),
+        "absorbed": np.array(seen.get("absorbed", [[]])[-1], int).tolist(),
         "unconverged": int(seen["unconverged"][-1]),
     }
 

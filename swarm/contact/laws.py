@@ -1,13 +1,18 @@
 """The laws of walls: restitution, Coulomb's friction, thermal walls, one's own. What no wall has is None."""
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ..errors import SceneError
 from ..kernel.jit import select
 from ..kernel.record import Record
-from ..kernel.vector import dot
+from ..kernel.vector import dot, square
 from ..surfaces.shapes.slab import AXES
+from ..surfaces.wall_law import leave_of, may_end, mirrored
+
+# The square of the part of speeds before and after that is none into the wall.
+_ROUND_OFF = 1e-30
 
 
 class Laws(Record):
@@ -28,16 +33,36 @@ class Laws(Record):
     @property
     def change_energy(self):
         """Whether an impact may change the energy of a particle: a constant for the compiler."""
-        return self.loses or self.give_heat or self.moving is not None
+        return self.loses or self.send_off or self.moving is not None
+
+    @property
+    def send_off(self):
+        """Whether a wall may send a particle off by a law, of a temperature or its own: a constant for the compiler."""
+        return self.thermal is not None or self.own is not None
+
+    @property
+    def may_dissipate(self):
+        """Whether some of what such a law changes of the energy may be dissipated: a constant for the compiler."""
+        return any(law.book == "dissipated" for one in self.own or () for some in one.each for law in some.laws)
+
+    @property
+    def dissipate_all(self):
+        """Whether all of that is: a constant for the compiler."""
+        return self.own is not None and self.thermal is None and all(one.dissipates for one in self.own)
 
     @property
     def give_heat(self):
-        """Whether a wall may send a particle off by a law that gives or takes heat: a constant for the compiler."""
-        return self.thermal is not None or self.own is not None
+        """Whether some of it may be heat: a constant for the compiler."""
+        return self.send_off and not self.dissipate_all
+
+    @property
+    def may_end(self):
+        """Whether a law of its own may absorb a particle, or let it wait."""
+        return any(may_end(law) for one in self.own or () for some in one.each for law in some.laws)
 
     def in_plane(self, across):
         """These laws in a scene whose plane is across the axis of this number, None where it has none."""
-        return self if across is None or not self.give_heat else self._replace(across=AXES[across](1.0))
+        return self if across is None or not self.send_off else self._replace(across=AXES[across](1.0))
 
     def restitution_of(self, wall):
         """e of a wall."""
@@ -63,7 +88,7 @@ class Span(Record):
     walls: float
 
 
-class Owned(Record):
+class Some(Record):
     """The laws of the walls from number `first` on, before number `after`."""
 
     laws: Any
@@ -74,12 +99,59 @@ class Owned(Record):
         """Whether a wall is one of these."""
         return (wall >= self.first) & (wall < self.after)
 
-    def leave(self, v, n, u, random, mass):
-        """The velocity after all laws: each takes what a mirror would turn into what the one before sends."""
-        for k, law in enumerate(self.laws):
-            v = v if k == 0 else v - 2.0 * dot(v - u, n) * n
-            v = law.leave(v, n, u, random, mass)
-        return v
+
+class Owned(Record):
+    """The laws of walls whose lists of laws differ in their numbers only."""
+
+    each: Any
+
+    def has(self, wall):
+        """Whether a wall is one of these."""
+        found = False
+        for one in self.each:
+            found = one.has(wall) | found
+        return found
+
+    @property
+    def dissipates(self):
+        """Whether all that these laws change of the energy is dissipated: a constant for the compiler."""
+        return all(law.book == "dissipated" for law in self.each[0].laws)
+
+    def _laws_of(self, wall):
+        found = self.each[-1].laws
+        for one in reversed(self.each[:-1]):
+            found = select(one.has(wall), one.laws, found)
+        return found
+
+    def leave(self, wall, v, n, u, random, mass):
+        """`Ended` after all laws: each takes what a mirror would turn into what the one before sends."""
+        stays, wait, lost, is_right = True, 0.0, 0.0, True
+        for k, law in enumerate(self._laws_of(wall)):
+            v = v if k == 0 else mirrored(v, n, u)
+            left = leave_of(law.leave(v, n, u, random.of_law(k), mass))
+            before, after = v - u, left.v - u
+            stays = left.stays if k == 0 else left.stays & stays
+            wait = left.wait if k == 0 else left.wait + wait
+            if law.book == "dissipated":
+                lost = square(before) - square(after) + lost
+            # False for NaN.
+            away, speed2 = dot(after, n), square(before) + square(after)
+            is_right = (((away >= 0.0) | (away * away <= _ROUND_OFF * speed2)) & (speed2 < math.inf)) & is_right
+            v = left.v
+        return Ended(v, stays, wait, lost, is_right & (wait >= 0.0))
+
+
+class Ended(Record):
+    """The end of an impact by the laws of a wall: `Leave`, what they dissipate, and whether all velocities are right.
+
+    `lost` is twice the energy per mass, relative to the wall.
+    """
+
+    v: Any
+    stays: Any
+    wait: Any
+    lost: Any
+    is_right: Any
 
 
 class Moves(Record):
@@ -121,7 +193,7 @@ def owned_in(
 
     `spans` are (number of a piece, how many walls in a row are of it), `owners` the surfaces that pieces are of.
     """
-    owned: list[Owned] = []
+    owned: list[Some] = []
     first = 0
     for i, walls in spans:
         laws = pieces[i].laws
@@ -133,6 +205,9 @@ def owned_in(
         if laws and owned and owned[-1].after == first and owned[-1].laws == laws:
             owned[-1] = owned[-1]._replace(after=float(first + walls))
         elif laws:
-            owned.append(Owned(laws, float(first), float(first + walls)))
+            owned.append(Some(laws, float(first), float(first + walls)))
         first += walls
-    return tuple(owned) or None
+    alike: dict[Any, list[Some]] = {}
+    for some in owned:
+        alike.setdefault(tuple((type(law), *(part is None for part in law)) for law in some.laws), []).append(some)
+    return tuple(Owned(tuple(each)) for each in alike.values()) or None

@@ -17,8 +17,8 @@ _MULTIPLIERS = 0xD2511F53, 0xCD9E8D57
 _WEYL = 0x9E3779B9, 0xBB67AE85  # what is added to the key from round to round
 _WORD = 0xFFFFFFFF
 
-# The blocks of an event's counter that `uniforms` takes.
-_BLOCKS = 2
+# The blocks of an event's counter that `uniforms` takes, and those of each law.
+_BLOCKS, _LAW = 2, 1 << 20
 
 _HALF_ROOT = 0.7071067811865476  # sqrt(1/2)
 # ln 2 in two parts: the first has 32 bits, so that its product with an exponent is exact.
@@ -80,19 +80,26 @@ def uniforms(seed, particle, number):
 class Stream(Record):
     """The random numbers of one event of a particle: of a seed, the particle, and the number of the event.
 
-    They have numbers of their own, so that a branch that needs none changes no others.
+    They have numbers of their own, so that a branch that needs none changes no others. Two of one block, 2 j and
+    2 j + 1, cost as much as one.
     """
 
     seed: Any
     particle: Any
     number: Any
+    law: int = 0  # of several laws of one event each has numbers of its own, this many blocks further
+    across: Any = None  # the axis across the plane of a scene of two dimensions, or None
+
+    def of_law(self, k):
+        """The stream of the k-th law."""
+        return self._replace(law=k * _LAW)
 
     def uniform(self, k):
         """The k-th uniform number in (0, 1); k from 0 on."""
         seed, particle, number = int(self.seed), int(self.particle), int(self.number)
-        counter = number & _WORD, (number >> 32) & _WORD, particle & _WORD, k + _BLOCKS
-        a, b, _c, _d = philox(counter, (seed & _WORD, (seed >> 32) & _WORD))
-        return _fraction(a, b)
+        counter = number & _WORD, (number >> 32) & _WORD, particle & _WORD, (k >> 1) + _BLOCKS + self.law
+        a, b, c, d = philox(counter, (seed & _WORD, (seed >> 32) & _WORD))
+        return select((k & 1) == 0, _fraction(a, b), _fraction(c, d))
 
     def exponential(self, k):
         """-ln of the k-th uniform number: of mean 1."""
@@ -102,6 +109,19 @@ class Stream(Record):
         """A normal number of variance 1 (Box and Muller), of the uniform numbers k and k + 1."""
         cosine, _sine = circle(self.uniform(k + 1))
         return math.sqrt(-2.0 * logarithm(self.uniform(k))) * cosine
+
+    def diffuse(self, n, u, k):
+        """A unit vector by the cosine law about a unit vector n, of a number u in (0, 1) and the uniform number k.
+
+        Its part along n is sqrt(u); in a plane its part across n is uniform in (-1, 1), which needs no number k.
+        """
+        if self.across is not None:
+            across = 2.0 * u - 1.0
+            return (2.0 * math.sqrt(u * (1.0 - u))) * n + across * cross(self.across.scaled(1.0), n)
+        first, second = tangents(n)
+        cosine, sine = circle(self.uniform(k))
+        along = math.sqrt(1.0 - u)
+        return math.sqrt(u) * n + (along * cosine) * first + (along * sine) * second
 
 
 def logarithm(u):
@@ -151,19 +171,22 @@ def flux_maxwellian(n, speed2, u, across=None):
 
     `speed2` is k_B T/m, `across` the axis across the plane that it stays in, or None. The normal speed has the
     distribution 1 - exp(-w^2/(2 speed2)) of what passes a plane in a gas at rest, the two tangential components are
-    Gaussian (Box and Muller); in a plane there is one. The tangents are those of Duff et al., "Building an orthonormal
-    basis, revisited" (JCGT 2017).
+    Gaussian (Box and Muller); in a plane there is one.
     """
     if across is not None:
         cosine, _sine = circle(u.angle)
         tangent = cross(across.scaled(1.0), n)
         along = math.sqrt(-2.0 * speed2 * logarithm(u.tangential)) * cosine
         return along * tangent - math.sqrt(-2.0 * speed2 * logarithm(u.normal)) * n
-    sign = math.copysign(1.0, n.z)
-    a = -1.0 / (sign + n.z)
-    b = n.x * n.y * a
-    first = Vec(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x)
-    second = Vec(b, sign + n.y * n.y * a, -n.y)
+    first, second = tangents(n)
     cosine, sine = circle(u.angle)
     along = math.sqrt(-2.0 * speed2 * logarithm(u.tangential))
     return along * cosine * first + along * sine * second - math.sqrt(-2.0 * speed2 * logarithm(u.normal)) * n
+
+
+def tangents(n):
+    """Two unit vectors across a unit vector and each other: Duff et al., JCGT 6 (2017)."""
+    sign = math.copysign(1.0, n.z)
+    a = -1.0 / (sign + n.z)
+    b = n.x * n.y * a
+    return Vec(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec(b, sign + n.y * n.y * a, -n.y)

@@ -1,6 +1,11 @@
 """The accounts of a particle's energy: the shares of walls that move or are hot, and the loss."""
 
+import math
+
+from ..kernel.arrays import index
+from ..kernel.jit import select
 from ..surfaces.moving import Carried
+from ..surfaces.walls import Field, Listed
 
 
 def lose(state, i, before, after):
@@ -43,9 +48,48 @@ def book_step(walls, state, i, wall, change, given, loses):
         book_work(walls, state, i, wall, after - before - given)
 
 
-def book_heat(state, i, wall, before, after):
-    """Book what a thermal wall gives to particle i, from twice its energies per mass."""
+def book_sent(laws, state, i, row, change, lost):
+    """Book a change (before, after) of twice the energy per mass by a law of a wall.
+
+    So much of it is `lost`, all where that has no end; the rest is heat that the wall gives.
+    """
+    before, after = change
     # What impacts have taken since the energy was written is booked when the particle leaves its lane.
     pending = state.energy[i] - 0.5 * before
     state.energy[i] = 0.5 * after + pending
-    state.heat[wall, i] += 0.5 * (after - before) * state.mass[i]
+    given = after - before
+    if laws.dissipate_all:
+        state.dissipated[i] -= 0.5 * given * state.mass[i]
+        return
+    if laws.may_dissipate:
+        taken = select(lost == math.inf, -given, lost)
+        state.dissipated[i] += 0.5 * taken * state.mass[i]
+        given = select(lost == math.inf, 0.0, given + taken)
+    state.heat[row, i] += 0.5 * given * state.mass[i]
+
+
+# --- Of a lane ------------------------------------------------------------------------------------------
+
+
+def add_work(walls, impulse, i, wall, given):
+    """The work of walls that move is in the rows after those of the impulses."""
+    if isinstance(walls, Carried):
+        add_to_rows(walls, impulse, walls.length(), i, wall, given)
+
+
+def add_to_rows(walls, rows, row, i, wall, given):
+    """rows[row + the row of a wall, i] += given, without a branch; of any other wall nothing."""
+    for one in walls.each:
+        if isinstance(one, Field):
+            count = one.count()
+            here = (wall >= 0.0) & (wall < count)
+            if isinstance(one, Listed):
+                rows[index(row + int(select(here, wall, 0.0))), i] += select(here, given, 0.0)
+                row += int(count)
+            else:
+                rows[row, i] += select(here, given, 0.0)
+                row += 1
+            wall = select(wall < count, -1.0, wall - count)
+        else:
+            rows[row, i] += select(wall == 0.0, given, 0.0)
+            row, wall = row + 1, wall - 1.0

@@ -238,12 +238,12 @@ class Share(NamedTuple):
             drawn += 1
 
 
-def empty(walls: int, rows: int, period: Any = None) -> Lanes:
-    """Lanes for one block, with so many rows of what walls give."""
+def empty(walls: int, given: int, period: Any = None, rows: int = Flying.ALL) -> Lanes:
+    """Lanes for one block, with so many rows of what walls give, and `rows` of a particle."""
     eights = np.zeros(STRIDE // EIGHT, np.int64)
     return Lanes(
-        rows=table(Flying.ALL),
-        impulse=table(rows),
+        rows=table(rows),
+        impulse=table(given),
         wall=table(1)[0],
         kappa=table(1)[0],
         unsolved=np.zeros(STRIDE, np.bool_),
@@ -256,7 +256,7 @@ def empty(walls: int, rows: int, period: Any = None) -> Lanes:
         eights=eights,
         some=np.zeros_like(eights),
         order=np.zeros(STRIDE, np.int64),
-        left_behind=table(Flying.ROWS + rows),
+        left_behind=table(Flying.ROWS + given),
         period=period,
     )
 

@@ -7,26 +7,21 @@ depend on which lane or block a particle is in.
 
 import math
 
-import numpy as np
-
 from ..contact.events import FLYING
-from ..contact.heat import exchange
 from ..kernel.arrays import index
-from ..kernel.gravity import potential
-from ..kernel.jit import kernel, outlined, select
-from ..kernel.random import Stream
+from ..kernel.jit import kernel, outlined
 from ..kernel.record import Record
-from ..kernel.vector import put, square
+from ..kernel.vector import put
 from ..methods import contract as methods
 from ..status import Status
 from ..surfaces.moving import Carried
-from ..surfaces.walls import Field, Listed
 from . import log as impact_log
-from .accounts import book_heat
+from .accounts import add_to_rows, add_work
 from .escape import let_out_lanes
 from .flight import go
 from .hit_member import of_lane, pick, picks
 from .periodic import return_lanes
+from .sending import send_off
 from .solve import count_sweeps, keep_failure, solution, solve
 from .table import LANES, LOOK, marked_lanes, with_distances
 
@@ -66,8 +61,8 @@ def advance_block(method, walls, gravity, hard, share, lanes):
         if status != Status.DONE.value:
             return status, live, place.drawn
         passes += 1
-        some_arrived, some_hard = _pass(method, walls, gravity, share, lanes, picked, live)
-        if some_hard or passes % LOOK == 0:
+        some_arrived, some_hard, some_wrong = _pass(method, walls, gravity, share, lanes, picked, live)
+        if some_wrong or some_hard or passes % LOOK == 0:
             status, lane = _rare(hard, method, walls, gravity, state, lanes, live, some_hard)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
@@ -120,9 +115,10 @@ def _look(method, walls, state, lanes, live):
     most_hits = 0.1 * MOST_HITS if isinstance(walls, Carried) else MOST_HITS
     for i in range(live):
         lane, p, status = lanes.lane(i), float(lanes.particle[i]), Status.DONE.value
-        if method.laws.own is not None and math.isnan(lane.v.x):
-            status = Status.SENT_WRONG.value
-        elif method.holds and lane.hits > most_hits:
+        if method.laws.own is not None and math.isnan(lane.remaining):
+            # What it was asked is in the state.
+            return Status.SENT_WRONG.value, i
+        if method.holds and lane.hits > most_hits:
             status = Status.STALLED.value
         elif lane.stands(method, p) and lane.looked_hits == lane.hits:
             status = Status.TIMELESS.value
@@ -153,7 +149,7 @@ def _hard_passes(hard, method, walls, gravity, lanes, live):
 
 
 def _pass(method, walls, gravity, share, lanes, picked, live):
-    """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
+    """A flight and a contact of every lane: whether one reached the end of the frame, is hard, was sent off wrong."""
     state, watches = share.state, share.watches()
     go(method, walls, gravity, lanes, live)
     if lanes.period is not None:
@@ -164,13 +160,14 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
         solve(method, walls, gravity, state.multipliers, lanes, live)
     for watch in watches:
         watch.keep_before(lanes, live)
-    if method.laws.give_heat:
-        _exchange_heat(method, walls, gravity, share, lanes, live)
     pick(walls, lanes, picked, live)
+    some_wrong = False
+    if method.laws.send_off:
+        some_wrong = send_off(method, walls, gravity, share, lanes, picked, live)
     some_arrived, some_hard = _make_contacts(method, walls, gravity, watches, lanes, picked, live)
     for watch in watches:
         watch.add_rows(method, walls, state, lanes, live)
-    return some_arrived, some_hard
+    return some_arrived, some_hard, some_wrong
 
 
 def _make_contacts(method, walls, gravity, watches, lanes, picked, live):
@@ -182,38 +179,12 @@ def _make_contacts(method, walls, gravity, watches, lanes, picked, live):
         contact = method.contact(here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _put_contact(method, lanes, i, contact), (contact.wall <= methods.HARD) & (not method.holds)
         _add_impulse(walls, lanes.impulse, i, contact.wall, contact.impulse)
-        _add_work(walls, lanes.impulse, i, contact.wall, contact.work)
+        add_work(walls, lanes.impulse, i, contact.wall, contact.work)
         lanes.wall[i] = contact.wall
         for watch in watches:
             watch.note(lanes, i, contact.impulse)
         some_arrived, some_hard = some_arrived | arrived, some_hard | hard
     return some_arrived, some_hard
-
-
-def _exchange_heat(method, walls, gravity, share, lanes, live):
-    """The impacts on walls that send particles off by a law of their own: a temperature's, or the user's."""
-    state = share.state
-    for i in range(index(live)):
-        lane, wall, p = lanes.lane(i), lanes.wall[i], index(lanes.particle[i])
-        if wall >= 0.0:
-            r, v = lane.r, lane.v
-            random = Stream(share.seed, share.first + lanes.particle[i], state.impacts[p] + np.int64(lane.hits))
-            now, laws = walls.at(lane.remaining), method.laws
-            sent = exchange(laws, now, wall, (r, v, 0.0), state.mass[p], random)
-            if sent.happens:
-                before, after = lane.twice, square(sent.v) + 2.0 * potential(gravity, r)
-                book_heat(state, p, walls.row(wall), before, after - sent.work)
-                _add_work(walls, lanes.impulse, i, wall, 0.5 * sent.work)
-                lane.v, lane.twice = sent.v, after
-                lane.hits += 1.0
-                lanes.impulse[walls.row(wall), i] += sent.impulse
-                for watch in share.watches():
-                    watch.note(lanes, i, sent.impulse)
-                # The contact is done, unless a wall at 0 K holds the particle, or one of its own law may.
-                holds = not square(sent.v) > 0.0
-                if laws.own is not None:
-                    holds = holds | method.is_within(lanes.given(method, i), 2.0 * sent.away, 1.0)
-                lanes.wall[i] = select(holds, wall, -1.0)
 
 
 def _put_contact(method, lanes, i, contact):
@@ -233,28 +204,4 @@ def _add_impulse(walls, impulse, i, wall, given):
         # One wall: what is given is 0, or it is given by that.
         impulse[0, i] += given
     else:
-        _add_to(walls, impulse, 0, i, wall, given)
-
-
-def _add_work(walls, impulse, i, wall, given):
-    """The work of walls that move is in the rows after those of the impulses."""
-    if isinstance(walls, Carried):
-        _add_to(walls, impulse, walls.length(), i, wall, given)
-
-
-def _add_to(walls, impulse, row, i, wall, given):
-    """The same for all walls, from `row` on."""
-    for one in walls.each:
-        if isinstance(one, Field):
-            count = one.count()
-            here = (wall >= 0.0) & (wall < count)
-            if isinstance(one, Listed):
-                impulse[index(row + int(select(here, wall, 0.0))), i] += select(here, given, 0.0)
-                row += int(count)
-            else:
-                impulse[row, i] += select(here, given, 0.0)
-                row += 1
-            wall = select(wall < count, -1.0, wall - count)
-        else:
-            impulse[row, i] += select(wall == 0.0, given, 0.0)
-            row, wall = row + 1, wall - 1.0
+        add_to_rows(walls, impulse, 0, i, wall, given)

@@ -1,26 +1,28 @@
 """Particles at a wall where their contact lasts, or that they meet while they slide: what becomes of each."""
 
+import math
+
 import numpy as np
 
 from ..contact import crossing, events, touching
 from ..contact.doorways import leads_on, lets_through, through
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
-from ..contact.heat import exchange
 from ..contact.hold import One, Two, drift
 from ..contact.passing import hit_wall, open_wall_at
 from ..contact.reflection import given, wall_velocity
+from ..contact.sending import Arriving, send
 from ..kernel.arrays import scratch
 from ..kernel.gravity import potential
-from ..kernel.jit import long_kernel, outlined
+from ..kernel.jit import long_kernel, outlined, select
 from ..kernel.random import Stream
 from ..kernel.vector import ZERO, column, norm, put, square
 from ..status import Status
 from ..surfaces.moving import Carried
 from . import log as impact_log
-from .accounts import book, book_heat, book_step, book_work, lose
+from .accounts import book, book_sent, book_step, book_work, lose
 from .arrays import booked, speed2_scale
 from .carried import NOT_CARRIED, carry, is_carried
-from .escape import escape
+from .escape import absorb, escape
 from .periodic import return_particle
 from .table import LANES
 
@@ -57,7 +59,8 @@ def _one_by_one(phase, advance, scene, share):
             impact_log.keep_going(share.log, place, 0, done)
             return Status.LOG_FULL.value, 0, place.drawn
         if not advance(*scene, share, place.i):
-            return Status.STALLED.value, place.i, place.drawn
+            is_wrong = math.isnan(share.state.contacts.keep[place.i])
+            return select(is_wrong, Status.SENT_WRONG.value, Status.STALLED.value), place.i, place.drawn
         place, done = place.after(), done + 1
 
 
@@ -74,8 +77,8 @@ def _decide(method, walls, gravity, share, i):
     again = 0.0 if abs(moved) > _MOVED * method.size / np.sqrt(p.scale2) else contacts.events[1, i] + 1.0
     contacts.events[0, i], contacts.events[1, i] = remaining, again
     first, second, wall = contacts.walls[0, i], contacts.walls[1, i], contacts.met[i]
-    if method.laws.give_heat and first >= 0.0 and _exchange_heat(method, carried, gravity, share, i):
-        return True
+    if method.laws.send_off and first >= 0.0 and _send_off(method, carried, gravity, share, i):
+        return not math.isnan(contacts.keep[i])
     moving = method.laws.moving
     if moving is not None:
         settles = is_carried(method, carried, gravity, p)
@@ -158,6 +161,11 @@ def _go_through(walls, gravity, share, i, wall, r, v):
 def _leave(share, i, wall, r, v, remaining):
     """Particle i has escaped through a wall."""
     escape(share, i, wall, r, v, remaining)
+    _end_frame(share, i)
+
+
+def _end_frame(share, i):
+    """Nothing is left of the frame of particle i, which no wall holds."""
     contacts = share.state.contacts
     contacts.remaining[i], contacts.keep[i] = 0.0, 0.0
     contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
@@ -166,26 +174,34 @@ def _leave(share, i, wall, r, v, remaining):
 
 
 @outlined
-def _exchange_heat(method, walls, gravity, share, i):
-    """Whether a law of the wall that a sliding particle meets sends it off: then it flies."""
-    state, contacts = share.state, share.state.contacts
+def _send_off(method, walls, gravity, share, i):
+    """Whether a law of the wall that a sliding particle meets sends it off: then it flies, or is absorbed."""
+    state, contacts, laws = share.state, share.state.contacts, method.laws
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
-    now = walls.at(contacts.remaining[i])
-    random = Stream(share.seed, share.first + i, state.impacts[i])
+    remaining = contacts.remaining[i]
+    now, before, fall = walls.at(remaining), 2.0 * state.energy[i], 2.0 * potential(gravity, r)
+    random = Stream(share.seed, share.first + i, state.impacts[i], 0, laws.across)
     # What slides along another wall meets it without end: the surface's restitution and an edge are for slow impacts.
     slow = events.GRAZING * np.sqrt(max(speed2_scale(state, i), square(v)))
-    sent = exchange(method.laws, now, wall, (r, v, slow), state.mass[i], random)
+    sent = send(laws, now, wall, Arriving(r, v, before - fall, slow, state.mass[i]), random)
     if not sent.happens:
         return False
-    before, after = 2.0 * state.energy[i], square(sent.v) + 2.0 * potential(gravity, r)
-    book_heat(state, i, walls.row(wall), before, after - sent.work)
+    if laws.own is not None and math.isnan(sent.v.x):
+        # Who asks whether it goes on finds it.
+        contacts.keep[i] = math.nan
+        return True
+    after = select(sent.keeps, before + sent.work, square(sent.v) + fall)
+    book_sent(laws, state, i, walls.row(wall), (before, after - sent.work), sent.lost)
     book_work(walls, state, i, wall, sent.work)
     state.energy[i] = 0.5 * after
     put(state.velocity, 0, i, sent.v)
     state.impacts[i] += 1
-    struck = impact_log.Struck(r, v, sent.v, wall, contacts.remaining[i], sent.impulse)
-    share.note_impact(method, walls, i, struck)
+    share.note_impact(method, walls, i, impact_log.Struck(r, v, sent.v, wall, remaining, sent.impulse))
     state.impulse[walls.row(wall), i] += sent.impulse * state.mass[i]
+    if state.absorbed is not None and sent.wait == math.inf:
+        absorb(share, i, wall, remaining)
+        _end_frame(share, i)
+        return True
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.hand_over(i, FLYING)
     return True

@@ -1,4 +1,6 @@
-"""Particles that reach a wall where it is open: they have escaped, and nothing is left of their frames."""
+"""Particles that reach a wall where it is open, or that absorbs them: nothing is left of their frames."""
+
+import numpy as np
 
 from ..contact import crossing
 from ..contact.doorways import closeness, leads_on, lets_through, through
@@ -15,6 +17,12 @@ def escape(share, p, wall, r, v, remaining):
     share.state.escape_time[p] = share.moment - remaining
     if share.log is not None:
         share.log.add_escape(share.state, p, impact_log.Struck(r, v, v, wall, remaining, 0.0))
+
+
+def absorb(share, p, wall, remaining):
+    """A wall has absorbed particle p, with so much of its frame left: it stays where and as fast as it is."""
+    absorbed = share.state.absorbed
+    absorbed.time[p], absorbed.wall[p] = share.moment - remaining, np.int32(wall)
 
 
 def let_out_lanes(openings, method, walls, gravity, share, lanes, live):

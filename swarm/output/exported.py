@@ -21,7 +21,8 @@ class Moment(NamedTuple):
     time: float  # [s]
     position: NDArray[Any]  # (n, 3) [m]
     velocity: NDArray[Any]  # (n, 3) [m/s]
-    # Further columns by their names, (n,) or (n, 3): "impacts"; where there are some, "image" and "escape_time".
+    # Further columns by their names, (n,) or (n, 3): "impacts"; where there are some, "image", "escape_time",
+    # "absorbed_time".
     more: dict[str, NDArray[Any]]
     ids: NDArray[np.int64]  # (n,) numbers of the particles
     mass: NDArray[np.float64]  # (n,) [kg]

@@ -97,7 +97,14 @@ def of_run(seen: dict[str, Any]) -> dict[str, str]:
             rows[f"{what} of parts"] = f"{', '.join(f'{given:.4g}' for given in of_parts)} {unit}"
     if seen.get("escaped", [0])[-1]:
         rows["escaped"] = f"{int(seen['escaped'][-1])} particles"
-    return rows
+    return rows | _absorbed(seen)
+
+
+def _absorbed(seen: dict[str, Any]) -> dict[str, str]:
+    """How many particles each surface has absorbed."""
+    taken = enumerate(seen.get("absorbed", [[]])[-1])
+    told = ", ".join(f"{int(number)} by surfaces[{i}]" for i, number in taken if number)
+    return {"absorbed": told} if told else {}
 
 
 def _what(trajectory: Any) -> dict[str, str]:

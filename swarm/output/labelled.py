@@ -18,6 +18,7 @@ _PARTICLES = {
     layout.IMAGES: (layout.IMAGES, "1"),
     layout.COUNTS: ("impacts_per_particle", "1"),
     layout.ESCAPES: (layout.ESCAPES, "s"),
+    layout.ABSORBED: (layout.ABSORBED, "s"),
 }
 # Of observables by the end of their name, in this order; of all others "1".
 _UNITS = {

@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from .sources import DamagedError
 
 # Of each particle: its impacts, which files of older versions lack; the cells that it has come through, where the scene
-# repeats; when it has escaped [s], where walls have openings.
+# repeats; when it has escaped [s], where walls have openings, and
+# when it was absorbed [s], where they may absorb it.
 PARTS, COUNTS, IMAGES, ESCAPES = ("position", "velocity"), "impacts", "image", "escape_time"
+ABSORBED = "absorbed_time"
 _INTEGER, _REAL, _NUMBER = "iu", "f", "iuf"
 _ELEMENTS: dict[str, tuple[str, tuple[int, ...]]] = {
     **dict.fromkeys(PARTS, (_REAL, (3,))), COUNTS: (_INTEGER, ()), IMAGES: (_INTEGER, (3,)), ESCAPES: (_REAL, ()),
+    ABSORBED: (_REAL, ()),
 }  # fmt: skip
 KEPT = tuple(_ELEMENTS)
 # Of each particle of a run with sources: when it came [s], and the number of its source, -1 of those of the start.
@@ -40,7 +43,7 @@ _OF_PARTS = ("part_impulse", "part_heat")
 # Likewise, but files of older versions have none of them, or only those of bodies.
 _LATER: dict[str, tuple[int | None, ...]] = {
     **dict.fromkeys(("sliding", "sliding_time", "link_error", "work", "source_energy"), ()),
-    **dict.fromkeys(("wall_heat", "wall_work", "wall_energy", *_OF_PARTS), (None,)),
+    **dict.fromkeys(("absorbed", "wall_heat", "wall_work", "wall_energy", *_OF_PARTS), (None,)),
     **dict.fromkeys(("wall_position", "wall_velocity", "wall_spin"), (None, 3)),
     "wall_orientation": (None, 4),
 }

@@ -130,11 +130,12 @@ class Presented(Stored):
     def to_xarray(self: Any) -> "xarray.Dataset":
         """The trajectory as a Dataset of xarray, with the dimensions time, particle, axis and surface.
 
-        What is kept of particles, `position`, `velocity`, `image`, `impacts_per_particle` and `escape_time`, is read
-        from the file when its values are used, and only the part that is: a file larger than the memory is no
-        problem, `dataset.position.sel(time=slice(2.0, 3.0)).mean("particle")` reads these frames. Nothing that is read
-        is kept; `dataset.load()` keeps all. As long as it is read, the trajectory must not be closed. Observables and
-        masses are read at once. Units are in `attrs`, and so are the tables of the scene and the method.
+        What is kept of particles, `position`, `velocity`, `image`, `impacts_per_particle`, `escape_time` and
+        `absorbed_time`, is read from the file when its values are used, and only the part that is: a file larger than
+        the memory is no problem, `dataset.position.sel(time=slice(2.0, 3.0)).mean("particle")` reads these frames.
+        Nothing that is read is kept; `dataset.load()` keeps all. As long as it is read, the trajectory must not be
+        closed. Observables and masses are read at once. Units are in `attrs`, and so are the tables of the scene and
+        the method.
 
         Raises:
             SceneError: the trajectory is damaged, or xarray is not installed.

@@ -2,7 +2,8 @@
 
 particles/all/{position,velocity,impacts}/{step,time,value}, value (frames, N, 3), of impacts (frames, N), since the
 start; where the scene repeats also particles/all/image, (frames, N, 3), and particles/all/box/edges, (frames, 3); where
-walls have openings particles/all/escape_time, (frames, N) [s], NaN of those inside; particles/all/{mass,id} (N,), and
+walls have openings particles/all/escape_time, (frames, N) [s], NaN of those inside, and where they may absorb also
+absorbed_time; particles/all/{mass,id} (N,), and
 of a run with sources particles/all/{birth_time,birth_source} (N,), where who comes later is at NaN;
 observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
 number that were run, parameters/start, a digest of them at the start, parameters/seed, of thermal walls, and
@@ -166,8 +167,15 @@ class Trajectory(Presented):
 
     def escape_times(self, k: int) -> NDArray[np.float64]:
         """Times at which the particles of frame k have passed an opening of a wall [s], (N,); NaN of those inside."""
-        k, name = self._number(k), f"particles/all/{layout.ESCAPES}"
-        with self._reading(f"the escapes of frame {k}") as file:
+        return self._ends(k, layout.ESCAPES)
+
+    def absorbed_times(self, k: int) -> NDArray[np.float64]:
+        """Times at which walls have absorbed the particles of frame k [s], (N,); NaN of those that are not."""
+        return self._ends(k, layout.ABSORBED)
+
+    def _ends(self, k: int, kind: str) -> NDArray[np.float64]:
+        k, name = self._number(k), f"particles/all/{kind}"
+        with self._reading(f"{kind} of frame {k}") as file:
             kept = len(file["particles/all/mass"])
             times = file[f"{name}/value"][k].astype(np.float64) if name in file else np.full(kept, np.nan)
             if (times < 0.0).any():

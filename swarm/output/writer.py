@@ -16,7 +16,7 @@ from ..scene import Scene
 from ..version import VERSION
 from . import paths
 from .appended import AppendedFile, put
-from .layout import ARRAYS, BIRTHS, COUNTS, ESCAPES, IMAGES, KEPT, PARTS
+from .layout import ABSORBED, ARRAYS, BIRTHS, COUNTS, ESCAPES, IMAGES, KEPT, PARTS
 from .storage import Storage
 
 if TYPE_CHECKING:
@@ -120,6 +120,7 @@ class TrajectoryWriter(AppendedFile):
         kept: list[tuple[str, tuple[int, ...], Any]] = [(name, (3,), self._storage.precision) for name in PARTS]
         kept += [(IMAGES, (3,), np.int64)] * (repeats is not None)
         kept += [(COUNTS, (), np.int64), *[(ESCAPES, (), np.float64)] * any(self._scene.volumes)]
+        kept += [(ABSORBED, (), np.float64)] * self._scene.may_absorb()
         for name, width, kind in kept:
             self._make_particles(name, (n, *width), kind)
 
@@ -169,7 +170,7 @@ class TrajectoryWriter(AppendedFile):
                 self._begin()
             for name, dataset in self._values.items():
                 parts = [getattr(state, name) for state in states]
-                put(dataset, first, parts if name in (COUNTS, ESCAPES) else rows(parts, dataset.dtype))
+                put(dataset, first, parts if name in (COUNTS, ESCAPES, ABSORBED) else rows(parts, dataset.dtype))
             if self._edges is not None:
                 put(self._edges, first, [_edges_of(self._scene)] * len(frames))
             for name, dataset in self._observables.items():

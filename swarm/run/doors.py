@@ -92,8 +92,7 @@ class DoorRun(Run):
             return
         distances = self._scene.distances_outside(self.state.position, instant)
         distances[~came] = -math.inf
-        if self.state.escape_time is not None:
-            distances[:, ~np.isnan(self.state.escape_time)] = -math.inf
+        distances[:, self.state.gone()] = -math.inf
         # Where phi is no number is no place either.
         inside = ~(distances <= self._deepest)
         if inside.any():

@@ -18,6 +18,7 @@ from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..lanes import contact_events, slide, sliding, table
 from ..lanes import log as impact_log
+from ..lanes.sending import Sending
 from ..methods.base import Method
 from ..particles import Contacts, Multipliers, Particles, State
 from ..scene import Scene
@@ -63,6 +64,7 @@ class Run(BaseRun):
         self.state = state_of(scene, particles, method, self._booked)
         observables.start_energies(scene, self._law, self.state)
         self._moment, self._faces = 0.0, scene.open_faces()
+        self._surfaces_of_walls = scene.members()[0]
         # Whole chunks, so that a thread observes what it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
         self._present = Present(particles.births, n, self._size)
@@ -217,7 +219,8 @@ class Run(BaseRun):
         return lanes.Draws(self._ticket, order, self._size, np.empty(len(order), np.int64))
 
     def _empty_lanes(self) -> lanes.Lanes:
-        made = lanes.empty(len(self._owners), self._booked, self.state.period)
+        rows = Sending.ROWS if self._numbers.laws.send_off else lanes.Flying.ALL
+        made = lanes.empty(len(self._owners), self._booked, self.state.period, rows)
         watched = self._impacts is not None or self._tally is not None
         return made._replace(before=table.table(impact_log.ROWS)) if watched else made
 
@@ -288,6 +291,11 @@ class Run(BaseRun):
         escaped = 0 if is_closed else self._tier.kernel(observables.count_escaped)(*self._escaping())
         if self.state.escape_time is not None:
             escaped += int(np.count_nonzero(~np.isnan(self.state.escape_time)))
+        if self.state.absorbed is not None:
+            # Of each wall, of a field of each member, its surface.
+            walls = self.state.absorbed.wall
+            surfaces = self._surfaces_of_walls[walls[walls >= 0]]
+            seen["absorbed"] = np.bincount(surfaces, minlength=len(self._scene.surfaces)).astype(np.int64)
         if self._scene.moves():
             poses = self._scene.poses(self._moment)
             seen["wall_position"] = np.array([pose.position() for pose in poses])

@@ -43,8 +43,7 @@ def require_admissible(
     distances = scene.distances_outside(position, moment)
     # Far out in an open scene the round-off of a position is that of its own size.
     outside = distances > deepest / size * np.maximum(np.abs(position).max(axis=0), size)
-    if state.escape_time is not None:
-        outside &= np.isnan(state.escape_time[: len(state.mass)])
+    outside &= ~state.gone()
     if outside.any():
         wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
         depth = f"{distances[wall, particle]:.3g} m outside {_named(scene, int(wall))}"

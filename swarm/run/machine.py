@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .. import interrupt
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
-from ..particles import Multipliers, Particles
+from ..particles import Absorbed, Multipliers, Particles
 from ..snapshot import Read, Snapshot
 from .base import BaseRun
 from .bodies import BodyRun
@@ -52,6 +52,7 @@ class End(NamedTuple):
     multipliers: Multipliers | None
     impacts: NDArray[np.int64]
     escape_time: NDArray[np.float64]
+    absorbed: Absorbed | None
     members: list[NDArray[np.int64]] | None
     birth_time: NDArray[np.float64]
 
@@ -198,6 +199,7 @@ def _end(task: Task, session: Session, run: BaseRun, kept: Columns, tally: Tally
         state.multipliers,
         state.impacts,
         np.full(len(task.particles), np.nan) if state.escape_time is None else state.escape_time,
+        state.absorbed,
         None if tally is None else tally.of_members(),
         birth_times(task.particles),
     )

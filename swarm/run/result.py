@@ -37,12 +37,14 @@ class Result:
             (w, x, y, z): what is given at xi is at position + orientation xi. Where walls react also "wall_energy"
             (frames, surfaces) [J], which "total_energy" includes, "wall_velocity" [m/s] and "wall_spin" [rad/s]
             (frames, surfaces, 3). Of bodies also "link_error", the "work" of led anchors [J], and "cavity_impulse"
-            (frames, cavities) of what points carry [N s].
+            (frames, cavities) of what points carry [N s]. Where laws of walls return a `Leave` also "absorbed" (frames,
+            surfaces), how many particles each has absorbed so far.
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
         impacts_per_particle: (N,) how many impacts each has had.
         escape_time: (N,) when each has passed an opening of a wall [s], where it is since then; NaN of those inside.
+        absorbed_time: (N,) when a law of a wall has absorbed each [s], where it is since then; NaN of the others.
         member_impacts: with member_impacts=True how many impacts each surface has had since 0 s, in all sessions: a
             list with an array for each, (members,) of a field such as `Spheres` and (1,) of any other; in a cell that
             repeats all images of a body are one. Else None. No file holds it.
@@ -58,6 +60,7 @@ class Result:
     multipliers: Multipliers | None
     impacts_per_particle: NDArray[np.int64]
     escape_time: NDArray[np.float64]
+    absorbed_time: NDArray[np.float64]
     member_impacts: list[NDArray[np.int64]] | None = None
     bodies: Bodies | None = None
     scene: Scene | None = None

@@ -4,6 +4,8 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ..bodies.state import Bodies
 from ..frames import Frame
 from ..methods.base import Method
@@ -142,7 +144,8 @@ def carry_out(scene: Scene, particles: Particles | Bodies | None, method: Method
     task = task_of(scene, particles, method, options)
     end = carried(task, session)
     bodies = None if task.bodies is None else task.bodies.moved(end.particles)
+    absorbed_time = np.full(len(end.particles), np.nan) if end.absorbed is None else end.absorbed.time
     return Result(
         end.particles, end.observables, end.wall_time, options.trajectory, end.multipliers, end.impacts,
-        end.escape_time, end.members, bodies, scene, method, end.birth_time,
+        end.escape_time, absorbed_time, end.members, bodies, scene, method, end.birth_time,
     )  # fmt: skip

@@ -44,6 +44,7 @@ def state_of(scene: Scene, particles: Particles, method: Method, booked: int) ->
         None if openings is None else np.full(n, math.nan),
         openings,
         None if particles.births is None else particles.births.time.copy(),
+        *((None, None) if laws is None or not laws.may_end else (np.full(n, math.nan), np.full(n, -1, np.int32))),
     )
 
 
@@ -64,8 +65,8 @@ def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], las
             # What is at rest costs this much.
             state.impulse[: len(contacts.load)] += contacts.load * (span * state.mass)
             contacts.sliding[:] += span * rests
-    if state.escape_time is not None:
-        phase[~np.isnan(state.escape_time[: len(phase)])] = ARRIVED
+    if state.escape_time is not None or state.absorbed is not None:
+        phase[state.gone()] = ARRIVED
     if state.starts is not None:
         _begin_late(state.starts[: len(phase)], state.contacts, phase, span, end)
 

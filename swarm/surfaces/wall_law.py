@@ -14,16 +14,50 @@ from ..kernel.vector import Vec, dot
 
 # Impacts with which a law is tried before a run, and the speed into the wall that is none, as a part of that of these.
 _TRIED, _ROUND_OFF = 64, 1e-15
+# Where it is booked what a law takes or gives.
+BOOKS = ("heat", "dissipated")
+
+
+class Leave(Record):
+    """The leave of a particle from a wall, where a law says more of it than the velocity.
+
+    A particle that does not stay is absorbed: it ends where it is, and gives the wall its normal momentum. One that
+    waits stays on the wall, and then leaves with this velocity, which it has in all files from the impact on.
+
+    Args:
+        v: the velocity after the impact [m/s].
+        stays: whether the particle stays in the run; else it is absorbed.
+        wait: how long it stays on the wall [s], 0 or more.
+
+    Example:
+        >>> import swarm
+        >>> from swarm.surfaces.wall_law import mirrored
+        >>> class Gate(swarm.WallLaw):
+        ...     probability: float
+        ...     def leave(self, v, n, u, random, mass):
+        ...         return swarm.Leave(mirrored(v, n, u), stays=random.uniform(0) >= self.probability)
+        >>> swarm.Sphere(1.0, laws=[Gate(0.1)])
+        Sphere(radius=1.0, laws=(Gate(probability=0.1),))
+    """
+
+    v: Any
+    stays: Any = True
+    wait: Any = 0.0
 
 
 class WallLaw(Record):
-    """A law of a wall: the velocity with which a particle leaves it.
+    """A law of a wall: the velocity with which a particle leaves it, or whether it is absorbed there, or waits.
 
     Derive a record from it, whose fields are numbers, and give it as `laws=[...]` of a surface. Kernels call `leave`:
-    numbers in, numbers out, no lists and no arrays. It takes the place of the elastic reflection at every impact, on a
-    thermal wall of the particles that this does not accommodate. A particle that it leaves so slowly that it is back at
-    once (`shortest_flight` of `Impact`) slides or rests, by the restitution and the friction of the surface. What it
-    changes of the energy is heat that the wall gives.
+    numbers in, numbers out, no lists and no arrays; without branches (`swarm.kernel.jit.select` in their place) it
+    costs least. Laws take the place of the elastic reflection at every impact, on a thermal wall of the particles that
+    this does not accommodate. Of several each is told of what a mirror would make come from what the one before sends
+    off. A particle that it leaves so slowly that it is back at once (`shortest_flight` of `Impact`) slides or rests, by
+    the restitution and the friction of the surface, and meets no law of this wall meanwhile.
+
+    What a law changes of the energy is heat that the wall gives, in the observable "wall_heat"; with `book =
+    "dissipated"` in the class it is lost, in "dissipated_energy". A speed that it changes by round-off only is kept to
+    the last digit.
 
     Raises:
         SceneError: by the surface: no `leave`, a field that is no finite number, a velocity into the wall in a trial.
@@ -34,25 +68,43 @@ class WallLaw(Record):
         >>> from swarm.kernel.vector import dot
         >>> class Damped(swarm.WallLaw):
         ...     e: float
+        ...     book = "dissipated"
         ...     def leave(self, v, n, u, random, mass):
         ...         return v - (1.0 + self.e) * dot(v - u, n) * n
         >>> swarm.Sphere(1.0, laws=[Damped(0.9)])
         Sphere(radius=1.0, laws=(Damped(e=0.9),))
     """
 
+    book = "heat"
+
     def leave(self, v, n, u, random, mass):
-        """The velocity after an impact [m/s], away from the wall.
+        """The velocity after an impact [m/s], away from the wall, or a `Leave`.
 
         Args:
             v: the velocity before it [m/s].
             n: the unit normal of the wall, into the vessel: n.(v - u) < 0, and n.(what is returned - u) >= 0. In a
                 scene with a plane all vectors are along that, and so must be what is returned.
             u: the velocity of the wall [m/s].
-            random: random numbers of this impact: `random.uniform(k)` in (0, 1), `random.normal(k)`, which takes k and
-                k + 1, and `random.exponential(k)`, for k = 0, 1, ...; the same for any threads and any resume.
+            random: random numbers of this impact and law: `random.uniform(k)` in (0, 1), `random.normal(k)`, which
+                takes k and k + 1, and `random.exponential(k)`, for k = 0, 1, ...; the same for any threads and any
+                resume. 2 k and 2 k + 1 together cost as much as one. `random.diffuse(n, u, k)` is a unit vector of the
+                cosine law, `random.across` the axis across the plane of the scene, or None.
             mass: of the particle [kg].
         """
         raise NotImplementedError
+
+    def check(self, name: str) -> None:
+        """Raise a `SceneError` where a field of this law, which is `name` of its surface, is out of its range."""
+
+
+def mirrored(v, n, u):
+    """The velocity with which an elastic wall sends a particle off."""
+    return v - 2.0 * dot(v - u, n) * n
+
+
+def leave_of(given):
+    """What a law has returned as a `Leave`."""
+    return given if isinstance(given, Leave) else Leave(given)
 
 
 def checked_laws(given: Any) -> tuple[Any, ...]:
@@ -67,28 +119,47 @@ def _checked(name: str, law: Any) -> Any:
         raise SceneError(f"{name} must be a WallLaw, a record derived from swarm.WallLaw, got {shown(law)}")
     if type(law).leave is WallLaw.leave:
         raise SceneError(f"{name} must have a method leave(self, v, n, u, random, mass), {type(law).__name__} has none")
-    numbers = []
+    if law.book not in BOOKS:
+        raise SceneError(
+            f'{name} must have book = "heat" or "dissipated" in its class, {type(law).__name__} has {shown(law.book)}'
+        )
+    numbers: list[float | None] = []
     for field, value in zip(law._fields, law, strict=True):
+        if value is None and type(law)._field_defaults.get(field, 0.0) is None:
+            numbers.append(None)
+            continue
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not math.isfinite(value):
             raise SceneError(f"{name}.{field} must be a finite number, got {shown(value)}")
         numbers.append(float(value))
     law = type(law)(*numbers)
+    law.check(name)
     _try(name, law)
     return law
 
 
 def _try(name: str, law: Any) -> None:
     """Raise a `SceneError` where a law sends a particle into the wall, or gives no velocity."""
-    for v, n, after in tries_of(law):
-        is_finite = isinstance(after, tuple) and len(after) == 3 and all(map(math.isfinite, after))
-        if not (is_finite and dot(after, n) >= -_ROUND_OFF * math.sqrt(dot(v, v))):
-            raise SceneError(
-                f"{name} must send particles away from the wall: n.v >= 0 of the velocity that leave returns; "
-                f"{law} returned {shown(after)} for v = {_said(v)}, n = {_said(n)} and u = 0"
-            )
+    for v, n, given in tries_of(law):
+        if wrong := why_wrong(given, v, n, None):
+            raise SceneError(f"{name} {wrong}; {law} returned {shown(given)} for v = {_said(v)}, n = {_said(n)}, u = 0")
 
 
-def tries_of(law: Any, across: int | None = None) -> Iterator[tuple[Vec, Vec, Any]]:
+def why_wrong(given: Any, v: Vec, n: Vec, u: Vec | None) -> str:
+    """What is wrong with what a law returns, as the end of a sentence; "" where nothing is."""
+    after, stays, wait = leave_of(given)
+    is_known = isinstance(stays, (bool, np.bool_)) and not wait < 0.0 and not math.isnan(wait)
+    if not is_known:
+        return "must return a Leave whose stays is True or False, and whose wait is 0 or more [s]"
+    is_finite = isinstance(after, tuple) and len(after) == 3 and all(map(math.isfinite, after))
+    if stays and not is_finite:
+        return "must return a velocity, three finite numbers, or a swarm.Leave"
+    own, before = (Vec(*after), v) if u is None or not stays else (Vec(*after) - u, v - u)
+    if stays and not dot(own, n) >= -_ROUND_OFF * (math.sqrt(dot(before, before)) + math.sqrt(dot(own, own))):
+        return "must send particles away from the wall: n.(v - u) >= 0 of the velocity that leave returns"
+    return ""
+
+
+def tries_of(law: Any, across: int | None = None, axis: Any = None) -> Iterator[tuple[Vec, Vec, Any]]:
     """Some trials of a law: (velocity before, normal into the vessel, what it returns); in a plane across an axis."""
     rng = np.random.default_rng(0)
     for k in range(_TRIED):
@@ -98,8 +169,14 @@ def tries_of(law: Any, across: int | None = None) -> Iterator[tuple[Vec, Vec, An
         n, v = (Vec(*map(np.float64, row)) for row in rows)
         n = n / math.sqrt(dot(n, n))
         v = v - (dot(v, n) + abs(dot(v, n))) * n
+        stream = Stream(0, 0, k, across=axis)
         with np.errstate(all="ignore"):
-            yield v, n, law.leave(v, n, Vec(*map(np.float64, np.zeros(3))), Stream(0, 0, k), np.float64(1.0))
+            yield v, n, law.leave(v, n, Vec(*map(np.float64, np.zeros(3))), stream, np.float64(1.0))
+
+
+def may_end(law: Any) -> bool:
+    """Whether a law returns a `Leave`: then it may absorb particles, or let them wait."""
+    return isinstance(next(tries_of(law))[2], Leave)
 
 
 def _said(vector: Vec) -> str:

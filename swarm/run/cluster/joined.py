@@ -28,7 +28,7 @@ from . import shards
 # The largest value of any shard is that of all; the other observables, whole numbers, add up exactly.
 _LARGEST = ("energy_error", "max_penetration", "link_error")
 # Whole numbers of each of some.
-_OF_EACH = ("born",)
+_OF_EACH = ("born", "absorbed")
 # The same of every shard.
 _COMMON = ("wall_position", "wall_orientation")
 # Frames that are read at a time.
@@ -100,6 +100,11 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
             else:
                 seen[name] = np.sum(values, axis=0) if name in _OF_EACH else int(sum(values))
     return seen
+
+
+def _sum(values: list[Any]) -> Any:
+    """The sum of whole numbers, or of arrays of them."""
+    return np.sum(values, axis=0) if isinstance(values[0], np.ndarray) else int(sum(values))
 
 
 class JoinedWriter(TrajectoryWriter):

@@ -22,7 +22,7 @@ from ...errors import SceneError
 from ...methods.base import Method
 from ...observables import CHUNK
 from ...output import paths
-from ...particles import Births, Multipliers, Particles
+from ...particles import Absorbed, Births, Multipliers, Particles
 from ...scene import Scene
 from ..machine import End, birth_times
 from ..options import RunOptions, Task
@@ -169,6 +169,8 @@ def write_end(path: Path, end: End) -> None:
     arrays["impacts"] = end.impacts
     if not np.isnan(end.escape_time).all():
         arrays["escape_time"] = end.escape_time
+    if end.absorbed is not None:
+        arrays |= {f"absorbed.{name}": array for name, array in end.absorbed._asdict().items()}
     if end.particles.image is not None:
         arrays["image"] = end.particles.image
     if end.multipliers is not None:
@@ -203,7 +205,8 @@ def joined_end(folder: Path, task: Task, bounds: list[int]) -> End:
     particles = task.particles
     particles.position, particles.velocity, particles.image = flat["position"], flat["velocity"], flat.get("image")
     loops = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("multipliers.")}
+    gone = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("absorbed.")}
     return End(
         particles, {}, 0.0, Multipliers(**loops) if loops else None, flat["impacts"], flat["escape_time"],
-        members or None, birth_times(particles),
+        Absorbed(**gone) if gone else None, members or None, birth_times(particles),
     )  # fmt: skip

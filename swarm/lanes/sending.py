@@ -1,0 +1,108 @@
+"""The impacts on walls that send particles off by a law: a temperature's, or one's own.
+
+A loop without branches, which LLVM vectorises if the law has none, computes what becomes of each lane; another books
+it for those that are sent off. What the first reads of a particle, by its number, is put beside its lane before: of
+what it looks up in a table the compiler cannot tell that it is none of what it writes.
+"""
+
+import math
+
+import numpy as np
+
+from ..contact.sending import Arriving, send
+from ..kernel.arrays import index
+from ..kernel.gravity import potential
+from ..kernel.jit import select
+from ..kernel.random import Stream
+from ..kernel.vector import put, square
+from .accounts import add_work, book_sent
+from .arrays import Flying
+from .escape import absorb
+from .hit_member import of_lane
+from .table import Lane, Rows, marked_lanes
+
+_named = Rows()
+_named.take(Flying.ALL)
+
+
+class Sending(Lane):
+    """A lane that a law sends off, in rows behind those of its flight."""
+
+    v, twice, impulse, work = _named.vector(), _named.number(), _named.number(), _named.number()
+    lost, wait, wall, mass = _named.number(), _named.number(), _named.number(), _named.number()
+
+    # With those of its flight.
+    ROWS = _named.count
+
+
+def send_off(method, walls, gravity, share, lanes, picked, live):
+    """Send off every lane that a law does; whether one of these gave no velocity, or one into the wall."""
+    state, order = share.state, lanes.order
+    for i in range(index(live)):
+        p = index(lanes.particle[i])
+        Sending(lanes.rows, i).mass, order[i] = state.mass[p], state.impacts[p]
+    for i in range(index(live)):
+        _compute(method, walls, gravity, share, lanes, picked, i)
+    some_wrong = False
+    for k in range(marked_lanes(lanes, live)):
+        some_wrong = _book(method, walls, share, lanes, index(order[k])) | some_wrong
+    return some_wrong
+
+
+def _compute(method, walls, gravity, share, lanes, picked, i):
+    """What becomes of a lane, if a law sends it off."""
+    lane, sent, wall, laws = lanes.lane(i), Sending(lanes.rows, i), lanes.wall[i], method.laws
+    here = method.walls_of(of_lane(walls, picked, i), lane.remaining)
+    number = lanes.order[i] + np.int64(lane.hits)
+    random = Stream(share.seed, share.first + lanes.particle[i], number, 0, laws.across)
+    r, twice, fall = lane.r, lane.twice, 2.0 * potential(gravity, lane.r)
+    found = send(laws, here, wall, Arriving(r, lane.v, twice - fall, 0.0, sent.mass), random)
+    # The contact is done, unless a wall at 0 K holds the particle, or one of its own law may.
+    holds = not square(found.v) > 0.0
+    if laws.own is not None:
+        after = lanes.given(method, i)._replace(v=found.v)
+        holds = holds | method.is_within(after, 2.0 * found.away, 1.0)
+    sent.v, sent.twice = found.v, select(found.keeps, twice + found.work, square(found.v) + fall)
+    sent.impulse, sent.work, sent.lost, sent.wait = found.impulse, found.work, found.lost, found.wait
+    sent.wall = select(holds, wall, -1.0)
+    lanes.marked[i] = found.happens & (wall >= 0.0)
+
+
+def _book(method, walls, share, lanes, i):
+    """Send a lane off; whether a law has gone wrong."""
+    state, laws = share.state, method.laws
+    lane, sent, wall, p = lanes.lane(i), Sending(lanes.rows, i), lanes.wall[i], index(lanes.particle[i])
+    if laws.own is not None and math.isnan(sent.v.x):
+        _leave_wrong(state, lanes, i)
+        return True
+    row = walls.row(wall)
+    book_sent(laws, state, p, row, (lane.twice, sent.twice - sent.work), sent.lost)
+    add_work(walls, lanes.impulse, i, wall, 0.5 * sent.work)
+    lane.v, lane.twice = sent.v, sent.twice
+    lane.hits += 1.0
+    lanes.impulse[row, i] += sent.impulse
+    for watch in share.watches():
+        watch.note(lanes, i, sent.impulse)
+    lanes.wall[i] = sent.wall
+    if state.absorbed is not None and sent.wait > 0.0:
+        _detain(share, lanes, i, p, wall)
+    return False
+
+
+def _detain(share, lanes, i, p, wall):
+    """End a lane that is absorbed."""
+    lane, wait = lanes.lane(i), Sending(lanes.rows, i).wait
+    if wait == math.inf:
+        absorb(share, p, wall, lane.remaining)
+        lane.remaining, lanes.wall[i] = 0.0, -1.0
+
+
+def _leave_wrong(state, lanes, i):
+    """Leave in the state what a law was asked that has gone wrong."""
+    lane, p = lanes.lane(i), index(lanes.particle[i])
+    put(state.position, 0, p, lane.r)
+    put(state.velocity, 0, p, lane.v)
+    state.impacts[p] += np.int64(lane.hits)
+    state.contacts.remaining[p], state.contacts.met[p] = lane.remaining, lanes.wall[i]
+    # Who looks at all lanes finds it.
+    lane.remaining, lanes.wall[i] = math.nan, -1.0

@@ -1,0 +1,37 @@
+"""A wall on which particles stay for a while."""
+
+from ..wall_law import Leave, WallLaw, mirrored
+from .numbers import require_magnitude
+
+
+class Sticky(WallLaw):
+    """Residence on the wall: a particle leaves after a time that is exponential with a mean, as from a mirror.
+
+    Args:
+        time: the mean residence time [s], 0 or more.
+
+    With another law it leaves by that: `laws=[Lambert(), Sticky(1e-3)]`. Files and observables have a particle that
+    waits where it is on the wall, with the velocity with which it will leave, so its energy and momentum are those
+    after the impact, and the log of impacts has the time of the impact. It costs nothing in frames in which it waits.
+    The scene must have no motion.
+
+    Raises:
+        SceneError: by the surface: a time below 0; by the run: a wall moves.
+
+    Source: Frenkel, Z. Phys. 26 (1924) 117; de Boer, The Dynamical Character of Adsorption (1953), section 3.
+
+    Example:
+        >>> import swarm
+        >>> swarm.Sphere(0.5, laws=[swarm.Lambert(), swarm.Sticky(0.01)]).laws[1]
+        Sticky(time=0.01)
+    """
+
+    time: float
+
+    def check(self, name):
+        """A time of 0 or more."""
+        require_magnitude(f"{name}.time", self.time, "s")
+
+    def leave(self, v, n, u, random, mass):
+        """As from a mirror, after a time."""
+        return Leave(mirrored(v, n, u), wait=self.time * random.exponential(0))
