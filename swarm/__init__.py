@@ -100,10 +100,10 @@ __all__ = [
     "CompleteError", "Cone", "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError",
     "Formula", "Frame", "Guide", "Impact", "ImpactLog", "Intersection", "Lambert", "Leave", "Mesh", "Midpoint",
     "Opening", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism",
-    "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Source", "Sphere", "Spheres",
-    "Stadium", "Sticky", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal", "Union",
-    "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell", "elastic", "fill",
-    "from_mesh", "load", "load_impacts", "place", "rigid", "simulate", "sweep", "tetrahedron",
+    "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Source", "Sphere",
+    "Spheres", "Stadium", "Sticky", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal",
+    "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell", "elastic",
+    "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate", "sweep", "tetrahedron",
 ]  # fmt: skip
 
 
