@@ -16,7 +16,7 @@ from .source import Source
 
 # Points that are tried at a time, so that a longer run has the same first births; and in all, as long as fewer than one
 # in a million is a place of a birth.
-_BATCH, _TRIES = 1 << 14, 20_000_000
+_BATCH, _TRIES = 1 << 14, 4_000_000
 # Round-off of a point of a surface, as a part of the scene's extent.
 _ROUND_OFF = 16.0 * np.finfo(np.float64).eps
 # Steps of a point onto its surface.
@@ -135,9 +135,10 @@ class Points:
         return points, normals
 
     def _sentence(self, count: int, tried: int) -> str:
+        within = " and in within=" * bool(self._place.only)
         return (
-            f"{self._name}.where must be in the vessel, got {self._place.surface!r:.200}, of which {count} of {tried} "
-            f"points are in it{' and within= ' * bool(self._place.only)}; move it, or make it larger"
+            f"{self._name}.where must be in the vessel{within}, got {self._place.surface!r:.200}, of which {count} of "
+            f"{tried} points are; move it, or make it larger"
         )
 
     def _box(self) -> tuple[Floats, Floats]:
