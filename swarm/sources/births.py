@@ -66,24 +66,24 @@ def _require_room(sources: tuple[Source, ...], given: int, until: float) -> None
     """Raise a `SceneError` where more particles come than this machine has memory for."""
     most = float(given)
     for k, one in enumerate(sources):
-        come = _most(one, until)
-        most += come
+        come, at_most = _most(one, until)
+        most += at_most
         checks.require_memory(
             f"sources[{k}]", f" with all particles that come until {until:g} s, got {come:.6g}, which take",
-            _PARTICLE * come,
+            _PARTICLE * at_most,
         )  # fmt: skip
     checks.require_memory("sources", f" with all particles of the run, got {most:.6g}, which take", _PARTICLE * most)
 
 
-def _most(source: Source, until: float) -> float:
-    """The number of births of a source that is reckoned with."""
-    if source.times is not None:
-        return float(len(source.times))
+def _most(source: Source, until: float) -> tuple[float, float]:
+    """The number of births of a source that is expected, and the one that is reckoned with."""
     if source.rate is None:
-        return float(source.count or 0)
+        number = float(source.count or 0) if source.times is None else float(len(source.times))
+        return number, number
     mean = source.rate * max(0.0, _end(source, until) - source.start)
     most = mean + (0.0 if source.even else _SIGMAS * math.sqrt(mean))
-    return most if source.count is None else min(most, float(source.count))
+    limit = math.inf if source.count is None else float(source.count)
+    return min(mean, limit), min(most, limit)
 
 
 def _end(source: Source, until: float) -> float:

@@ -39,6 +39,10 @@ Draw = Callable[[Random, int], Floats]
 Placed = Callable[[Floats, Floats], Floats]
 
 
+# A point that is drawn is as near to its surface, of its extent.
+NEAR = 1e-10
+
+
 class Piece(NamedTuple):
     """A part of a surface.
 
@@ -59,11 +63,31 @@ def pieces_of(surface: Surface, bounds: Bounds, across: int | None) -> list[Piec
     """
     if isinstance(surface, Joined):
         # One that several rooms have is drawn once.
-        return [part for one in dict.fromkeys(surface.surfaces()) for part in pieces_of(one, bounds, across)]
-    if isinstance(surface, Many):
+        parts = dict.fromkeys(surface.surfaces())
+        return [_of_part(one, piece) for one in parts for piece in pieces_of(one, bounds, across)]
+    if isinstance(surface, Many) and not isinstance(surface, (Mesh, Outlined)):
         return [part for one in surface.solids() for part in pieces_of(one, bounds, across)]
     found = list(_drawn_as_they_are(surface, bounds, across))
     return found or list(_of_lines(surface, bounds, across))
+
+
+def _of_part(part: Surface, piece: Piece) -> Piece:
+    """A piece of a part of a union as far as it is on that part: what goes on beyond it may be a wall of another."""
+
+    def draw(random: Random, n: int) -> Floats:
+        points = piece.draw(random, n)
+        known = np.isfinite(points).all(axis=0)
+        off = np.abs(distances(part, points[:, known])) > NEAR * part.extent()
+        points[:, np.flatnonzero(known)[off]] = np.nan
+        return points
+
+    return piece._replace(draw=draw)
+
+
+def distances(surface: Surface, points: Floats) -> Floats:
+    """Distances of points from a surface to first order, above 0 outside."""
+    slopes = np.sqrt((surface.gradient(points) ** 2).sum(axis=0))
+    return np.asarray(surface.phi(points) / np.maximum(slopes, np.finfo(np.float64).tiny))
 
 
 def points_of(pieces: list[Piece], random: Random, n: int) -> Floats:
@@ -170,7 +194,8 @@ def _of_outline(surface: Outlined, bounds: Bounds, across: int | None) -> Iterat
         length, path = _side(begin, end)
         yield Piece(length * width, _on_side(path, placed, low, high))
     if isinstance(surface, Prism) and across is None:
-        least, most = (np.array(corner) for corner in surface.boundary.corners())
+        lows, highs = surface.boundary.corners()
+        least, most = lows.min(axis=1), highs.max(axis=1)
         for height in (middle - 0.5 * surface.height, middle + 0.5 * surface.height):
             yield Piece(float(np.prod(most - least)), _on_lid(least[:, None], most[:, None], placed, height))
 

@@ -11,12 +11,12 @@ from ..surfaces.doors import Opening
 from ..surfaces.instant import gaps_of, side_of
 from ..surfaces.surface import Surface, volume_of
 from ..surfaces.union import Joined
-from .pieces import Floats, Piece, Random, pieces_of, points_of
+from .pieces import NEAR, Floats, Piece, Random, distances, pieces_of, points_of
 from .source import Source
 
 # Points that are tried at a time, so that a longer run has the same first births; and in all, as long as fewer than one
 # in a million is a place of a birth.
-_BATCH, _TRIES = 1 << 14, 20_000_000
+_BATCH, _TRIES = 1 << 14, 4_000_000
 # Round-off of a point of a surface, as a part of the scene's extent.
 _ROUND_OFF = 16.0 * np.finfo(np.float64).eps
 # Steps of a point onto its surface.
@@ -135,9 +135,10 @@ class Points:
         return points, normals
 
     def _sentence(self, count: int, tried: int) -> str:
+        within = " and in within=" * bool(self._place.only)
         return (
-            f"{self._name}.where must be in the vessel, got {self._place.surface!r:.200}, of which {count} of {tried} "
-            f"points are in it{' and within= ' * bool(self._place.only)}; move it, or make it larger"
+            f"{self._name}.where must be in the vessel{within}, got {self._place.surface!r:.200}, of which {count} of "
+            f"{tried} points are; move it, or make it larger"
         )
 
     def _box(self) -> tuple[Floats, Floats]:
@@ -184,9 +185,10 @@ class Points:
 
     def _surface(self, random: Random) -> Floats:
         surface, points = self._place.surface, points_of(self._pieces, random, _BATCH)
+        # Not what another part cuts off
+        points = points[:, np.abs(distances(surface, points)) <= NEAR * self._extent]
         points = self._on(surface, points)
-        # Of an edge, a tip or a part that another one cuts off
-        points = points[:, np.abs(self._distance(surface, points)) <= _ROUND_OFF * self._extent]
+        points = points[:, np.abs(distances(surface, points)) <= _ROUND_OFF * self._extent]
         points = points[:, self._is_wanted(points)]
         if self._place.holes:
             shut = [self._gap(hole, points) > 0.0 for hole in self._place.holes]
@@ -203,7 +205,7 @@ class Points:
         """Which points of a union are on its walls, not where two parts touch, and each as often as if by one part."""
         beyond = self._gap(surface, points + _BESIDE * self._extent * normals) > 0.0
         parts = dict.fromkeys(surface.surfaces())
-        near = [np.abs(self._distance(part, points)) <= _ROUND_OFF * self._extent for part in parts]
+        near = [np.abs(distances(part, points)) <= _ROUND_OFF * self._extent for part in parts]
         return np.asarray(beyond & (random.random(points.shape[1]) * np.sum(near, axis=0) < 1.0))
 
     def _on(self, surface: Surface, points: Floats) -> Floats:
@@ -236,11 +238,6 @@ class Points:
         """Where phi is no number is no place."""
         found = gaps_of((surface,), points, 0.0)[0]
         return np.asarray(np.where(np.isnan(found), np.inf, found))
-
-    @staticmethod
-    def _distance(surface: Surface, points: Floats) -> Floats:
-        slopes = np.sqrt((surface.gradient(points) ** 2).sum(axis=0))
-        return np.asarray(surface.phi(points) / np.maximum(slopes, np.finfo(np.float64).tiny))
 
     @staticmethod
     def _normals(surface: Surface, points: Floats) -> Floats:

@@ -1,0 +1,124 @@
+"""Flow through a tube without collisions: how many of those that come in at one end leave by the other one.
+
+    python -m examples.tube_flow
+
+A gas outside passes the open end of a tube at a steady rate, by the cosine law. Its wall sends each particle off in a
+direction of the cosine law too, whatever it comes from, so that particles go to and fro until they leave by one of the
+ends. The part that leaves by the other end is Clausing's factor W(L/R) (Ann. Phys. 12 (1932) 961); the number in the
+tube settles, and falls from the one end to the other.
+"""
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import swarm
+from swarm.kernel.vector import Vec, norm
+
+from .asked import Asked
+
+# Length over radius of tubes, and the factors of Clausing to the digits of later computations.
+FACTORS = {1.0: 0.6720, 2.0: 0.5142, 5.0: 0.3105, 10.0: 0.1910}
+# Of all particles [m/s]; radii are 1 m.
+SPEED = 1.0
+FRAMES = 60
+
+
+class Diffuse(swarm.WallLaw):
+    """The cosine law, with the speed that a particle has: the direction of n + s is, for s uniform on the sphere."""
+
+    def leave(self, v, n, u, random, mass):
+        """|v| (n + s)/|n + s|."""
+        s = Vec(random.normal(0), random.normal(2), random.normal(4))
+        d = n + (1.0 / norm(s)) * s
+        return u + (norm(v - u) / norm(d)) * d
+
+
+class Flow(NamedTuple):
+    """What a run shows; times in units of L/v."""
+
+    time: np.ndarray
+    inside: np.ndarray  # how many are in the tube
+    factor: float  # the part of those that have come through
+    error: float  # its standard error
+    place: np.ndarray  # along the tube, from 0 to 1
+    density: np.ndarray  # there in the steady state, over its mean
+
+
+def tube(length: float) -> swarm.Scene:
+    """A tube of radius 1 with open ends."""
+    ends = [
+        swarm.Plane(
+            (0.0, 0.0, sign), 0.5 * length, openings=[swarm.Sphere(2.0, center=(0.0, 0.0, sign * 0.5 * length))]
+        )
+        for sign in (-1.0, 1.0)
+    ]
+    return swarm.Scene([*ends, swarm.Cylinder(1.0, laws=[Diffuse()])])
+
+
+def run(count: int, length: float, stays: float = 12.0, seed: int = 1) -> Flow:
+    """The tube while some `count` particles come, and until nearly all have left."""
+    scene = tube(length)
+    # The gas outside is there for so many times of the way across the tube and along it, and then the rest leaves.
+    unit = length * (1.0 + 0.5 * length) / SPEED
+    stop, until = stays * unit, 3.0 * stays * unit
+    source = swarm.Source(scene.surfaces[0].openings[0], rate=count / stop, speed=SPEED, stop=stop)
+    shown = []
+
+    def look(frame: swarm.Frame) -> None:
+        if 0.5 * stop < frame.time <= stop:
+            shown.append(frame.position[2, np.isnan(frame.escape_time)])
+
+    result = swarm.simulate(
+        scene, None, swarm.Impact(), until=until, every=until / FRAMES, sources=[source], seed=seed, progress=look
+    )
+    seen, gone = result.observables, np.isfinite(result.escape_time)
+    through = result.particles.position[2, gone] > 0.0
+    born = seen["born"][:, 0]
+    counts, edges = np.histogram(np.concatenate(shown), bins=20, range=(-0.5 * length, 0.5 * length))
+    return Flow(
+        seen["time"] * SPEED / length,
+        born - seen["escaped"],
+        float(through.mean()),
+        math.sqrt(float(through.var()) / len(through)),
+        0.5 + 0.5 * (edges[1:] + edges[:-1]) / length,
+        counts / counts.mean(),
+    )
+
+
+def draw(flows: dict[float, Flow], file: Path) -> None:
+    """The number in each tube, the density along it, and the factors."""
+    from .paper.plotting import BLUE, GREY, RED, page
+
+    with page(file, "Flow through a tube without collisions", 1, 3, (11.0, 3.5)) as axes:
+        for color, (ratio, flow) in zip((BLUE, RED, "tab:green", "tab:purple"), flows.items(), strict=False):
+            axes[0].plot(
+                flow.time / flow.time[-1], flow.inside / flow.inside.max(), color=color, label=f"L/R = {ratio:g}"
+            )
+            axes[1].plot(flow.place, flow.density, ".-", color=color)
+            axes[2].errorbar(ratio, flow.factor - FACTORS[ratio], flow.error, fmt="o", color=color)
+        axes[0].set(xlabel="time, of the run", ylabel="particles in the tube, over the most")
+        axes[0].legend()
+        axes[1].set(xlabel="place along the tube", ylabel="density, over its mean")
+        axes[2].axhline(0.0, color=GREY, linewidth=0.8)
+        axes[2].set(xscale="log", xlabel="L/R", ylabel="factor, less Clausing's")
+
+
+def main() -> None:
+    """Run, draw and print."""
+    ask = Asked(__doc__, "tube_flow.png", "plot")
+    ask.add_argument("--particles", type=int, default=100_000)
+    asked = ask.parse_args()
+    flows = {ratio: run(asked.particles, ratio) for ratio in FACTORS}
+    for ratio, flow in flows.items():
+        off = (flow.factor - FACTORS[ratio]) / flow.error
+        print(f"L/R = {ratio:g}: {flow.factor:.4f} +- {flow.error:.4f} come through, {FACTORS[ratio]:.4f} by Clausing")
+        print(f"({off:+.1f} standard errors); {flow.inside[-1]} are still in the tube")
+    draw(flows, asked.output)
+    print(f"written {asked.output}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,167 @@
+"""Bad input of sources: one sentence each, before anything runs; and who is refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+
+SPHERE = swarm.Scene([swarm.Sphere(0.5)])
+OPEN = swarm.Scene([swarm.Plane((0, 0, -1), 0.0)], gravity=(0, 0, -9.81))
+GIVEN = {"rate": 10.0, "speed": 1.0}
+MANY = {"rate": 100.0, "speed": 1.0}
+
+
+def without(*names, **more):
+    return {name: value for name, value in GIVEN.items() if name not in names} | more
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (without("rate"), "needs one of rate, times and count, got none"),
+        (without(times=[0.5]), "needs one of rate, times and count .*, got rate and times"),
+        (without("rate", times=[0.5], count=3), "got times and count"),
+        (without(rate=-1.0), "rate must be .*, got -1"),
+        (without(rate=0.0), "rate must be"),
+        (without(rate=math.nan), "rate must be"),
+        (without(count=0), "count must be"),
+        (without(count=2.5), "count must be"),
+        (without(start=-1.0), "start must be 0 or more, got -1"),
+        (without(start=2.0, stop=1.0), "stop must be at start = 2 s or later, got 1"),
+        (without("rate", times=[]), "times must be a list of at least one"),
+        (without("rate", times=[0.1, -1.0]), r"times\[1\] must be a finite time of 0 s or later, got -1"),
+        (without("rate", times=[0.1, math.inf]), r"times\[1\] must be"),
+        (without("rate", times=[0.1], start=1.0), "start and stop must be left out with times"),
+        (without("rate", count=3, even=True), "even must go with a rate"),
+        (without("speed"), "needs one of temperature, speed and beam, got none"),
+        (without(temperature=1.0), "got temperature and speed"),
+        (without("speed", temperature=1.0, beam=(0, 0, 1)), "got temperature and beam"),
+        (without(speed=-1.0), "speed must be"),
+        (without("speed", temperature=-1.0), "temperature must be"),
+        (without("speed", beam=(0, 0, 0)), "beam must be a velocity, three numbers that are not all 0"),
+        (without("speed", beam=(0, 1)), "beam must be"),
+        (without("speed", beam=(0, 0, 1), divergence=4.0), "divergence must be below pi"),
+        (without(divergence=0.1), "divergence must go with a beam"),
+        (without(mass=0.0), "mass must be from"),
+        (without(volume=1), "volume must be true or false"),
+        (without(within=3), "within must be a surface"),
+    ],
+)
+def test_a_source_that_is_none(given, said):
+    with pytest.raises(swarm.SceneError, match=said):
+        swarm.Source(0, **given)
+
+
+def test_no_place_of_a_source():
+    for where in ("wall", 1.5, None, True, -1):
+        with pytest.raises(swarm.SceneError, match="where must be"):
+            swarm.Source(where, **GIVEN)
+    with pytest.raises(swarm.SceneError, match="volume must be False at an opening"):
+        swarm.Source(swarm.Opening(swarm.Sphere(0.1)), volume=True, **GIVEN)
+
+
+def run(scene, source, particles=None, method=None, **more):
+    more = {"until": 1.0, "compile": "never", **more}
+    return swarm.simulate(scene, particles, method or swarm.Impact(), sources=source, **more)
+
+
+OPENED = swarm.Scene([swarm.Sphere(0.5, openings=[swarm.Sphere(0.1, (0, 0, 0.5))])])
+MOVING = swarm.Scene(
+    [swarm.Box((0.5, 0.5, 0.5)), swarm.Sphere(0.2, side="outside", motion=swarm.Translation((0.1, 0, 0)))]
+)
+TIMED = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Sphere(0.2, side="outside", present=[(0.5, 0.75)])])
+
+
+@pytest.mark.parametrize(
+    ("scene", "source", "said"),
+    [
+        (SPHERE, swarm.Source(1, **GIVEN), r"sources\[0\].where must be the number of a surface .* from 0 to 0, got 1"),
+        (SPHERE, swarm.Source(swarm.Sphere(0.1, (2.0, 0, 0)), **GIVEN), r"sources\[0\].where must be in the vessel"),
+        (SPHERE, swarm.Source(swarm.Box((0.1, 0.1, 0.1), (0, 0, 3.0)), **GIVEN), "where must be in the vessel"),
+        (SPHERE, swarm.Source(swarm.Sphere(0.1, (2.0, 0, 0)), volume=True, **GIVEN), "where must be in the vessel"),
+        (SPHERE, swarm.Source(0, within=swarm.Sphere(0.1), **GIVEN), "where must be in the vessel and in within="),
+        (SPHERE, swarm.Source(swarm.Opening(swarm.Sphere(0.1)), **GIVEN), "must be one of the openings of the scene's"),
+        (SPHERE, swarm.Source(0, rate=10.0, beam=(0, 0, 1)), r"sources\[0\].beam must lead from its surface"),
+        (OPEN, swarm.Source(0, **GIVEN), r"sources\[0\].where must be bounded, .* give within="),
+        (OPEN, swarm.Source(0, volume=True, **GIVEN), r"sources\[0\].where must be bounded"),
+        (MOVING, swarm.Source(1, **GIVEN), r"where = surfaces\[1\] must be at rest and always there"),
+        (TIMED, swarm.Source(1, **GIVEN), r"where = surfaces\[1\] must be at rest and always there"),
+        (
+            MOVING,
+            swarm.Source(0, volume=True, **MANY),
+            r"sources\[0\] must be free when particles come, .* surfaces\[1\]",
+        ),
+        (
+            TIMED,
+            swarm.Source(swarm.Sphere(0.1), volume=True, **MANY),
+            r"must be free when particles come, .* surfaces\[1\]",
+        ),
+        (SPHERE, swarm.Source(0, rate=1e300, speed=1.0), r"sources\[0\] must fit in memory .* got 1e\+300, which take"),
+        (SPHERE, swarm.Source(0, rate=1e12, speed=1.0), r"sources\[0\] must fit in memory .* got 1e\+12, which take"),
+        (
+            SPHERE,
+            swarm.Source(0, speed=1.0, times=[2.0]),
+            "sources must give at least one particle .* got none until 1 s",
+        ),
+        (
+            swarm.Scene([swarm.Sphere(0.5)], plane="z"),
+            swarm.Source(0, volume=True, rate=1.0, beam=(0, 0, 1)),
+            r"beam\[2\]",
+        ),
+        (
+            swarm.Scene([swarm.Formula("x**2 + y**2 + z**4 - 0.1")]),
+            swarm.Source(0, **GIVEN),
+            "of which points can be drawn exactly, got Formula",
+        ),
+    ],
+)
+def test_a_source_that_does_not_go_with_the_scene(scene, source, said):
+    with pytest.raises(swarm.SceneError, match=said):
+        run(scene, [source])
+
+
+def test_who_has_no_sources():
+    source = swarm.Source(0, **GIVEN)
+    for given in (3, "all", [source, 3]):
+        with pytest.raises(swarm.SceneError, match="sources"):
+            run(SPHERE, given)
+    with pytest.raises(swarm.SceneError, match=r"particles must be a swarm.Particles, got NoneType"):
+        run(SPHERE, None)
+    start = swarm.fill(SPHERE, 3, speed=1.0)
+    for method in (swarm.Penalty(1e-3, 1e6), swarm.AugmentedLagrangian(1e-3, 1e6), swarm.Impact(contact_step=1e-3)):
+        with pytest.raises(swarm.SceneError, match=r"sources must be left out here, .* Impact"):
+            run(SPHERE, source, start, method)
+    bodies = swarm.place(SPHERE, swarm.dumbbell(0.1, 1.0), 2, speed=1.0)
+    with pytest.raises(swarm.SceneError, match="not of bodies"):
+        run(SPHERE, source, bodies, swarm.Impact(dt=1e-2))
+    heavy = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.1, side="outside", mass=1.0)])
+    with pytest.raises(swarm.SceneError, match="where impacts move no wall"):
+        run(heavy, source)
+
+
+def test_a_formula_has_a_volume_to_be_born_in():
+    scene = swarm.Scene([swarm.Formula("x**2 + y**2 + z**4 - 0.1")])
+    assert len(run(scene, [swarm.Source(0, volume=True, **GIVEN)]).particles) > 1
+
+
+def test_a_wall_that_comes_and_goes_is_looked_at_when_particles_come():
+    source = swarm.Source(swarm.Sphere(0.1), volume=True, rate=50.0, speed=0.0, stop=0.1)
+    gone = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Sphere(0.3, side="outside", present=[(0.0, 0.5)])])
+    with pytest.raises(swarm.SceneError, match="must be free when particles come"):
+        run(gone, source)
+    later = swarm.Source(swarm.Sphere(0.1), volume=True, rate=50.0, speed=1.0, start=0.5)
+    assert run(gone, later).observables["born"][-1, 0] > 0
+    away = swarm.Sphere(0.2, side="outside", motion=swarm.Translation((1.0, 0.0, 0.0)))
+    moved = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), away])
+    assert run(moved, later, until=0.75).observables["born"][-1, 0] > 0
+
+
+def test_a_frame_with_those_that_come_later_is_no_start():
+    """Those that are there are: `born`."""
+    rows = np.array([[0.1, np.nan]] * 3)
+    some = swarm.Particles.of_frame(rows, rows, np.ones(2), None, np.array([True, False]))
+    with pytest.raises(swarm.SceneError, match=r"particle 1 .*take those that are there: .born\(\)"):
+        swarm.simulate(SPHERE, some, swarm.Impact(), until=1.0)
+    assert len(some.born()) == 1
