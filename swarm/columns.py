@@ -49,13 +49,15 @@ COMPONENTS = dict.fromkeys(
 
 
 def flattened(observables: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """A column for each number of observables, which have one entry a frame; "time" first.
+    """A column for each number of observables, which have one entry a frame, but those of members; "time" first.
 
     >>> list(flattened({"momentum": np.zeros((2, 3)), "impulse": np.zeros((2, 2)), "time": np.arange(2)}))
     ['time', 'momentum_x', 'momentum_y', 'momentum_z', 'impulse_0', 'impulse_1']
     """
     columns = {}
-    for name in sorted(observables, key=lambda name: name != "time"):
+    # Those of members would be too many.
+    told = [name for name in observables if not name.startswith("member_")]
+    for name in sorted(told, key=lambda name: name != "time"):
         values = np.asarray(observables[name])
         for place in np.ndindex(values.shape[1:]):
             parts = [str(i) for i in place]

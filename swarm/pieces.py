@@ -179,6 +179,13 @@ class Pieces(Volume):
         rows = [(i, of_pieces[i] if member < 0 else member) for i, member in self.order.members(self.pieces)]
         return np.array([(self.owners_of_pieces[i], member) for i, member in rows]).T
 
+    def split_by_members(self, values: NDArray[Any]) -> list[NDArray[Any]]:
+        """Of each surface what its members have, from (..., members) of those of all surfaces, one after the other."""
+        surface, member = self.members()
+        counts = np.zeros(int(surface.max()) + 1, np.int64)
+        np.maximum.at(counts, surface, member + 1)
+        return np.split(values, np.cumsum(np.maximum(counts, 1))[:-1], axis=-1)
+
     def _unions(self) -> list[int]:
         """The surfaces that are unions of several rooms."""
         return [self.owners_of_pieces[rooms[0][0]] for rooms in self.order.unions]

@@ -644,6 +644,7 @@ LAYERS = [
     ["contact"],
     ["surfaces"],
     ["frames", "kernel", "motion", "rows"],
+    ["snapshot"],
     ["checks", "columns", "notebook"],
     ["extras"],
     ["status", "errors", "version", "interrupt"],

@@ -1,5 +1,7 @@
 """Impacts counted on each member of a surface: those of the log, for any threads, halts and sessions."""
 
+import math
+
 import numpy as np
 import pytest
 from conftest import rarely
@@ -7,9 +9,10 @@ from test_impacts import BALLS, DOWN, LISTED, SCENES, SPHERE, table_of
 from test_sessions import stopped_at
 
 import swarm
+from swarm.lanes.counts import PARTS, Sums
 from swarm.run.engine import Run
 from swarm.run.state import Seeding
-from swarm.run.tally import Tally, Watched
+from swarm.run.tally import Tally, Watched, value_of
 
 MANY = {
     **SCENES,
@@ -71,7 +74,7 @@ def test_halts_and_sessions_lose_and_repeat_none(tmp_path):
     start, halts = swarm.fill(scene, 30, speed=1.0, seed=1), 0
 
     def begun():
-        tally = Tally(scene)
+        tally = Tally(scene.members(), 2.0**-10)
         return Run(scene, start.copy(), swarm.Impact(), 1, None, "never", Seeding(), Watched(None, tally)), tally
 
     one, tally = begun()
@@ -89,7 +92,9 @@ def test_halts_and_sessions_lose_and_repeat_none(tmp_path):
             halts, passes = halts + 1, 2 * passes
     one.__exit__()
     assert halts > 3
-    for counts, others in zip(whole.member_impacts, tally.of_members(), strict=True):
+    for counts, others in zip(
+        whole.member_impacts, scene.split_by_members(tally.seen()["member_impacts"]), strict=True
+    ):
         assert counts.tolist() == others.tolist()
 
 
@@ -112,12 +117,123 @@ def test_without_it_there_is_none():
     assert counts.shape == (1,)
 
 
+BALL = swarm.Sphere(0.1, side="outside")
+KINDS = {
+    "penalty": (swarm.Scene([swarm.Sphere(0.5), BALL]), swarm.Penalty(dt=0.02, penalty=1e4)),
+    "corners": (
+        swarm.Scene(
+            [swarm.Box((0.5, 0.5, 0.5)), swarm.Sphere(0.2, (0.5, 0.5, -0.5), side="outside")], (0.3, 0.2, -1.0)
+        ),
+        swarm.Penalty(dt=0.02, penalty=1e3),
+    ),
+    "loops": (swarm.Scene([swarm.Sphere(0.5), BALL]), swarm.AugmentedLagrangian(dt=0.05, penalty=1e3, adaptive=True)),
+    "contact steps": (swarm.Scene([swarm.Sphere(0.5), BALL]), swarm.Impact(contact_step=1e-2)),
+    "walls that react": (swarm.Scene([swarm.Sphere(0.5, mass=3.0), swarm.Box((0.7, 0.7, 0.7)), BALL]), swarm.Impact()),
+    "bodies": (
+        swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Sphere(0.3, side="outside")], DOWN),
+        swarm.Impact(dt=0.02),
+    ),
+    "bodies on springs": (
+        swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Sphere(0.3, side="outside")], DOWN),
+        swarm.Penalty(dt=0.01, penalty=1e4),
+    ),
+    "lossy field": (
+        swarm.Scene([swarm.Sphere(0.5, restitution=0.6, friction=0.2), BALLS], DOWN),
+        swarm.Impact(shortest_flight=1e-2),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_those_of_all_members_are_those_of_all_particles_in_every_kind_of_run(name, tmp_path):
+    scene, method = KINDS[name]
+    if "bodies" in name:
+        start = swarm.place(scene, swarm.dumbbell(0.1, 1.0), 12, speed=1.0, seed=1)
+    else:
+        start = swarm.fill(scene, 20, speed=1.0, seed=1)
+    path = tmp_path / "run.h5"
+    more = {"until": 2.0, "every": 0.5, "compile": "never"}
+    result = swarm.simulate(scene, start, method, member_impacts=True, trajectory=path, **more)
+    seen, bare = result.observables, swarm.simulate(scene, start, method, **more).observables
+    for key, values in bare.items():
+        assert values.tobytes() == seen[key].tobytes(), key
+    assert seen["member_impacts"].sum(axis=1).tolist() == seen["impacts"].tolist()
+    assert min(counts.sum() for counts in result.member_impacts) > 0
+    if "member_residence" in seen:
+        assert seen["member_residence"].sum(axis=1) == pytest.approx(seen["sliding_time"], rel=1e-13, abs=1e-13)
+    with swarm.load(path) as written:
+        for k in (-1, 2):
+            told = written.members(k)
+            assert np.concatenate(told["impacts"]).tolist() == seen["member_impacts"][k].tolist()
+        assert [len(one) for one in told["impacts"]] == [len(one) for one in result.member_impacts]
+        assert "member_impacts" in written.to_xarray()
+        assert not any("member" in column for column in written.table().columns)
+        with pytest.raises(swarm.SceneError, match="frame must lie between -5 and 4, got 5"):
+            written.members(5)
+
+
+def test_the_time_on_each_wall_is_that_of_what_lies_on_it():
+    """One particle lies on the floor from the start, one on a shelf from its fall on; one on the lower of two balls."""
+    walls = [
+        swarm.Plane((0.0, 0.0, -1.0), 1.0, restitution=0.0),
+        swarm.Box((0.2, 0.2, 0.2), (3.0, 0.0, 0.0), side="outside", restitution=0.0),
+    ]
+    start = swarm.Particles([[0.0, 3.0, 1.0], [0.0] * 3, [-1.0, 0.7, 1.0]], np.zeros((3, 3)))
+    result = swarm.simulate(
+        swarm.Scene(walls, (0.0, 0.0, -1.0)), start, swarm.Impact(), until=4.0, every=1.0, compile="never",
+        member_impacts=True,
+    )  # fmt: skip
+    floor, shelf = (times.item() for times in result.member_residence)
+    assert floor == pytest.approx(4.0 + (4.0 - 2.0), rel=1e-6)
+    assert shelf == pytest.approx(4.0 - 1.0, rel=1e-6)
+    assert result.observables["member_residence"].sum(axis=1) == pytest.approx(
+        result.observables["sliding_time"], rel=1e-14
+    )
+
+
+def test_times_on_members_have_the_same_bits_for_any_threads():
+    scene = swarm.Scene([swarm.Box((0.5, 0.5, 0.5), restitution=0.0), swarm.Sphere(0.3, side="outside")], DOWN)
+    one = run(scene, 300, 0.6, every=0.2)
+    assert sum(times.sum() for times in one.member_residence) > 10.0
+    for keywords in ({"threads": 2, "block_size": 256}, {"every": 0.2, "threads": 3, "block_size": 1}):
+        other = run(scene, 300, 0.6, **{"every": 0.2} | keywords)
+        assert other.observables["member_residence"].tobytes() == one.observables["member_residence"].tobytes()
+
+
+def test_sums_of_whole_numbers_are_exact_in_any_order():
+    rng = np.random.default_rng(1)
+    terms = rng.normal(size=2000) * 10.0 ** rng.uniform(-6.0, 6.0, 2000)
+    made = []
+    for order in (terms, terms[::-1], np.sort(terms)):
+        sums = Sums(*np.zeros((2, 1), np.int64), 2.0**-10)
+        for term in order:
+            sums.add(0, term)
+        assert 0 <= sums.rest[0] < PARTS
+        made.append(value_of(np.array((sums.whole, sums.rest)), sums.unit).item())
+    assert made[0] == made[1] == made[2] == pytest.approx(math.fsum(terms), abs=2000 * 2.0**-51)
+
+
+def test_facets_of_a_mesh_have_their_own():
+    """In a tetrahedron whose floor is one triangle."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    mesh = swarm.Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], restitution=0.3)
+    scene = swarm.Scene([mesh], (0.0, 0.0, -1.0))
+    result = run(scene, 4, 3.0)
+    (impacts,), (times,) = result.member_impacts, result.member_residence
+    assert impacts.shape == times.shape == (4,)
+    assert impacts.sum() == result.observables["impacts"][-1]
+    floor = (np.asarray(mesh.vertices)[np.asarray(mesh.triangles)][:, :, 2] == 0.0).all(axis=1)
+    assert times[floor].item() > 0.8 * times.sum() > 0.0
+    assert times.sum() == pytest.approx(result.observables["sliding_time"][-1], rel=1e-13)
+
+
 def test_what_has_no_impacts_of_members():
-    body = swarm.place(SPHERE, swarm.dumbbell(0.1, 1.0), 2)
-    with pytest.raises(swarm.SceneError, match=r"member_impacts must be False here, .* not of bodies"):
-        swarm.simulate(SPHERE, body, swarm.Impact(dt=1e-2), until=1.0, member_impacts=True)
     start = swarm.fill(SPHERE, 2, speed=1.0)
-    with pytest.raises(swarm.SceneError, match=r"member_impacts must be False here, .* not of Penalty"):
-        swarm.simulate(SPHERE, start, swarm.Penalty(dt=1e-2, penalty=1e4), until=1.0, member_impacts=True)
+    loops = swarm.AugmentedLagrangian(dt=1e-2, penalty=1e4, on_unconverged="impact")
+    with pytest.raises(swarm.SceneError, match='member_impacts must be False with on_unconverged = "impact"'):
+        swarm.simulate(SPHERE, start, loops, until=1.0, member_impacts=True)
     with pytest.raises(swarm.SceneError, match="member_impacts"):
         run(SPHERE, member_impacts="yes")
+    many = {"until": 1e7, "every": 1e-3, "member_impacts": True}
+    with pytest.raises(swarm.SceneError, match="every must leave frames that fit"):
+        swarm.simulate(swarm.Scene([swarm.Sphere(0.5), BALLS]), start, swarm.Impact(), **many)

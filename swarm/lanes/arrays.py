@@ -199,7 +199,7 @@ class Share(NamedTuple):
     first: int  # the number of particle 0 in the whole run, for them
     moment: float  # at which the frame ends [s]
     log: Any = None  # `log.Log` of impacts
-    counts: Any = None  # `log.Counts` of them
+    counts: Any = None  # `counts.Counts` of them
 
     def watches(self):
         """The log and the counts of impacts, if the run has any."""
@@ -209,6 +209,18 @@ class Share(NamedTuple):
         """Log and count an impact of particle i, a `log.Struck`."""
         for watch in self.watches():
             watch.add_row(method, walls, self.state, i, struck)
+
+    def note_stay(self, i, time):
+        """Count a time in which walls hold particle i [s]: as that of the first of them, or of the one it has met."""
+        if self.counts is not None:
+            contacts = self.state.contacts
+            first = contacts.walls[0, i]
+            self.counts.stay(select(first >= 0.0, first, contacts.met[i]), time)
+
+    def note_hops(self, wall, time):
+        """Take a time [s] that is of hops from that in which a wall holds a particle."""
+        if self.counts is not None:
+            self.counts.stay(max(wall, 0.0), -time)
 
     def hand_over(self, i, phase):
         """Leave particle i to the kernel of a phase."""

@@ -63,7 +63,7 @@ def advance_block(method, walls, gravity, hard, share, lanes):
         passes += 1
         some_arrived, some_hard, some_wrong = _pass(method, walls, gravity, share, lanes, picked, live)
         if some_wrong or some_hard or passes % LOOK == 0:
-            status, lane = _rare(hard, method, walls, gravity, state, lanes, live, some_hard)
+            status, lane = _rare(hard, method, walls, gravity, share, lanes, live, some_hard)
             if status != Status.DONE.value:
                 keep_failure(state.multipliers, lanes, lane)
                 return status, lanes.particle[lane], place.drawn
@@ -96,13 +96,13 @@ def _halts(share, lanes, place, live, passes):
 
 
 @outlined
-def _rare(hard, method, walls, gravity, state, lanes, live, some_hard):
+def _rare(hard, method, walls, gravity, share, lanes, live, some_hard):
     """The rare part of a pass: (worst status, its lane)."""
     if not some_hard:
-        return _look(method, walls, state, lanes, live)
+        return _look(method, walls, share.state, lanes, live)
     if hard is None:
         return Status.HARD_CONTACT.value, 0
-    return _hard_passes(hard, method, walls, gravity, lanes, live)
+    return _hard_passes(hard, method, walls, gravity, share, lanes, live)
 
 
 @outlined
@@ -133,14 +133,16 @@ def _look(method, walls, state, lanes, live):
 
 
 @outlined
-def _hard_passes(hard, method, walls, gravity, lanes, live):
+def _hard_passes(hard, method, walls, gravity, share, lanes, live):
     """The hard lanes, one by one: (worst status, its lane)."""
     worst, where = 0, 0
     for i in range(live):
         if lanes.wall[i] <= methods.HARD:
-            lane = lanes.given(method, i)
-            contact, status = method.hard_pass(walls, gravity, lane, methods.HARD - lanes.wall[i], lanes, i)
+            lane, wall = lanes.given(method, i), methods.HARD - lanes.wall[i]
+            contact, status = method.hard_pass(walls, gravity, lane, wall, lanes, i)
             _put_contact(method, lanes, i, contact)
+            if share.counts is not None:
+                share.counts.add(wall, contact.hits)
             if lanes.lane(i).hits > hard.most_hits:
                 status = Status.STALLED.value
             if status > worst:

@@ -100,7 +100,9 @@ def _decide(method, walls, gravity, share, i):
         _spare(moving, walls, state, i, found, wall)
     u = wall_velocity(moving, walls, wall, r)
     book(carried, state, i, wall, (p.twice, found.twice), given(u, found.v - v), method.laws.loses)
-    contacts.sliding[i] -= min(found.wait, remaining)
+    hops = min(found.wait, remaining)
+    contacts.sliding[i] -= hops
+    share.note_hops(found.wall, hops)
     phase, v = found.phase, found.v
     if phase == FLYING:
         v = events.off_the_wall(walls, wall, r, v, u)
@@ -252,6 +254,7 @@ def _rest(method, walls, gravity, share, i, p, active):
         lose(state, i, p.twice, 2.0 * potential(gravity, r))
         put(state.velocity, 0, i, ZERO)
     contacts.sliding[i] += p.remaining
+    share.note_stay(i, p.remaining)
     contacts.remaining[i], contacts.keep[i] = 0.0, 0.0
     contacts.phase[i] = ARRIVED
     share.hand_over(i, ARRIVED)
@@ -303,6 +306,7 @@ def _step(method, walls, gravity, share, i):
     change = p.twice, end.twice_energy
     book_step(walls, state, i, contacts.met[i], change, given_work, method.laws.loses)
     contacts.sliding[i] += end.used
+    share.note_stay(i, end.used)
     contacts.remaining[i] = max(remaining - end.used, 0.0)
     phase = FLYING if contacts.remaining[i] > 0.0 else ARRIVED
     contacts.phase[i], contacts.step[i], contacts.keep[i] = FLYING, 0.0, 0.0

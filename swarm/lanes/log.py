@@ -1,6 +1,6 @@
 """The log of impacts: each one that a kernel counts is a row, in arrays that another thread writes to a file.
 
-And their number on each wall. Where a run has none of these there is None in its place, and nothing of it is compiled.
+Where a run has none there is None in its place, and nothing of it is compiled.
 """
 
 from typing import Any, NamedTuple
@@ -128,32 +128,6 @@ class Log(NamedTuple):
 
 def _put(rows, k, vector):
     rows[k, 0], rows[k, 1], rows[k, 2] = vector.x, vector.y, vector.z
-
-
-class Counts(Record):
-    """Impacts on each wall of the scene that one thread has computed."""
-
-    impacts: Array  # (walls,) int64
-
-    def keep_before(self, lanes, live):
-        """Keep of every lane what says whether its contact is an impact."""
-        for i in range(index(live)):
-            before = Before(lanes.before, i)
-            before.hits, before.wall = lanes.lane(i).hits, lanes.wall[i]
-
-    def note(self, lanes, i, impulse):
-        """Nothing: impulses are not counted."""
-
-    def add_rows(self, method, walls, state, lanes, live):
-        """Count the impacts of a pass."""
-        for i in range(index(live)):
-            before = Before(lanes.before, i)
-            # A lane without an impact may be at no wall.
-            self.impacts[index(int(max(before.wall, 0.0)))] += np.int64(lanes.lane(i).hits - before.hits)
-
-    def add_row(self, method, walls, state, particle, struck):
-        """Count an impact of a particle."""
-        self.impacts[index(int(struck.wall))] += 1
 
 
 # --- A log that is full ----------------------------------------------------------------------------------

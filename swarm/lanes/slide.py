@@ -30,7 +30,7 @@ def slide_block(kind, method, walls, gravity, share, lanes):
     Each until it has arrived, flies, or is held by other walls; `share.pending` counts what is left to other kernels.
     """
     lanes = with_distances(lanes)
-    slide = Slide(kind, method, walls, gravity, share.state, lanes)
+    slide = Slide(kind, method, walls, gravity, share.state, lanes, share.counts)
     place, live, passes, loaded = Place(0, 0, 0), 0, 0, True
     while live < LANES and loaded:
         place, loaded = _refill(slide, share, live, place, passes)

@@ -86,6 +86,7 @@ class Slide(Record):
     gravity: Any
     state: Any
     lanes: SlidingLanes
+    counts: Any = None  # those of the share
 
     def phase(self):
         """The phase of particles that one wall holds, or two."""
@@ -124,13 +125,19 @@ class Slide(Record):
         lanes, lane = self.lanes, self.lanes.lane(i)
         if not lanes.unsolved[i]:
             return
-        self.state.contacts.sliding[lanes.particle[i]] += lane.h
+        self.stay(i, lane.h)
         self.push(i, lane.impulse, lane.impulse_second)
         lane.trials = 0.0
         if self.method.laws.friction is not None:
             self.lose(i, lane.work)
         if self.moves():
             self.work(i, lanes.gained[i], lane.given_by_second)
+
+    def stay(self, i, time):
+        """Book a time on the walls that hold a lane [s]."""
+        self.state.contacts.sliding[self.lanes.particle[i]] += time
+        if self.counts is not None:
+            self.counts.stay(self.lanes.lane(i).first, time)
 
     def push(self, i, first, second):
         """Impulses per mass to the walls that hold a lane."""

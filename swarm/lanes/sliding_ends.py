@@ -46,7 +46,7 @@ def set_going(slide, i):
         return stay(slide, i)
     if square(v) == 0.0 and events.rests(slide.gravity, force):
         p, contacts = lanes.particle[i], slide.state.contacts
-        contacts.sliding[p] += remaining
+        slide.stay(i, remaining)
         contacts.phase[p], contacts.load[walls.row(lane.first), p] = ARRIVED, force.n
         if lane.second >= 0.0:
             contacts.load[walls.row(lane.second), p] = force.m

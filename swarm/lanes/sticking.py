@@ -74,7 +74,7 @@ def stay(slide, i):
     lane.r, lane.v, lane.remaining, lane.twice, lane.keep = r1, v1, after, twice, 0.0
     slide.push(i, pressed, pressed_second)
     slide.work(i, given, 0.0)
-    contacts.sliding[lanes.particle[i]] += end
+    slide.stay(i, end)
     if goes_on or not after > 0.0:
         return AGAIN if after > 0.0 else ARRIVED
     if met >= 0.0:

@@ -24,6 +24,7 @@ _PARTICLES = {
 _UNITS = {
     "angular_momentum": "kg m2 s-1", "momentum": "kg m s-1", "impulse": "N s", "energy_error": "1", "energy": "J",
     "penetration": "m", "heat": "J", "work": "J", "time": "s", "position": "m", "velocity": "m s-1", "spin": "rad s-1",
+    "residence": "s",
 }  # fmt: skip
 _AXES = ("x", "y", "z")
 
@@ -91,6 +92,6 @@ def dataset_of(trajectory: Any) -> xr.Dataset:
 def _dimensions(name: str, dimensions: int) -> list[str]:
     """The dimensions of an observable besides the time."""
     last = {None: [], 3: ["axis"], 4: ["quaternion"]}[len(COMPONENTS[name]) if name in COMPONENTS else None]
-    first = next((kind for kind in ("cavity", "part") if name.startswith(kind)), "surface")
+    first = next((kind for kind in ("cavity", "part", "member") if name.startswith(kind)), "surface")
     first = "source" if name == "born" else first
     return [first] * (dimensions - 1 - len(last)) + last

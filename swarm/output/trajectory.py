@@ -92,6 +92,18 @@ class Trajectory(Presented):
         """The names of the observables of one's own; these may be NaN."""
         return self._text("observables").split(", ") if self._has("parameters/observables") else []
 
+    def members(self, k: int = -1) -> dict[str, list[NDArray[Any]]]:
+        """Of a run with member_impacts=True what each member of each surface has had until frame k; else nothing.
+
+        "impacts", and where particles may slide "residence" [s]: a list with an array for each surface, (members,) of a
+        field such as `Spheres`, of the facets of a `Mesh` or of the parts of a union, and (1,) of any other.
+        """
+        k = self._number_of(k)
+        with self._reading("its members") as file:
+            names = [name for name in file.get("observables", {}) if name.startswith("member_")]
+            seen = {name: file[f"observables/{name}/value"][k] for name in names}
+        return {name.removeprefix("member_"): self.scene.split_by_members(values) for name, values in seen.items()}
+
     def observed(self) -> dict[str, NDArray[Any]]:
         """The observables, checked to include those of every run."""
         seen, scene = self.observables, self.scene
@@ -184,11 +196,16 @@ class Trajectory(Presented):
 
     def _number(self, k: int) -> int:
         """The number of a frame whose particles are kept, from 0 on."""
+        k = self._number_of(k)
+        self._require_particles()
+        return k
+
+    def _number_of(self, k: int) -> int:
+        """The number of a frame, from 0 on."""
         k, n = whole(f"{self.path}: frame", k), len(self)
         self.require_frames()
         if not -n <= k < n:
             raise SceneError(f"{self.path}: frame must lie between {-n} and {n - 1}, got {k}")
-        self._require_particles()
         return k % n
 
     def particle(self, i: int) -> tuple[NDArray[np.floating], NDArray[np.floating]]:

@@ -65,6 +65,7 @@ class Queue(NamedTuple):
     listed: Array  # (N,) bool, whether it is in `close`
     close: Array  # (N,) those that are near, and some that were
     heap: Heap
+    counts: Any = None  # (walls,) int64, impacts on each, where they are counted
 
 
 class Rule(NamedTuple):
@@ -134,6 +135,8 @@ def _bounce(scenery, queue, i, wall, remaining):
     queue.dissipated[i] += 0.5 * m * (twice - (bounce.twice_energy - bounce.work))
     queue.energy[i] = 0.5 * bounce.twice_energy
     queue.impacts[i] += bounce.impulse > 0.0
+    if queue.counts is not None:
+        queue.counts[owner] += bounce.impulse > 0.0
 
 
 @outlined
@@ -153,6 +156,8 @@ def _strike(scenery, walls, queue, i, now):
     queue.impulse[index(blow.owner), i] += blow.impulse
     queue.dissipated[i] += blow.lost
     queue.impacts[i] += blow.impulse > 0.0
+    if queue.counts is not None:
+        queue.counts[index(blow.owner)] += blow.impulse > 0.0
 
 
 # --- Of all ----------------------------------------------------------------------------------------------

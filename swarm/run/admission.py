@@ -87,6 +87,10 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
 
 def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
     require_method_of_bodies(scene, bodies, method, options)
+    if options.member_impacts and bodies.body.cavities:
+        raise SceneError(
+            "member_impacts must be False with bodies that carry cavities, which are no surfaces of the scene, got True"
+        )
     if scene.period is not None:
         raise SceneError(
             f"period must be None with bodies, whose points would be torn apart by the faces, got {scene.period}; use "
@@ -195,6 +199,15 @@ def _require_instants(scene: Scene, particles: Particles, method: Method, option
         _require_no_log(
             f"of Impact, whose impacts have an instant, not of {type(method).__name__}; use Impact", options
         )
+    if (
+        options.member_impacts
+        and getattr(method, "on_unconverged", "") == "impact"
+        and not getattr(method, "adaptive", True)
+    ):
+        raise SceneError(
+            'member_impacts must be False with on_unconverged = "impact" in fixed steps, one of which may have impacts '
+            'on several walls, got True; use adaptive=True, or on_unconverged = "count"'
+        )
     if scene.reacts():
         _require_no_log("of walls that impacts do not move; give them a motion instead of a mass", options)
     numbers = options.impact_particles
@@ -207,8 +220,6 @@ def _require_instants(scene: Scene, particles: Particles, method: Method, option
 def _require_no_log(instead: str, options: RunOptions) -> None:
     if options.impacts is not None:
         raise SceneError(f"impacts must be None here, a log of impacts is {instead}; got {options.impacts}")
-    if options.member_impacts:
-        raise SceneError(f"member_impacts must be False here, their count is {instead}; got True")
 
 
 def _require_inside(scene: Scene, particles: Particles) -> None:

@@ -21,6 +21,7 @@ from ..scene import Scene
 from ..status import Status
 from .base import Arrays, BaseRun
 from .energies import Energies, summed
+from .tally import Tally
 from .tiers import Tier
 
 # Round-off of a position on a wall, as a part of the scene's size.
@@ -38,6 +39,9 @@ STAGES = {2: (1.0,), 4: (_OUTER, _OUTER, 1.0 - 4.0 * _OUTER, _OUTER, _OUTER)}
 
 class BodyRun(BaseRun):
     """The run of bodies; `particles` are all their points, whose arrays become a part of its state."""
+
+    # Where impacts are counted by walls.
+    tally: Tally | None = None
 
     def __init__(
         self, scene: Scene, bodies: Bodies, particles: Particles, method: Method, threads: int,
@@ -92,19 +96,22 @@ class BodyRun(BaseRun):
         self._sums = np.zeros((0, 0))
 
     def calls(self) -> list[tuple[Any, tuple[Any, ...]]]:
-        return [(advance_bodies, self._arguments())]
+        return [(advance_bodies, self._arguments(0, np.zeros(1, np.int64)))]
 
-    def _arguments(self) -> tuple[Any, ...]:
-        """Arguments of `advance_bodies`, with a ticket of their own."""
-        both, ticket = (self._ties, self._touching), np.zeros(1, np.int64)
-        return both, self._walls, self._rule, self._bodies, ticket, self._size, self._watch.passes
+    def _arguments(self, thread: int, ticket: Any) -> tuple[Any, ...]:
+        """Arguments of `advance_bodies`, with the counts of a thread."""
+        both, bodies = (self._ties, self._touching), self._bodies
+        if self.tally is not None:
+            bodies = bodies._replace(counts=self.tally.of_thread(thread).impacts)
+        return both, self._walls, self._rule, bodies, ticket, self._size, self._watch.passes
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         if not self._cut_short:
             self._bodies.remaining.fill(span * self._unit)
         self._rule = self._rule._replace(end=moment)
-        threads = 1 if self._tier.is_plain else self._threads
-        status, number = max(self._called(advance_bodies, [self._arguments()] * threads, latest))
+        threads, ticket = 1 if self._tier.is_plain else self._threads, np.zeros(1, np.int64)
+        calls = [self._arguments(thread, ticket) for thread in range(threads)]
+        status, number = max(self._called(advance_bodies, calls, latest))
         self._watch.end()
         self._cut_short = status == Status.INTERRUPTED
         if status not in (Status.DONE, Status.INTERRUPTED):
@@ -219,7 +226,13 @@ class BodyRun(BaseRun):
             )
 
     def arrays(self) -> Arrays:
-        return dict(self._bodies._asdict())
+        held = {name: array for name, array in self._bodies._asdict().items() if array is not None}
+        return held if self.tally is None else {**held, **self.tally.arrays()}
+
+    def restore(self, arrays: Arrays, cut_short: bool) -> None:
+        super().restore(arrays, cut_short)
+        if self.tally is not None:
+            self.tally.restore(arrays)
 
 
 def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:

@@ -27,7 +27,7 @@ from . import failures
 from .base import Arrays, BaseRun, result_of
 from .impacts import Page
 from .present import Present
-from .state import Seeding, begin, have_lasted, state_of
+from .state import Seeding, begin, have_lasted, holders_of_resting, state_of
 from .tally import Watched
 from .tiers import Tier
 from .turns import End, Turns, left_behind
@@ -90,6 +90,8 @@ class Run(BaseRun):
         self._reach(moment)
         if not self._cut_short:
             begin(self.state, self._present.of(self._phase), (span, self._moment), bool(self._kinds))
+            if self._tally is not None and self._kinds:
+                self._tally.rest(holders_of_resting(self.state.contacts), span)
         again = True
         while again:
             until = self._limit(latest)
@@ -274,13 +276,13 @@ class Run(BaseRun):
                 found |= {f"{name}.{field}": array for field, array in value._asdict().items()}
             elif isinstance(value, np.ndarray):
                 found[name] = value
-        return found if self._tally is None else {**found, "member_impacts": self._tally.total()}
+        return found if self._tally is None else {**found, **self._tally.arrays()}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self._halted = lanes.Halted(arrays["halted.particle"], arrays["halted.rows"])
         super().restore(arrays, cut_short)
         if self._tally is not None:
-            self._tally.restore(arrays["member_impacts"])
+            self._tally.restore(arrays)
         if have_lasted(self.state.contacts, self._phase):
             self._kinds = set(_KINDS)
             self._choose_tier()

@@ -30,7 +30,7 @@ from .progress import Display, display
 from .reacting import ReactingRun
 from .session import Session
 from .state import Seeding
-from .tally import Tally, Watched
+from .tally import Watched, tally_of
 
 if TYPE_CHECKING:
     from ..output.background import Background
@@ -53,7 +53,6 @@ class End(NamedTuple):
     impacts: NDArray[np.int64]
     escape_time: NDArray[np.float64]
     absorbed: Absorbed | None
-    members: list[NDArray[np.int64]] | None
     birth_time: NDArray[np.float64]
 
 
@@ -101,7 +100,7 @@ def carry_out_task(task: Task, session: Session) -> End:
                     while not run.advance(span, moment, *_meanwhile(session, writer, show)):
                         show.within(before + run.share_done(span) * (moment - before), until)
                         session.look(run, writer, number - 1, before, moment)
-                seen = {"time": moment, **run.seen()}
+                seen = {"time": moment, **run.seen(), **(tally.seen(task.is_shard) if tally else {})}
                 run.require_admissible(seen, moment)
                 read = functools.partial(getattr, run.state)
                 seen |= measures.of(number, moment, _snapshot_of(task, read, moment))
@@ -119,7 +118,7 @@ def carry_out_task(task: Task, session: Session) -> End:
                 if moment < until:
                     session.look(run, writer, number, moment, None)
         session.finish()
-        return _end(task, session, run, kept, tally)
+        return _end(task, session, run, kept)
 
 
 @contextlib.contextmanager
@@ -130,7 +129,7 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
     """
     recorder, watched = (
         recorder_of(task),
-        Watched(log_of(task), Tally(task.scene) if task.options.member_impacts else None),
+        Watched(log_of(task), tally_of(task)),
     )
     runs: list[BaseRun] = []
 
@@ -143,7 +142,7 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
     with session, interrupt.taken_by(stop), shown as show, kernels_compiled(show.compiling, compilations.sentence):
         session.prepare(task, watched.log)
         measures = _measures_of(task, session)
-        _require_room(task, session, measures.size())
+        _require_room(task, session, measures.size() + (watched.tally.size() if watched.tally else 0))
         runs.append(run := run_of(task, watched))
         compilations.calls = run.calls
         session.restore(run)
@@ -182,14 +181,16 @@ def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
     options = task.options
     how = options.thread_count(), options.block_size, options.compile
     if task.bodies is not None:
-        return BodyRun(task.scene, task.bodies, task.particles, task.method, *how, task.first)
+        bodies = BodyRun(task.scene, task.bodies, task.particles, task.method, *how, task.first)
+        bodies.tally = watched.tally
+        return bodies
     if task.scene.reacts():
-        return ReactingRun(task.scene, task.particles, task.method, *how)
+        return ReactingRun(task.scene, task.particles, task.method, *how, watched.tally)
     kind = DoorRun if task.scene.has_doors() else Run
     return kind(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
 
 
-def _end(task: Task, session: Session, run: BaseRun, kept: Columns, tally: Tally | None) -> End:
+def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> End:
     state = run.state
     is_whole = session.first == 0 or task.is_shard
     return End(
@@ -200,7 +201,6 @@ def _end(task: Task, session: Session, run: BaseRun, kept: Columns, tally: Tally
         state.impacts,
         np.full(len(task.particles), np.nan) if state.escape_time is None else state.escape_time,
         state.absorbed,
-        None if tally is None else tally.of_members(),
         birth_times(task.particles),
     )
 

@@ -45,7 +45,7 @@ class RunOptions:
     recording: Any = None
     impacts: Any = None
     impact_particles: Any = "all"
-    member_impacts: bool = field(default=False, metadata=_OF_A_SESSION)
+    member_impacts: bool = False
     observables: Any = field(default=None, metadata=_OF_A_SESSION)  # then functions by their names
     record_particles: int = 5000
     record_color: str = "speed"

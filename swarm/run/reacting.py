@@ -23,6 +23,7 @@ from ..scene import Scene
 from ..status import Status
 from . import failures
 from .base import Arrays, BaseRun
+from .tally import Tally
 from .tiers import Tier
 
 # Fewer particles than this are predicted sooner than another thread is awake.
@@ -41,7 +42,7 @@ class ReactingRun(BaseRun):
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
-        compile: str = "always",
+        compile: str = "always", tally: Tally | None = None,
     ) -> None:  # fmt: skip
         n, walls, gravity = len(particles), len(scene.owners()), scene.pull()
         energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(gravity, vec(particles.position))
@@ -57,8 +58,9 @@ class ReactingRun(BaseRun):
             state.position, state.velocity, state.mass, state.energy, state.impulse, state.dissipated, state.impacts,
             np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool),
             np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
-            Heap(np.zeros(n), number.copy(), number.copy()),
+            Heap(np.zeros(n), number.copy(), number.copy()), None if tally is None else tally.of_thread(0).impacts,
         )  # fmt: skip
+        self._tally = tally
         speed = math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))
         self._freedoms = freedoms_of(scene, _WIDTH * speed or _WIDTH)
         self._clock = np.zeros(CLOCK)
@@ -201,13 +203,16 @@ class ReactingRun(BaseRun):
         return float(self._clock[NOW] / span)
 
     def arrays(self) -> Arrays:
-        queue = {name: array for name, array in self._queue._asdict().items() if name not in ("heap", "mass")}
+        queue = {name: array for name, array in self._queue._asdict().items() if name not in ("heap", "mass", "counts")}
         freedoms = {f"walls.{name}": array for name, array in self._freedoms._asdict().items()}
-        return {**queue, **freedoms, "key": self._queue.heap.key, "clock": self._clock}
+        counts = {} if self._tally is None else self._tally.arrays()
+        return {**queue, **freedoms, **counts, "key": self._queue.heap.key, "clock": self._clock}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
         super().restore(arrays, cut_short)
+        if self._tally is not None:
+            self._queue.counts[:] = arrays["member_impacts"]
 
 
 def _balance(seen: dict[str, Any]) -> float:

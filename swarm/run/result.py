@@ -37,17 +37,16 @@ class Result:
             (w, x, y, z): what is given at xi is at position + orientation xi. Where walls react also "wall_energy"
             (frames, surfaces) [J], which "total_energy" includes, "wall_velocity" [m/s] and "wall_spin" [rad/s]
             (frames, surfaces, 3). Of bodies also "link_error", the "work" of led anchors [J], and "cavity_impulse"
-            (frames, cavities) of what points carry [N s]. Where laws of walls return a `Leave` also "absorbed" (frames,
-            surfaces), how many particles each has absorbed so far.
+            (frames, cavities) of what points carry [N s]. With member_impacts=True "member_impacts" (frames, members)
+            of all members of surface 0, then of surface 1, and so on, and where particles may slide "member_residence"
+            [s], how long they slid or rested there, at an edge on the wall that they were on before. Where
+            laws of walls return a `Leave` also "absorbed" (frames, surfaces), how many each has absorbed so far.
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
         impacts_per_particle: (N,) how many impacts each has had.
         escape_time: (N,) when each has passed an opening of a wall [s], where it is since then; NaN of those inside.
         absorbed_time: (N,) when a law of a wall has absorbed each [s], where it is since then; NaN of the others.
-        member_impacts: with member_impacts=True how many impacts each surface has had since 0 s, in all sessions: a
-            list with an array for each, (members,) of a field such as `Spheres` and (1,) of any other; in a cell that
-            repeats all images of a body are one. Else None. No file holds it.
         bodies: the bodies at `until`, or None; then `particles` are all their points.
         scene, method: as they were run.
         birth_time: (N,) when each came [s], 0 of those of the start.
@@ -61,7 +60,6 @@ class Result:
     impacts_per_particle: NDArray[np.int64]
     escape_time: NDArray[np.float64]
     absorbed_time: NDArray[np.float64]
-    member_impacts: list[NDArray[np.int64]] | None = None
     bodies: Bodies | None = None
     scene: Scene | None = None
     method: Method | None = None
@@ -95,6 +93,25 @@ class Result:
             SceneError: pandas is not installed.
         """
         return frame_of(self.observables)
+
+    @property
+    def member_impacts(self) -> list[NDArray[np.int64]] | None:
+        """With member_impacts=True how many impacts each surface has had since 0 s, in all sessions, else None.
+
+        A list with an array for each, (members,) of a field such as `Spheres`, of the facets of a `Mesh` or of the
+        parts of a union, and (1,) of any other; in a cell that repeats all images of a body are one.
+        """
+        return self._of_members("member_impacts")
+
+    @property
+    def member_residence(self) -> list[NDArray[np.float64]] | None:
+        """Likewise how long particles have slid or rested on each [s]; None where none may."""
+        return self._of_members("member_residence")
+
+    def _of_members(self, name: str) -> list[NDArray[Any]] | None:
+        if name not in self.observables or self.scene is None:
+            return None
+        return self.scene.split_by_members(self.observables[name][-1])
 
     @property
     def frames(self) -> "Frames":

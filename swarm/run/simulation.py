@@ -73,7 +73,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         recording: Rerun file to write; its folder must exist. Needs the packages of the extra "record".
         impacts: HDF5 file for a log of every impact, by Impact; see `load_impacts`. Its folder must exist.
         impact_particles: those whose impacts it has, "all", k for every k-th one, or a list of their numbers.
-        member_impacts: True to count the impacts on each member of each surface, by Impact; see `Result`.
+        member_impacts: True to count the impacts on each member of each surface, and how long particles stay there; see
+            `Result`.
         observables: functions of one's own by their names, each called with every `Frame`: what they return, a number,
             or an array of the same shape at every frame, is an observable as the others are, in float64; NaN says that
             there is none. They are tried with the start before anything is compiled, and are given all particles, also
@@ -147,5 +148,5 @@ def carry_out(scene: Scene, particles: Particles | Bodies | None, method: Method
     absorbed_time = np.full(len(end.particles), np.nan) if end.absorbed is None else end.absorbed.time
     return Result(
         end.particles, end.observables, end.wall_time, options.trajectory, end.multipliers, end.impacts,
-        end.escape_time, absorbed_time, end.members, bodies, scene, method, end.birth_time,
+        end.escape_time, absorbed_time, bodies, scene, method, end.birth_time,
     )  # fmt: skip

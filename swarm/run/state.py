@@ -81,6 +81,15 @@ def _begin_late(starts: Floats, contacts: Contacts | None, phase: NDArray[np.int
         contacts.remaining[late] = left[late]
 
 
+def holders_of_resting(contacts: Contacts | None) -> NDArray[np.int64]:
+    """The wall on which each particle rests that does."""
+    if contacts is None:
+        return np.zeros(0, np.int64)
+    rests = contacts.phase == ARRIVED
+    first = contacts.walls[0, rests]
+    return np.asarray(np.where(first >= 0.0, first, contacts.met[rests]), np.int64)
+
+
 def have_lasted(contacts: Contacts | None, phase: NDArray[np.int8]) -> bool:
     """Whether a contact of a run has lasted, or is about to.
 

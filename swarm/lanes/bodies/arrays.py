@@ -111,6 +111,13 @@ class BodyState(NamedTuple):
     sweeps: Any  # (n,) of Uzawa's loop
     unconverged: Any  # (n,) steps whose loop did not
     energy: Any  # (n,) at the start of the run [J]
+    counts: Any = None  # (walls,) int64, impacts on each that one thread has computed, where they are counted
+
+    def count_impact(self, number, wall):
+        """Count an impact of a body on a wall."""
+        self.impacts[number] += 1
+        if self.counts is not None:
+            self.counts[wall] += 1
 
 
 class Lanes(NamedTuple):

@@ -121,7 +121,7 @@ def _blow(bodies, state, name, frame, found, i):
         elastic = elastic and touching.restitution[w] == 1.0 and touching.friction[w] == 0.0
         state.impulse[bodies.walls.row(float(w)), number] += p[wide * a]
         if p[wide * a] > 0.0:
-            state.impacts[number] += 1
+            state.count_impact(number, w)
     if not elastic:
         # p times the mean of the rates before and after
         for a in range(rows):

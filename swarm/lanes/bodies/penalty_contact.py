@@ -270,7 +270,8 @@ class SoftContacts(Contacts):
                 lasts = lasts or pushes
             else:
                 lasts = lasts or self._is_outside(lanes.r1, k, wall, i)
-                state.impacts[number] += 1 if pushes and not self._is_outside(lanes.ra, k, wall, i) else 0
+                if pushes and not self._is_outside(lanes.ra, k, wall, i):
+                    state.count_impact(number, wall)
         pace.lasts[i] = lasts
         if not lasts:
             pace.active[i] = 0
@@ -280,5 +281,6 @@ class SoftContacts(Contacts):
         # The next step is that of the contact, from State I.
         name = scratch((MOST_CONTACTS, 2), np.int64)
         frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
-        state.impacts[self.pace.body[i]] += self.near(i, name, frame, True)
+        for a in range(self.near(i, name, frame, True)):
+            state.count_impact(self.pace.body[i], name[a, 1])
         self.pace.lasts[i] = True

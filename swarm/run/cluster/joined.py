@@ -23,14 +23,15 @@ from ..machine import CHUNK_SUMS, Columns
 from ..measures import NONE, Measures
 from ..options import Task
 from ..present import total_of
+from ..tally import unit_of, value_of
 from . import shards
 
 # The largest value of any shard is that of all; the other observables, whole numbers, add up exactly.
 _LARGEST = ("energy_error", "max_penetration", "link_error")
-# Whole numbers of each of some.
-_OF_EACH = ("born", "absorbed")
 # The same of every shard.
 _COMMON = ("wall_position", "wall_orientation")
+# Of shards whole numbers.
+_STAYS = "member_residence"
 # Frames that are read at a time.
 _AT_ONCE = 256
 
@@ -95,16 +96,9 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
             seen[name] = parts[0][name]
         else:
             values = [part[name] for part in parts]
-            if name in _LARGEST:
-                seen[name] = max(values).item()
-            else:
-                seen[name] = np.sum(values, axis=0) if name in _OF_EACH else int(sum(values))
-    return seen
-
-
-def _sum(values: list[Any]) -> Any:
-    """The sum of whole numbers, or of arrays of them."""
-    return np.sum(values, axis=0) if isinstance(values[0], np.ndarray) else int(sum(values))
+            total = np.sum(values, axis=0)
+            seen[name] = max(values).item() if name in _LARGEST else total if total.ndim else int(total)
+    return seen | ({_STAYS: value_of(seen[_STAYS], unit_of(task))} if _STAYS in seen else {})
 
 
 class JoinedWriter(TrajectoryWriter):

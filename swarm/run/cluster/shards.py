@@ -175,8 +175,6 @@ def write_end(path: Path, end: End) -> None:
         arrays["image"] = end.particles.image
     if end.multipliers is not None:
         arrays |= {f"multipliers.{name}": array for name, array in end.multipliers._asdict().items()}
-    for i, counts in enumerate(end.members or ()):
-        arrays[f"members.{i}"] = counts
     _replace(path, functools.partial(_save, np.array(list(arrays)), *arrays.values()))
 
 
@@ -187,15 +185,10 @@ def joined_end(folder: Path, task: Task, bounds: list[int]) -> End:
     """The end of all shards; without observables and wall time."""
     n = bounds[-1]
     whole: dict[str, NDArray[Any]] = {"escape_time": np.full((len(task.particles) // n, n), np.nan)}
-    members: list[NDArray[np.int64]] = []
     for k, (first, last) in enumerate(itertools.pairwise(bounds)):
         with open(end_of(folder, k), "rb") as file:
             for name in np.load(file).tolist():
                 part = np.load(file)
-                if name.startswith("members."):
-                    i = int(name.partition(".")[2])
-                    members[i:] = [part + members[i] if i < len(members) else part, *members[i + 1 :]]
-                    continue
                 # Of bodies point p of copy i is particle p n + i.
                 points = part.shape[-1] // (last - first)
                 if name not in whole:
@@ -208,5 +201,5 @@ def joined_end(folder: Path, task: Task, bounds: list[int]) -> End:
     gone = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("absorbed.")}
     return End(
         particles, {}, 0.0, Multipliers(**loops) if loops else None, flat["impacts"], flat["escape_time"],
-        Absorbed(**gone) if gone else None, members or None, birth_times(particles),
+        Absorbed(**gone) if gone else None, birth_times(particles),
     )  # fmt: skip
