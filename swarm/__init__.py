@@ -54,6 +54,7 @@ if TYPE_CHECKING:
         Torus,
         Union,
     )  # fmt: skip
+    from .surfaces.counter import Counter
     from .surfaces.data.mesh import from_mesh
     from .surfaces.doors import Opening
     from .surfaces.wall_law import WallLaw
@@ -80,6 +81,7 @@ _HOMES = {
     "scene": ("Scene",),
     "run.result": ("Result",),
     "run.simulation": ("simulate",),
+    "surfaces.counter": ("Counter",),
     "surfaces.data.mesh": ("from_mesh",),
     "surfaces.doors": ("Opening",),
     "surfaces": (
@@ -93,7 +95,7 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
-    "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
+    "ContactHistory", "Counter", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
     "Impact", "ImpactLog", "Intersection", "Mesh", "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid",
     "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled",
     "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError", "Torus", "Trajectory",

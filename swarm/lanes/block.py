@@ -85,7 +85,7 @@ def advance_block(method, walls, gravity, hard, share, lanes):
                 place = place.after()
             else:
                 live -= 1
-                lanes.move(walls, live, lane)
+                lanes.move(walls, share.counters, live, lane)
     return Status.DONE.value, 0, place.drawn
 
 
@@ -154,8 +154,12 @@ def _hard_passes(hard, method, walls, gravity, lanes, live):
 
 def _pass(method, walls, gravity, share, lanes, picked, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
-    state, watches = share.state, share.watches()
+    state, watches, counters = share.state, share.watches(), share.counters
+    if counters is not None:
+        counters.keep_before(lanes, live)
     go(method, walls, gravity, lanes, live)
+    if counters is not None:
+        counters.count_flights(gravity, share, lanes, live)
     if lanes.period is not None:
         return_lanes(lanes.period, state, lanes, live)
     if state.openings is not None:

@@ -16,6 +16,7 @@ from ..output import paths
 from ..output.storage import Storage
 from ..particles import Particles
 from ..scene import Scene
+from ..surfaces.counter import checked_counters
 from .tiers import CHOICES
 
 # At shorter intervals [s] a run would do little but save checkpoints.
@@ -44,6 +45,7 @@ class RunOptions:
     impacts: Any = None
     impact_particles: Any = "all"
     member_impacts: bool = field(default=False, metadata=_OF_A_SESSION)
+    counters: Any = field(default=(), metadata=_OF_A_SESSION)
     record_particles: int = 5000
     record_color: str = "speed"
     record_megabytes: float = 100.0
@@ -82,6 +84,7 @@ class RunOptions:
             raise SceneError(f"shards must be None without a cluster, got {self.shards}; give cluster=")
         checks.one_of("compile", self.compile, CHOICES)
         checks.flag("member_impacts", self.member_impacts)
+        object.__setattr__(self, "counters", checked_counters(self.counters))
         self._check_impacts()
         object.__setattr__(self, "seed", checks.seed("seed", self.seed))
         _ = self.storage

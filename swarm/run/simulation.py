@@ -9,6 +9,8 @@ from ..frames import Frame
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
+from ..surfaces.counter import Counter
+from ..surfaces.surface import Surface
 from . import machine
 from .admission import task_of
 from .options import RunOptions, Task
@@ -28,6 +30,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     impacts: str | os.PathLike[str] | None = None,
     impact_particles: str | int | Sequence[int] = "all",
     member_impacts: bool = False,
+    counters: Sequence[Surface | Counter] = (),
     record_particles: int = 5000,
     record_color: str = "speed",
     record_megabytes: float = 100.0,
@@ -69,6 +72,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         impacts: HDF5 file for a log of every impact, by Impact; see `load_impacts`. Its folder must exist.
         impact_particles: those whose impacts it has, "all", k for every k-th one, or a list of their numbers.
         member_impacts: True to count the impacts on each member of each surface, by Impact; see `Result`.
+        counters: surfaces that stop nobody and count what crosses them, each a surface at rest or a `Counter`, by
+            Impact with contact_step = 0. The motion has the same bits without them. See `Result.observables`.
         record_particles: the most particles recorded, evenly chosen.
         record_color: what their colour shows, "speed" or "energy-error".
         record_megabytes: largest size of the recording, above 0; of too many frames every k-th is recorded.

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..lanes.log import Counts
 from ..scene import Scene
+from ..surfaces.counter import Counter
 from .impacts import Impacts
 
 
@@ -41,7 +42,8 @@ class Tally:
 
 
 class Watched(NamedTuple):
-    """The records of impacts: their log and their tally, None where there is none."""
+    """The records of impacts: their log and their tally, None where there is none; and the counters."""
 
     log: Impacts | None = None
     tally: Tally | None = None
+    counters: tuple[Counter, ...] = ()
