@@ -95,10 +95,10 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CompleteError", "Cone",
-    "ContactHistory", "Counter", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame", "Guide",
-    "Impact", "ImpactLog", "Intersection", "Mesh", "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid",
-    "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled",
-    "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError", "Torus", "Trajectory",
+    "ContactHistory", "Counter", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame",
+    "Guide", "Impact", "ImpactLog", "Intersection", "Mesh", "Midpoint", "Opening", "Oscillation", "OwnSurface",
+    "Paraboloid", "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism", "Quadric", "Result", "Rotation",
+    "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError", "Torus", "Trajectory",
     "Translation", "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain",
     "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate",
     "sweep", "tetrahedron",

@@ -19,8 +19,8 @@ from ..surfaces.moving import Carried
 from . import log as impact_log
 from .accounts import book, book_heat, book_step, book_work, lose
 from .arrays import booked, speed2_scale
-from .counters import Moment
 from .carried import NOT_CARRIED, carry, is_carried
+from .counters import Moment
 from .escape import escape
 from .periodic import return_particle
 from .table import LANES

@@ -13,7 +13,7 @@ from ..kernel.arrays import index
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, absolute, column, norm, square, total
+from ..kernel.vector import ZERO, Vec, absolute, norm, square, total
 from ..particles import CROSSED
 from ..surfaces.axes import length_of, pulls, time_out
 from ..surfaces.counted import slowness

@@ -41,12 +41,10 @@ def slide_block(kind, method, walls, gravity, share, lanes):
             lanes.lane(live).looked_particle = -1.0
             live += 1
     while live > 0:
-        status, particle = _over(method, share, lanes, live, passes)
+        status, particle = _over(method, share, lanes, live, (place, passes))
         if status != Status.DONE.value:
             for i in range(live):
                 _retire(slide, share, i, slide.phase())
-            if status == Status.LOG_FULL.value:
-                impact_log.keep_going(share.log, place, 0, passes)
             return status, particle, place.drawn
         passes += 1
         compose(slide, live)
@@ -67,11 +65,13 @@ def slide_block(kind, method, walls, gravity, share, lanes):
 
 
 @outlined
-def _over(method, share, lanes, live, passes):
+def _over(method, share, lanes, live, going):
     """Whether the call ends before the next pass: (status, particle), a halt or one that got nowhere since a look."""
+    place, passes = going
     if passes >= share.halt[0]:
         return Status.INTERRUPTED.value, 0
     if share.counters is not None and impact_log.is_full(share.log):
+        impact_log.keep_going(share.log, place, 0, passes)
         return Status.LOG_FULL.value, 0
     if passes % LOOK == 0:
         for i in range(live):

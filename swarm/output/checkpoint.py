@@ -51,6 +51,7 @@ class Job:
         seed: of thermal walls.
         kept: what the log of impacts keeps, as text, or ""; rows: how many it has.
         member_impacts: whether the impacts on each member are counted.
+        counters: as text, or "".
         first: of a shard the number of its first particle, or body, in the whole run.
     """
 
@@ -68,6 +69,7 @@ class Job:
     kept: str = ""
     rows: int = 0
     member_impacts: bool = False
+    counters: str = ""
     first: int = 0
 
     def require_same(self, other: "Job", path: Path) -> None:
@@ -89,6 +91,7 @@ _NAMES = {
     "seed": "seed of thermal walls is",
     "kept": "log of impacts keeps",
     "member_impacts": "member_impacts is",
+    "counters": "counters are",
     "version": "version of swarm is",
 }
 

@@ -23,6 +23,7 @@ _PARTICLES = {
 _UNITS = {
     "angular_momentum": "kg m2 s-1", "momentum": "kg m s-1", "impulse": "N s", "energy_error": "1", "energy": "J",
     "penetration": "m", "heat": "J", "work": "J", "time": "s", "position": "m", "velocity": "m s-1", "spin": "rad s-1",
+    "slowness": "s m-1",
 }  # fmt: skip
 _AXES = ("x", "y", "z")
 
@@ -60,6 +61,8 @@ def dataset_of(trajectory: Any) -> xr.Dataset:
     }
     if parts := names_of_parts(trajectory.scene):
         coordinates["part"] = parts
+    if trajectory.counters:
+        coordinates["sense"] = ["out", "back"]
     for name, values in trajectory.observables.items():
         if name != "time":
             unit = next((unit for end, unit in _UNITS.items() if name.endswith(end)), "1")
@@ -84,5 +87,7 @@ def dataset_of(trajectory: Any) -> xr.Dataset:
 def _dimensions(name: str, dimensions: int) -> list[str]:
     """The dimensions of an observable besides the time."""
     last = {None: [], 3: ["axis"], 4: ["quaternion"]}[len(COMPONENTS[name]) if name in COMPONENTS else None]
+    if name.startswith("cross"):
+        return ["counter", "sense", *last]
     first = next((kind for kind in ("cavity", "part") if name.startswith(kind)), "surface")
     return [first] * (dimensions - 1 - len(last)) + last

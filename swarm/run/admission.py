@@ -17,6 +17,7 @@ from ..surfaces.instant import gaps_of, gradient_of
 from ..surfaces.shapes.cone import Cone
 from ..surfaces.shapes.quadric import Quadric
 from . import passing, workload
+from .counting import require_counters, require_no_counters
 from .options import RunOptions, Task
 from .with_bodies import require_method_of_bodies, require_walls_of_bodies
 
@@ -43,6 +44,7 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
             raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
     if isinstance(particles, Bodies):
         _require_no_log("of particles, not of bodies, whose points meet walls together", options)
+        require_no_counters("of particles, not of bodies, whose points are tied to one another", options)
         # Of springs each point may be in every wall at once.
         scene.require_no_rooms("bodies")
         known = scene if isinstance(method, Impact) else scene.apart("bodies and soft walls")
@@ -66,8 +68,11 @@ def task_of(scene: Scene, particles: Particles | Bodies, method: Method, options
     _require_precision(scene, particles, options)
     check_surfaces(method, scene)
     if options.compile != "never":
-        require_compiled([one for surface in scene.surfaces for one in (surface, *surface.open_volumes())])
+        counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
+        walls = [one for surface in scene.surfaces for one in (surface, *surface.open_volumes())]
+        require_compiled([*walls, *counters])
     method.check(scene, particles)
+    require_counters(scene, particles, method, options)
     times = options.times
     assert times.every is not None
     method.span("until", times.until)

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..lanes.counters import Counters
-from ..particles import CROSSED, Crossed
+from ..methods import Impact
+from ..methods.base import Method
+from ..particles import CROSSED, Crossed, Particles
 from ..scene import Scene
 from ..surfaces.counted import Counted, Turned, Walled
 from ..surfaces.counter import Counter
@@ -25,13 +27,51 @@ from ..surfaces.shapes.quadratic import QuadricNumbers
 from ..surfaces.shapes.sphere import SphereNumbers
 from ..surfaces.surface import Surface
 from ..surfaces.union import Union
+from .options import RunOptions
 
 # Of the size of a scene and of a counter, a distance that is round-off: rooms that touch are three times 1e-13 apart.
 _NEAR = 1e-12
 # The most walls of all counters: each is compiled into the kernels.
 _MOST = 24
+# The most cells that a particle may come through in a frame: seconds.
+_MOST_CELLS = 1e7
 # Particles whose sides are found at a time.
 _AT_ONCE = 65_536
+
+
+def require_counters(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> None:
+    """Raise a `SceneError` where counters do not go with the other arguments of a run."""
+    if not options.counters:
+        return
+    if not isinstance(method, Impact):
+        require_no_counters(f"of flights by Impact, not of the steps of {type(method).__name__}; use Impact", options)
+    elif method.contact_step > 0.0:
+        require_no_counters(f"of flights, got a contact_step of {method.contact_step:g}; use Impact()", options)
+    if scene.reacts():
+        require_no_counters("of walls that impacts do not move; give them a motion instead of a mass", options)
+    counters_of(scene, options.counters)
+    _require_few_cells(scene, particles, options)
+
+
+def require_no_counters(instead: str, options: RunOptions) -> None:
+    """Raise a `SceneError` where there are counters."""
+    if options.counters:
+        raise SceneError(f"counters must be left out here, they are {instead}; got {len(options.counters)}")
+
+
+def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) -> None:
+    """Raise a `SceneError` where a flight may cross counters in more cells than can be looked at in a while."""
+    every = options.times.every
+    assert every is not None
+    for k, length in enumerate(scene.period or ()):
+        pull = 0.0 if scene.gravity is None else abs(scene.gravity[k])
+        fastest = particles.fastest() + pull * options.times.until
+        if length is not None and not fastest * every / length <= _MOST_CELLS:
+            raise SceneError(
+                f"period[{k}] must be so long that particles come through at most {_MOST_CELLS:g} cells a frame where "
+                f"there are counters, which are in each, got {length:g} m for {fastest * every / length:.3g} cells; "
+                "give a longer period, or more frames (every)"
+            )
 
 
 def counters_of(scene: Scene, given: tuple[Counter, ...]) -> Counters | None:

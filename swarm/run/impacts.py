@@ -137,7 +137,9 @@ def log_of(task: Task) -> Impacts | None:
     if options.impacts is None:
         return None
     threads = options.thread_count()
-    return Impacts(task.scene, len(task.particles), options.impact_particles, options.precision, threads, bool(options.counters))
+    return Impacts(
+        task.scene, len(task.particles), options.impact_particles, options.precision, threads, bool(options.counters)
+    )
 
 
 class Page:

@@ -121,9 +121,7 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
     """
     recorder, watched = (
         recorder_of(task),
-        Watched(
-            log_of(task), Tally(task.scene) if task.options.member_impacts else None, task.options.counters
-        ),
+        Watched(log_of(task), Tally(task.scene) if task.options.member_impacts else None, task.options.counters),
     )
     runs: list[BaseRun] = []
 

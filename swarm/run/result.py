@@ -35,7 +35,10 @@ class Result:
             (w, x, y, z): what is given at xi is at position + orientation xi. Where walls react also "wall_energy"
             (frames, surfaces) [J], which "total_energy" includes, "wall_velocity" [m/s] and "wall_spin" [rad/s]
             (frames, surfaces, 3). Of bodies also "link_error", the "work" of led anchors [J], and "cavity_impulse"
-            (frames, cavities) of what points carry [N s].
+            (frames, cavities) of what points carry [N s]. With counters "crossings" (frames, counters, 2), how many
+            have crossed each since 0 s, out of its admissible side and back; what they carried, "crossed_momentum"
+            (frames, counters, 2, 3) [kg m/s] and "crossed_energy" (frames, counters, 2) [J]; and "crossed_slowness",
+            the sum of 1/|v_n| [s/m]. A flux is a difference over frames; see `Counter`.
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.

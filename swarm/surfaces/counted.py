@@ -99,11 +99,8 @@ class Walled(Counted):
         return penetration(self.inner, r) - penetration(self.outer, r)
 
     def speed(self, sign, wall, r, v):
-        if sign > 0.0:
-            across = dot(self.inner.unit_normal(wall, r), v)
-        else:
-            across = dot(self.outer.unit_normal(wall, r), v)
-        return abs(across)
+        n = self.inner.unit_normal(wall, r) if sign > 0.0 else self.outer.unit_normal(wall, r)
+        return abs(dot(n, v))
 
 
 def _are_simple(walls):
