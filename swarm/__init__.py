@@ -98,10 +98,10 @@ __all__ = [
     "ContactHistory", "Counter", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError", "Formula", "Frame",
     "Guide", "Impact", "ImpactLog", "Intersection", "Mesh", "Midpoint", "Opening", "Oscillation", "OwnSurface",
     "Paraboloid", "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism", "Quadric", "Result", "Rotation",
-    "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError", "Torus", "Trajectory",
-    "Translation", "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain",
-    "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate",
-    "sweep", "tetrahedron",
+    "RunError", "Sampled", "Scene", "SceneError", "Slab", "Sphere", "Spheres", "Stadium", "Strain", "SwarmError",
+    "Torus", "Trajectory", "Translation", "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__",
+    "chain", "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid",
+    "simulate", "sweep", "tetrahedron",
 ]  # fmt: skip
 
 

@@ -57,14 +57,14 @@ class Turned(Counted):
     volumes: Any  # None, or those in which crossings count
 
     def may_cross(self, sign, gravity, r, v, span):
-        wall = turned(self.wall, sign)
+        wall = with_sign(self.wall, sign)
         if gravity is None or not wall.is_quartic:
             time, _found = flights.hit(gravity, wall, r, v)
             return time < span
         return wall.safe_time(r, v, as_vector(gravity)) < span
 
     def crossing(self, sign, gravity, r, v):
-        time, found = flights.hit(gravity, turned(self.wall, sign), r, v)
+        time, found = flights.hit(gravity, with_sign(self.wall, sign), r, v)
         return Crossing(time, select(found, 0.0, -1.0))
 
     def distance(self, r):
@@ -108,10 +108,10 @@ def _are_simple(walls):
     return not walls.fields() and not walls.unions and not walls.in_steps()
 
 
-def turned(wall, sign):
+def with_sign(wall, sign):
     """A wall, seen from its other side where the sign is -1."""
     if isinstance(wall, Framed):
-        return wall._replace(body=turned(wall.body, sign))
+        return wall._replace(body=with_sign(wall.body, sign))
     if isinstance(wall, PlaneNumbers):
         return wall._replace(normal=sign * wall.normal, offset=sign * wall.offset)
     return wall._replace(side=sign * wall.side)
