@@ -118,6 +118,8 @@ class Lanes(NamedTuple):
         state, lane, i = share.state, self.lane(k), index(self.particle[k])
         put(state.position, 0, i, lane.r)
         put(state.velocity, 0, i, lane.v)
+        if share.counters is not None:
+            share.counters.retire(state, self, i, k)
         state.impacts[i] += np.int64(lane.hits)
         for s in range(booked(walls)):
             state.impulse[s, i] += self.impulse[s, k] * state.mass[i]

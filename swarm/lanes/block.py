@@ -93,6 +93,9 @@ def _halts(share, lanes, place, live, passes):
     """Whether the call ends before the next pass."""
     if passes >= share.halt[0]:
         lanes.leave(live)
+        if share.counters is not None:
+            for k in range(live):
+                share.counters.retire(share.state, lanes, index(lanes.particle[k]), k)
         return Status.INTERRUPTED.value
     if impact_log.is_full(share.log):
         impact_log.keep_going(share.log, place, live, passes)
@@ -156,7 +159,7 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
     """A flight and a contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     state, watches, counters = share.state, share.watches(), share.counters
     if counters is not None:
-        counters.keep_before(lanes, live)
+        counters.keep_before(gravity, lanes, live)
     go(method, walls, gravity, lanes, live)
     if counters is not None:
         counters.count_flights(gravity, share, lanes, live)

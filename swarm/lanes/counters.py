@@ -9,14 +9,16 @@ round there: a counter at the place of a wall counts nobody, and one at a face o
 import math
 from typing import Any
 
+import numpy as np
+
 from ..kernel.arrays import index
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, absolute, norm, square, total
+from ..kernel.vector import ZERO, Vec, absolute, either, norm, square, total
 from ..particles import CROSSED
 from ..surfaces.axes import length_of, pulls, time_out
-from ..surfaces.counted import slowness
+from ..surfaces.counted import Turned, slowness
 from ..surfaces.period import has_left, into
 from .table import Lane, Rows, copy_lane, marked_lanes
 
@@ -29,12 +31,15 @@ _named = Rows()
 
 
 class Began(Lane):
-    """A lane before its flight; behind these rows are its sides, 1 or -1 of each counter."""
+    """A lane before its flight, and its mass."""
 
-    r, v, remaining = _named.vector(), _named.vector(), _named.number()
+    r, v, remaining, mass = _named.vector(), _named.vector(), _named.number(), _named.number()
 
 
-SIDES = _named.count
+BEGAN = _named.count
+# Behind these rows are those of each counter: the side of the lane, 1 or -1, and what it has crossed in both senses.
+_SENSE = 1 + CROSSED
+_ROWS = 1 + 2 * _SENSE
 
 
 class Flown(Record):
@@ -60,26 +65,65 @@ class Counters(Record):
     """The counters of a run."""
 
     each: Any  # `Counted` of each
+    straight: Any  # whether flights are straight, within one cell, and no crossing is logged; else None
+
+    def rows(self):
+        """The number of rows of a lane."""
+        return BEGAN + _ROWS * len(self.each)
+
+    def is_in_lanes(self, one):
+        """Whether crossings of a counter are counted in lanes, without branches: a constant for the compiler."""
+        return self.straight is not None and isinstance(one, Turned)
 
     # --- Flights in lanes ---
 
     def load(self, state, lanes, i, k):
-        """The sides of particle i into lane k."""
-        for c in range(len(self.each)):
-            lanes.began[SIDES + c, k] = _sign(state, c, i)
+        """What is known of particle i into lane k."""
+        Began(lanes.began, k).mass = state.mass[i]
+        for c, one in enumerate(self.each):
+            lanes.began[_row(c), k] = _sign(state, c, i)
+            for s in range(2 if self.is_in_lanes(one) else 0):
+                first = _row_of_sense(c, s)
+                lanes.began[first, k] = float(state.crossed.number[2 * c + s, i])
+                for j in range(CROSSED):
+                    lanes.began[first + 1 + j, k] = state.crossed.sums[CROSSED * (2 * c + s) + j, i]
+
+    def retire(self, state, lanes, i, k):
+        """What lane k has crossed back into particle i."""
+        for c, one in enumerate(self.each):
+            if self.is_in_lanes(one):
+                state.crossed.side[c, i] = 0 if lanes.began[_row(c), k] > 0.0 else 1
+                for s in range(2):
+                    first = _row_of_sense(c, s)
+                    state.crossed.number[2 * c + s, i] = np.int64(lanes.began[first, k])
+                    for j in range(CROSSED):
+                        state.crossed.sums[CROSSED * (2 * c + s) + j, i] = lanes.began[first + 1 + j, k]
 
     def move(self, lanes, source, target):
-        """The sides of a lane into another."""
-        copy_lane(lanes.began, source, lanes.began, target, SIDES + len(self.each))
+        """A lane into another."""
+        copy_lane(lanes.began, source, lanes.began, target, self.rows())
 
-    def keep_before(self, lanes, live):
+    def keep_before(self, gravity, lanes, live):
         """Keep every lane as it is before its flight."""
         for i in range(index(live)):
             lane, began = lanes.lane(i), Began(lanes.began, i)
-            began.r, began.v, began.remaining = lane.r, lane.v, lane.remaining
+            began.r, began.remaining = lane.r, lane.remaining
+            if gravity is not None:
+                began.v = lane.v
 
     def count_flights(self, gravity, share, lanes, live):
         """Count what the flights of all lanes have crossed."""
+        marks = False
+        for c, one in enumerate(self.each):
+            if self.is_in_lanes(one):
+                _count_in_lanes(one, c, lanes, live)
+            else:
+                marks = True
+        if marks:
+            self._look_at_lanes(gravity, share, lanes, live)
+
+    def _look_at_lanes(self, gravity, share, lanes, live):
+        """The lanes that may cross a counter, one by one."""
         # A fall may leave a cell and come back into it.
         all_of_them = lanes.period is not None and gravity is not None
         for i in range(index(live)):
@@ -87,7 +131,11 @@ class Counters(Record):
             time = began.remaining - lane.remaining
             found = (time > 0.0) if all_of_them else has_left(lanes.period, lane.r)
             for c, one in enumerate(self.each):
-                found = one.may_cross(lanes.began[SIDES + c, i], gravity, began.r, began.v, time) | found
+                if not self.is_in_lanes(one):
+                    found = (
+                        one.may_cross(lanes.began[_row(c), i], gravity, began.r, _before(gravity, lane, began), time)
+                        | found
+                    )
             lanes.marked[i] = found
         for k in range(marked_lanes(lanes, live)):
             self._look_at_lane(gravity, share, lanes, index(lanes.order[k]))
@@ -95,17 +143,21 @@ class Counters(Record):
     @outlined
     def _look_at_lane(self, gravity, share, lanes, i):
         lane, began, p = lanes.lane(i), Began(lanes.began, i), index(lanes.particle[i])
-        flown = Flown(began.r, began.v, began.remaining - lane.remaining, began.remaining, lane.r, ZERO)
+        flown = Flown(
+            began.r, _before(gravity, lane, began), began.remaining - lane.remaining, began.remaining, lane.r, ZERO
+        )
         if lanes.period is None:
             self._look_at(gravity, share, p, flown)
         else:
             self._look_at_cells(lanes.period, gravity, share, p, flown)
-        for c in range(len(self.each)):
-            lanes.began[SIDES + c, i] = _sign(share.state, c, p)
+        for c, one in enumerate(self.each):
+            if not self.is_in_lanes(one):
+                lanes.began[_row(c), i] = _sign(share.state, c, p)
 
     def _look_at(self, gravity, share, p, flown):
         for c, one in enumerate(self.each):
-            _look_at_one(one, c, gravity, share, p, flown)
+            if not self.is_in_lanes(one):
+                _look_at_one(one, c, gravity, share, p, flown)
 
     def _look_at_cells(self, period, gravity, share, p, flown):
         """The same of a flight over faces, cell by cell: walls and counters are known in one."""
@@ -193,11 +245,53 @@ class Counters(Record):
                 _cross(one, c, share, p, there, across, images)
 
 
+def _before(gravity, lane, began):
+    """The velocity of a lane before its flight."""
+    return lane.v if gravity is None else began.v
+
+
+def _row(c):
+    """The first row of a counter: the side."""
+    return BEGAN + _ROWS * c
+
+
+def _row_of_sense(c, s):
+    """The first row of what has crossed it in a sense: how many, then the sums."""
+    return _row(c) + 1 + _SENSE * s
+
+
+def _count_in_lanes(one, c, lanes, live):
+    """Count the crossings of a counter by straight flights of all lanes: the same as of each by itself."""
+    rows = lanes.began
+    for i in range(index(live)):
+        lane, began = lanes.lane(i), Began(lanes.began, i)
+        v, m = lane.v, began.mass
+        r, left, sign = began.r, began.remaining - lane.remaining, rows[_row(c), i]
+        ends_near = one.is_near(lane.r)
+        for k in range(one.most):
+            time = one.crossing(sign, None, r, v).time
+            there, after = r + v * time, left - time
+            stays_near = one.is_near(there + v * (0.5 * after)) if one.most > 1 else True
+            crosses = (time < left) & (not (ends_near & stays_near))
+            slow = slowness(one.speed(sign, 0.0, there, v), v)
+            for s, of in ((0, 1.0), (1, -1.0)):
+                first, counts = _row_of_sense(c, s), crosses & (sign * of > 0.0)
+                if one.volumes is not None:
+                    counts = counts & one.has(there)
+                rows[first, i] += select(counts, 1.0, 0.0)
+                for j, part in enumerate((m * v.x, m * v.y, m * v.z, 0.5 * m * square(v), slow)):
+                    rows[first + 1 + j, i] += select(counts, part, 0.0)
+            if k + 1 < one.most:
+                r, left = either(crosses, there, r), select(crosses, after, left)
+            sign = select(crosses, -sign, sign)
+        rows[_row(c), i] = sign
+
+
 @outlined
 def _look_at_one(one, c, gravity, share, p, flown):
     """Count the crossings of a counter by a flight within one cell."""
     r, v, left, remaining = flown.r, flown.v, flown.time, flown.remaining
-    ends_near = abs(one.distance(flown.end)) <= one.near
+    ends_near = one.is_near(flown.end)
     for _k in range(_MOST):
         sign = _sign(share.state, c, p)
         found = one.crossing(sign, gravity, r, v)
@@ -207,7 +301,7 @@ def _look_at_one(one, c, gravity, share, p, flown):
         r, v = r + displacement(gravity, v, found.time), accelerated(gravity, v, found.time)
         if found.wall < 0.0:
             continue
-        if ends_near and abs(one.distance(r + displacement(gravity, v, 0.5 * left))) <= one.near:
+        if ends_near and one.is_near(r + displacement(gravity, v, 0.5 * left)):
             return
         _cross(one, c, share, p, Moment(r, v, remaining), one.speed(sign, found.wall, r, v), flown.images)
 
@@ -228,7 +322,7 @@ def _cross(one, c, share, p, there, across, images):
     crossed.sums[first + 1, p] += m * v.y
     crossed.sums[first + 2, p] += m * v.z
     crossed.sums[first + 3, p] += 0.5 * m * square(v)
-    crossed.sums[first + 4, p] += slowness(across, norm(v))
+    crossed.sums[first + 4, p] += slowness(across, v)
     if share.log is not None:
         share.log.add_crossing(share.state, p, there, 2 * c + sense, images)
 

@@ -40,7 +40,12 @@ def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
         if leads_on(now, wall, r):
             (flier.r, flier.v), lanes.wall[i] = through(now, gravity, wall, (r, v)), -1.0
             continue
-        escape(share, index(lanes.particle[i]), lanes.wall[i], r, v, flier.remaining)
+        p, counters = index(lanes.particle[i]), share.counters
+        if counters is not None:
+            counters.retire(share.state, lanes, p, i)
+        escape(share, p, lanes.wall[i], r, v, flier.remaining)
+        if counters is not None:
+            counters.load(share.state, lanes, p, i)
         flier.remaining, lanes.wall[i] = 0.0, -1.0
 
 

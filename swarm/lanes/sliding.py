@@ -9,7 +9,7 @@ from ..contact import sliding as slides
 from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
-from .counters import SIDES
+from .counters import BEGAN
 from .table import STRIDE, Advanced, Rows, copy_lane, table
 
 # What a step may end with.
@@ -71,14 +71,14 @@ class SlidingLanes(Record):
         """The last live lane into the free slot."""
         copy_lane(self.rows, source, self.rows, target, Sliding.ROWS)
         if self.began is not None:
-            copy_lane(self.began, source, self.began, target, SIDES)
+            copy_lane(self.began, source, self.began, target, BEGAN)
         self.particle[target] = self.particle[source]
 
 
 def empty_sliding(state: Any) -> SlidingLanes:
     """Lanes for one block of a state."""
     particle, unsolved, event = np.zeros(STRIDE, np.int64), np.zeros(STRIDE, np.bool_), np.zeros(STRIDE, np.int64)
-    began = None if state.crossed is None else table(SIDES)
+    began = None if state.crossed is None else table(BEGAN)
     return SlidingLanes(table(Sliding.ALL), particle, unsolved, event, *table(2), state.period, state.openings, began)
 
 

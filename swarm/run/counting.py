@@ -74,8 +74,8 @@ def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) 
             )
 
 
-def counters_of(scene: Scene, given: tuple[Counter, ...]) -> Counters | None:
-    """The counters as kernels take them; None where there are none.
+def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) -> Counters | None:
+    """The counters as kernels take them, with their crossings logged or not; None where there are none.
 
     Raises:
         SceneError: a surface cannot be a counter in this scene.
@@ -88,7 +88,8 @@ def counters_of(scene: Scene, given: tuple[Counter, ...]) -> Counters | None:
             f"counters must have at most {_MOST} walls in all, got {walls}: each is compiled into the kernels; of many "
             "of one kind make one of many bodies, such as swarm.Spheres"
         )
-    return Counters(tuple(_counted(scene, f"counters[{k}]", one) for k, one in enumerate(given)))
+    straight = 0.0 if scene.gravity is None and scene.period is None and not logs else None
+    return Counters(tuple(_counted(scene, f"counters[{k}]", one) for k, one in enumerate(given)), straight)
 
 
 def _counted(scene: Scene, name: str, counter: Counter) -> Counted:

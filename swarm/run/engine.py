@@ -18,7 +18,6 @@ from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..lanes import contact_events, slide, sliding, table
 from ..lanes import log as impact_log
-from ..lanes.counters import SIDES
 from ..methods.base import Method
 from ..particles import Contacts, Crossed, Multipliers, Particles
 from ..scene import Scene
@@ -60,7 +59,7 @@ class Run(BaseRun):
         pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, (self._numbers, self._law, self._walls), n)
         super().__init__(scene, method, n, pool, tier, seeding.first)
         self._impacts, self._tally, counters = watched
-        self._counters = counters_of(scene, counters)
+        self._counters = counters_of(scene, counters, self._impacts is not None)
         self._booked = lanes.booked(self._walls)
         self.state = state_of(scene, particles, method, self._booked)
         if self._counters is not None:
@@ -224,7 +223,7 @@ class Run(BaseRun):
         watched = self._impacts is not None or self._tally is not None
         made = made._replace(before=table.table(impact_log.ROWS)) if watched else made
         counters = self._counters
-        return made if counters is None else made._replace(began=table.table(SIDES + len(counters.each)))
+        return made if counters is None else made._replace(began=table.table(counters.rows()))
 
     def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
         """The share of a thread, with the arrays of all, and its counts."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from ..kernel.gravity import as_vector
 from ..kernel.jit import select
 from ..kernel.record import Record
-from ..kernel.vector import dot
+from ..kernel.vector import absolute, dot, square, total
 from . import flights
 from .depth import penetration
 from .frames import Framed
@@ -40,6 +40,10 @@ class Counted(Record):
         """The distance out of the admissible side, to first order; below 0 in it."""
         raise NotImplementedError
 
+    def is_near(self, r):
+        """Whether a place is on it, within round-off."""
+        return abs(self.distance(r)) <= self.near
+
     def speed(self, sign, wall, r, v):
         """The speed across a wall at a place on it."""
         raise NotImplementedError
@@ -70,8 +74,18 @@ class Turned(Counted):
     def distance(self, r):
         return self.wall.distance(r)
 
+    def is_near(self, r):
+        # The same without a root and a division
+        level = self.wall.level_of(self.wall.inner(r))
+        return level * level <= (self.near * self.near) * square(self.wall.inner_gradient(r))
+
     def speed(self, sign, wall, r, v):
         return abs(dot(self.wall.unit_normal(r), v))
+
+    @property
+    def most(self):
+        """The most crossings of a straight flight: a constant for the compiler."""
+        return 1 if isinstance(_body_of(self.wall), PlaneNumbers) else 2
 
 
 class Walled(Counted):
@@ -103,6 +117,10 @@ class Walled(Counted):
         return abs(dot(n, v))
 
 
+def _body_of(wall):
+    return _body_of(wall.body) if isinstance(wall, Framed) else wall
+
+
 def _are_simple(walls):
     """Whether straight flights to walls have hits in closed form: a constant for the compiler."""
     return not walls.fields() and not walls.unions and not walls.in_steps()
@@ -121,7 +139,8 @@ def with_sign(wall, sign):
 _GRAZING = 1e-9
 
 
-def slowness(across, speed):
-    """1/(the speed across a counter) [s/m], of a particle with this speed."""
+def slowness(across, v):
+    """1/(the speed across a counter) [s/m], of a particle with this velocity."""
+    speed = total(absolute(v))
     least = select(speed > 0.0, _GRAZING * speed, math.inf)
     return 1.0 / select(across > least, across, least)
