@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from ..kernel.vector import vec
 from ..lanes.counters import Counters
 from ..methods import Impact
 from ..methods.base import Method
@@ -24,13 +25,15 @@ from ..surfaces.part import other_side
 from ..surfaces.shapes.ellipsoid import EllipsoidNumbers
 from ..surfaces.shapes.plane import PlaneNumbers
 from ..surfaces.shapes.quadratic import QuadricNumbers
-from ..surfaces.shapes.sphere import SphereNumbers
+from ..surfaces.shapes.sphere import SphereNumbers, ball
 from ..surfaces.surface import Surface
 from ..surfaces.union import Union
 from .options import RunOptions
 
 # Of the size of a scene and of a counter, a distance that is round-off: rooms that touch are three times 1e-13 apart.
 _NEAR = 1e-12
+# The part by which a ball is larger than what is in it.
+_ROOM = 1e-9
 # The most walls of all counters: each is compiled into the kernels.
 _MOST = 24
 # The most cells that a particle may come through in a frame: seconds.
@@ -105,7 +108,25 @@ def _counted(scene: Scene, name: str, counter: Counter) -> Counted:
     except SceneError:
         raise SceneError(f"{name} must be a surface with two sides, got {surface!r:.200}; count on another") from None
     inner, outer = (_alone(scene, name, one).walls() for one in (surface, other))
-    return Walled(inner, outer, near, volumes)
+    return Walled(inner, outer, near, volumes, _ball_around(surface, other, near))
+
+
+def _ball_around(*given: Any) -> Any:
+    """A solid ball around the side of a surface that has bounds, or None."""
+    *sides, near = given
+    for one in sides:
+        low, high = (np.array(corner) for corner in _box_around(one))
+        if np.isfinite([low, high]).all():
+            radius = (1.0 + _ROOM) * float(np.linalg.norm(high - low)) / 2.0 + near
+            return ball(vec(((low + high) / 2.0).tolist()), radius)
+    return None
+
+
+def _box_around(surface: Surface) -> Any:
+    if isinstance(surface, Many):
+        low, high = surface.corners()
+        return low.min(axis=1), high.max(axis=1)
+    return surface.bounds()
 
 
 def _alone(scene: Scene, name: str, surface: Surface) -> Scene:

@@ -95,12 +95,16 @@ class Walled(Counted):
     outer: Any
     near: float  # a distance that is round-off [m]
     volumes: Any  # None, or those in which crossings count
+    ball: Any  # None, or a solid ball that the surface is in
 
     def may_cross(self, sign, gravity, r, v, span):
-        if gravity is not None or not (_are_simple(self.inner) and _are_simple(self.outer)):
-            return span > 0.0
-        inner, outer = flights.first_hit(self.inner, None, r, v), flights.first_hit(self.outer, None, r, v)
-        return select(sign > 0.0, inner.time, outer.time) < span
+        found = span > 0.0
+        if self.ball is not None:
+            found = found & _may_meet(self.ball, gravity, r, v, span)
+        if gravity is not None:
+            return found
+        inner, outer = _soonest(self.inner, r, v), _soonest(self.outer, r, v)
+        return found & (select(sign > 0.0, inner, outer) < span)
 
     def crossing(self, sign, gravity, r, v):
         if sign > 0.0:
@@ -115,6 +119,20 @@ class Walled(Counted):
     def speed(self, sign, wall, r, v):
         n = self.inner.unit_normal(wall, r) if sign > 0.0 else self.outer.unit_normal(wall, r)
         return abs(dot(n, v))
+
+
+def _may_meet(ball, gravity, r, v, span):
+    """Whether a flight is in a ball within a time."""
+    if gravity is None:
+        time, _found = ball.first_hit(r, v)
+    else:
+        time = ball.safe_time(r, v, as_vector(gravity))
+    return (time < span) | (ball.level_of(ball.inner(r)) > 0.0)
+
+
+def _soonest(walls, r, v):
+    """When a straight flight leaves walls, or before that: where it has no closed form at once."""
+    return flights.first_hit(walls, None, r, v).time if _are_simple(walls) else 0.0
 
 
 def _body_of(wall):
