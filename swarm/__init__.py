@@ -55,6 +55,7 @@ if TYPE_CHECKING:
         Torus,
         Union,
     )  # fmt: skip
+    from .surfaces.counter import Counter
     from .surfaces.data.mesh import from_mesh
     from .surfaces.doors import Opening
     from .surfaces.laws import Absorb, CercignaniLampis, Lambert, Sticky
@@ -83,6 +84,7 @@ _HOMES = {
     "sources.source": ("Source",),
     "run.result": ("Result",),
     "run.simulation": ("simulate",),
+    "surfaces.counter": ("Counter",),
     "surfaces.data.mesh": ("from_mesh",),
     "surfaces.doors": ("Opening",),
     "surfaces": (
@@ -97,13 +99,14 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Absorb", "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CercignaniLampis",
-    "CompleteError", "Cone", "ContactHistory", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "FileError",
-    "Formula", "Frame", "Guide", "Impact", "ImpactLog", "Intersection", "Lambert", "Leave", "Mesh", "Midpoint",
-    "Opening", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty", "Plane", "Polygon", "Prism",
-    "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab", "Source", "Sphere",
-    "Spheres", "Stadium", "Sticky", "Strain", "SwarmError", "Torus", "Trajectory", "Translation", "Trapezoidal",
-    "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history", "dumbbell", "elastic",
-    "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate", "sweep", "tetrahedron",
+    "CompleteError", "Cone", "ContactHistory", "Counter", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids",
+    "FileError", "Formula", "Frame", "Guide", "Impact", "ImpactLog", "Intersection", "Lambert", "Leave", "Mesh",
+    "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty", "Plane",
+    "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab",
+    "Source", "Sphere", "Spheres", "Stadium", "Sticky", "Strain", "SwarmError", "Torus", "Trajectory", "Translation",
+    "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history",
+    "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate", "sweep",
+    "tetrahedron",
 ]  # fmt: skip
 
 

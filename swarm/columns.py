@@ -38,6 +38,7 @@ COMPONENTS = dict.fromkeys(
         "wall_position",
         "wall_velocity",
         "wall_spin",
+        "crossed_momentum",
         "position",
         "velocity_before",
         "velocity_after",

@@ -6,48 +6,28 @@ Sums run over fixed chunks of particles in a fixed order, so they have the same 
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .contact.energy import contact_energy
 from .kernel.arrays import scratch
 from .kernel.gravity import potential
 from .kernel.jit import kernel, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
-from .particles import Floats, State, is_gone
+from .particles import CROSSED, Floats, State, is_gone
 from .pieces import PartsOfRows
 from .scene import Scene
 from .surfaces import flights
-from .surfaces.walls import Field
+from .surfaces.depth import penetration
 
 # Particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256
 # Partial sums run in this many interleaved columns, which the compiler vectorises without reordering any.
 _COLUMNS = 64
 
+# Rows of what has crossed a counter, in both senses: how many, and the sums.
+_COUNTED = 2 * (1 + CROSSED)
+
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
-
-
-def penetration(walls, r):
-    """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
-    deepest = 0.0
-    for _number, wall in reversed(walls.shared()):
-        distance = wall.members.deepest_in_cell(r) if isinstance(wall, Field) else wall.distance(r)
-        deepest = select(distance > deepest, distance, deepest)
-    for rooms in walls.joined():
-        distance = _out_of_all(rooms, r)
-        deepest = select(distance > deepest, distance, deepest)
-    return deepest
-
-
-def _out_of_all(rooms, r):
-    """Distance outside of the nearest room of a union."""
-    least = np.inf
-    for room in rooms:
-        farthest = 0.0
-        for _number, wall, _gentle in room:
-            distance = wall.distance(r)
-            farthest = select(distance > farthest, distance, farthest)
-        least = select(farthest < least, farthest, least)
-    return least
 
 
 def _whole_fall(period, state, i, in_cell):
@@ -203,13 +183,15 @@ def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
     """The sums over the particles of each chunk: (quantities, chunks).
 
     The rows are the sums of `observe`, what was dissipated, how long contacts have lasted, the impulse of each wall
-    with the work of walls that move behind it, and the heat of each wall. Chunks are summed on their own and in their
-    order, so those of a part of the particles, of whole chunks, are a part of those of all.
+    with the work of walls that move behind it, the heat of each wall, and what has crossed counters. Chunks are summed
+    on their own and in their order, so those of a part of the particles, of whole chunks, are a part of those of all.
     """
     contacts = state.contacts if lasts else None
     n, heat = state.mass.size, state.heat
     booked, more = _ENERGY_ERROR + 2 + len(state.impulse), 1 if heat is None else len(heat)
-    sums = np.zeros((booked + more, len(partial)))
+    crossed = () if state.crossed is None else (state.crossed.number, state.crossed.sums)
+    last = booked + more
+    sums = np.zeros((last + sum(map(len, crossed)), len(partial)))
     sums[:_ENERGY_ERROR] = partial.T[:_ENERGY_ERROR]
     if state.dissipated.size:
         add_up(state.dissipated[None], n, sums[_ENERGY_ERROR, None])
@@ -217,11 +199,14 @@ def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
         add_up(contacts.sliding[None], n, sums[_ENERGY_ERROR + 1, None])
     add_up(state.impulse, n, sums[_ENERGY_ERROR + 2 : booked])
     if heat is not None:
-        add_up(heat, n, sums[booked:])
+        add_up(heat, n, sums[booked:last])
+    for values in crossed:
+        add_up(values, n, sums[last : last + len(values)])
+        last += len(values)
     return sums
 
 
-def add_up(values: Floats, n: int, sums: Floats) -> None:
+def add_up(values: NDArray[Any], n: int, sums: Floats) -> None:
     """Sums of values (rows, n) over chunks into sums (rows, chunks)."""
     whole = n // CHUNK
     if whole:
@@ -231,18 +216,23 @@ def add_up(values: Floats, n: int, sums: Floats) -> None:
 
 
 def summed(
-    sums: Floats, owners: list[int], booked: int, has_heat: bool, parts: PartsOfRows | None = None
+    sums: Floats,
+    owners: list[int],
+    booked: int,
+    has_heat: bool,
+    parts: PartsOfRows | None = None,
+    counters: int = 0,
 ) -> dict[str, Any]:
     """The observables that are sums over particles, from those of all chunks (quantities, chunks); NumPy adds pairwise.
 
     `owners` says which surface each wall belongs to, `parts` which part of a union, `booked` how many rows of impulse
-    and work there are.
+    and work there are, `counters` how many counters.
     """
     # NumPy adds rows in an order that depends on how they lie in memory.
     totals = np.add.reduce(np.ascontiguousarray(sums), axis=1)
     kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
     lost, lasted = totals[_ENERGY_ERROR : _ENERGY_ERROR + 2].tolist()
-    walls = totals[_ENERGY_ERROR + 2 :]
+    walls, crossed = np.split(totals[_ENERGY_ERROR + 2 :], [len(totals) - _ENERGY_ERROR - 2 - _COUNTED * counters])
     pushed, heat = walls[:booked], walls[booked:]
     # The work of walls that move is booked behind their impulses.
     moves = {} if booked == len(owners) else {"wall_work": np.bincount(owners, weights=pushed[len(owners) :])}
@@ -260,6 +250,21 @@ def summed(
         "wall_heat": np.bincount(owners, weights=heat) if has_heat else np.zeros_like(impulse),
         **moves,
         **_of_parts(parts, pushed[: len(owners)], heat if has_heat else None),
+        **_of_counters(crossed, counters),
+    }
+
+
+def _of_counters(crossed: Floats, counters: int) -> dict[str, NDArray[Any]]:
+    """What has crossed each counter in each sense, from the rows of `Crossed`."""
+    if not counters:
+        return {}
+    sums = crossed[2 * counters :].reshape(counters, 2, CROSSED)
+    return {
+        # Whole numbers, which floats hold exactly up to 2^53.
+        "crossings": crossed[: 2 * counters].astype(np.int64).reshape(counters, 2),
+        "crossed_momentum": sums[..., :3].copy(),
+        "crossed_energy": sums[..., 3].copy(),
+        "crossed_slowness": sums[..., 4].copy(),
     }
 
 
@@ -292,5 +297,6 @@ def summary(
 ) -> dict[str, Any]:
     """The observables of one frame from the partial sums (chunks, ROWS); `lasts`: a contact has lasted in this run."""
     sums = chunk_sums(partial, state, lasts)
-    added = summed(sums, owners, len(state.impulse), state.heat is not None, parts)
+    counters = 0 if state.crossed is None else len(state.crossed.side)
+    added = summed(sums, owners, len(state.impulse), state.heat is not None, parts, counters)
     return {**added, **counted(partial, state, lasts)}

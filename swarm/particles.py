@@ -187,6 +187,24 @@ class Absorbed(NamedTuple):
     wall: NDArray[np.int32]
 
 
+# What is summed up of the crossings of a counter: three components of the momentum, the energy, the slowness.
+CROSSED = 5
+
+
+class Crossed(NamedTuple):
+    """The crossings of counters by each particle since the start.
+
+    Attributes:
+        side: (counters, N) int8, 1 where it is out of the admissible side of a counter.
+        number: (2 counters, N) crossings of each counter, out of that side and back.
+        sums: (10 counters, N) of these the momentum [kg m/s], the kinetic energy [J], and the slowness 1/|v_n| [s/m].
+    """
+
+    side: NDArray[np.int8]
+    number: NDArray[np.int64]
+    sums: Floats
+
+
 class State(NamedTuple):
     """The arrays that kernels advance.
 
@@ -216,6 +234,8 @@ class State(NamedTuple):
     # Where a wall may absorb any, as in `Absorbed`:
     absorbed_time: Floats | None = None
     absorbed_wall: NDArray[np.int32] | None = None
+
+    crossed: Crossed | None = None  # where there are counters
 
     @property
     def absorbed(self) -> Any:

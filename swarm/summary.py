@@ -36,6 +36,7 @@ def numbers(trajectory: Path) -> dict[str, Any]:
         "wall_work": np.array(seen.get("wall_work", [[]])[-1]).tolist(),
         "sliding": int(seen.get("sliding", [0])[-1]),
         "sliding_time": float(seen.get("sliding_time", [0.0])[-1]),
+        "crossings": np.array(seen.get("crossings", [[]])[-1]).tolist(),
         "escaped": int(seen["escaped"][-1]),
         "absorbed": np.array(seen.get("absorbed", [[]])[-1], int).tolist(),
         "unconverged": int(seen["unconverged"][-1]),

@@ -6,11 +6,13 @@ Every error names the key by its full path, such as surface[1].radius.
 import dataclasses
 import hashlib
 import re
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
+import tomli_w
 from numpy.typing import NDArray
 
 from .checks import closest, listed, one_of
@@ -19,6 +21,7 @@ from .methods import ALL_METHODS, Method
 from .motion import table_of as motion_table
 from .scene import Scene
 from .surfaces import ALL_SURFACES, OwnSurface, Surface
+from .surfaces.counter import Counter
 from .surfaces.doors import Opening
 
 T = TypeVar("T")
@@ -133,6 +136,26 @@ def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str,
     period = {} if scene.period is None else {"period": [length or False for length in scene.period]}
     plane = {} if scene.plane is None else {"plane": scene.plane}
     return {**gravity, **period, **plane, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
+
+
+def counters_text(counters: Iterable[Counter]) -> str:
+    """Counters as TOML text; "" where there are none."""
+    made = [
+        {"surface": table_of(one.surface), **({} if one.inside is None else {"inside": table_of(one.inside)})}
+        for one in counters
+    ]
+    return tomli_w.dumps({"counter": made}) if made else ""
+
+
+def counters_of(text: str) -> tuple[Counter, ...]:
+    """The counters of such a text."""
+    found = []
+    for k, table in enumerate(tomllib.loads(text).get("counter", ())):
+        surface, inside = (
+            _surface_of(table[key], f"counter[{k}].{key}") if key in table else None for key in ("surface", "inside")
+        )
+        found.append(Counter(surface, inside))
+    return tuple(found)
 
 
 def _kept(cls: type[Any]) -> list[dataclasses.Field[Any]]:

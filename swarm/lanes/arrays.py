@@ -57,6 +57,7 @@ class Lanes(NamedTuple):
     left_behind: Array  # (ROWS + booked, stride) what the lanes hold when a halt ends the block
     period: Any = None  # the cell where it repeats
     before: Any = None  # what a lane is before its contact, where impacts are logged or counted by wall
+    began: Any = None  # the same before its flight, where there are counters
 
     def lane(self, i):
         """The rows of a lane."""
@@ -70,6 +71,8 @@ class Lanes(NamedTuple):
     def load(self, method, walls, share, i, k):
         """Particle i into lane k, as it starts the frame, or as a halt left it."""
         self.particle[k] = i
+        if share.counters is not None:
+            share.counters.load(share.state, self, i, k)
         state, lane, remaining = share.state, self.lane(k), 0.0
         if state.contacts is not None:
             remaining = state.contacts.remaining[i]
@@ -115,6 +118,8 @@ class Lanes(NamedTuple):
         state, lane, i = share.state, self.lane(k), index(self.particle[k])
         put(state.position, 0, i, lane.r)
         put(state.velocity, 0, i, lane.v)
+        if share.counters is not None:
+            share.counters.retire(state, self, i, k)
         state.impacts[i] += np.int64(lane.hits)
         for s in range(booked(walls)):
             state.impulse[s, i] += self.impulse[s, k] * state.mass[i]
@@ -134,11 +139,13 @@ class Lanes(NamedTuple):
             contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
         share.hand_over(i, phase)
 
-    def move(self, walls, source, target):
+    def move(self, walls, counters, source, target):
         """The last live lane into the free slot. What flight and contact leave for each other need not move."""
         copy_lane(self.rows, source, self.rows, target, Flying.ROWS)
         copy_lane(self.impulse, source, self.impulse, target, booked(walls))
         self.particle[target] = self.particle[source]
+        if counters is not None:
+            counters.move(self, source, target)
 
 
 class Halted(Record):
@@ -200,6 +207,7 @@ class Share(NamedTuple):
     moment: float  # at which the frame ends [s]
     log: Any = None  # `log.Log` of impacts
     counts: Any = None  # `counts.Counts` of them
+    counters: Any = None  # `counters.Counters`
 
     def watches(self):
         """The log and the counts of impacts, if the run has any."""

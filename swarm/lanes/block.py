@@ -80,7 +80,7 @@ def advance_block(method, walls, gravity, hard, share, lanes):
                 place = place.after()
             else:
                 live -= 1
-                lanes.move(walls, live, lane)
+                lanes.move(walls, share.counters, live, lane)
     return Status.DONE.value, 0, place.drawn
 
 
@@ -88,6 +88,9 @@ def _halts(share, lanes, place, live, passes):
     """Whether the call ends before the next pass."""
     if passes >= share.halt[0]:
         lanes.leave(live)
+        if share.counters is not None:
+            for k in range(live):
+                share.counters.retire(share.state, lanes, index(lanes.particle[k]), k)
         return Status.INTERRUPTED.value
     if impact_log.is_full(share.log):
         impact_log.keep_going(share.log, place, live, passes)
@@ -152,8 +155,12 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
 
 def _pass(method, walls, gravity, share, lanes, picked, live):
     """A flight and a contact of every lane: whether one reached the end of the frame, is hard, was sent off wrong."""
-    state, watches = share.state, share.watches()
+    state, watches, counters = share.state, share.watches(), share.counters
+    if counters is not None:
+        counters.keep_before(gravity, lanes, live)
     go(method, walls, gravity, lanes, live)
+    if counters is not None:
+        counters.count_flights(gravity, share, lanes, live)
     if lanes.period is not None:
         return_lanes(lanes.period, state, lanes, live)
     if state.openings is not None:

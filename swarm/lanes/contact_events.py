@@ -22,6 +22,7 @@ from . import log as impact_log
 from .accounts import book, book_sent, book_step, book_work, lose
 from .arrays import booked, speed2_scale
 from .carried import NOT_CARRIED, carry, is_carried
+from .counters import Moment
 from .escape import absorb, escape
 from .periodic import return_particle
 from .table import LANES
@@ -230,12 +231,31 @@ def _spare(moving, walls, state, i, found, wall):
 def _take_care(method, walls, gravity, share, i):
     """A short step of particle i; whether it moves on."""
     state, contacts = share.state, share.state.contacts
-    _step(method, walls, gravity, share, i)
-    if state.period is not None:
-        return_particle(state.period, walls, state, i)
+    if share.counters is None:
+        _step(method, walls, gravity, share, i)
+        if state.period is not None:
+            return_particle(state.period, walls, state, i)
+    else:
+        _count_step(method, walls, gravity, share, i)
     r = column(state.position, 0, i)
     closed = isinstance(walls, Carried) and _have_closed(walls, method, r, contacts.remaining[i])
     return not closed and not contacts.short_steps[i] > _MOST_SHORT_STEPS
+
+
+@outlined
+def _count_step(method, walls, gravity, share, i):
+    """A short step of particle i, and what it crosses."""
+    state, counters, remaining = share.state, share.counters, share.state.contacts.remaining
+    left = remaining[i]
+    before = Moment(column(state.position, 0, i), column(state.velocity, 0, i), left if left > 0.0 else share.span)
+    _step(method, walls, gravity, share, i)
+    end = Moment(column(state.position, 0, i), column(state.velocity, 0, i), remaining[i])
+    counters.count_step(share, i, before, end)
+    if state.period is not None:
+        return_particle(state.period, walls, state, i)
+        back = Moment(column(state.position, 0, i), end.v, end.remaining)
+        if square(back.r - end.r) > 0.0:
+            counters.come_back(share, i, before, end.r, back)
 
 
 @outlined

@@ -9,12 +9,15 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..surfaces.openings import is_open
 from . import log as impact_log
+from .counters import Moment
 from .table import marked_lanes
 
 
 def escape(share, p, wall, r, v, remaining):
     """Particle p has escaped, with so much of its frame left: it stays where and as fast as it is."""
     share.state.escape_time[p] = share.moment - remaining
+    if share.counters is not None:
+        share.counters.settle(share, p, Moment(r, v, remaining))
     if share.log is not None:
         share.log.add_escape(share.state, p, impact_log.Struck(r, v, v, wall, remaining, 0.0))
 
@@ -45,7 +48,12 @@ def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
         if leads_on(now, wall, r):
             (flier.r, flier.v), lanes.wall[i] = through(now, gravity, wall, (r, v)), -1.0
             continue
-        escape(share, index(lanes.particle[i]), lanes.wall[i], r, v, flier.remaining)
+        p, counters = index(lanes.particle[i]), share.counters
+        if counters is not None:
+            counters.retire(share.state, lanes, p, i)
+        escape(share, p, lanes.wall[i], r, v, flier.remaining)
+        if counters is not None:
+            counters.load(share.state, lanes, p, i)
         flier.remaining, lanes.wall[i] = 0.0, -1.0
 
 

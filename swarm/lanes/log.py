@@ -54,12 +54,13 @@ class Log(NamedTuple):
     impulse: Array  # (rows,) [N s], along the wall's normal
     slip: Any  # (rows, 3) [m/s] tangential velocity relative to the wall, before; None without friction
     image: Any  # (rows, 3) int32, how many cells away that is; None where the scene does not repeat
-    filled: Array  # (1,) int64
+    filled: Array  # (2,) int64, and how many rows had no room
     going: Array  # (GOING,) int64
     order: Array  # int64, the lanes of a pass that have a row
     chosen: Any  # (N,) bool, the particles that have rows; None: all
     begin: float  # of the frame [s]
     end: float
+    room: int  # rows that one pass may have
 
     def keep_before(self, lanes, live):
         """Keep every lane as it is before its contact."""
@@ -96,6 +97,20 @@ class Log(NamedTuple):
         """A row, without an impulse or a slip, for a particle that passes an opening."""
         if self.has(particle):
             self._add(state, particle, struck, ZERO)
+
+    def add_crossing(self, state, particle, there, number, images):
+        """A row for a particle, a `Moment`, that crosses a counter: 2 counter + sense, so many cells away."""
+        if not self.has(particle):
+            return
+        # The rest is for the impacts of this pass.
+        if self.filled[0] + LANES >= self.time.size:
+            self.filled[1] += 1
+            return
+        k = index(self.filled[0])
+        self._add(state, particle, Struck(there.r, there.v, there.v, -1.0 - number, there.remaining, 0.0), ZERO)
+        if self.image is not None:
+            for axis, images_along in enumerate(images):
+                self.image[k, axis] += np.int32(images_along)
 
     def has(self, particle):
         """Whether a particle has rows."""
@@ -135,7 +150,7 @@ def _put(rows, k, vector):
 
 def is_full(log):
     """Whether a pass may have more rows than there is room for."""
-    return False if log is None else log.filled[0] + LANES > log.time.size
+    return False if log is None else log.filled[0] + log.room > log.time.size
 
 
 def keep_going(log, place, live, passes):

@@ -15,7 +15,9 @@ from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import column, put, square
 from ..status import Status
 from ..surfaces.rooms import inside_of
-from .arrays import Place, speed2_scale
+from . import log as impact_log
+from .arrays import speed2_scale
+from .counters import Began, Moment
 from .periodic import return_particle, return_sliding
 from .sliding import AGAIN, Slide
 from .sliding_ends import decide, set_going
@@ -31,14 +33,15 @@ def slide_block(kind, method, walls, gravity, share, lanes):
     """
     lanes = with_distances(lanes)
     slide = Slide(kind, method, walls, gravity, share.state, lanes, share.counts)
-    place, live, passes, loaded = Place(0, 0, 0), 0, 0, True
+    place, live, passes = impact_log.gone_on(share.log)
+    loaded = True
     while live < LANES and loaded:
         place, loaded = _refill(slide, share, live, place, passes)
         if loaded:
             lanes.lane(live).looked_particle = -1.0
             live += 1
     while live > 0:
-        status, particle = _over(method, share, lanes, live, passes)
+        status, particle = _over(method, share, lanes, live, (place, passes))
         if status != Status.DONE.value:
             for i in range(live):
                 _retire(slide, share, i, slide.phase())
@@ -50,7 +53,7 @@ def slide_block(kind, method, walls, gravity, share, lanes):
             slide.account(i)
         # From the last, so that every lane behind one that leaves is still under way, and may take its place.
         for i in range(live - 1, -1, -1):
-            phase = _next_phase(slide, i)
+            phase = _next_phase(slide, share, i)
             if phase != slide.phase():
                 _retire(slide, share, i, phase)
                 place, loaded = _refill(slide, share, i, place, passes)
@@ -62,10 +65,14 @@ def slide_block(kind, method, walls, gravity, share, lanes):
 
 
 @outlined
-def _over(method, share, lanes, live, passes):
+def _over(method, share, lanes, live, going):
     """Whether the call ends before the next pass: (status, particle), a halt or one that got nowhere since a look."""
+    place, passes = going
     if passes >= share.halt[0]:
         return Status.INTERRUPTED.value, 0
+    if share.counters is not None and impact_log.is_full(share.log):
+        impact_log.keep_going(share.log, place, 0, passes)
+        return Status.LOG_FULL.value, 0
     if passes % LOOK == 0:
         for i in range(live):
             lane, p = lanes.lane(i), lanes.particle[i]
@@ -75,13 +82,55 @@ def _over(method, share, lanes, live, passes):
     return Status.DONE.value, 0
 
 
-def _next_phase(slide, i):
+def _next_phase(slide, share, i):
     """The phase of a lane after a step."""
     phase, lanes = slide.phase(), slide.lanes
     if lanes.event[i] != 0:
         phase = decide(slide, i)
     phase = phase if lanes.lane(i).remaining > 0.0 else ARRIVED
+    if share.counters is None:
+        return _in_cell(slide, i, phase)
+    before, end = _count_step(slide, share, i), lanes.lane(i).r
+    phase = _in_cell(slide, i, phase)
+    _count_return(slide, share, i, before, end)
+    return phase
+
+
+def _in_cell(slide, i, phase):
+    """A lane in the cell where it repeats; its phase then."""
+    lanes = slide.lanes
     return phase if lanes.period is None else return_sliding(lanes.period, slide.walls, slide.state, lanes, i, phase)
+
+
+# --- What it crosses -------------------------------------------------------------------------------------
+
+
+def _begin_step(slide, i):
+    """Keep a lane as it is before its next step."""
+    lane, began = slide.lanes.lane(i), Began(slide.lanes.began, i)
+    began.r, began.v, began.remaining = lane.r, lane.v, lane.remaining
+
+
+@outlined
+def _count_step(slide, share, i):
+    """Count what a lane has crossed since its step began: the `Moment` of that."""
+    lane, began = slide.lanes.lane(i), Began(slide.lanes.began, i)
+    before = Moment(began.r, began.v, began.remaining)
+    share.counters.count_step(share, slide.lanes.particle[i], before, Moment(lane.r, lane.v, lane.remaining))
+    _begin_step(slide, i)
+    return before
+
+
+@outlined
+def _count_return(slide, share, i, before, end):
+    """Count what a lane crosses at a face of the cell, whose step has ended beyond that; its next step begins."""
+    lane = slide.lanes.lane(i)
+    if slide.lanes.period is not None:
+        shift = lane.r - end
+        if square(shift) > 0.0:
+            now = Moment(lane.r, lane.v, lane.remaining)
+            share.counters.come_back(share, slide.lanes.particle[i], before, end, now)
+            _begin_step(slide, i)
 
 
 # --- Into lanes and out of them --------------------------------------------------------------------------
@@ -122,7 +171,11 @@ def _load(slide, share, i, p):
             slide.cross(i, square(along) + lane.keep * lane.keep - square(v))
         v = along
     lane.r, lane.v = r, v
+    if share.counters is not None:
+        _begin_step(slide, i)
     phase = set_going(slide, i)
+    if share.counters is not None:
+        _count_step(slide, share, i)
     if phase != slide.phase():
         _retire(slide, share, i, phase)
         return False
@@ -161,4 +214,9 @@ def _retire(slide, share, i, phase):
     contacts.keep[p] = keep
     if lanes.period is not None:
         return_particle(lanes.period, slide.walls, state, p)
+        if share.counters is not None:
+            lane.v = v
+            end = lane.r
+            lane.r = column(state.position, 0, p)
+            _count_return(slide, share, i, Moment(end, v, lane.remaining), end)
     share.hand_over(p, phase)

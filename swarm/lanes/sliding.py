@@ -9,6 +9,7 @@ from ..contact import sliding as slides
 from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
+from .counters import BEGAN
 from .table import STRIDE, Advanced, Rows, copy_lane, table
 
 # What a step may end with.
@@ -60,6 +61,7 @@ class SlidingLanes(Record):
     after: Array  # twice the energy per mass at its end
     period: Any  # the cell where it repeats
     openings: Any  # of the walls, or None
+    began: Any = None  # what a lane is before its step, where there are counters
 
     def lane(self, i):
         """The rows of a lane."""
@@ -68,13 +70,16 @@ class SlidingLanes(Record):
     def move(self, source, target):
         """The last live lane into the free slot."""
         copy_lane(self.rows, source, self.rows, target, Sliding.ROWS)
+        if self.began is not None:
+            copy_lane(self.began, source, self.began, target, BEGAN)
         self.particle[target] = self.particle[source]
 
 
 def empty_sliding(state: Any) -> SlidingLanes:
     """Lanes for one block of a state."""
     particle, unsolved, event = np.zeros(STRIDE, np.int64), np.zeros(STRIDE, np.bool_), np.zeros(STRIDE, np.int64)
-    return SlidingLanes(table(Sliding.ALL), particle, unsolved, event, *table(2), state.period, state.openings)
+    began = None if state.crossed is None else table(BEGAN)
+    return SlidingLanes(table(Sliding.ALL), particle, unsolved, event, *table(2), state.period, state.openings, began)
 
 
 class Slide(Record):

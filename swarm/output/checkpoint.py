@@ -52,6 +52,7 @@ class Job:
         kept: what the log of impacts keeps, as text, or ""; rows: how many it has.
         member_impacts: whether the impacts on each member are counted.
         observables: the names of those of one's own, in order.
+        counters: as text, or "".
         first: of a shard the number of its first particle, or body, in the whole run.
     """
 
@@ -70,6 +71,7 @@ class Job:
     rows: int = 0
     member_impacts: bool = False
     observables: str = ""
+    counters: str = ""
     first: int = 0
 
     def require_same(self, other: "Job", path: Path) -> None:
@@ -92,6 +94,7 @@ _NAMES = {
     "kept": "log of impacts keeps",
     "member_impacts": "member_impacts is",
     "observables": "observables of one's own are",
+    "counters": "counters are",
     "version": "version of swarm is",
 }
 

@@ -17,6 +17,7 @@ def of_trajectory(trajectory: Any) -> dict[str, str]:
         "frames": f"{len(times)}{last}",
         **_what(trajectory),
         **of_scene(trajectory.scene),
+        **of_counters(trajectory.counters),
         "method": _call(trajectory.method),
         "observables": ", ".join(seen) or "none",
         "size": f"{trajectory.path.stat().st_size / 1e6:.1f} MB",
@@ -28,20 +29,29 @@ def of_trajectory(trajectory: Any) -> dict[str, str]:
 
 def of_log(log: Any) -> dict[str, str]:
     """The content of an `ImpactLog`."""
-    times, scene = log.times, log.scene
+    times, scene, counts = log.times, log.scene, log.counts()
     which = len(range(log.count)[:: log.kept]) if isinstance(log.kept, int) else len(log.kept)
     return {
-        "impacts": f"{len(log):,}".replace(",", " "),
+        "impacts": f"{counts.sum():,}".replace(",", " "),
         "frames": f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""),
         "particles": f"{which} of {log.count}",
         "surfaces": "\n".join(
-            f"{_call(surface)}: {count}" for surface, count in zip(scene.surfaces, log.counts(), strict=True)
+            f"{_call(surface)}: {count}" for surface, count in zip(scene.surfaces, counts, strict=True)
         ),
+        **of_counters(log.counters, log.crossings()),
         **_period(scene),
         "method": _call(log.method),
         "columns": ", ".join(log.dtype.names or ()),
         "size": f"{log.path.stat().st_size / 1e6:.1f} MB",
     }
+
+
+def of_counters(counters: Any, crossings: Any = None) -> dict[str, str]:
+    """The counters of a run, and how many rows of a log each has; nothing where there are none."""
+    told = [_call(one.surface if one.inside is None else one) for one in counters]
+    if crossings is not None:
+        told = [f"{one}: {out} out, {back} back" for one, (out, back) in zip(told, crossings.tolist(), strict=True)]
+    return {"counters": "\n".join(told)} if told else {}
 
 
 def of_scene(scene: Any) -> dict[str, str]:
@@ -95,6 +105,14 @@ def of_run(seen: dict[str, Any]) -> dict[str, str]:
         of_parts = np.array(seen.get(f"part_{what}", [[]])[-1])
         if of_parts.any():
             rows[f"{what} of parts"] = f"{', '.join(f'{given:.4g}' for given in of_parts)} {unit}"
+    if "crossings" in seen:
+        of_each = enumerate(seen["crossings"][-1].tolist())
+        rows["crossings"] = "\n".join(f"counters[{k}]: {out} out, {back} back" for k, (out, back) in of_each)
+    return rows | _escaped(seen)
+
+
+def _escaped(seen: dict[str, Any]) -> dict[str, str]:
+    rows = {}
     if seen.get("escaped", [0])[-1]:
         rows["escaped"] = f"{int(seen['escaped'][-1])} particles"
     return rows | _absorbed(seen)

@@ -81,6 +81,8 @@ class ImpactLog(Stored):
         surface = layout.dataset(file, "walls/surface", "iu", (None,))
         member = layout.dataset(file, "walls/member", "iu", surface.shape)
         self._surface, self._member = surface[()].astype(np.int32), member[()].astype(np.int32)
+        # How many, whose rows have walls below 0.
+        self._counters = len(self.counters)
 
     def __len__(self) -> int:
         """Number of impacts, of complete frames."""
@@ -105,18 +107,27 @@ class ImpactLog(Stored):
 
     def counts(self) -> NDArray[np.int64]:
         """Number of impacts on each surface, with a last row of each particle that passed an opening."""
-        counts = np.zeros(self._surfaces(), np.int64)
+        return self._counted()[0]
+
+    def crossings(self) -> NDArray[np.int64]:
+        """Number of rows of each counter, (counters, 2), out and back."""
+        return self._counted()[1]
+
+    def _counted(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        counts, crossings = np.zeros(self._surfaces(), np.int64), np.zeros(2 * self._counters, np.int64)
         for k in range(0, self._rows, _AT_ONCE):
             with self._reading(f"its rows from {k} on"):
                 walls = self._columns["wall"][k : min(k + _AT_ONCE, self._rows)]
-                counts += np.bincount(self._surface[walls], minlength=len(counts))
-        return counts
+                counts += np.bincount(self._surface[walls[walls >= 0]], minlength=len(counts))
+                crossings += np.bincount(-1 - walls[walls < 0], minlength=len(crossings))
+        return counts, crossings.reshape(-1, 2)
 
     @property
     def identity(self) -> dict[str, Any]:
         """The values that identify the run."""
         texts = {name: self._text(name) for name in ("scene", "method", "kept")}
-        return {**texts, "particles": self.count, "start": self.start, "seed": self.seed}
+        identity = {"particles": self.count, "start": self.start, "seed": self.seed}
+        return {**texts, **identity, "counters": self.counters_text}
 
     def require_holds(self, frames: int, rows: int, checkpoint: Path) -> None:
         """Raise a SceneError if there are fewer frames, or rows with those of the frame after them."""
@@ -136,6 +147,7 @@ class ImpactLog(Stored):
         fields: list[Any] = [("time", "f8"), ("particle", "i4"), ("surface", "i4"), ("member", "i4")]
         fields += [*((name, real, 3) for name in _VECTORS), ("impulse", real)]
         fields += [field for field in (("slip", real, 3), ("image", "i4", 3)) if field[0] in self._columns]
+        fields += [("counter", "i4"), ("sense", "i4")] * (self._counters > 0)
         return np.dtype(fields)
 
     def table(
@@ -152,7 +164,7 @@ class ImpactLog(Stored):
 
         Args:
             particles: only of this particle, or of these; None: all.
-            surfaces: only on this surface of the scene, or on these; None: all.
+            surfaces: only on this surface of the scene, or on these; None: all, and crossings of counters.
             begin: only from this time on [s]; None: from the start.
             end: only before this time [s]; None: to the last frame.
 
@@ -166,6 +178,10 @@ class ImpactLog(Stored):
 
             Who passes an opening of a surface has a last row there, with an impulse of 0.
 
+            In a run with counters a crossing is a row too, with an impulse of 0 and the velocity at the crossing twice:
+            `counter` is the place of the counter in `counters` and `sense` 0 out of its admissible side, 1 back, and
+            both `surface` and `member` are -1. Of impacts `counter` and `sense` are -1.
+
             A contact step begins at the impact, and `velocity_after` is that at its end. After an impact that is the
             last of a series, `velocity_after` is the velocity along the wall. What slides, rests or is pressed into an
             edge by several walls has no impacts: its impulse is in the observable alone.
@@ -177,7 +193,10 @@ class ImpactLog(Stored):
         high = np.inf if end is None else checks.number("end", end)
         if low > high:
             raise SceneError(f"end must be begin or later, got {high:g} before {low:g}")
-        wanted = _among("particles", particles, self.count), _among("surfaces", surfaces, self._surfaces())
+        wanted = (
+            _among("particles", particles, self.count), _among("surfaces", surfaces, self._surfaces()),
+            surfaces is None,
+        )  # fmt: skip
         # The rows of the frames that this time is in.
         begins = np.append(0, self.ends)
         first = int(begins[np.searchsorted(self.times, low)])
@@ -198,24 +217,33 @@ class ImpactLog(Stored):
     def _surfaces(self) -> int:
         return int(self._surface.max()) + 1 if len(self._surface) else 0
 
-    def _part(self, rows: slice, wanted: tuple[Any, Any], span: tuple[float, float]) -> NDArray[Any]:
+    def _part(self, rows: slice, wanted: tuple[Any, Any, bool], span: tuple[float, float]) -> NDArray[Any]:
         """The wanted ones of some rows."""
         with self._reading(f"its rows from {rows.start} on"):
             time = finite(self._columns["time"][rows], "row")
             particle, wall = self._columns["particle"][rows], self._columns["wall"][rows]
-            if len(wall) and not (wall.min() >= 0 and wall.max() < len(self._surface)):
-                raise ValueError(f"expected walls from 0 to {len(self._surface) - 1}, got {wall.min()} to {wall.max()}")
+            lowest = -2 * self._counters
+            if len(wall) and not (wall.min() >= lowest and wall.max() < len(self._surface)):
+                raise ValueError(
+                    f"expected walls from {lowest} to {len(self._surface) - 1}, got {wall.min()} to {wall.max()}"
+                )
             if len(particle) and not (particle.min() >= 0 and particle.max() < self.count):
                 raise ValueError(f"expected particles below {self.count}, got {particle.min()} to {particle.max()}")
-            surface, (particles, surfaces), (begin, end) = self._surface[wall], wanted, span
-            taken = (time >= begin) & (time < end) & particles[particle] & surfaces[surface]
+            (particles, surfaces, crossings), (begin, end) = wanted, span
+            is_impact = wall >= 0
+            surface = np.where(is_impact, self._surface[np.maximum(wall, 0)], -1)
+            of_these = np.where(is_impact, surfaces[surface], crossings)
+            taken = (time >= begin) & (time < end) & particles[particle] & of_these
             k = np.flatnonzero(taken)
             table = np.empty(len(k), self.dtype)
             table["time"], table["particle"], table["surface"] = time[k], particle[k], surface[k]
-            table["member"] = self._member[wall[k]]
+            table["member"] = np.where(is_impact[k], self._member[np.maximum(wall[k], 0)], -1)
+            if self._counters:
+                table["counter"] = np.where(is_impact[k], -1, (-1 - wall[k]) // 2)
+                table["sense"] = np.where(is_impact[k], -1, (-1 - wall[k]) % 2)
             if len(k):
                 within = slice(rows.start + int(k[0]), rows.start + int(k[-1]) + 1)
-                for name in table.dtype.names[4:]:
+                for name in (name for name in table.dtype.names[4:] if name in self._columns):
                     table[name] = finite(self._columns[name][within], "row")[k - k[0]]
         return table
 

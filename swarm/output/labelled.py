@@ -25,6 +25,7 @@ _UNITS = {
     "angular_momentum": "kg m2 s-1", "momentum": "kg m s-1", "impulse": "N s", "energy_error": "1", "energy": "J",
     "penetration": "m", "heat": "J", "work": "J", "time": "s", "position": "m", "velocity": "m s-1", "spin": "rad s-1",
     "residence": "s",
+    "slowness": "s m-1",
 }  # fmt: skip
 _AXES = ("x", "y", "z")
 
@@ -53,15 +54,8 @@ class _Column(BackendArray):  # type: ignore[misc]
 
 def dataset_of(trajectory: Any) -> xr.Dataset:
     """The Dataset of a trajectory; see `Trajectory.to_xarray`."""
-    surfaces = [name_of(trajectory.scene, i) for i in range(len(trajectory.scene.surfaces))]
     data: dict[str, Any] = {}
-    coordinates: dict[str, Any] = {
-        "time": ("time", trajectory.times, {"units": "s"}),
-        "axis": list(_AXES),
-        "surface": surfaces,
-    }
-    if parts := names_of_parts(trajectory.scene):
-        coordinates["part"] = parts
+    coordinates = _coordinates(trajectory)
     own = trajectory.own_observables
     for name, values in trajectory.observables.items():
         if name in own:
@@ -89,9 +83,25 @@ def dataset_of(trajectory: Any) -> xr.Dataset:
     return xr.Dataset(data, coordinates, about)
 
 
+def _coordinates(trajectory: Any) -> dict[str, Any]:
+    """The coordinates of every Dataset."""
+    found: dict[str, Any] = {
+        "time": ("time", trajectory.times, {"units": "s"}),
+        "axis": list(_AXES),
+        "surface": [name_of(trajectory.scene, i) for i in range(len(trajectory.scene.surfaces))],
+    }
+    if parts := names_of_parts(trajectory.scene):
+        found["part"] = parts
+    if trajectory.counters:
+        found["sense"] = ["out", "back"]
+    return found
+
+
 def _dimensions(name: str, dimensions: int) -> list[str]:
     """The dimensions of an observable besides the time."""
     last = {None: [], 3: ["axis"], 4: ["quaternion"]}[len(COMPONENTS[name]) if name in COMPONENTS else None]
+    if name.startswith("cross"):
+        return ["counter", "sense", *last]
     first = next((kind for kind in ("cavity", "part", "member") if name.startswith(kind)), "surface")
     first = "source" if name == "born" else first
     return [first] * (dimensions - 1 - len(last)) + last

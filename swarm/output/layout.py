@@ -40,12 +40,16 @@ _OBSERVABLES: dict[str, tuple[int | None, ...]] = {
 }
 # Of each part of the unions of a scene.
 _OF_PARTS = ("part_impulse", "part_heat")
+# Of each counter.
+_OF_COUNTERS = ("crossings", "crossed_momentum", "crossed_energy", "crossed_slowness")
 # Likewise, but files of older versions have none of them, or only those of bodies.
 _LATER: dict[str, tuple[int | None, ...]] = {
     **dict.fromkeys(("sliding", "sliding_time", "link_error", "work", "source_energy"), ()),
     **dict.fromkeys(("absorbed", "wall_heat", "wall_work", "wall_energy", *_OF_PARTS), (None,)),
     **dict.fromkeys(("wall_position", "wall_velocity", "wall_spin"), (None, 3)),
     "wall_orientation": (None, 4),
+    **dict.fromkeys(_OF_COUNTERS, (None, 2)),
+    "crossed_momentum": (None, 2, 3),
 }
 
 
@@ -59,7 +63,8 @@ def frames(file: Any, path: Path) -> int:
 
     While a file is being written, a dataset may have more entries than there are complete frames, never fewer.
     """
-    for name in (f"parameters/{text}" for text in (*_TEXTS, "scene_file", "start", "body", "observables")):
+    texts = (*_TEXTS, "scene_file", "start", "body", "observables", "counters")
+    for name in (f"parameters/{text}" for text in texts):
         if name in file and (h5py.check_string_dtype(dataset(file, name).dtype) is None or file[name].shape != ()):
             raise ValueError(f"{name} must be a text")
     for name in ("parameters/seed", "parameters/copies"):
@@ -162,11 +167,11 @@ def text(dataset: Any, path: Path) -> str:
     return str(dataset.asstr()[()])
 
 
-def require_observables(seen: dict[str, NDArray[Any]], surfaces: int, parts: int) -> None:
+def require_observables(seen: dict[str, NDArray[Any]], surfaces: int, parts: int, counters: int) -> None:
     """Raise a ValueError if an observable of every run is missing or has another shape."""
     n = len(seen["time"])
     for name, entry in {**_OBSERVABLES, **{name: _LATER[name] for name in _LATER if name in seen}}.items():
-        each = parts if name in _OF_PARTS else surfaces
+        each = parts if name in _OF_PARTS else counters if name in _OF_COUNTERS else surfaces
         shape = (n, *(each if length is None else length for length in entry))
         if name not in seen or seen[name].shape != shape:
             came = "nothing" if name not in seen else str(seen[name].shape)

@@ -15,6 +15,7 @@ from .. import tables
 from ..errors import SceneError
 from ..methods import Method
 from ..scene import Scene
+from ..surfaces.counter import Counter
 from . import driver, layout, paths, superblock
 from .sources import DAMAGE, DamagedError, reason, require_file
 
@@ -69,6 +70,17 @@ class Stored:
         """The seed of thermal walls; 0 if the file has none, as those of runs before there were such walls."""
         with self._reading("its seed") as file:
             return int(file["parameters/seed"][()]) if "parameters/seed" in file else 0
+
+    @property
+    def counters_text(self) -> str:
+        """The counters of the run as text; "" if it had none."""
+        return self._text("counters") if self._has("parameters/counters") else ""
+
+    @property
+    def counters(self) -> tuple[Counter, ...]:
+        """The counters of the run."""
+        with self._reading("its counters"):
+            return tables.counters_of(self.counters_text)
 
     @property
     def scene(self) -> Scene:

@@ -108,7 +108,7 @@ class Trajectory(Presented):
         """The observables, checked to include those of every run."""
         seen, scene = self.observables, self.scene
         with self._reading("its observables"):
-            layout.require_observables(seen, len(scene.surfaces), len(scene.parts))
+            layout.require_observables(seen, len(scene.surfaces), len(scene.parts), len(self.counters))
         return seen
 
     def require_frames(self) -> None:

@@ -18,6 +18,7 @@ from ..surfaces.instant import gaps_of, gradient_of
 from ..surfaces.shapes.cone import Cone
 from ..surfaces.shapes.quadric import Quadric
 from . import passing, workload
+from .counting import require_counters, require_no_counters
 from .options import RunOptions, Task
 from .with_bodies import require_method_of_bodies, require_walls_of_bodies
 
@@ -45,6 +46,7 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
     _require_births(scene, particles, method, options)
     if isinstance(particles, Bodies):
         _require_no_log("of particles, not of bodies, whose points meet walls together", options)
+        require_no_counters("of particles, not of bodies, whose points are tied to one another", options)
         # Of springs each point may be in every wall at once.
         scene.require_no_rooms("bodies")
         known = scene if isinstance(method, Impact) else scene.apart("bodies and soft walls")
@@ -66,13 +68,16 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
         )
     check_surfaces(method, scene)
     if options.compile != "never":
-        require_compiled([one for surface in scene.surfaces for one in (surface, *surface.open_volumes())])
+        counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
+        walls = [one for surface in scene.surfaces for one in (surface, *surface.open_volumes())]
+        require_compiled([*walls, *counters])
     times = options.times
     _require_motions(scene, times.until)
     particles = with_births(scene, start, options.sources, options.seed, times.until)
     _require_instants(scene, particles, method, options)
     _require_precision(scene, particles, options)
     method.check(scene, particles)
+    require_counters(scene, particles, method, options)
     assert times.every is not None
     method.span("until", times.until)
     method.span("every", times.every)

@@ -20,11 +20,12 @@ from ..lanes import contact_events, slide, sliding, table
 from ..lanes import log as impact_log
 from ..lanes.sending import Sending
 from ..methods.base import Method
-from ..particles import Contacts, Multipliers, Particles, State
+from ..particles import Contacts, Crossed, Multipliers, Particles, State
 from ..scene import Scene
 from ..status import Status
 from . import failures
 from .base import Arrays, BaseRun, result_of
+from .counting import counters_of, crossed_of
 from .impacts import Page
 from .present import Present
 from .state import Seeding, begin, have_lasted, holders_of_resting, state_of
@@ -59,9 +60,13 @@ class Run(BaseRun):
         self._walls, self._gravity = scene.walls(), scene.pull()
         pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, (self._numbers, self._law, self._walls), n)
         super().__init__(scene, method, n, pool, tier, seeding.first)
-        self._impacts, self._tally = watched
+        self._impacts, self._tally, counters = watched
+        self._counters = counters_of(scene, counters, self._impacts is not None)
         self._booked = lanes.booked(self._walls)
         self.state = state_of(scene, particles, method, self._booked)
+        if self._counters is not None:
+            crossed = crossed_of(self._counters, counters, scene, particles.position)
+            self.state = self.state._replace(crossed=crossed)
         observables.start_energies(scene, self._law, self.state)
         self._moment, self._faces = 0.0, scene.open_faces()
         self._surfaces_of_walls = scene.members()[0]
@@ -224,7 +229,9 @@ class Run(BaseRun):
         rows = Sending.ROWS if self._numbers.laws.send_off else lanes.Flying.ALL
         made = lanes.empty(len(self._owners), self._booked, self.state.period, rows)
         watched = self._impacts is not None or self._tally is not None
-        return made._replace(before=table.table(impact_log.ROWS)) if watched else made
+        made = made._replace(before=table.table(impact_log.ROWS)) if watched else made
+        counters = self._counters
+        return made if counters is None else made._replace(began=table.table(counters.rows()))
 
     def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
         """The share of a thread, with the arrays of all, and its counts."""
@@ -232,7 +239,7 @@ class Run(BaseRun):
             self._present.flying(self.state), self._present.of(self._phase), np.zeros(PHASES, np.int64), self._halted,
             draws, self._watch.passes, span,
             self._seed, self._first, self._moment, None if self._impacts is None else self._impacts.example,
-            None if self._tally is None else self._tally.counts(),
+            None if self._tally is None else self._tally.counts(), self._counters,
         )  # fmt: skip
 
     def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
@@ -272,7 +279,7 @@ class Run(BaseRun):
     def arrays(self) -> Arrays:
         found: Arrays = {}
         for name, value in {"phase": self._phase, "halted": self._halted, **self.state._asdict()}.items():
-            if isinstance(value, (lanes.Halted, Contacts, Multipliers)):
+            if isinstance(value, (lanes.Halted, Contacts, Crossed, Multipliers)):
                 found |= {f"{name}.{field}": array for field, array in value._asdict().items()}
             elif isinstance(value, np.ndarray):
                 found[name] = value

@@ -9,9 +9,10 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
+from ..errors import RunError
 from ..lanes.arrays import Share
 from ..lanes.log import GOING, Log
-from ..lanes.table import STRIDE
+from ..lanes.table import LANES, STRIDE
 from ..scene import Scene
 from ..status import Status
 from .options import Task
@@ -36,6 +37,7 @@ class Impacts:
         particles: "all", k for every k-th one, or the numbers of those whose impacts are logged.
         precision: of positions, velocities and impulses; times are float64.
         threads: how many fill logs.
+        counts: whether crossings of counters have rows too.
 
     Attributes:
         kept: the particles and the precision, as TOML text.
@@ -46,12 +48,16 @@ class Impacts:
         queue: what has a thread call a function in its turn among the frames; the writer's thread sets it.
     """
 
-    def __init__(self, scene: Scene, n: int, particles: Any, precision: str, threads: int) -> None:
+    def __init__(
+        self, scene: Scene, n: int, particles: Any, precision: str, threads: int, counts: bool = False
+    ) -> None:
         laws, real = scene.laws(), np.dtype(precision)
         self.kept = tomli_w.dumps({"particles": particles, "precision": precision})
         self._chosen = chosen(particles, n)
         self._slips, self._repeats = laws is not None and laws.friction is not None, scene.period is not None
         self._real = real
+        # A flight may cross many counters.
+        self._room = _ROWS // 2 if counts else LANES
         self._spare: queue.SimpleQueue[Log] = queue.SimpleQueue()
         for _ in range(2 * threads + _MORE):
             self._spare.put(self._made(_ROWS))
@@ -70,8 +76,8 @@ class Impacts:
             np.empty(rows), np.empty(rows, np.int32), np.empty(rows, np.int32), np.empty((rows, 3), real),
             np.empty((rows, 3), real), np.empty((rows, 3), real), np.empty(rows, real),
             np.empty((rows, 3), real) if self._slips else None,
-            np.empty((rows, 3), np.int32) if self._repeats else None, np.zeros(1, np.int64), np.zeros(GOING, np.int64),
-            np.zeros(STRIDE, np.int64), self._chosen, 0.0, 0.0,
+            np.empty((rows, 3), np.int32) if self._repeats else None, np.zeros(2, np.int64), np.zeros(GOING, np.int64),
+            np.zeros(STRIDE, np.int64), self._chosen, 0.0, 0.0, self._room,
         )  # fmt: skip
 
     def columns(self) -> dict[str, Any]:
@@ -93,7 +99,7 @@ class Impacts:
                 log = self._spare.get(timeout=_GLANCE)
             except queue.Empty:
                 continue
-            log.filled[0] = 0
+            log.filled.fill(0)
             log.going.fill(0)
             return log._replace(begin=self.begin, end=end)
 
@@ -131,7 +137,9 @@ def log_of(task: Task) -> Impacts | None:
     if options.impacts is None:
         return None
     threads = options.thread_count()
-    return Impacts(task.scene, len(task.particles), options.impact_particles, options.precision, threads)
+    return Impacts(
+        task.scene, len(task.particles), options.impact_particles, options.precision, threads, bool(options.counters)
+    )
 
 
 class Page:
@@ -146,6 +154,11 @@ class Page:
         while True:
             given = [one._replace(log=self._log) if isinstance(one, Share) else one for one in arguments]
             status, particle, drawn = kernel(*given)
+            if self._log.filled[1]:
+                raise RunError(
+                    f"the frame at {self._end:g} s has flights that cross counters more often than the log of impacts "
+                    "has room for; use more frames (every), which cut flights, or leave impacts out"
+                )
             if status != Status.LOG_FULL:
                 return status, particle, drawn
             going = self._log.going.copy()

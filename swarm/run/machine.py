@@ -88,7 +88,7 @@ def carry_out_task(task: Task, session: Session) -> End:
     if not task.is_shard:
         warn_of_overlap(task.scene)
     until, span_of, kept = task.options.until, task.method.span, Columns()
-    with _begun(task, session) as (run, writer, show, (log, tally), measures):
+    with _begun(task, session) as (run, writer, show, (log, tally, _counters), measures):
         with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
             for number, before, moment in session.frames(task.options.times):
                 if number == 0:
@@ -129,7 +129,7 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
     """
     recorder, watched = (
         recorder_of(task),
-        Watched(log_of(task), tally_of(task)),
+        Watched(log_of(task), tally_of(task), task.options.counters),
     )
     runs: list[BaseRun] = []
 

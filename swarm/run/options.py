@@ -17,6 +17,7 @@ from ..output.storage import Storage
 from ..particles import Particles
 from ..scene import Scene
 from ..sources.source import checked_sources
+from ..surfaces.counter import checked_counters
 from . import measures
 from .tiers import CHOICES
 
@@ -47,6 +48,7 @@ class RunOptions:
     impact_particles: Any = "all"
     member_impacts: bool = False
     observables: Any = field(default=None, metadata=_OF_A_SESSION)  # then functions by their names
+    counters: Any = field(default=(), metadata=_OF_A_SESSION)
     record_particles: int = 5000
     record_color: str = "speed"
     record_megabytes: float = 100.0
@@ -87,6 +89,7 @@ class RunOptions:
         checks.one_of("compile", self.compile, CHOICES)
         checks.flag("member_impacts", self.member_impacts)
         object.__setattr__(self, "observables", measures.checked(self.observables))
+        object.__setattr__(self, "counters", checked_counters(self.counters))
         self._check_impacts()
         object.__setattr__(self, "seed", checks.seed("seed", self.seed))
         object.__setattr__(self, "sources", checked_sources(self.sources))

@@ -39,8 +39,12 @@ class Result:
             (frames, surfaces, 3). Of bodies also "link_error", the "work" of led anchors [J], and "cavity_impulse"
             (frames, cavities) of what points carry [N s]. With member_impacts=True "member_impacts" (frames, members)
             of all members of surface 0, then of surface 1, and so on, and where particles may slide "member_residence"
-            [s], how long they slid or rested there, at an edge on the wall that they were on before. Where
-            laws of walls return a `Leave` also "absorbed" (frames, surfaces), how many each has absorbed so far.
+            [s], how long they slid or rested there, at an edge on the wall that they were on before. Where laws of
+            walls return a `Leave` also "absorbed" (frames, surfaces), how many each has absorbed so far.
+            With counters "crossings" (frames, counters, 2), how many have crossed each since 0 s, out of its admissible
+            side and back; what they carried, "crossed_momentum" (frames, counters, 2, 3) [kg m/s] and "crossed_energy"
+            (frames, counters, 2) [J]; and "crossed_slowness", the sum of 1/|v_n| [s/m]. A flux is a difference over
+            frames; see `Counter`.
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.

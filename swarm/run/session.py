@@ -10,6 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
+from .. import tables
 from ..errors import CompleteError, SceneError, WallTimeError
 from ..frames import FrameTimes
 from ..output import checkpoint, paths
@@ -91,6 +92,8 @@ class Session:
         self.identity = {"start": task.start or checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
         self.identity |= {"first": task.first} if task.is_shard else {}
         self.identity |= {"observables": ", ".join(task.options.observables)} if task.options.observables else {}
+        if task.options.counters:
+            self.identity["counters"] = tables.counters_text(task.options.counters)
         self._log = log
         if log is not None:
             paths.check_target(impacts, overwrite or self._resumes, "impacts")
@@ -130,6 +133,7 @@ class Session:
             texts: dict[str, Any] = before.descriptions
             identity: dict[str, Any] = {"particles": before.count, "start": before.start, "seed": before.seed}
             identity["observables"] = ", ".join(before.own_observables)
+            identity["counters"] = before.counters_text
             there = dataclasses.replace(self._job, **texts, **identity)
             frames, last = len(before), before.times[-1:]
         if not there.start:

@@ -12,6 +12,8 @@ from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
 from ..sources.source import Source
+from ..surfaces.counter import Counter
+from ..surfaces.surface import Surface
 from . import machine
 from .admission import task_of
 from .options import RunOptions, Task
@@ -32,6 +34,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     impact_particles: str | int | Sequence[int] = "all",
     member_impacts: bool = False,
     observables: Mapping[str, Callable[[Frame], Any]] | None = None,
+    counters: Sequence[Surface | Counter] = (),
     record_particles: int = 5000,
     record_color: str = "speed",
     record_megabytes: float = 100.0,
@@ -79,6 +82,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             or an array of the same shape at every frame, is an observable as the others are, in float64; NaN says that
             there is none. They are tried with the start before anything is compiled, and are given all particles, also
             on a cluster, where the client calls them when the shards have ended.
+        counters: surfaces that stop nobody and count what crosses them, each a surface at rest or a `Counter`, by
+            Impact with contact_step = 0. The motion has the same bits without them. See `Result.observables`.
         record_particles: the most particles recorded, evenly chosen.
         record_color: what their colour shows, "speed" or "energy-error".
         record_megabytes: largest size of the recording, above 0; of too many frames every k-th is recorded.

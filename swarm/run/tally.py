@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..lanes.counts import PARTS, Counts, Sums
+from ..surfaces.counter import Counter
 from .impacts import Impacts
 from .options import Task
 
@@ -98,10 +99,11 @@ class Tally:
 
 
 class Watched(NamedTuple):
-    """The records of impacts: their log and their tally, None where there is none."""
+    """The records of impacts: their log and their tally, None where there is none; and the counters."""
 
     log: Impacts | None = None
     tally: Tally | None = None
+    counters: tuple[Counter, ...] = ()
 
 
 def tally_of(task: Task) -> Tally | None:

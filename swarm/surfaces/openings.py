@@ -100,6 +100,26 @@ def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Sur
     return tuple(found)
 
 
+def volumes_of_counter(volume: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
+    """The volume in which a counter counts and, where the scene repeats, the images of that.
+
+    Raises:
+        SceneError: it has no phi that is known everywhere, or it does not go with the period.
+    """
+    if isinstance(volume, Outlined):
+        raise SceneError(
+            f"{name} must be a volume of surfaces such as swarm.Box, got {type(volume).__name__}; give a box or a "
+            "cylinder"
+        )
+    required.require_description([volume], name)
+    return (volume,) if period is None else tuple(_images(volume, period, name))
+
+
+def volumes_in(volumes: Sequence[Surface]) -> tuple[Any, ...]:
+    """Volumes as kernels take them."""
+    return _taken(volumes, 0.0)
+
+
 def _images(opening: Surface, period: Lengths, name: str) -> list[Surface]:
     """The volume in every cell, as far as it reaches into this one."""
     side = getattr(opening, "side", None)
@@ -191,12 +211,20 @@ def outside(volume, r):
     return farthest
 
 
+def is_in_any(volumes, r):
+    """Whether a place is in any of some volumes."""
+    found = False
+    for volume in reversed(volumes):
+        found = (outside(volume, r) <= 0.0) | found
+    return found
+
+
 def is_open(openings, wall, r, near):
     """Whether a place on this wall is open, or nearer to what is than that; False for no wall, which is -1."""
-    is_in_any = False
+    is_open_in_any = False
     for opening in reversed(openings or ()):
         found = False
         for volume in reversed(opening.volumes):
             found = (outside(volume, r) <= near) | found
-        is_in_any = (opening.is_of(wall) & found) | is_in_any
-    return is_in_any
+        is_open_in_any = (opening.is_of(wall) & found) | is_open_in_any
+    return is_open_in_any

@@ -83,7 +83,8 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
     if task.bodies is None:
         laws = task.scene.laws()
         has_heat = laws is not None and laws.give_heat
-        added = observables.summed(sums, owners, booked(task.scene.walls()), has_heat, task.scene.parts_of_rows())
+        rows, of_parts = booked(task.scene.walls()), task.scene.parts_of_rows()
+        added = observables.summed(sums, owners, rows, has_heat, of_parts, len(task.options.counters))
     else:
         added = energies.summed(sums, owners, len(task.scene.surfaces), len(task.bodies.body.cavities))
     added |= brought

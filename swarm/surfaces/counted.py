@@ -1,0 +1,164 @@
+"""Counters as kernels take them: when a flight crosses one, and on which side of it a place is."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from ..kernel.gravity import as_vector
+from ..kernel.jit import select
+from ..kernel.record import Record
+from ..kernel.vector import absolute, dot, square, total
+from . import flights
+from .depth import penetration
+from .frames import Framed
+from .openings import is_in_any
+from .shapes.plane import PlaneNumbers
+
+
+class Crossing(Record):
+    """When a flight crosses a counter, and the number of its wall, or -1 where it surely crosses none until then."""
+
+    time: Any
+    wall: Any
+
+
+class Counted(Record):
+    """A counter. Its `sign` is 1 of a particle on its admissible side, -1 of one on the other."""
+
+    if TYPE_CHECKING:
+        near: Any
+        volumes: Any
+
+    def may_cross(self, sign, gravity, r, v, span):
+        """Whether a flight may cross it within a time, without a branch."""
+        raise NotImplementedError
+
+    def crossing(self, sign, gravity, r, v):
+        """The first `Crossing` of a flight."""
+        raise NotImplementedError
+
+    def distance(self, r):
+        """The distance out of the admissible side, to first order; below 0 in it."""
+        raise NotImplementedError
+
+    def is_near(self, r):
+        """Whether a place is on it, within round-off."""
+        return abs(self.distance(r)) <= self.near
+
+    def speed(self, sign, wall, r, v):
+        """The speed across a wall at a place on it."""
+        raise NotImplementedError
+
+    def has(self, r):
+        """Whether a crossing at this place counts."""
+        return True if self.volumes is None else is_in_any(self.volumes, r)
+
+
+class Turned(Counted):
+    """A counter of one wall that is the same from its other side when its sign is changed."""
+
+    wall: Any
+    near: float  # a distance that is round-off [m]
+    volumes: Any  # None, or those in which crossings count
+
+    def may_cross(self, sign, gravity, r, v, span):
+        wall = with_sign(self.wall, sign)
+        if gravity is None or not wall.is_quartic:
+            time, _found = flights.hit(gravity, wall, r, v)
+            return time < span
+        return wall.safe_time(r, v, as_vector(gravity)) < span
+
+    def crossing(self, sign, gravity, r, v):
+        time, found = flights.hit(gravity, with_sign(self.wall, sign), r, v)
+        return Crossing(time, select(found, 0.0, -1.0))
+
+    def distance(self, r):
+        return self.wall.distance(r)
+
+    def is_near(self, r):
+        # The same without a root and a division
+        level = self.wall.level_of(self.wall.inner(r))
+        return level * level <= (self.near * self.near) * square(self.wall.inner_gradient(r))
+
+    def speed(self, sign, wall, r, v):
+        return abs(dot(self.wall.unit_normal(r), v))
+
+    @property
+    def most(self):
+        """The most crossings of a straight flight: a constant for the compiler."""
+        return 1 if isinstance(_body_of(self.wall), PlaneNumbers) else 2
+
+
+class Walled(Counted):
+    """Any counter: the walls that hold what is on its admissible side, and those of the other one."""
+
+    inner: Any
+    outer: Any
+    near: float  # a distance that is round-off [m]
+    volumes: Any  # None, or those in which crossings count
+    ball: Any  # None, or a solid ball that the surface is in
+
+    def may_cross(self, sign, gravity, r, v, span):
+        found = span > 0.0
+        if self.ball is not None:
+            found = found & _may_meet(self.ball, gravity, r, v, span)
+        if gravity is not None:
+            return found
+        inner, outer = _soonest(self.inner, r, v), _soonest(self.outer, r, v)
+        return found & (select(sign > 0.0, inner, outer) < span)
+
+    def crossing(self, sign, gravity, r, v):
+        if sign > 0.0:
+            found = flights.first_hit(self.inner, gravity, r, v)
+        else:
+            found = flights.first_hit(self.outer, gravity, r, v)
+        return Crossing(found.time, found.wall)
+
+    def distance(self, r):
+        return penetration(self.inner, r) - penetration(self.outer, r)
+
+    def speed(self, sign, wall, r, v):
+        n = self.inner.unit_normal(wall, r) if sign > 0.0 else self.outer.unit_normal(wall, r)
+        return abs(dot(n, v))
+
+
+def _may_meet(ball, gravity, r, v, span):
+    """Whether a flight is in a ball within a time."""
+    if gravity is None:
+        time, _found = ball.first_hit(r, v)
+    else:
+        time = ball.safe_time(r, v, as_vector(gravity))
+    return (time < span) | (ball.level_of(ball.inner(r)) > 0.0)
+
+
+def _soonest(walls, r, v):
+    """When a straight flight leaves walls, or before that: where it has no closed form at once."""
+    return flights.first_hit(walls, None, r, v).time if _are_simple(walls) else 0.0
+
+
+def _body_of(wall):
+    return _body_of(wall.body) if isinstance(wall, Framed) else wall
+
+
+def _are_simple(walls):
+    """Whether straight flights to walls have hits in closed form: a constant for the compiler."""
+    return not walls.fields() and not walls.unions and not walls.in_steps()
+
+
+def with_sign(wall, sign):
+    """A wall, seen from its other side where the sign is -1."""
+    if isinstance(wall, Framed):
+        return wall._replace(body=with_sign(wall.body, sign))
+    if isinstance(wall, PlaneNumbers):
+        return wall._replace(normal=sign * wall.normal, offset=sign * wall.offset)
+    return wall._replace(side=sign * wall.side)
+
+
+# A crossing speed below this part of the speed is round-off.
+_GRAZING = 1e-9
+
+
+def slowness(across, v):
+    """1/(the speed across a counter) [s/m], of a particle with this velocity."""
+    speed = total(absolute(v))
+    least = select(speed > 0.0, _GRAZING * speed, math.inf)
+    return 1.0 / select(across > least, across, least)

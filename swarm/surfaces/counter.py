@@ -1,0 +1,64 @@
+"""Counters: surfaces that stop nobody and count what crosses them, as users describe them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import Any
+
+from ..checks import shown
+from ..errors import SceneError
+from .surface import Surface
+
+
+@dataclass(frozen=True)
+class Counter:
+    """A surface that stops nobody and counts what crosses it; `counters` of `simulate` has them.
+
+    Crossings have two senses: 0 is out of the admissible side of the surface (along the normal of a plane, out of a
+    sphere), 1 is back. A surface by itself is a counter as well: this says where on it crossings count.
+
+    Args:
+        surface: any surface at rest without laws, openings and `present`.
+        inside: None: all crossings count. Else a volume, a surface as an opening is: those within it do, as at the
+            mouth of a tube.
+
+    Raises:
+        SceneError: what is given is no such surface.
+
+    >>> import swarm
+    >>> cavity = swarm.Scene([swarm.Sphere(radius=0.5)])
+    >>> start = swarm.Particles([-0.5, 0.0, 0.0], [1.0, 0.0, 0.0])
+    >>> mouth = Counter(swarm.Plane((1.0, 0.0, 0.0)), inside=swarm.Sphere(0.1))
+    >>> run = swarm.simulate(cavity, start, swarm.Impact(), until=2.0, counters=[mouth, swarm.Sphere(0.2)])
+    >>> run.observables["crossings"][-1].tolist()
+    [[1, 1], [2, 2]]
+    """
+
+    surface: Any
+    inside: Any = None
+
+    def __post_init__(self) -> None:
+        require_bare("surface", self.surface, "a counter stops nobody")
+        if self.inside is not None:
+            require_bare("inside", self.inside, "it is no wall")
+
+
+def require_bare(name: str, given: Any, why: str) -> None:
+    """Raise a `SceneError` unless this is a surface with nothing that a wall has besides its place."""
+    if not isinstance(given, Surface):
+        raise SceneError(f"{name} must be a surface such as swarm.Plane, got {shown(given)}")
+    for law in fields(Surface):
+        came = getattr(given, law.name)
+        if law.name != "rotation" and came != law.default:
+            raise SceneError(f"{name}.{law.name} must be left out, {why}, got {came!r:.200}")
+
+
+def checked_counters(value: Any) -> tuple[Counter, ...]:
+    """The argument `counters`: each as a `Counter`."""
+    if isinstance(value, (Surface, Counter, str)) or not isinstance(value, Iterable):
+        raise SceneError(f"counters must be a list of surfaces such as swarm.Plane, got {shown(value)}")
+    found = []
+    for k, one in enumerate(value):
+        if not isinstance(one, Counter):
+            require_bare(f"counters[{k}]", one, "a counter stops nobody")
+        found.append(one if isinstance(one, Counter) else Counter(one))
+    return tuple(found)
