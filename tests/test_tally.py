@@ -218,12 +218,12 @@ def test_facets_of_a_mesh_have_their_own():
     corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     mesh = swarm.Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], restitution=0.3)
     scene = swarm.Scene([mesh], (0.0, 0.0, -1.0))
-    result = run(scene, 4, 3.0)
+    result = run(scene, 3, 2.0)
     (impacts,), (times,) = result.member_impacts, result.member_residence
     assert impacts.shape == times.shape == (4,)
     assert impacts.sum() == result.observables["impacts"][-1]
     floor = (np.asarray(mesh.vertices)[np.asarray(mesh.triangles)][:, :, 2] == 0.0).all(axis=1)
-    assert times[floor].item() > 0.8 * times.sum() > 0.0
+    assert times[floor].item() > 0.5 * times.sum() > 0.0
     assert times.sum() == pytest.approx(result.observables["sliding_time"][-1], rel=1e-13)
 
 
