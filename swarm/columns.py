@@ -23,7 +23,8 @@ _POSITIVE = {"mass", "radius", "length", "half_x", "half_y", "half_z", "a", "b",
 # The names of all that runs have, which functions of one's own cannot take.
 NAMES = frozenset((
     "absorbed", "angular_momentum", "born", "cavity_impulse", "chunk_sums", "contact_energy", "crossed_energy",
-    "crossed_momentum", "crossings", "dissipated_energy", "energy_error", "escaped", "impacts", "impulse",
+    "crossed_momentum", "crossed_slowness", "crossings", "dissipated_energy", "energy_error", "escaped", "impacts",
+    "impulse",
     "kinetic_energy", "link_error", "max_penetration", "member_absorbed", "member_heat", "member_impacts",
     "member_residence", "momentum", "part_heat", "part_impulse", "potential_energy", "sliding", "sliding_time",
     "source_energy", "sweeps", "time", "total_energy", "unconverged", "wall_energy", "wall_heat",
@@ -39,6 +40,7 @@ COMPONENTS = dict.fromkeys(
         "wall_velocity",
         "wall_spin",
         "crossed_momentum",
+        "crossed_slowness",
         "position",
         "velocity_before",
         "velocity_after",

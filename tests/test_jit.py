@@ -631,7 +631,7 @@ LAYERS = [
     ["scene_file", "summary"],
     ["run"],
     ["output"],
-    ["bodies"],
+    ["bodies", "sources"],
     ["tables", "filling"],
     ["observables", "history"],
     ["lanes", "reacting"],

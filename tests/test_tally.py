@@ -12,7 +12,7 @@ import swarm
 from swarm.lanes.counts import PARTS, Sums
 from swarm.run.engine import Run
 from swarm.run.state import Seeding
-from swarm.run.tally import Tally, Watched, value_of
+from swarm.run.tally import Tally, Units, Watched, value_of
 
 MANY = {
     **SCENES,
@@ -74,7 +74,7 @@ def test_halts_and_sessions_lose_and_repeat_none(tmp_path):
     start, halts = swarm.fill(scene, 30, speed=1.0, seed=1), 0
 
     def begun():
-        tally = Tally(scene.members(), 2.0**-10)
+        tally = Tally(scene.members(), Units(2.0**-10))
         return Run(scene, start.copy(), swarm.Impact(), 1, None, "never", Seeding(), Watched(None, tally)), tally
 
     one, tally = begun()
@@ -211,6 +211,37 @@ def test_sums_of_whole_numbers_are_exact_in_any_order():
         assert 0 <= sums.rest[0] < PARTS
         made.append(value_of(np.array((sums.whole, sums.rest)), sums.unit).item())
     assert made[0] == made[1] == made[2] == pytest.approx(math.fsum(terms), abs=2000 * 2.0**-51)
+
+
+HOT = swarm.Spheres(
+    [[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0], [0.0, 0.25, 0.0]], [0.1, 0.1, 0.05], temperature=2.0, accommodation=0.7
+)
+WARM = {
+    "thermal": swarm.Scene([swarm.Sphere(0.5, temperature=1.0), HOT]),
+    "of laws": swarm.Scene([swarm.Sphere(0.5, laws=[swarm.CercignaniLampis(3.0, 0.5, 0.9)]), HOT], DOWN),
+    "absorbing": swarm.Scene(
+        [swarm.Sphere(0.5, temperature=1.0), swarm.Spheres(HOT.centers, HOT.radii, laws=[swarm.Absorb(0.3)])]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WARM)
+def test_heat_and_absorbed_of_members_are_those_of_surfaces(name):
+    scene = WARM[name]
+    one = run(scene, 300, 1.0, every=0.5)
+    seen = one.observables
+    scale = np.abs(seen["wall_heat"][-1]).max() + seen["kinetic_energy"][0]
+    for k, heat in enumerate(one.member_heat):
+        assert heat.sum() == pytest.approx(seen["wall_heat"][-1, k], abs=1e-13 * scale)
+    assert (np.abs(one.member_heat[0]) > 1e-3 * scale).all()
+    if name == "absorbing":
+        assert [counts.sum() for counts in one.member_absorbed] == seen["absorbed"][-1].tolist()
+        assert (one.member_absorbed[1] > 0).all()
+    else:
+        assert one.member_absorbed is None
+        assert (np.abs(one.member_heat[1]) > 1e-4 * scale).all()
+    other = run(scene, 300, 1.0, every=0.5, threads=3, block_size=1).observables
+    assert all(other[key].tobytes() == seen[key].tobytes() for key in seen)
 
 
 def test_facets_of_a_mesh_have_their_own():

@@ -51,7 +51,7 @@ def book_step(walls, state, i, wall, change, given, loses):
 def book_sent(laws, state, i, row, change, lost):
     """Book a change (before, after) of twice the energy per mass by a law of a wall.
 
-    So much of it is `lost`, all where that has no end; the rest is heat that the wall gives.
+    So much of it is `lost`, all where that has no end; the rest is heat that the wall gives, and is returned [J].
     """
     before, after = change
     # What impacts have taken since the energy was written is booked when the particle leaves its lane.
@@ -60,12 +60,14 @@ def book_sent(laws, state, i, row, change, lost):
     given = after - before
     if laws.dissipate_all:
         state.dissipated[i] -= 0.5 * given * state.mass[i]
-        return
+        return 0.0
     if laws.may_dissipate:
         taken = select(lost == math.inf, -given, lost)
         state.dissipated[i] += 0.5 * taken * state.mass[i]
         given = select(lost == math.inf, 0.0, given + taken)
-    state.heat[row, i] += 0.5 * given * state.mass[i]
+    heat = 0.5 * given * state.mass[i]
+    state.heat[row, i] += heat
+    return heat
 
 
 # --- Of a lane ------------------------------------------------------------------------------------------

@@ -39,10 +39,11 @@ class Sums(Record):
 
 
 class Counts(Record):
-    """Impacts on each wall of the scene that one thread has computed, and for how long particles were held there."""
+    """Of each wall of the scene what one thread has computed: impacts, and sums, None where there is nothing."""
 
     impacts: Array  # (walls,) int64
-    stays: Any = None  # `Sums` of times [s], or None where nothing slides
+    stays: Any = None  # `Sums` of the times for which particles were held there [s]
+    heats: Any = None  # `Sums` of the heat that it gave [J]
 
     def keep_before(self, lanes, live):
         """Keep of every lane what says whether its contact is an impact."""
@@ -72,3 +73,8 @@ class Counts(Record):
         """Count a time in which a wall has held a particle [s]."""
         if self.stays is not None:
             self.stays.add(wall, time)
+
+    def give(self, wall, heat):
+        """Count heat that a wall has given [J]."""
+        if self.heats is not None:
+            self.heats.add(wall, heat)

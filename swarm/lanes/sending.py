@@ -76,7 +76,9 @@ def _book(method, walls, share, lanes, i):
         _leave_wrong(state, lanes, i)
         return True
     row = walls.row(wall)
-    book_sent(laws, state, p, row, (lane.twice, sent.twice - sent.work), sent.lost)
+    heat = book_sent(laws, state, p, row, (lane.twice, sent.twice - sent.work), sent.lost)
+    if share.counts is not None:
+        share.counts.give(wall, heat)
     add_work(walls, lanes.impulse, i, wall, 0.5 * sent.work)
     lane.v, lane.twice = sent.v, sent.twice
     lane.hits += 1.0

@@ -95,8 +95,8 @@ class Trajectory(Presented):
     def members(self, k: int = -1) -> dict[str, list[NDArray[Any]]]:
         """Of a run with member_impacts=True what each member of each surface has had until frame k; else nothing.
 
-        "impacts", and where particles may slide "residence" [s]: a list with an array for each surface, (members,) of a
-        field such as `Spheres`, of the facets of a `Mesh` or of the parts of a union, and (1,) of any other.
+        "impacts", and "residence" [s], "heat" [J] and "absorbed" where walls hold, heat or absorb particles: a list
+        with an array for each surface, as `Result.member_impacts`.
         """
         k = self._number_of(k)
         with self._reading("its members") as file:

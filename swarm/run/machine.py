@@ -100,7 +100,11 @@ def carry_out_task(task: Task, session: Session) -> End:
                     while not run.advance(span, moment, *_meanwhile(session, writer, show)):
                         show.within(before + run.share_done(span) * (moment - before), until)
                         session.look(run, writer, number - 1, before, moment)
-                seen = {"time": moment, **run.seen(), **(tally.seen(task.is_shard) if tally else {})}
+                seen = {
+                    "time": moment,
+                    **run.seen(),
+                    **(tally.seen(run.state.absorbed, task.is_shard) if tally else {}),
+                }
                 run.require_admissible(seen, moment)
                 read = functools.partial(getattr, run.state)
                 seen |= measures.of(number, moment, _snapshot_of(task, read, moment))

@@ -39,8 +39,9 @@ class Result:
             (frames, surfaces, 3). Of bodies also "link_error", the "work" of led anchors [J], and "cavity_impulse"
             (frames, cavities) of what points carry [N s]. With member_impacts=True "member_impacts" (frames, members)
             of all members of surface 0, then of surface 1, and so on, and where particles may slide "member_residence"
-            [s], how long they slid or rested there, at an edge on the wall that they were on before. Where laws of
-            walls return a `Leave` also "absorbed" (frames, surfaces), how many each has absorbed so far.
+            [s], how long they slid or rested there, at an edge on the wall that they were on before; where walls heat
+            or absorb them "member_heat" [J] and "member_absorbed". Where laws of walls return a `Leave` also "absorbed"
+            (frames, surfaces), how many each has absorbed so far.
             With counters "crossings" (frames, counters, 2), how many have crossed each since 0 s, out of its admissible
             side and back; what they carried, "crossed_momentum" (frames, counters, 2, 3) [kg m/s] and "crossed_energy"
             (frames, counters, 2) [J]; and "crossed_slowness", the sum of 1/|v_n| [s/m]. A flux is a difference over
@@ -111,6 +112,16 @@ class Result:
     def member_residence(self) -> list[NDArray[np.float64]] | None:
         """Likewise how long particles have slid or rested on each [s]; None where none may."""
         return self._of_members("member_residence")
+
+    @property
+    def member_heat(self) -> list[NDArray[np.float64]] | None:
+        """Likewise the heat that each has given [J]; None where no wall gives any."""
+        return self._of_members("member_heat")
+
+    @property
+    def member_absorbed(self) -> list[NDArray[np.int64]] | None:
+        """Likewise how many each has absorbed; None where no wall absorbs."""
+        return self._of_members("member_absorbed")
 
     def _of_members(self, name: str) -> list[NDArray[Any]] | None:
         if name not in self.observables or self.scene is None:

@@ -8,13 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..lanes.counts import PARTS, Counts, Sums
+from ..particles import Absorbed
 from ..surfaces.counter import Counter
 from .impacts import Impacts
 from .options import Task
 
 Wholes = NDArray[np.int64]
-# The units of a time in that of the whole run, a power of two: what is added is rounded to 2^-52 of that.
+# The unit of a sum is this part of what is large in the run: each term is rounded to 2^-52 of that.
 _UNITS = 4096.0
+
+
+class Units(NamedTuple):
+    """The units of the sums, powers of two; None where there is no such sum."""
+
+    stays: float | None = None  # [s]
+    heats: float | None = None  # [J]
+
+
+# The observable of each sum.
+OBSERVED = {"stays": "member_residence", "heats": "member_heat"}
 
 
 class Tally:
@@ -22,17 +34,17 @@ class Tally:
 
     Args:
         owners: of each wall of the kernels its surface, and its number in the field or of the part, or -1: (2, walls).
-        unit: of times [s], a power of two; None where none are counted.
+        units: of the sums.
     """
 
-    def __init__(self, owners: Wholes, unit: float | None = None) -> None:
+    def __init__(self, owners: Wholes, units: Units = Units()) -> None:  # noqa: B008  it cannot be changed
         self._places, self._members = _places_of(owners)
-        self._walls, self._unit = owners.shape[1], unit
+        self._walls, self._units = owners.shape[1], units
         self._counts: dict[int, Counts] = {}
 
     def size(self) -> int:
         """Bytes of the observables of a frame."""
-        return 8 * self._members * (1 if self._unit is None else 2)
+        return 8 * self._members * (2 + len(self._summed()))
 
     def counts(self) -> Counts:
         """The counts of the thread that calls."""
@@ -42,9 +54,13 @@ class Tally:
         """The counts of a thread."""
         return self._counts.setdefault(number, self._none())
 
+    def _summed(self) -> dict[str, float]:
+        """The sums that there are, and their units."""
+        return {name: unit for name, unit in self._units._asdict().items() if unit is not None}
+
     def _none(self) -> Counts:
-        whole = np.zeros((3, self._walls), np.int64)
-        return Counts(whole[0], None if self._unit is None else Sums(whole[1], whole[2], self._unit))
+        sums = {name: Sums(*np.zeros((2, self._walls), np.int64), unit) for name, unit in self._summed().items()}
+        return Counts(np.zeros(self._walls, np.int64), **sums)
 
     def rest(self, walls: Wholes, time: float) -> None:
         """Count a time that each of some particles rests on a wall [s]."""
@@ -62,33 +78,35 @@ class Tally:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """What `restore` takes."""
-        every = list(self._counts.values())
-        empty = self._none()
-        found = {"member_impacts": sum((one.impacts for one in every), empty.impacts)}
-        if empty.stays is not None:
-            both = [np.array((one.stays.whole, one.stays.rest)) for one in [*every, empty] if one.stays is not None]
-            found["member_stays"], found["member_unit"] = np.sum(both, axis=0), np.array([self._unit])
+        every = [*self._counts.values(), self._none()]
+        found = {"member_impacts": np.sum([one.impacts for one in every], axis=0)}
+        for name, unit in self._summed().items():
+            parts = [(sums.whole, sums.rest) for sums in (getattr(one, name) for one in every)]
+            found[f"member_{name}"], found[f"member_{name}_unit"] = np.sum(parts, axis=0), np.array([unit])
         return found
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Go on from the arrays of a checkpoint."""
-        if self._unit is not None:
-            # A run that goes on may have got another end.
-            self._unit = float(arrays["member_unit"][0])
+        # A run that goes on may have got another end.
+        self._units = Units(**{name: float(arrays[f"member_{name}_unit"][0]) for name in self._summed()})
         self._counts = {}
         mine = self.counts()
         mine.impacts[:] = arrays["member_impacts"]
-        if mine.stays is not None:
-            mine.stays.whole[:], mine.stays.rest[:] = arrays["member_stays"]
-            _carry(mine.stays.whole, mine.stays.rest)
+        for name in self._summed():
+            sums = getattr(mine, name)
+            sums.whole[:], sums.rest[:] = arrays[f"member_{name}"]
+            _carry(sums.whole, sums.rest)
 
-    def seen(self, is_shard: bool = False) -> dict[str, NDArray[Any]]:
-        """The observables: of all members, surface by surface; of a shard whole numbers for those that are none."""
+    def seen(self, absorbed: Absorbed | None = None, is_shard: bool = False) -> dict[str, NDArray[Any]]:
+        """The observables: of all members, surface by surface; of a shard the whole numbers that stand for sums."""
         arrays = self.arrays()
         found: dict[str, NDArray[Any]] = {"member_impacts": self._of_members(arrays["member_impacts"])}
-        if self._unit is not None:
-            parts = np.array([self._of_members(row) for row in arrays["member_stays"]])
-            found["member_residence"] = parts if is_shard else value_of(parts, self._unit)
+        for name, unit in self._summed().items():
+            parts = np.array([self._of_members(row) for row in arrays[f"member_{name}"]])
+            found[OBSERVED[name]] = parts if is_shard else value_of(parts, unit)
+        if absorbed is not None:
+            on = absorbed.wall[absorbed.wall >= 0]
+            found["member_absorbed"] = np.bincount(self._places[on], minlength=self._members)
         return found
 
     def _of_members(self, of_walls: Wholes) -> Wholes:
@@ -108,13 +126,35 @@ class Watched(NamedTuple):
 
 def tally_of(task: Task) -> Tally | None:
     """The tally of a run, if it has one."""
-    return Tally(task.scene.members(), unit_of(task)) if task.options.member_impacts else None
+    return Tally(task.scene.members(), units_of(task)) if task.options.member_impacts else None
 
 
-def unit_of(task: Task) -> float | None:
-    """The unit of the times of a tally [s], or None where no contact lasts."""
-    lasts = task.bodies is None and not task.scene.reacts() and task.method.may_slide()
-    return 2.0 ** math.floor(math.log2(task.options.until)) / _UNITS if lasts else None
+def units_of(task: Task) -> Units:
+    """The units of the sums of a run."""
+    laws = task.scene.laws()
+    are_alone = task.bodies is None and not task.scene.reacts()
+    return Units(
+        _power_of_two(task.options.until) if are_alone and task.method.may_slide() else None,
+        (task.heat_unit or heat_unit(task)) if are_alone and laws is not None and laws.give_heat else None,
+    )
+
+
+def heat_unit(task: Task) -> float:
+    """The unit of heat of a run: by the energy of its particles, or that of its hottest wall if that is more."""
+    v, mass, gravity = task.particles.velocity, task.particles.mass, task.scene.gravity or (0.0, 0.0, 0.0)
+    mean = float((0.5 * mass * (v * v).sum(axis=0)).mean())
+    fall = float(mass.mean()) * math.hypot(*gravity) * task.scene.finite_size()
+    hot = [
+        float(value)
+        for piece in task.scene.pieces
+        for one in (piece, *piece.laws)
+        if (value := getattr(one, "temperature", None)) is not None
+    ]
+    return _power_of_two(max(mean, fall, *hot, 0.0) or 1.0)
+
+
+def _power_of_two(large: float) -> float:
+    return float(2.0 ** math.floor(math.log2(large)) / _UNITS)
 
 
 def value_of(parts: Wholes, unit: float | None) -> NDArray[np.float64]:

@@ -87,7 +87,7 @@ CASES = {
     "few of them": (sphere, {"frames": 300}),
     "no particles": (sphere, {"frames": "none"}),
     "members": (periodic, {"member_impacts": True}),
-    "thermal": (thermal, {"seed": 2**64 - 3}),
+    "thermal": (thermal, {"seed": 2**64 - 3, "member_impacts": True}),
     "sliding": (sliding, {}),
     "members on which they slide": (sliding, {"member_impacts": True}),
     "penalty": (penalty, {"until": 0.2, "every": 0.1}),

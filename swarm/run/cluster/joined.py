@@ -23,15 +23,13 @@ from ..machine import CHUNK_SUMS, Columns
 from ..measures import NONE, Measures
 from ..options import Task
 from ..present import total_of
-from ..tally import unit_of, value_of
+from ..tally import OBSERVED, units_of, value_of
 from . import shards
 
 # The largest value of any shard is that of all; the other observables, whole numbers, add up exactly.
 _LARGEST = ("energy_error", "max_penetration", "link_error")
 # The same of every shard.
 _COMMON = ("wall_position", "wall_orientation")
-# Of shards whole numbers.
-_STAYS = "member_residence"
 # Frames that are read at a time.
 _AT_ONCE = 256
 
@@ -99,7 +97,10 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
             values = [part[name] for part in parts]
             total = np.sum(values, axis=0)
             seen[name] = max(values).item() if name in _LARGEST else total if total.ndim else int(total)
-    return seen | ({_STAYS: value_of(seen[_STAYS], unit_of(task))} if _STAYS in seen else {})
+    if task.options.member_impacts:
+        units = units_of(task)._asdict().items()
+        seen |= {OBSERVED[name]: value_of(seen[OBSERVED[name]], unit) for name, unit in units if unit is not None}
+    return seen
 
 
 class JoinedWriter(TrajectoryWriter):
