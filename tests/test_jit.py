@@ -632,7 +632,7 @@ LAYERS = [
     ["run"],
     ["output"],
     ["bodies"],
-    ["tables", "filling"],
+    ["tables", "filling", "sources"],
     ["observables", "history"],
     ["lanes", "reacting"],
     ["methods"],
