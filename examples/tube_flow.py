@@ -15,25 +15,14 @@ from typing import NamedTuple
 import numpy as np
 
 import swarm
-from swarm.kernel.vector import Vec, norm
 
 from .asked import Asked
 
-# Length over radius of tubes, and the factors of Clausing to the digits of later computations.
+# Length over radius of tubes, and Clausing's factors to the digits of later computations.
 FACTORS = {1.0: 0.6720, 2.0: 0.5142, 5.0: 0.3105, 10.0: 0.1910}
 # Of all particles [m/s]; radii are 1 m.
 SPEED = 1.0
 FRAMES = 60
-
-
-class Diffuse(swarm.WallLaw):
-    """The cosine law, with the speed that a particle has: the direction of n + s is, for s uniform on the sphere."""
-
-    def leave(self, v, n, u, random, mass):
-        """|v| (n + s)/|n + s|."""
-        s = Vec(random.normal(0), random.normal(2), random.normal(4))
-        d = n + (1.0 / norm(s)) * s
-        return u + (norm(v - u) / norm(d)) * d
 
 
 class Flow(NamedTuple):
@@ -55,7 +44,7 @@ def tube(length: float) -> swarm.Scene:
         )
         for sign in (-1.0, 1.0)
     ]
-    return swarm.Scene([*ends, swarm.Cylinder(1.0, laws=[Diffuse()])])
+    return swarm.Scene([*ends, swarm.Cylinder(1.0, laws=[swarm.Lambert()])])
 
 
 def run(count: int, length: float, stays: float = 12.0, seed: int = 1) -> Flow:

@@ -38,6 +38,8 @@ def numbers(trajectory: Path) -> dict[str, Any]:
         "sliding_time": float(seen.get("sliding_time", [0.0])[-1]),
         "crossings": np.array(seen.get("crossings", [[]])[-1]).tolist(),
         "escaped": int(seen["escaped"][-1]),
+        "born": np.array(seen.get("born", [[]])[-1], np.int64).tolist(),
+        "source_energy": float(seen.get("source_energy", [0.0])[-1]),
         "absorbed": np.array(seen.get("absorbed", [[]])[-1], int).tolist(),
         "unconverged": int(seen["unconverged"][-1]),
     }

@@ -115,7 +115,15 @@ def _escaped(seen: dict[str, Any]) -> dict[str, str]:
     rows = {}
     if seen.get("escaped", [0])[-1]:
         rows["escaped"] = f"{int(seen['escaped'][-1])} particles"
-    return rows | _absorbed(seen)
+    return rows | _born(seen) | _absorbed(seen)
+
+
+def _born(seen: dict[str, Any]) -> dict[str, str]:
+    """How many particles have come from each source, and what they have brought."""
+    if not np.any(born := seen.get("born", [[]])[-1]):
+        return {}
+    each = ", ".join(f"{int(count)} from sources[{k}]" for k, count in enumerate(born))
+    return {"born": f"{each}, with {seen['source_energy'][-1]:.4g} J"}
 
 
 def _absorbed(seen: dict[str, Any]) -> dict[str, str]:

@@ -93,6 +93,9 @@ class DoorRun(Run):
         distances = self._scene.distances_outside(self.state.position, instant)
         distances[~came] = -math.inf
         distances[:, self.state.gone()] = -math.inf
+        # Who comes later is born where no wall is then.
+        self._present.reach(instant)
+        distances[:, self._present.count :] = -math.inf
         # Where phi is no number is no place either.
         inside = ~(distances <= self._deepest)
         if inside.any():

@@ -66,7 +66,7 @@ def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], las
             state.impulse[: len(contacts.load)] += contacts.load * (span * state.mass)
             contacts.sliding[:] += span * rests
     if state.escape_time is not None or state.absorbed is not None:
-        phase[state.gone()] = ARRIVED
+        phase[state.gone()[: len(phase)]] = ARRIVED
     if state.starts is not None:
         _begin_late(state.starts[: len(phase)], state.contacts, phase, span, end)
 

@@ -113,11 +113,11 @@ class Followed(NamedTuple):
     end: float
 
 
-def follow(scene, r, v, times):
-    """One particle from time 0; it ends where a contact begins to last, or an impact is a matter of round-off."""
+def follow(scene, r, v, times, start=0.0):
+    """One particle from a time on; it ends where a contact begins to last, or an impact is a matter of round-off."""
     walls = [Wall.of(surface) for surface in scene.surfaces]
     pull = np.array(scene.gravity if scene.gravity is not None else (0.0, 0.0, 0.0))
-    start, count, seen = 0.0, 0, []
+    count, seen = 0, []
     until = times[-1]
     while True:
 

@@ -11,6 +11,7 @@ from physics.event_loop import follow
 
 import swarm
 from swarm.kernel.vector import dot, norm
+from swarm.sources.births import with_births
 
 UNTIL, FRAMES, NUMBER = 1.0, 8, 4
 # Coarse steps while it slides: the event loop says nothing of those.
@@ -156,11 +157,13 @@ def a_scene(seed, vessels=VESSELS):
 def compared(scene, start, frames, result):
     """Hold every particle against the event loop, as long as that can say; returns how many states were compared."""
     states = 0
-    times = [time for time, _ in frames]
-    for i in range(NUMBER):
+    times, born = [time for time, _ in frames], result.birth_time
+    for i in range(len(born)):
         r, v = start.position[:, i], start.velocity[:, i]
-        exact = follow(scene, r, v, times)
-        near = [follow(scene, r + nudge, v, times) for nudge in NUDGE * np.eye(3)]
+        late = [time for time in times if time >= born[i]]
+        first = len(times) - len(late)
+        exact = follow(scene, r, v, late, born[i])
+        near = [follow(scene, r + nudge, v, late, born[i]) for nudge in NUDGE * np.eye(3)]
         certain = min(len(one.position) for one in (exact, *near))
         for k in range(certain):
             grown = max(np.abs(one.position[k] - exact.position[k]).max() for one in near)
@@ -168,23 +171,40 @@ def compared(scene, start, frames, result):
                 certain = k
                 break
             bar = LEAST + SPARE * grown
-            assert frames[k][1].position[:, i] == pytest.approx(exact.position[k], abs=bar), f"particle {i}, frame {k}"
-            assert frames[k][1].velocity[:, i] == pytest.approx(exact.velocity[k], abs=1e2 * bar), (
-                f"particle {i}, frame {k}"
-            )
+            frame = frames[first + k][1]
+            assert frame.position[:, i] == pytest.approx(exact.position[k], abs=bar), f"particle {i}, frame {k}"
+            assert frame.velocity[:, i] == pytest.approx(exact.velocity[k], abs=1e2 * bar), f"particle {i}, frame {k}"
         states += certain
-        if certain == len(times):
+        if certain == len(late):
             assert result.impacts_per_particle[i] == exact.impacts[-1], f"particle {i}"
     return states
 
 
-def holds(seed, folder, vessels=VESSELS):
+def with_sources(scene, start, seed):
+    """Two sources: on the vessel, if that is at rest, by any law; and where the first particle is at the start."""
+    random = np.random.default_rng([47, seed])
+    laws = {"speed": 1.0}, {"temperature": 0.5}, {"speed": 0.0}
+    here = swarm.Sphere(0.02, tuple(start.position[:, 0].tolist()))
+    sources = [swarm.Source(here, volume=True, count=2, stop=UNTIL, **laws[random.integers(3)])]
+    for i, surface in enumerate(scene.surfaces):
+        if surface.motion is None and surface.present is None and not surface.is_solid():
+            sources.append(swarm.Source(i, rate=2.0, even=True, start=0.1, **laws[random.integers(2)]))
+            break
+    return sources
+
+
+def holds(seed, folder, vessels=VESSELS, sourced=False):
     """Run the scene of a seed and look at everything; returns how many states were compared with the event loop."""
     scene, start = a_scene(seed, vessels)
     path = folder / f"{seed}.h5"
-    times = {"until": UNTIL, "every": UNTIL / FRAMES}
+    times = {"until": UNTIL, "every": UNTIL / FRAMES, "trajectory": path, "threads": 1, "compile": "never"}
+    times["sources"] = with_sources(scene, start, seed) if sourced else None
     try:
-        result = swarm.simulate(scene, start, METHOD, **times, trajectory=path, threads=1, compile="never")
+        result = swarm.simulate(scene, start, METHOD, **times)
+    except swarm.SceneError as refused:
+        if "must be free when particles come" in str(refused) or "must be in the vessel" in str(refused):
+            return 0  # a wall that moves, or comes, is there
+        raise
     except swarm.RunError as failed:
         # A solid has come back where a particle was.
         if "must come where nobody is" in str(failed) and len(scene.surfaces[-1].present or ()) > 1:
@@ -193,12 +213,14 @@ def holds(seed, folder, vessels=VESSELS):
     seen = result.observables
     assert seen["max_penetration"].max() <= OUTSIDE
     booked = seen["dissipated_energy"] - sum(seen[name].sum(axis=1) for name in BOOKS if name in seen)
-    kept = seen["total_energy"] + booked
+    kept = seen["total_energy"] + booked - seen.get("source_energy", 0.0)
     scale = max(np.abs(seen[name]).max() for name in ("kinetic_energy", "potential_energy"))
     assert np.abs(kept - kept[0]).max() <= UNBOOKED * scale
     assert (np.diff(seen["impacts"]) >= 0).all()
     with swarm.load(path) as trajectory:
         frames = [(float(time), trajectory.frame(k)) for k, time in enumerate(trajectory.times)]
+    if sourced:
+        start = with_births(scene, start, tuple(times["sources"]), 0, UNTIL)
     return compared(scene, start, frames, result)
 
 
@@ -214,6 +236,26 @@ def test_some_scenes_that_move(seed, tmp_path, monkeypatch):
 def test_some_unions_that_move(seed, tmp_path, monkeypatch):
     bounded(monkeypatch, PASSES)
     holds(seed, tmp_path, UNIONS)
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("seed", range(8))
+def test_some_scenes_that_move_with_sources(seed, tmp_path, monkeypatch):
+    bounded(monkeypatch, PASSES)
+    holds(seed, tmp_path, sourced=True)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("hundred", range(5))
+def test_many_scenes_with_sources(hundred, tmp_path, monkeypatch, capsys):
+    """A fourth of the vessels unions."""
+    count, states = bounded(monkeypatch, PASSES), 0
+    for seed in range(100 * hundred, 100 * hundred + 100):
+        count[0] = 0
+        states += holds(seed, tmp_path, UNIONS if seed % 4 == 0 else VESSELS, sourced=True)
+    with capsys.disabled():
+        print(f"\n{states} states are those of the event loop", end="")
+    assert states >= 1000
 
 
 @pytest.mark.long
