@@ -14,6 +14,7 @@ from . import (
     contacts,
     endurance,
     fields,
+    laws,
     meshes,
     motion,
     plane,
@@ -56,6 +57,7 @@ def main() -> None:
     commands.add_parser(
         "fields", help="scenes of many bodies, and the log of impacts: speed, first calls, what is kept"
     )
+    commands.add_parser("laws", help="laws of walls: what an impact costs under each, the books, first calls")
     commands.add_parser("unions", help="vessels of several parts: what an impact costs beside one of them, first calls")
     commands.add_parser("meshes", help="meshes of triangles: the scene, its memory, an impact, the first call")
     first = commands.add_parser("compile", help="first calls: processor time, functions compiled, and the next process")
@@ -94,6 +96,7 @@ def main() -> None:
         "bodies": bodies,
         "motion": motion,
         "fields": fields,
+        "laws": laws,
         "unions": unions,
         "meshes": meshes,
         "compile": compiling,

@@ -37,8 +37,7 @@ _SENTENCES = {
     Status.HARD_CONTACT: "a contact needs the slow-path kernel",
     Status.LEASE_ENDED: "walls that react have moved so far that all particles are predicted again",
     Status.LOG_FULL: "the log of impacts needs an empty part",
-    Status.SENT_WRONG: "one of the laws of a wall gave it no velocity, or one into the wall; leave must return "
-    "one with n.(v - u) >= 0, in a scene with a plane one along that",
+    Status.SENT_WRONG: "one of the laws of a wall gave it no velocity, or one into the wall, or out of the plane",
     Status.TIMELESS: "it goes from step to step, or from wall to wall, and no time passes; start it elsewhere, or end "
     "the run before; if nothing is special about the place, it is an error of swarm: please report it with the scene",
 }

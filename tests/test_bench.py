@@ -186,6 +186,13 @@ def test_fields_quick():
 
 
 @pytest.mark.long
+def test_laws_quick():
+    told = printed("laws")
+    for row in ("Lambert, an impact", "one's own Lambert, an impact", "energy that no book has"):
+        assert row in told
+
+
+@pytest.mark.long
 def test_unions_quick():
     told = printed("unions")
     for row in ("two balls, an impact", "a box, a tube, a box under gravity, an impact"):

@@ -117,7 +117,8 @@ class Owned(Record):
         """Whether all that these laws change of the energy is dissipated: a constant for the compiler."""
         return all(law.book == "dissipated" for law in self.each[0].laws)
 
-    def _laws_of(self, wall):
+    def laws_of(self, wall):
+        """The laws of a wall, in their order."""
         found = self.each[-1].laws
         for one in reversed(self.each[:-1]):
             found = select(one.has(wall), one.laws, found)
@@ -126,7 +127,7 @@ class Owned(Record):
     def leave(self, wall, v, n, u, random, mass):
         """`Ended` after all laws: each takes what a mirror would turn into what the one before sends."""
         stays, wait, lost, is_right = True, 0.0, 0.0, True
-        for k, law in enumerate(self._laws_of(wall)):
+        for k, law in enumerate(self.laws_of(wall)):
             v = v if k == 0 else mirrored(v, n, u)
             left = leave_of(law.leave(v, n, u, random.of_law(k), mass))
             before, after = v - u, left.v - u

@@ -95,6 +95,9 @@ def _by_law(laws, one, wall, at, arriving, random, acts):
     ended = one.leave(wall, v, n, u, random, arriving.mass)
     after = ended.v - u
     is_right = ended.is_right if laws.across is None else ended.is_right & (laws.across.part(after) == 0.0)
+    if moving is not None:
+        # Who waits would have to be carried along.
+        is_right = is_right & ((ended.wait == 0.0) | (not ended.stays))
     stays, wait = ended.stays, select(is_right & (not ended.wait < 0.0), ended.wait, 0.0)
     speed2 = square(before)
     keeps = abs(square(after) - speed2) <= _ROUND_OFF * speed2

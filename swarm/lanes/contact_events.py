@@ -203,10 +203,14 @@ def _send_off(method, walls, gravity, share, i):
     state.impacts[i] += 1
     share.note_impact(method, walls, i, impact_log.Struck(r, v, sent.v, wall, remaining, sent.impulse))
     state.impulse[walls.row(wall), i] += sent.impulse * state.mass[i]
-    if state.absorbed is not None and sent.wait == math.inf:
-        absorb(share, i, wall, remaining)
+    if state.absorbed is not None and not sent.wait < remaining:
+        if sent.wait == math.inf:
+            absorb(share, i, wall, remaining)
+        else:
+            state.starts[i] = share.moment - remaining + sent.wait
         _end_frame(share, i)
         return True
+    contacts.remaining[i] = remaining - sent.wait
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
     share.hand_over(i, FLYING)
     return True

@@ -92,11 +92,16 @@ def _book(method, walls, share, lanes, i):
 
 
 def _detain(share, lanes, i, p, wall):
-    """End a lane that is absorbed."""
+    """End a lane that is absorbed, or that waits until the end of the frame; else it goes on after it has waited."""
     lane, wait = lanes.lane(i), Sending(lanes.rows, i).wait
+    if wait < lane.remaining:
+        lane.remaining -= wait
+        return
     if wait == math.inf:
         absorb(share, p, wall, lane.remaining)
-        lane.remaining, lanes.wall[i] = 0.0, -1.0
+    else:
+        share.state.starts[p] = share.moment - lane.remaining + wait
+    lane.remaining, lanes.wall[i] = 0.0, -1.0
 
 
 def _leave_wrong(state, lanes, i):

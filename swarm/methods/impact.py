@@ -19,6 +19,7 @@ from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import flights
 from ..surfaces.surface import Surface
+from ..surfaces.wall_law import lets_wait
 from . import base, contract
 
 # Of the sliding tolerance: round-off, and steps that no longer follow the wall.
@@ -101,6 +102,7 @@ class Impact(base.Method):
                 f"contact_step must be 0 where a wall is present, or an opening open, for some times only, got "
                 f"{self.contact_step:g}: a contact step would last while they change"
             )
+        _require_no_waiting(scene)
         if scene.reacts():
             _require_reacting(scene)
         base.check_bends(scene)
@@ -139,6 +141,17 @@ def _bend(scene: Scene) -> float:
 
 def _is_straight(surface: Surface) -> bool:
     return surface.motion is None and all(wall.flat for wall in surface.walls())
+
+
+def _require_no_waiting(scene: Scene) -> None:
+    """Raise a `SceneError` where a law lets particles wait on its wall, and walls move."""
+    for i, surface in enumerate(scene.surfaces if scene.moves() else ()):
+        for k, law in enumerate(surface.laws):
+            if not isinstance(law, str) and lets_wait(law):
+                raise SceneError(
+                    f"surfaces[{i}].laws[{k}] must let nobody wait where walls move, which would carry who waits "
+                    f"along, got {law}; leave it out, or the motions"
+                )
 
 
 def _require_reacting(scene: Scene) -> None:

@@ -126,7 +126,8 @@ class Run(BaseRun):
         self._watch.end()
         if status not in (Status.DONE, Status.INTERRUPTED):
             ended = Status(status), particle
-            raise RunError(failures.of_frame(self._scene, self._method, self.state, ended, moment, self._first))
+            seeding = Seeding(self._seed, self._first)
+            raise RunError(failures.of_frame(self._scene, self._method, self.state, ended, moment, seeding))
         if status == Status.DONE:
             self._halted = lanes.none_halted(self._booked)
             self._pace = seconds * (others + helps) / span if span > 0.0 else self._pace

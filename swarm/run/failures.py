@@ -6,15 +6,23 @@ from typing import Any
 import numpy as np
 
 from ..errors import RunError
+from ..kernel.random import Stream
+from ..kernel.vector import ZERO, column
 from ..methods.base import Method
 from ..particles import State
 from ..scene import Scene
 from ..status import Status
+from ..surfaces.wall_law import leave_of, mirrored, said_of, why_wrong
+from .state import Seeding
+
+_UNSEEDED = Seeding()
 
 
-def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int], moment: float, first: int = 0) -> str:
-    """The sentence about a frame that ended with this status and particle; `first` is the number of particle 0."""
-    status, particle = end
+def of_frame(
+    scene: Scene, method: Method, state: State, end: tuple[Status, int], moment: float, seeding: Seeding = _UNSEEDED
+) -> str:
+    """The sentence about a frame that ended with this status and particle."""
+    (status, particle), first = end, seeding.first
     sentence = f"{_failed(moment)} {first + particle}: {status.sentence}"
     if status in (Status.STALLED, Status.TIMELESS):
         sentence += _place(scene, state, particle, moment)
@@ -22,6 +30,8 @@ def of_frame(scene: Scene, method: Method, state: State, end: tuple[Status, int]
         sentence += ": walls that move have closed on it; end the run before"
     if status == Status.TOO_FAST:
         sentence += f", {method.too_fast(scene)}"
+    if status == Status.SENT_WRONG:
+        sentence += _of_law(scene, state, particle, moment, seeding)
     multipliers = state.multipliers
     if status == Status.UNCONVERGED and multipliers is not None:
         remaining, stored = multipliers.remaining[particle], multipliers.stored_energy[particle]
@@ -69,6 +79,27 @@ def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
     wall = int(np.argmax(scene.distances_outside(place[:, None], found)[:, 0]))
     where = f"({', '.join(f'{x:.6g}' for x in place)}) m, at {_named(scene, wall)}"
     return f"; it is at {where}" + (f" at {found:.9g} s" if remaining > 0.0 else "")
+
+
+def _of_law(scene: Scene, state: State, particle: int, moment: float, seeding: Seeding) -> str:
+    """Which law has gone wrong, and what it was asked: that is in the state."""
+    contacts, laws = state.contacts, scene.laws()
+    assert contacts is not None
+    assert laws is not None
+    wall, walls = contacts.met[particle], scene.walls(moment).at(contacts.remaining[particle])
+    r, v = column(state.position, 0, particle), column(state.velocity, 0, particle)
+    n = -1.0 * walls.unit_normal(wall, r)
+    u = walls.velocity(wall, r) if scene.moves() else ZERO
+    random = Stream(seeding.seed, seeding.first + particle, state.impacts[particle], 0, laws.across)
+    with np.errstate(all="ignore"):
+        for one in (one for one in laws.own or () if one.has(wall)):
+            for k, law in enumerate(one.laws_of(wall)):
+                given = law.leave(v, n, u, random.of_law(k), state.mass[particle])
+                if wrong := why_wrong(given, v, n, u, scene.moves()):
+                    name = f"surfaces[{scene.members()[0, int(wall)]}].laws[{k}]"
+                    return f"; {name} {wrong}; {said_of(law, given, v, n, u)}"
+                v = mirrored(leave_of(given).v, n, u)
+    return ""
 
 
 def _failed(moment: float) -> str:

@@ -68,8 +68,8 @@ class Present:
         return {"born": born.astype(np.int64), **brought}
 
     def flying(self, state: State) -> State:
-        """The state as kernels know it that do not ask when particles start."""
-        return state if state.starts is None else state._replace(starts=None)
+        """The state as kernels know it: they ask when particles start only where a wall lets some wait."""
+        return state if state.starts is None or state.absorbed is not None else state._replace(starts=None)
 
 
 def total_of(sums: Floats) -> dict[str, Any]:

@@ -25,7 +25,7 @@ class Seeding(NamedTuple):
 def state_of(scene: Scene, particles: Particles, method: Method, booked: int) -> State:
     """The state with the arrays of the particles and so many rows of what walls give; energies are still to be set."""
     n, laws, surfaces = len(particles), scene.laws(), len(scene.owners())
-    period, openings = scene.cell(), scene.openings()
+    period, openings, ends = scene.cell(), scene.openings(), laws is not None and laws.may_end
     return State(
         particles.position,
         particles.velocity,
@@ -43,9 +43,17 @@ def state_of(scene: Scene, particles: Particles, method: Method, booked: int) ->
         period,
         None if openings is None else np.full(n, math.nan),
         openings,
-        None if particles.births is None else particles.births.time.copy(),
-        *((None, None) if laws is None or not laws.may_end else (np.full(n, math.nan), np.full(n, -1, np.int32))),
+        _starts(particles, ends),
+        np.full(n, math.nan) if ends else None,
+        np.full(n, -1, np.int32) if ends else None,
     )
+
+
+def _starts(particles: Particles, wait: bool) -> Floats | None:
+    """When each particle flies first, None where all do at once and none may `wait` on a wall later."""
+    if particles.births is not None:
+        return particles.births.time.copy()
+    return np.full(len(particles), -math.inf) if wait else None
 
 
 def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], lasts: bool) -> None:

@@ -37,7 +37,8 @@ class Surface:
         temperature: k_B T of a thermal wall [J], as in `fill`, 0 or more; None: the wall exchanges no heat.
         accommodation: in [0, 1], with which probability a particle leaves a thermal wall with a velocity of the wall's
             temperature (diffusely), instead of specularly.
-        laws: `WallLaw`s of one's own, which say with which velocity a particle leaves, in their order.
+        laws: `WallLaw`s, such as `Lambert`, `Absorb`, `CercignaniLampis`, `Sticky` or one's own, which say with which
+            velocity a particle leaves, in their order.
         motion: None, `Translation`, `Oscillation`, `Rotation`, `Path` or a sum of them, with what is given being where
             the wall is before it moves. Its laws act on the velocity relative to the wall.
         mass: of a wall that impacts move [kg], above 0; None: nothing does. It moves without turning: along its
@@ -76,6 +77,12 @@ class Surface:
                 "(k_B T in joule), or leave accommodation out"
             )
         object.__setattr__(self, "laws", checked_laws(self.laws))
+        if self.laws and self.temperature is not None and self.accommodation == 1.0:
+            raise SceneError(
+                f"laws must be left out where all particles leave with the temperature, got {self.laws} and "
+                "accommodation 1; give an accommodation below 1, or swarm.CercignaniLampis(temperature, 1.0, 1.0) as "
+                "the first of the laws in place of the temperature"
+            )
         if hasattr(self, "center"):
             object.__setattr__(self, "center", vector("center", self.center))
         side_sign(getattr(self, "side", "inside"))

@@ -10,7 +10,7 @@ from ..checks import shown
 from ..errors import SceneError
 from ..kernel.random import Stream
 from ..kernel.record import Record
-from ..kernel.vector import Vec, dot
+from ..kernel.vector import ZERO, Vec, dot
 
 # Impacts with which a law is tried before a run, and the speed into the wall that is none, as a part of that of these.
 _TRIED, _ROUND_OFF = 64, 1e-15
@@ -140,20 +140,22 @@ def _checked(name: str, law: Any) -> Any:
 def _try(name: str, law: Any) -> None:
     """Raise a `SceneError` where a law sends a particle into the wall, or gives no velocity."""
     for v, n, given in tries_of(law):
-        if wrong := why_wrong(given, v, n, None):
-            raise SceneError(f"{name} {wrong}; {law} returned {shown(given)} for v = {_said(v)}, n = {_said(n)}, u = 0")
+        if wrong := why_wrong(given, v, n, ZERO):
+            raise SceneError(f"{name} {wrong}; {said_of(law, given, v, n, ZERO)}")
 
 
-def why_wrong(given: Any, v: Vec, n: Vec, u: Vec | None) -> str:
+def why_wrong(given: Any, v: Vec, n: Vec, u: Vec, moves: bool = False) -> str:
     """What is wrong with what a law returns, as the end of a sentence; "" where nothing is."""
     after, stays, wait = leave_of(given)
     is_known = isinstance(stays, (bool, np.bool_)) and not wait < 0.0 and not math.isnan(wait)
     if not is_known:
         return "must return a Leave whose stays is True or False, and whose wait is 0 or more [s]"
+    if moves and stays and wait > 0.0:
+        return "must let nobody wait where walls move"
     is_finite = isinstance(after, tuple) and len(after) == 3 and all(map(math.isfinite, after))
     if stays and not is_finite:
         return "must return a velocity, three finite numbers, or a swarm.Leave"
-    own, before = (Vec(*after), v) if u is None or not stays else (Vec(*after) - u, v - u)
+    own, before = Vec(*after) - u if stays else v - u, v - u
     if stays and not dot(own, n) >= -_ROUND_OFF * (math.sqrt(dot(before, before)) + math.sqrt(dot(own, own))):
         return "must send particles away from the wall: n.(v - u) >= 0 of the velocity that leave returns"
     return ""
@@ -174,9 +176,28 @@ def tries_of(law: Any, across: int | None = None, axis: Any = None) -> Iterator[
             yield v, n, law.leave(v, n, Vec(*map(np.float64, np.zeros(3))), stream, np.float64(1.0))
 
 
+def lets_wait(law: Any) -> bool:
+    """Whether a law lets particles wait in a trial."""
+    return any(leave_of(given).stays and leave_of(given).wait > 0.0 for _v, _n, given in tries_of(law))
+
+
 def may_end(law: Any) -> bool:
     """Whether a law returns a `Leave`: then it may absorb particles, or let them wait."""
     return isinstance(next(tries_of(law))[2], Leave)
+
+
+def said_of(law: Any, given: Any, v: Vec, n: Vec, u: Vec) -> str:
+    """What a law has returned for which arguments."""
+    return f"{law} returned {_shown(given)} for v = {_said(v)}, n = {_said(n)} and u = {_said(u)}"
+
+
+def _shown(given: Any) -> str:
+    if isinstance(given, Leave):
+        return f"Leave({_shown(given.v)}, stays={given.stays}, wait={given.wait})"
+    try:
+        return _said(given)
+    except (TypeError, ValueError):
+        return shown(given)
 
 
 def _said(vector: Vec) -> str:
