@@ -65,7 +65,8 @@ class Counters(Record):
     """The counters of a run."""
 
     each: Any  # `Counted` of each
-    straight: Any  # whether flights are straight, within one cell, and no crossing is logged; else None
+    gravity: Any  # None where flights are straight
+    quiet: Any  # whether they stay within one cell, and no crossing is logged; else None
 
     def rows(self):
         """The number of rows of a lane."""
@@ -73,7 +74,7 @@ class Counters(Record):
 
     def is_in_lanes(self, one):
         """Whether crossings of a counter are counted in lanes, without branches: a constant for the compiler."""
-        return self.straight is not None and isinstance(one, Turned)
+        return self.quiet is not None and isinstance(one, Turned) and one.most(self.gravity) is not None
 
     # --- Flights in lanes ---
 
@@ -116,7 +117,7 @@ class Counters(Record):
         marks = False
         for c, one in enumerate(self.each):
             if self.is_in_lanes(one):
-                _count_in_lanes(one, c, lanes, live)
+                _count_in_lanes(one, c, gravity, lanes, live)
             else:
                 marks = True
         if marks:
@@ -260,31 +261,51 @@ def _row_of_sense(c, s):
     return _row(c) + 1 + _SENSE * s
 
 
-def _count_in_lanes(one, c, lanes, live):
-    """Count the crossings of a counter by straight flights of all lanes: the same as of each by itself."""
-    rows = lanes.began
+def _count_in_lanes(one, c, gravity, lanes, live):
+    """Count the crossings of a counter by the flights of all lanes: the same as of each by itself."""
+    rows, rounds = lanes.began, (True, False)[2 - one.most(gravity) :]
     for i in range(index(live)):
         lane, began = lanes.lane(i), Began(lanes.began, i)
-        v, m = lane.v, began.mass
+        v, m = _before(gravity, lane, began), began.mass
         r, left, sign = began.r, began.remaining - lane.remaining, rows[_row(c), i]
         ends_near = one.is_near(lane.r)
-        for k in range(one.most):
-            time = one.crossing(sign, None, r, v).time
-            there, after = r + v * time, left - time
-            stays_near = one.is_near(there + v * (0.5 * after)) if one.most > 1 else True
+        out = back = _NOT_CROSSED
+        for goes_on in rounds:
+            time = one.crossing(sign, gravity, r, v).time
+            there, after, w = r + displacement(gravity, v, time), left - time, accelerated(gravity, v, time)
+            stays_near = one.is_near(there + displacement(gravity, w, 0.5 * after)) if len(rounds) > 1 else True
             crosses = (time < left) & (not (ends_near & stays_near))
-            slow = slowness(one.speed(sign, 0.0, there, v), v)
-            for s, of in ((0, 1.0), (1, -1.0)):
-                first, counts = _row_of_sense(c, s), crosses & (sign * of > 0.0)
-                if one.volumes is not None:
-                    counts = counts & one.has(there)
-                rows[first, i] += select(counts, 1.0, 0.0)
-                for j, part in enumerate((m * v.x, m * v.y, m * v.z, 0.5 * m * square(v), slow)):
-                    rows[first + 1 + j, i] += select(counts, part, 0.0)
-            if k + 1 < one.most:
-                r, left = either(crosses, there, r), select(crosses, after, left)
+            counts, across = (
+                crosses if one.volumes is None else crosses & one.has(there),
+                one.speed(sign, 0.0, there, w),
+            )
+            # One of two crossings is out, and the other back.
+            out = _first_of(counts & (sign > 0.0), w, across, out)
+            back = _first_of(counts & (sign < 0.0), w, across, back)
+            if goes_on:
+                r, v, left = either(crosses, there, r), either(crosses, w, v), select(crosses, after, left)
             sign = select(crosses, -sign, sign)
+        for s, crossed in enumerate((out, back)):
+            w = crossed.v if gravity is not None else v
+            parts = 1.0, m * w.x, m * w.y, m * w.z, 0.5 * m * square(w), slowness(crossed.across, w)
+            for k, part in enumerate(parts):
+                rows[_row_of_sense(c, s) + k, i] += select(crossed.counts, part, 0.0)
         rows[_row(c), i] = sign
+
+
+class Passed(Record):
+    """The crossing of a lane in one sense: whether it counts, its velocity, and the speed across."""
+
+    counts: Any
+    v: Vec
+    across: Any
+
+
+_NOT_CROSSED = Passed(False, ZERO, 1.0)
+
+
+def _first_of(counts, v, across, before):
+    return Passed(counts | before.counts, either(counts, v, before.v), select(counts, across, before.across))
 
 
 @outlined

@@ -91,8 +91,9 @@ def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) ->
             f"counters must have at most {_MOST} walls in all, got {walls}: each is compiled into the kernels; of many "
             "of one kind make one of many bodies, such as swarm.Spheres"
         )
-    straight = 0.0 if scene.gravity is None and scene.period is None and not logs else None
-    return Counters(tuple(_counted(scene, f"counters[{k}]", one) for k, one in enumerate(given)), straight)
+    quiet = 0.0 if scene.period is None and not logs else None
+    each = tuple(_counted(scene, f"counters[{k}]", one) for k, one in enumerate(given))
+    return Counters(each, scene.pull(), quiet)
 
 
 def _counted(scene: Scene, name: str, counter: Counter) -> Counted:

@@ -65,7 +65,7 @@ class Turned(Counted):
         if gravity is None or not wall.is_quartic:
             time, _found = flights.hit(gravity, wall, r, v)
             return time < span
-        return wall.safe_time(r, v, as_vector(gravity)) < span
+        return _may_rise(wall.course(r, v, as_vector(gravity)), span)
 
     def crossing(self, sign, gravity, r, v):
         time, found = flights.hit(gravity, with_sign(self.wall, sign), r, v)
@@ -82,10 +82,11 @@ class Turned(Counted):
     def speed(self, sign, wall, r, v):
         return abs(dot(self.wall.unit_normal(r), v))
 
-    @property
-    def most(self):
-        """The most crossings of a straight flight: a constant for the compiler."""
-        return 1 if isinstance(_body_of(self.wall), PlaneNumbers) else 2
+    def most(self, gravity):
+        """The most crossings of a flight: a constant for the compiler, None where it has no closed form."""
+        if isinstance(_body_of(self.wall), PlaneNumbers):
+            return 1 if gravity is None else 2
+        return 2 if gravity is None else None
 
 
 class Walled(Counted):
@@ -123,11 +124,33 @@ class Walled(Counted):
 
 def _may_meet(ball, gravity, r, v, span):
     """Whether a flight is in a ball within a time."""
-    if gravity is None:
-        time, _found = ball.first_hit(r, v)
-    else:
-        time = ball.safe_time(r, v, as_vector(gravity))
+    if gravity is not None:
+        return _may_rise(ball.course(r, v, as_vector(gravity)), span)
+    time, _found = ball.first_hit(r, v)
     return (time < span) | (ball.level_of(ball.inner(r)) > 0.0)
+
+
+def _may_rise(level, span):
+    """Whether the level of a fall may be above 0 within a time: by Bernstein's coefficients of its parts."""
+    b, a2, a3, a4 = span * level.b, span * span * level.a2, span * span * span * level.a3, level.a4
+    a4 = (span * span) * (span * span) * a4
+    c = level.c
+    whole = (c, c + 0.5 * b, c + b + a2 / 6.0, c + 1.5 * b + 0.5 * a2 + 0.25 * a3, c + 2.0 * b + a2 + a3 + a4)
+    found = False
+    for half in _halves(whole):
+        for quarter in _halves(half):
+            for one in quarter:
+                found = (not (one < 0.0)) | found
+    return found
+
+
+def _halves(coefficients):
+    """Those of both halves of an interval, by de Casteljau's scheme."""
+    if len(coefficients) == 1:
+        return coefficients, coefficients
+    means = tuple(0.5 * (a + b) for a, b in zip(coefficients[:-1], coefficients[1:], strict=True))  # noqa: RUF007  traced
+    first, last = _halves(means)
+    return (coefficients[0], *first), (*last, coefficients[-1])
 
 
 def _soonest(walls, r, v):
