@@ -18,9 +18,10 @@ from .motion import Guide, Oscillation, Path, Rotation, Translation, parts_of
 from .surfaces.fields.bodies import Spheres
 from .surfaces.fields.many import Many
 from .surfaces.outlines.outlined import Outlined
+from .surfaces.shapes.slab import AXES
 from .surfaces.surface import Surface
 from .surfaces.upright import upright
-from .surfaces.wall_law import tries_of
+from .surfaces.wall_law import leave_of, tries_of
 
 Floats = NDArray[np.float64]
 
@@ -208,8 +209,9 @@ def _require_laws(plane: str, where: str, surface: Surface) -> None:
     for k, law in enumerate(surface.laws):
         if isinstance(law, str):
             continue  # a name, which a run refuses
-        for v, n, after in tries_of(law, across):
-            if after[across] != 0.0:
+        for v, n, given in tries_of(law, across, AXES[across](1.0)):
+            after, stays, _wait = leave_of(given)
+            if stays and after[across] != 0.0:
                 raise SceneError(
                     f'{where}[{k}] must send particles along the plane where plane = "{plane}": {plane} = 0 of the '
                     f"velocity that leave returns; {law} returned {checks.shown(after)} for v = {_told(v)[:-2]} "

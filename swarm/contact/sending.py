@@ -8,8 +8,9 @@ from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, either, square
 from .reflection import from_relative, given, relative, wall_velocity
 
-# Of |v|^2, the change by a law that is round-off; and how far a velocity may be from the energy that is kept for it.
-_ROUND_OFF, _NEAR = 1e-14, 0.1
+# Of |v|^2, the change by a law that is round-off of it or of the normal; and how far a velocity may be from the energy
+# that is kept for it.
+_ROUND_OFF, _NEAR = 1e-12, 0.1
 _NORMAL = Vec(0.0, 0.0, 1.0)
 
 
@@ -71,7 +72,9 @@ def send(laws, walls, wall, arriving, random):
     sent, away = from_relative(moving, after), -dot(after, n)
     if laws.own is not None:
         # Who is absorbed gives its normal momentum, and is as it was.
-        sent, away = either(keeps, _restored(sent, arriving.speed2 + work), sent), select(wait < math.inf, away, 0.0)
+        stays = wait < math.inf
+        sent = either(keeps & stays, _restored(sent, arriving.speed2 + work), sent)
+        away = select(stays, away, 0.0)
     return Sent(happens, sent, b, away, work, lost, keeps, wait)
 
 

@@ -56,8 +56,8 @@ class WallLaw(Record):
     the restitution and the friction of the surface, and meets no law of this wall meanwhile.
 
     What a law changes of the energy is heat that the wall gives, in the observable "wall_heat"; with `book =
-    "dissipated"` in the class it is lost, in "dissipated_energy". A speed that it changes by round-off only is kept to
-    the last digit.
+    "dissipated"` in the class it is lost, in "dissipated_energy". A square of a speed,
+    relative to the wall, that it changes by less than 1e-12 of it is kept to the last digit.
 
     Raises:
         SceneError: by the surface: no `leave`, a field that is no finite number, a velocity into the wall in a trial.
