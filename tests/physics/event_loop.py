@@ -3,6 +3,7 @@
 It shares with the engine only phi and its gradient of each surface at rest. What moves a wall is written anew here.
 """
 
+import cmath
 import dataclasses
 import math
 from typing import NamedTuple
@@ -11,6 +12,8 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 import swarm
+from swarm.kernel.random import Stream, tangents
+from swarm.kernel.vector import Vec
 from swarm.motion.given import parts_of
 
 # Between two samples of the gap [s], and how many at once.
@@ -32,14 +35,17 @@ class Wall(NamedTuple):
     mu: float
     present: tuple
     openings: tuple
+    laws: tuple
 
     @staticmethod
     def of(surface):
         sign = -1.0 if getattr(surface, "side", "inside") == "outside" else 1.0
         rest = dataclasses.replace(surface, motion=None, present=None, openings=())
-        # A law of one's own is a pair of both.
-        e, mu = surface.laws[0] if surface.laws else (surface.restitution, surface.friction)
-        return Wall(rest, parts_of(surface.motion), sign, e, mu, surface.present or ALWAYS, surface.openings)
+        e, mu, laws = surface.restitution, surface.friction, surface.laws
+        if laws and laws[0]._fields == ("e", "mu"):
+            # A law of one's own is a pair of both.
+            (e, mu), laws = laws[0], ()
+        return Wall(rest, parts_of(surface.motion), sign, e, mu, surface.present or ALWAYS, surface.openings, laws)
 
     def shift(self, t):
         """Displacements (3, T) and their rates at times (T,)."""
@@ -113,7 +119,7 @@ class Followed(NamedTuple):
     end: float
 
 
-def follow(scene, r, v, times, start=0.0):
+def follow(scene, r, v, times, start=0.0, particle=0):
     """One particle from a time on; it ends where a contact begins to last, or an impact is a matter of round-off."""
     walls = [Wall.of(surface) for surface in scene.surfaces]
     pull = np.array(scene.gravity if scene.gravity is not None else (0.0, 0.0, 0.0))
@@ -142,6 +148,14 @@ def follow(scene, r, v, times, start=0.0):
         b = w @ n
         if b <= 1e-6:
             break
+        if wall.laws:
+            w, stays = by_laws(wall.laws, w, n, [Stream(0, particle, count).of_law(k) for k in range(len(wall.laws))])
+            if not stays:
+                seen += [(r, v, count + 1)] * (len(times) - len(seen))
+                break
+            v = u + w
+            start, count = hit, count + 1
+            continue
         slip = w - b * n
         speed = np.linalg.norm(slip)
         share = min(wall.mu * (1.0 + wall.e) * b / speed, 1.0) if speed > 0.0 else 0.0
@@ -149,6 +163,31 @@ def follow(scene, r, v, times, start=0.0):
         start, count = hit, count + 1
     position, velocity, impacts = ([one[k] for one in seen] for k in range(3))
     return Followed(np.array(position).reshape(-1, 3), np.array(velocity).reshape(-1, 3), impacts, end)
+
+
+def by_laws(laws, w, n, streams):
+    """(velocity after, whether it stays) by laws of swarm's, relative to a wall with the outward normal n; mass 1."""
+    stays = True
+    for k, (law, stream) in enumerate(zip(laws, streams, strict=True)):
+        w = w if k == 0 else w - 2.0 * (w @ n) * n
+        b, u, kind = w @ n, [stream.uniform(j) for j in range(4)], type(law)
+        first, second = map(np.array, tangents(Vec(*-n)))
+        turn = [math.cos(2.0 * math.pi * u[j]) * first + math.sin(2.0 * math.pi * u[j]) * second for j in (1, 3)]
+        if kind is swarm.Absorb:
+            chance = law.probability if law.barrier is None else 1.0 if 0.5 * b * b > law.barrier else law.loss or 0.0
+            stays = stays and u[0] >= chance
+            w = w - 2.0 * b * n
+        elif kind is swarm.Lambert and u[0] < law.probability:
+            part = u[0] / law.probability
+            w = np.linalg.norm(w) * (math.sqrt(1.0 - part) * turn[0] - math.sqrt(part) * n)
+        elif kind is swarm.Lambert:
+            w = w - 2.0 * b * n
+        else:
+            speed2, spread = 2.0 * law.temperature, law.tangential * (2.0 - law.tangential)
+            drawn = cmath.rect(math.sqrt(-law.normal * speed2 * math.log(u[0])), 2.0 * math.pi * u[1])
+            away = abs(math.sqrt(1.0 - law.normal) * b + drawn)
+            w = (1.0 - law.tangential) * (w - b * n) - away * n + math.sqrt(-spread * speed2 * math.log(u[2])) * turn[1]
+    return w, stays
 
 
 def first_impact(walls, place, start, until):

@@ -24,6 +24,8 @@ SEEDS = range(16)
 NUDGE, SPARE, LEAST = 1e-9, 1e-3, 1e-11
 # Of so many surfaces restitution and friction are a law of the user's.
 OWN = 0.3
+# And of so many those of the package are in front of both.
+PACKAGE = 0.5
 # Of so many solids the wall goes, and of so many vessels at rest an opening opens, for a time.
 DOORS = 0.4
 # [m], and of the largest energy.
@@ -120,6 +122,16 @@ def a_motion(random):
     return sum(motions[1:], start=motions[0]) if motions else None
 
 
+def laws_in(random):
+    """One, two or three laws of the package, in any order."""
+    kinds = [
+        swarm.Lambert(float(random.choice([0.5, 1.0]))),
+        swarm.CercignaniLampis(*random.uniform([0.1, 0.0, 0.0], [1.0, 1.0, 1.0]).tolist()),
+        [swarm.Absorb(0.2), swarm.Absorb(barrier=0.8, loss=0.1)][random.integers(2)],
+    ]
+    return [kinds[k] for k in random.permutation(3)[: random.integers(1, 4)]]
+
+
 def with_opening(wall, times, random):
     """A wall with an opening at a place of it, open between two times."""
     r = random.standard_normal(3)
@@ -132,7 +144,7 @@ def with_opening(wall, times, random):
 
 def a_scene(seed, vessels=VESSELS):
     """(scene, particles): kinds, motions, laws and gravity, all drawn."""
-    random, own, doors = (np.random.default_rng([key, seed]) for key in (39, 41, 43))
+    random, own, doors, package = (np.random.default_rng([key, seed]) for key in (39, 41, 43, 47))
     vessel, solid = (str(random.choice(sorted(kinds))) for kinds in (vessels, SOLIDS))
     if vessel == "torus":
         solid = "nothing"
@@ -141,6 +153,8 @@ def a_scene(seed, vessels=VESSELS):
         law = {"restitution": float(random.choice([1.0, 0.9, 0.5])), "friction": float(random.choice([0.0, 0.3, 1.0]))}
         if own.random() < OWN:
             law = {"laws": [Rubbing(law["restitution"], law["friction"])]}
+        elif package.random() < PACKAGE:
+            law["laws"] = laws_in(package)
         motion = a_motion(random)
         times = np.round(np.sort(doors.uniform(0.05, 0.95, 2)), 3).tolist()
         if doors.random() < DOORS and make is SOLIDS[solid]:
@@ -162,8 +176,8 @@ def compared(scene, start, frames, result):
         r, v = start.position[:, i], start.velocity[:, i]
         late = [time for time in times if time >= born[i]]
         first = len(times) - len(late)
-        exact = follow(scene, r, v, late, born[i])
-        near = [follow(scene, r + nudge, v, late, born[i]) for nudge in NUDGE * np.eye(3)]
+        exact = follow(scene, r, v, late, born[i], i)
+        near = [follow(scene, r + nudge, v, late, born[i], i) for nudge in NUDGE * np.eye(3)]
         certain = min(len(one.position) for one in (exact, *near))
         for k in range(certain):
             grown = max(np.abs(one.position[k] - exact.position[k]).max() for one in near)
