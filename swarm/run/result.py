@@ -45,8 +45,8 @@ class Result:
             side and back; what they carried, "crossed_momentum" (frames, counters, 2, 3) [kg m/s] and "crossed_energy"
             (frames, counters, 2) [J]; and "crossed_slowness", the sum of 1/|v_n| [s/m]. A flux is a difference over
             frames; see `Counter`.
-            With sources "born" (frames, sources), how many have come, and "source_energy" [J], what they have brought; who
-            comes later is in no observable.
+            With sources "born" (frames, sources), how many have come, and "source_energy" [J], what they have brought;
+            who comes later is in no observable.
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
