@@ -93,6 +93,7 @@ CASES = {
     "penalty": (penalty, {"until": 0.2, "every": 0.1}),
     "loops": (loops, {"until": 0.1, "every": 0.05}),
     "openings": (openings, {"observables": OWN}),
+    "counters": (openings, {"counters": [swarm.Plane((0.0, 0.0, 1.0)), swarm.Sphere(0.2)]}),
     "a cell": (periodic, {"observables": OWN}),
     "moving": (moving, {}),
     "bodies": (bodies, {"until": 0.1, "every": 0.05, "observables": OWN, "member_impacts": True}),
