@@ -40,7 +40,6 @@ COMPONENTS = dict.fromkeys(
         "wall_velocity",
         "wall_spin",
         "crossed_momentum",
-        "crossed_slowness",
         "position",
         "velocity_before",
         "velocity_after",

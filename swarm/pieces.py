@@ -179,6 +179,10 @@ class Pieces(Volume):
         rows = [(i, of_pieces[i] if member < 0 else member) for i, member in self.order.members(self.pieces)]
         return np.array([(self.owners_of_pieces[i], member) for i, member in rows]).T
 
+    def names_laws(self) -> bool:
+        """Whether a law of a wall is known by its name alone, as from a file that was read without its code."""
+        return any(isinstance(law, str) for piece in self.pieces for law in piece.laws)
+
     def split_by_members(self, values: NDArray[Any]) -> list[NDArray[Any]]:
         """Of each surface what its members have, from (..., members) of those of all surfaces, one after the other."""
         surface, member = self.members()

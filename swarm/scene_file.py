@@ -2,19 +2,21 @@
 
 import dataclasses
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import tables
+from . import plugins, run_tables, tables
 from .checks import closest, count, listed, particles_fit
 from .columns import read_columns
 from .errors import SceneError
 from .filling import fill
 from .methods import Method
 from .particles import Particles
+from .plugins import allowed
 from .run.options import RunOptions
 from .scene import Scene
 from .surfaces import ALL_FIELDS
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from .bodies.state import Bodies
     from .bodies.table import Made
 
-_TABLES = ("gravity", "period", "plane", "particles", "body", "surface", "method", "run")
+_TABLES = ("gravity", "period", "plane", "particles", "body", "source", "counter", "surface", "method", "run")
 SWEEP = "sweep"
 _SAVED = {"checkpoint": 60.0}
 
@@ -73,7 +75,7 @@ class Job:
     method: Method
     run: RunOptions
     text: str
-    source: "ParticlesTable | BodiesFile | Made"
+    source: "ParticlesTable | BodiesFile | Made | None"
     path: Path
 
     def start_file(self) -> Path | None:
@@ -81,13 +83,15 @@ class Job:
         name = getattr(self.source, "source", None)
         return None if name is None else self.path.parent / name
 
-    def start(self) -> "Particles | Bodies":
-        """The particles or bodies at the start, made or read.
+    def start(self) -> "Particles | Bodies | None":
+        """The particles or bodies at the start, made or read; None where all come from sources.
 
         Raises:
             SceneError: a value of [particles] or [body] is out of its range, or the file it names cannot be used.
         """
         source, file = self.source, self.start_file()
+        if source is None:
+            return None
         try:
             if isinstance(source, ParticlesTable) and file is None:
                 return source.filled(self.scene)
@@ -115,13 +119,22 @@ def _read(file: Path, table: ParticlesTable | BodiesFile) -> "Particles | Bodies
         return trajectory.frame(frame).born() if trajectory.has_births() else trajectory.frame(frame)
 
 
-def read(path: str | Path) -> Job:
+def read(path: str | Path, plugins: Iterable[str] = ()) -> Job:
     """The job of a scene file.
 
+    Args:
+        path: the file.
+        plugins: the modules whose code it may name, as "module:Name", for laws, surfaces, methods and observables.
+
     Raises:
-        SceneError: the file cannot be read, is not TOML, or a key is unknown, missing or out of its range.
+        SceneError: the file cannot be read, is not TOML, a key is unknown, missing or out of its range, or it names
+            code of another module.
     """
-    path = Path(path)
+    with allowed(plugins):
+        return _read_job(Path(path))
+
+
+def _read_job(path: Path) -> Job:
     text = text_of(path)
     document = document_of(text, path)
     if SWEEP in document:
@@ -172,20 +185,29 @@ def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None 
     for key in ("method", "run"):
         if key not in document:
             raise SceneError(f"{key}: expected a [{key}] table, got none")
-    if ("particles" in document) == ("body" in document):
-        came = "both" if "body" in document else "neither"
-        raise SceneError(f"particles: expected a [particles] or a [body] table, got {came}")
+    if "particles" in document and "body" in document:
+        raise SceneError("particles: expected a [particles] or a [body] table, got both")
+    if not {"particles", "body", "source"} & set(document):
+        raise SceneError("particles: expected a [particles] or a [body] table, or a [[source]], got neither")
+    scene = scene or tables.scene_of(
+        _with_bodies(document.get("surface"), path), *(document.get(key) for key in ("gravity", "period", "plane"))
+    )
+    sources = run_tables.sources_of(document["source"], scene) if "source" in document else ()
+    counters = run_tables.counters_of(document["counter"]) if "counter" in document else ()
     return Job(
-        scene=scene
-        or tables.scene_of(
-            _with_bodies(document.get("surface"), path), *(document.get(key) for key in ("gravity", "period", "plane"))
-        ),
+        scene=scene,
         method=tables.method_of(document["method"]),
-        run=_run(document["run"]),
+        run=dataclasses.replace(_run(document["run"]), sources=sources, counters=counters),
         text=text,
-        source=_body(document["body"]) if "body" in document else _particles(document["particles"]),
+        source=_start_of(document),
         path=path,
     )
+
+
+def _start_of(document: dict[str, Any]) -> "ParticlesTable | BodiesFile | Made | None":
+    if "body" in document:
+        return _body(document["body"])
+    return _particles(document["particles"]) if "particles" in document else None
 
 
 def _with_bodies(surfaces: Any, path: Path) -> Any:
@@ -226,7 +248,20 @@ def _bodies_of(table: Any, where: str, path: Path) -> Any:
 
 def _run(table: Any) -> RunOptions:
     """[run]; a run from a file saves checkpoints even where it does not say so."""
-    return tables.convert({**_SAVED, **table} if isinstance(table, dict) else table, RunOptions, "run")
+    if not isinstance(table, dict):
+        return tables.convert(table, RunOptions, "run")
+    table, own = {**_SAVED, **table}, table.get("observables")
+    table.pop("observables", None)
+    options = tables.convert(table, RunOptions, "run")
+    if own is None:
+        return options
+    if not isinstance(own, dict):
+        raise SceneError(f'run.observables: expected a table such as {{ name = "module:function" }}, got {own!r:.200}')
+    found = {name: plugins.named(f"run.observables.{name}", text, "a function") for name, text in own.items()}
+    try:
+        return dataclasses.replace(options, observables=found)
+    except SceneError as error:
+        raise SceneError(f"run.{error}") from None
 
 
 def _body(table: Any) -> "BodiesFile | Made":

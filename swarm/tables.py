@@ -6,22 +6,21 @@ Every error names the key by its full path, such as surface[1].radius.
 import dataclasses
 import hashlib
 import re
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
-import tomli_w
 from numpy.typing import NDArray
 
+from . import plugins
 from .checks import closest, listed, one_of
 from .errors import SceneError
+from .law_tables import table_of_group, table_of_law, with_laws
 from .methods import ALL_METHODS, Method
 from .motion import table_of as motion_table
 from .scene import Scene
 from .surfaces import ALL_SURFACES, OwnSurface, Surface
-from .surfaces.counter import Counter
 from .surfaces.doors import Opening
 
 T = TypeVar("T")
@@ -35,28 +34,28 @@ def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None)
     """A scene from its tables: a list of surface tables; gravity, the period and the plane, or None."""
     if not isinstance(surfaces, list) or not surfaces:
         raise SceneError("surface: expected at least one [[surface]] table, got none")
-    built = [_surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
+    built = [surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
     return Scene(surfaces=built, gravity=gravity, period=period, plane=plane)
 
 
-def _surface_of(table: Any, where: str) -> Surface:
+def surface_of(table: Any, where: str) -> Surface:
     """A surface from its table, in which those of its openings and of its parts may be."""
     for key in NESTED if isinstance(table, Mapping) else ():
         if key in table:
             given = table[key]
             if not isinstance(given, list):
                 raise SceneError(f"{where}.{key}: expected [[surface.{key}]] tables, got {given!r:.200}")
-            made = _opening_of if key == "openings" else _surface_of
+            made = opening_of if key == "openings" else surface_of
             table = {**table, key: [made(one, f"{where}.{key}[{k}]") for k, one in enumerate(given)]}
-    return of_kind(table, where, ALL_SURFACES)
+    return of_kind(with_laws(table, where), where, ALL_SURFACES, Surface)
 
 
-def _opening_of(table: Any, where: str) -> Surface | Opening:
+def opening_of(table: Any, where: str) -> Surface | Opening:
     """An opening from its table, in which may be what it has besides a surface."""
     mine = {key: table[key] for key in ("times", "between") if key in table} if isinstance(table, Mapping) else {}
     if not mine:
-        return _surface_of(table, where)
-    surface = _surface_of({key: value for key, value in table.items() if key not in mine}, where)
+        return surface_of(table, where)
+    surface = surface_of({key: value for key, value in table.items() if key not in mine}, where)
     try:
         return Opening(surface, **mine)
     except SceneError as error:
@@ -65,7 +64,7 @@ def _opening_of(table: Any, where: str) -> Surface | Opening:
 
 def method_of(table: Any) -> Method:
     """A method from its table."""
-    return of_kind(table, "method", ALL_METHODS)
+    return of_kind(table, "method", ALL_METHODS, Method)
 
 
 def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) -> dict[str, Any]:
@@ -81,7 +80,9 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
     table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
     if table.get("motion") is not None:
         table["motion"] = motion_table(described.motion)  # type: ignore[union-attr]
-    return _with_nested({"kind": kinds[type(described)], **table}, described, arrays)
+    mine = type(described)
+    kind = kinds.get(mine, f"{mine.__module__}:{mine.__qualname__}")
+    return _with_nested({"kind": kind, **table}, described, arrays)
 
 
 def _with_nested(table: dict[str, Any], described: Surface | Method, arrays: dict[str, Any] | None) -> dict[str, Any]:
@@ -89,15 +90,18 @@ def _with_nested(table: dict[str, Any], described: Surface | Method, arrays: dic
     if isinstance(described, Surface):
         del table["openings"], table["laws"]
         if described.laws:
-            table["laws"] = [law if isinstance(law, str) else repr(law) for law in described.laws]
+            table["laws"] = [table_of_law(law) for law in described.laws]
+        if isinstance(table.get("groups"), Mapping):
+            table["groups"] = {name: table_of_group(group) for name, group in table["groups"].items()}
         if described.openings:
-            table["openings"] = [_table_of_opening(opening, arrays) for opening in described.openings]
+            table["openings"] = [table_of_opening(opening, arrays) for opening in described.openings]
         if "part" in table:
             table["part"] = [table_of(part, arrays) for part in table["part"]]
     return table
 
 
-def _table_of_opening(opening: Surface | Opening, arrays: dict[str, Any] | None) -> dict[str, Any]:
+def table_of_opening(opening: Surface | Opening, arrays: dict[str, Any] | None) -> dict[str, Any]:
+    """The table of an opening."""
     if isinstance(opening, Surface):
         return table_of(opening, arrays)
     mine = {"times": opening.times, "between": opening.between or None}
@@ -138,26 +142,6 @@ def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str,
     return {**gravity, **period, **plane, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
 
 
-def counters_text(counters: Iterable[Counter]) -> str:
-    """Counters as TOML text; "" where there are none."""
-    made = [
-        {"surface": table_of(one.surface), **({} if one.inside is None else {"inside": table_of(one.inside)})}
-        for one in counters
-    ]
-    return tomli_w.dumps({"counter": made}) if made else ""
-
-
-def counters_of(text: str) -> tuple[Counter, ...]:
-    """The counters of such a text."""
-    found = []
-    for k, table in enumerate(tomllib.loads(text).get("counter", ())):
-        surface, inside = (
-            _surface_of(table[key], f"counter[{k}].{key}") if key in table else None for key in ("surface", "inside")
-        )
-        found.append(Counter(surface, inside))
-    return tuple(found)
-
-
 def _kept(cls: type[Any]) -> list[dataclasses.Field[Any]]:
     """The fields of a dataclass that a file has: not the options of a session, and nothing that is made of others."""
     return [field for field in dataclasses.fields(cls) if field.metadata.get("in_file", True)]
@@ -184,8 +168,8 @@ def convert(table: Any, cls: type[T], where: str) -> T:
         ) from None
 
 
-def of_kind(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
-    """A dataclass from a table whose kind says which."""
+def of_kind(table: Any, where: str, kinds: Mapping[str, type[T]], base: type[Any] | None = None) -> T:
+    """A dataclass from a table whose kind says which: one of `kinds`, or code derived from `base`."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table with a kind, got {table!r}")
     if "kind" not in table:
@@ -195,8 +179,12 @@ def of_kind(table: Any, where: str, kinds: Mapping[str, type[T]]) -> T:
             f"{where}.kind: 'own' is a phi in Python, which no file holds; build the scene in Python, as the run's "
             "script does"
         )
-    cls = kinds[one_of(f"{where}.kind", table["kind"], kinds)]
-    return convert({key: value for key, value in table.items() if key != "kind"}, cls, where)
+    if base is not None and plugins.is_named(table["kind"]):
+        cls = plugins.class_of(f"{where}.kind", table["kind"], base, f"a {base.__name__.lower()}")
+    else:
+        cls = kinds[one_of(f"{where}.kind", table["kind"], kinds)]
+    made: T = convert({key: value for key, value in table.items() if key != "kind"}, cls, where)
+    return made
 
 
 def _type_name(kind: Any) -> str:

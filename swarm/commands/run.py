@@ -10,7 +10,7 @@ import typer
 
 from .. import interrupt
 from ..errors import CompleteError, SwarmError, WallTimeError
-from .shown import EXIT_CODES, REASONS, Quiet, command_again, table
+from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
 
 
 def run(  # noqa: PLR0913  one argument an option
@@ -47,6 +47,7 @@ def run(  # noqa: PLR0913  one argument an option
     shards: Annotated[
         int | None, typer.Option(help="Shards of a run on a cluster [default: one for each thread of its workers].")
     ] = None,
+    plugins: Plugins = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the outcome of the run as JSON, also if it fails.")
     ] = False,
@@ -66,7 +67,7 @@ def run(  # noqa: PLR0913  one argument an option
 
     try:
         with interrupt.at_once():
-            job = files.read(scene_file)
+            job = files.read(scene_file, plugins or ())
             stored = scene_file.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
             target = paths.target_of("trajectory", output or stored)
             options = dataclasses.replace(

@@ -9,7 +9,7 @@ import typer
 
 from .. import interrupt
 from ..errors import SwarmError
-from .shown import EXIT_CODES, REASONS, Quiet, command_again, table
+from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
 
 if TYPE_CHECKING:
     from ..ensemble.sweeping import Outcome
@@ -40,6 +40,7 @@ def sweep(  # noqa: PLR0913  one argument an option
         str | None,
         typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with checkpoints; the exit code is 75."),
     ] = None,
+    plugins: Plugins = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the outcome of the sweep as JSON, also if it fails.")
     ] = False,
@@ -51,7 +52,9 @@ def sweep(  # noqa: PLR0913  one argument an option
 
     try:
         latest = None if walltime is None else duration("--walltime", walltime)
-        options = sweeping.SweepOptions(output, processes, threads, resume, overwrite, not quiet, written, latest)
+        options = sweeping.SweepOptions(
+            output, processes, threads, resume, overwrite, not quiet, written, latest, tuple(plugins or ())
+        )
         outcome = sweeping.carry_out(sweep_file, options)
     except KeyboardInterrupt:  # the second one
         print("interrupted; with --resume, runs that were under way go on from their last checkpoints", file=sys.stderr)

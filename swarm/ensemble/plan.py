@@ -5,7 +5,7 @@ import itertools
 import json
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ import tomli_w
 from .. import scene_file
 from ..checks import count, listed, number, one_of
 from ..errors import SceneError
+from ..plugins import allowed, checked
 from ..scene import Scene
 
 # More runs than this are a mistake in a list: their files alone would be a burden to a folder.
@@ -55,11 +56,12 @@ class Variant:
 
 @dataclass(frozen=True)
 class Plan:
-    """The file of a sweep, its tables but [sweep], and its runs."""
+    """The file of a sweep, its tables but [sweep], its runs, and the modules whose code it may name."""
 
     path: Path
     document: Document
     variants: list[Variant]
+    plugins: tuple[str, ...] = ()
 
     def text(self, variant: Variant) -> str:
         """The scene file of a run."""
@@ -73,7 +75,7 @@ def told(parameters: Mapping[str, Any]) -> str:
     return ", ".join(f'"{key}" = {json.dumps(value, default=str):.200}' for key, value in parameters.items())
 
 
-def read(path: Path) -> Plan:
+def read(path: Path, plugins: Iterable[str] = ()) -> Plan:
     """The plan of a sweep file.
 
     Raises:
@@ -88,7 +90,8 @@ def read(path: Path) -> Plan:
                 f"scene file is carried out by swarm run {path}"
             )
         lists, way = _lists(document.pop(scene_file.SWEEP))
-        return Plan(path, document, _checked(path, document, list(_combined(lists, way))))
+        with allowed(plugins):
+            return Plan(path, document, _checked(path, document, list(_combined(lists, way))), checked(plugins))
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from None
 

@@ -131,6 +131,7 @@ class Pool:
             "impacts": None if impacts is None else str(impacts),
             "threads": self._threads,
             "goes_on": self._goes_on,
+            "plugins": self._results.plan.plugins,
         }
         if self._stops:
             status: Status = {"state": "stopped"}

@@ -3,6 +3,7 @@
 import math
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from ..errors import FileError, SceneError
 from ..extras import needed_by
 from ..output import paths
 from ..output.lock import only_writer
+from ..plugins import checked as checked_plugins
 from ..run.options import cores
 from .plan import Plan, read
 from .pool import Pool
@@ -39,6 +41,7 @@ class SweepOptions:
     progress: bool = False
     table: str = "csv"
     walltime: float | None = None
+    plugins: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("processes", "threads"):
@@ -62,7 +65,7 @@ class Outcome:
     wall_time: float
 
 
-def sweep(
+def sweep(  # noqa: PLR0913  the keywords are the public interface
     path: str | os.PathLike[str],
     folder: str | os.PathLike[str] | None = None,
     *,
@@ -72,6 +75,7 @@ def sweep(
     overwrite: bool = False,
     progress: bool = False,
     table: str = "csv",
+    plugins: Sequence[str] = (),
 ) -> "pd.DataFrame":
     """Carry out the runs of a sweep file, a scene file with a [sweep] table, and return the table of their results.
 
@@ -96,6 +100,7 @@ def sweep(
         progress: True for one progress bar of all runs.
         table: the file results.csv or results.parquet in the folder, "csv" or "parquet". It is replaced now and then
             during the sweep, and at its end.
+        plugins: the modules whose code the file may name, as "module:Name": laws, surfaces, methods, observables.
 
     Returns:
         The table, a row for each run in the order of the file (of a product the last key changes first): file,
@@ -110,7 +115,9 @@ def sweep(
     """
     with needed_by("the table of a sweep in Python", "table"):
         import pandas  # noqa: F401
-    options = SweepOptions(folder, processes, threads, resume, overwrite, progress, table)
+    options = SweepOptions(
+        folder, processes, threads, resume, overwrite, progress, table, plugins=checked_plugins(plugins)
+    )
     outcome = carry_out(path, options)
     if outcome.stopped:
         raise KeyboardInterrupt
@@ -123,7 +130,7 @@ def carry_out(path: str | os.PathLike[str], options: SweepOptions) -> Outcome:
     require_written(options.table)
     source = paths.given("path", path)
     folder = Path(source.stem) if options.folder is None else paths.given("folder", options.folder)
-    plan = read(source)
+    plan = read(source, options.plugins)
     results = Results(plan, folder, options.table)
     _require_free(results, options)
     try:

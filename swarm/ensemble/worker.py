@@ -103,12 +103,14 @@ def _carried_out(order: dict[str, Any], line: _Line) -> dict[str, Any]:
     from ..errors import SceneError
     from ..output import paths
     from ..output.lock import only_writer
+    from ..plugins import allowed
     from .results import of_trajectory
 
     target, source, text = Path(order["trajectory"]), Path(order["source"]), order["text"]
     with only_writer(target, patience=_OTHERS_END):
         pass
-    job = scene_file.job_of(scene_file.document_of(text, source), text, source)
+    with allowed(order["plugins"]):
+        job = scene_file.job_of(scene_file.document_of(text, source), text, source)
     if order["goes_on"] and target.exists():
         before = of_trajectory(target, job.run.until)
         if before is not None:

@@ -78,7 +78,7 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
         # Two digits are enough on a legend.
         fastest = float(f"{fastest:.1e}")
         return Scale("speed [m/s]", 0.0, fastest), lambda _position, velocity: np.sqrt((velocity**2).sum(axis=0))
-    if scene.laws() is not None:
+    if scene.names_laws() or scene.laws() is not None:
         raise SceneError(
             "record_color must be 'speed' where a surface has a restitution below 1, friction, a temperature, a motion "
             "or a mass, got 'energy-error': energy that walls dissipate or give is not an error"

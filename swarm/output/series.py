@@ -77,10 +77,14 @@ def group_of(path: str) -> str:
 
 def lines_of(scene: Scene, method: Method, shapes: list[Shape], body: Body | None = None) -> list[Line]:
     """The time series of a scene with particles or bodies, without those that are always zero in it."""
-    laws, one = scene.laws(), "particle" if body is None else "body"
+    named, one = scene.names_laws(), "particle" if body is None else "body"
+    laws = None if named else scene.laws()
     every = "all particles" if body is None else "all bodies"
     energies = {"total": True, "kinetic": True, "potential": scene.gravity is not None}
-    energies |= {"contact": method.law() is not None, "dissipated": laws is not None and laws[:2] != (None, None)}
+    energies |= {
+        "contact": method.law() is not None,
+        "dissipated": named or (laws is not None and laws[:2] != (None, None)),
+    }
     lines = [Line(f"/energy/{name}", name, f"{name}_energy") for name, there in energies.items() if there]
     lines += [
         Line("/energy_error", f"of a {one}", "energy_error", logarithm=True),

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import tables
+from .. import plugins, run_tables, tables
 from ..errors import SceneError
 from ..methods import Method
 from ..scene import Scene
@@ -80,7 +80,7 @@ class Stored:
     def counters(self) -> tuple[Counter, ...]:
         """The counters of the run."""
         with self._reading("its counters"):
-            return tables.counters_of(self.counters_text)
+            return run_tables.counters_of(self.counters_text)
 
     @property
     def scene(self) -> Scene:
@@ -89,7 +89,7 @@ class Stored:
             table, arrays = tomllib.loads(self._text("scene")), file["parameters"].get(layout.ARRAYS, {})
             surfaces = [tables.with_arrays(surface, arrays) for surface in table["surface"]]
             every = [one for surface in surfaces for one in (surface, *surface.get("openings", ()))]
-            own = any(surface["kind"] == "own" for surface in every)
+            own = any(surface["kind"] == "own" or plugins.is_named(surface["kind"]) for surface in every)
         # An OwnSurface is not damage: the error says that no file holds it.
         with contextlib.nullcontext() if own else self._reading("its scene"):
             return tables.scene_of(surfaces, *(table.get(key) for key in ("gravity", "period", "plane")))

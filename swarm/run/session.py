@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from .. import tables
+from .. import run_tables
 from ..errors import CompleteError, SceneError, WallTimeError
 from ..frames import FrameTimes
 from ..output import checkpoint, paths
@@ -93,7 +93,7 @@ class Session:
         self.identity |= {"first": task.first} if task.is_shard else {}
         self.identity |= {"observables": ", ".join(task.options.observables)} if task.options.observables else {}
         if task.options.counters:
-            self.identity["counters"] = tables.counters_text(task.options.counters)
+            self.identity["counters"] = run_tables.counters_text(task.options.counters)
         self._log = log
         if log is not None:
             paths.check_target(impacts, overwrite or self._resumes, "impacts")
