@@ -23,6 +23,8 @@ SHORTEST = 3e-3
 # A gap that comes so near to 0 and falls again [m]: whether it is an impact is round-off.
 GRAZES = 1e-9
 ALWAYS = ((0.0, math.inf),)
+# A normal with so small a part along z: which tangents it has is round-off.
+FLAT = 1e-9
 
 
 class Wall(NamedTuple):
@@ -149,6 +151,8 @@ def follow(scene, r, v, times, start=0.0, particle=0):
         if b <= 1e-6:
             break
         if wall.laws:
+            if abs(n[2]) < FLAT and any(type(law) is not swarm.Absorb for law in wall.laws):
+                break
             w, stays = by_laws(wall.laws, w, n, [Stream(0, particle, count).of_law(k) for k in range(len(wall.laws))])
             if not stays:
                 seen += [(r, v, count + 1)] * (len(times) - len(seen))
