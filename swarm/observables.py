@@ -285,8 +285,8 @@ def counted(partial: Floats, state: State, lasts: bool) -> dict[str, Any]:
     return {
         "energy_error": energy_error,
         "max_penetration": depth,
-        "impacts": int(state.impacts.sum()),
-        "sliding": 0 if contacts is None else int(np.count_nonzero(contacts.phase)),
+        "impacts": int(state.impacts[: state.mass.size].sum()),
+        "sliding": 0 if contacts is None else int(np.count_nonzero(contacts.phase[: state.mass.size])),
         **loops,
         "unconverged": 0 if multipliers is None else int(multipliers.unconverged.sum()),
     }

@@ -103,7 +103,7 @@ def _series(figure: Any, content: Content, shapes: list[Shape], width: float) ->
     """The time series, and the speeds, in a figure of this width [inches]."""
     times, seen = content.seen["time"], content.seen
     drawn = {}
-    for line in series.lines_of(content.scene, content.method, shapes, content.body):
+    for line in series.lines_of(content.scene, content.method, shapes, content.body, "source_energy" in seen):
         values = line.values(times, seen)
         known = ~np.isnan(values)
         drawn[line.path] = line.name, times[known], values[known]

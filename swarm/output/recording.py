@@ -98,6 +98,7 @@ class RecordingWriter:
                 raise FileError(f"cannot write the recording {path}: no permission")
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
         self._last, self._body = frames - 1, body
+        self._fed = start.births is not None or bool(np.isnan(start.position).any())
         self._drawn = drawn = Drawn(len(start), body, settings.particles)
         self._at_start, self._center = drawn.points(start.position), origin_of(scene, start)
         if body is None:
@@ -121,7 +122,7 @@ class RecordingWriter:
 
     def __enter__(self) -> WriteFrames:
         self._shapes = shapes_of(self._scene, self._at_start)
-        self._series = series.lines_of(self._scene, self._method, self._shapes, self._body)
+        self._series = series.lines_of(self._scene, self._method, self._shapes, self._body, self._fed)
         fixed = sum(24 * len(s.vertices) + 12 * len(s.triangles) + 12 * sum(map(len, s.wires)) for s in self._shapes)
         lines, triangles = len(self._drawn.lines), len(self._drawn.triangles)
         points = self._at_start.shape[1] * (2 if triangles else 1)

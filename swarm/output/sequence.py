@@ -4,6 +4,8 @@ import functools
 from collections.abc import Sequence
 from typing import Any, overload
 
+import numpy as np
+
 from ..checks import shown
 from ..errors import SceneError
 from ..frames import Frame
@@ -29,6 +31,7 @@ class Frames(Sequence[Frame]):
         self._trajectory = trajectory
         scene, self._seen = trajectory.scene, trajectory.observables
         self._gravity, self._period = scene.gravity, scene.period
+        self._born = trajectory.birth_time if trajectory.has_particles() and trajectory.has_births() else None
 
     def __len__(self) -> int:
         return len(self._seen["time"])
@@ -51,7 +54,9 @@ class Frames(Sequence[Frame]):
     def _frame(self, k: int) -> Frame:
         seen = {name: values[k] if values.ndim > 1 else values[k].item() for name, values in self._seen.items()}
         until = float(self._seen["time"][-1])
-        arrays = Snapshot(functools.partial(values_of, self._trajectory, k), self._gravity, self._period, copies=True)
+        there = None if self._born is None else int(np.searchsorted(self._born, seen["time"], side="right"))
+        read = functools.partial(values_of, self._trajectory, k)
+        arrays = Snapshot(read, self._gravity, self._period, there, copies=True)
         return Frame(k, seen["time"], until, seen, len(self), arrays)
 
 

@@ -75,8 +75,13 @@ def group_of(path: str) -> str:
     return path.split("/")[1]
 
 
-def lines_of(scene: Scene, method: Method, shapes: list[Shape], body: Body | None = None) -> list[Line]:
-    """The time series of a scene with particles or bodies, without those that are always zero in it."""
+def lines_of(
+    scene: Scene, method: Method, shapes: list[Shape], body: Body | None = None, fed: bool = False
+) -> list[Line]:
+    """The time series of a scene with particles or bodies, without those that are always zero in it.
+
+    `fed`: particles come from sources.
+    """
     named, one = scene.names_laws(), "particle" if body is None else "body"
     laws = None if named else scene.laws()
     every = "all particles" if body is None else "all bodies"
@@ -86,6 +91,7 @@ def lines_of(scene: Scene, method: Method, shapes: list[Shape], body: Body | Non
         "dissipated": named or (laws is not None and laws[:2] != (None, None)),
     }
     lines = [Line(f"/energy/{name}", name, f"{name}_energy") for name, there in energies.items() if there]
+    lines += [Line("/energy/sources", "brought by sources", "source_energy")] * fed
     lines += [
         Line("/energy_error", f"of a {one}", "energy_error", logarithm=True),
         Line("/penetration", f"of a {one}", "max_penetration", logarithm=True),

@@ -43,13 +43,14 @@ def require_admissible(
     scene: Scene, state: State, seen: dict[str, Any], deepest: float, moment: float, first: int = 0
 ) -> None:
     """Raise a RunError where a state is not finite, or deeper than `deepest` [m] in a wall."""
-    position, size = state.position[:, : len(state.mass)], scene.finite_size()
     # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
     if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
+        position = state.position[:, : len(state.mass)]
         good = np.isfinite(position).all(axis=0) & np.isfinite(state.velocity[:, : len(state.mass)]).all(axis=0)
         raise RunError(f"{_failed(moment)} {first + int(np.argmin(good))}: {Status.NOT_FINITE.sentence}")
     if seen["max_penetration"] <= deepest:
         return
+    position, size = state.position[:, : len(state.mass)], scene.finite_size()
     distances = scene.distances_outside(position, moment)
     # Far out in an open scene the round-off of a position is that of its own size.
     outside = distances > deepest / size * np.maximum(np.abs(position).max(axis=0), size)

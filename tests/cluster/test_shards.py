@@ -53,6 +53,15 @@ def openings():
     return scene, swarm.fill(scene, N, speed=1.0, seed=5), swarm.Impact()
 
 
+def fed():
+    hole = swarm.Sphere(0.2, center=(0.0, 0.0, 0.5))
+    scene = swarm.Scene([swarm.Sphere(0.5, openings=[hole], laws=[swarm.Lambert()])])
+    return scene, swarm.fill(scene, 100, speed=1.0, seed=5), swarm.Impact()
+
+
+SOURCES = [swarm.Source(0, rate=2000.0, temperature=1.0), swarm.Source(0, volume=True, count=100, stop=0.4, speed=1.0)]
+
+
 def periodic():
     scene = swarm.Scene([swarm.Sphere(0.3, side="outside")], period=(1.0, 1.0, 1.0))
     return scene, swarm.fill(scene, N, speed=1.0, seed=6), swarm.Impact()
@@ -94,6 +103,8 @@ CASES = {
     "loops": (loops, {"until": 0.1, "every": 0.05}),
     "openings": (openings, {"observables": OWN}),
     "counters": (openings, {"counters": [swarm.Plane((0.0, 0.0, 1.0)), swarm.Sphere(0.2)]}),
+    "sources": (fed, {"sources": SOURCES, "observables": OWN, "member_impacts": True}),
+    "sources, every third": (fed, {"sources": SOURCES, "frames": 3}),
     "a cell": (periodic, {"observables": OWN}),
     "moving": (moving, {}),
     "bodies": (bodies, {"until": 0.1, "every": 0.05, "observables": OWN, "member_impacts": True}),
@@ -164,6 +175,7 @@ def test_any_number_of_shards_gives_the_same_bits(name, count, alone, on_a_clust
         assert the_same(getattr(end.particles, key), getattr(other.particles, key)), key
     assert the_same(end.impacts, other.impacts)
     assert the_same(end.escape_time, other.escape_time)
+    assert the_same(end.birth_time, other.birth_time)
     assert int(end.impacts.sum()) > 20
     assert (end.multipliers is None) == (other.multipliers is None)
     for mine, its in zip(end.multipliers or (), other.multipliers or (), strict=True):

@@ -189,3 +189,16 @@ def test_a_log_of_impacts_has_those_of_births(tmp_path):
         table = log.table()
     assert len(table) == result.observables["impacts"][-1] > 100
     assert (table["time"] > result.birth_time[table["particle"]]).all()
+
+
+def test_frames_of_a_result_are_of_those_that_are_there(tmp_path):
+    """As those of a run under way."""
+    counts = []
+    source = swarm.Source(0, rate=200.0, temperature=1.0)
+    result = swarm.simulate(
+        BOX, None, swarm.Impact(), until=1.0, every=0.25, trajectory=tmp_path / "run.h5", sources=source,
+        compile="never", progress=lambda frame: counts.append(frame.position.shape[1]),
+    )  # fmt: skip
+    assert counts == [frame.position.shape[1] for frame in result.frames]
+    assert counts == result.observables["born"][:, 0].tolist()
+    assert not any(np.isnan(frame.velocity).any() for frame in result.frames)

@@ -50,8 +50,10 @@ def seen_of(
             for k in range(some.stop - begin):
                 joined = _joined(task, [{name: values[k] for name, values in part.items()} for part in parts])
                 read = functools.partial(_gathered, of_shards, task, begin + k)
-                particles = Snapshot(read, task.scene.gravity, task.scene.period, copies=True)
-                yield len(times), {"time": float(times[begin + k]), **joined}, particles
+                moment, births = float(times[begin + k]), task.particles.births
+                there = None if births is None else births.there(moment)
+                particles = Snapshot(read, task.scene.gravity, task.scene.period, there, copies=True)
+                yield len(times), {"time": moment, **joined}, particles
                 particles.end()
     finally:
         for one in of_shards:
