@@ -325,6 +325,8 @@ def _look_at_one(one, c, gravity, share, p, flown):
         if ends_near and one.is_near(r + displacement(gravity, v, 0.5 * left)):
             return
         _cross(one, c, share, p, Moment(r, v, remaining), one.speed(sign, found.wall, r, v), flown.images)
+        if not one.may_cross_again(-sign, gravity, r, v, left):
+            return
 
 
 @outlined
