@@ -22,7 +22,7 @@ from . import log as impact_log
 from .accounts import book, book_sent, book_step, book_work, lose
 from .arrays import booked, speed2_scale
 from .carried import NOT_CARRIED, carry, is_carried
-from .counters import Moment
+from .crossings import Moment
 from .escape import absorb, escape
 from .periodic import return_particle
 from .table import LANES

@@ -9,7 +9,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..surfaces.openings import is_open
 from . import log as impact_log
-from .counters import Moment
+from .crossings import Moment
 from .table import marked_lanes
 
 

@@ -17,7 +17,8 @@ from ..status import Status
 from ..surfaces.rooms import inside_of
 from . import log as impact_log
 from .arrays import speed2_scale
-from .counters import Began, Moment
+from .counted_lanes import Began
+from .crossings import Moment
 from .periodic import return_particle, return_sliding
 from .sliding import AGAIN, Slide
 from .sliding_ends import decide, set_going

@@ -9,7 +9,7 @@ from ..contact import sliding as slides
 from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
-from .counters import BEGAN
+from .counted_lanes import BEGAN
 from .table import STRIDE, Advanced, Rows, copy_lane, table
 
 # What a step may end with.

@@ -36,6 +36,10 @@ class Counted(Record):
         """The first `Crossing` of a flight."""
         raise NotImplementedError
 
+    def may_cross_again(self, sign, gravity, r, v, span):
+        """The same of a flight from it, into the side of the sign."""
+        return True
+
     def distance(self, r):
         """The distance out of the admissible side, to first order; below 0 in it."""
         raise NotImplementedError
@@ -66,6 +70,12 @@ class Turned(Counted):
             time, _found = flights.hit(gravity, wall, r, v)
             return time < span
         return _may_rise(wall.course(r, v, as_vector(gravity)), span)
+
+    def may_cross_again(self, sign, gravity, r, v, span):
+        wall = with_sign(self.wall, sign)
+        if gravity is None or not wall.is_quartic:
+            return True
+        return _may_rise_again(wall.course(r, v, as_vector(gravity)), span)
 
     def crossing(self, sign, gravity, r, v):
         time, found = flights.hit(gravity, with_sign(self.wall, sign), r, v)
@@ -136,6 +146,19 @@ def _may_rise(level, span):
     a4 = (span * span) * (span * span) * a4
     c = level.c
     whole = (c, c + 0.5 * b, c + b + a2 / 6.0, c + 1.5 * b + 0.5 * a2 + 0.25 * a3, c + 2.0 * b + a2 + a3 + a4)
+    return _are_some_above(whole)
+
+
+def _may_rise_again(level, span):
+    """The same of a flight from the level 0 inwards, by what is left of the level over the time."""
+    third, a3, a4 = span * level.a2 / 3.0, span * span * level.a3, span * span * span * level.a4
+    b = 2.0 * level.b
+    whole = (b, b + third, b + 2.0 * third + a3 / 3.0, b + 3.0 * third + a3 + a4)
+    return _are_some_above(whole)
+
+
+def _are_some_above(whole):
+    """Whether any coefficient of a quarter of an interval is not below 0, from those of the whole one."""
     found = False
     for half in _halves(whole):
         for quarter in _halves(half):
