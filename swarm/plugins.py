@@ -14,10 +14,12 @@ from .errors import SceneError
 
 _ALLOWED: ContextVar[tuple[str, ...]] = ContextVar("_ALLOWED", default=())
 _MODULE = r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*"
+# Those that were imported: workers of a cluster are sent their code.
+imported: set[str] = set()
 _NAMED = re.compile(rf"({_MODULE}):([A-Za-z_]\w*)")
 
 
-def checked(given: Any) -> tuple[str, ...]:
+def checked_modules(given: Any) -> tuple[str, ...]:
     """The names of modules, from a list of them, or of names with commas between them.
 
     Raises:
@@ -41,7 +43,7 @@ def allowed(given: Iterable[str]) -> Iterator[None]:
     Raises:
         SceneError: there is no such module, or it raises an error.
     """
-    names = checked(given)
+    names = checked_modules(given)
     for name in names:
         _imported(name)
     token = _ALLOWED.set(names)
@@ -58,7 +60,9 @@ def _imported(name: str) -> Any:
     if added:
         sys.path.insert(0, here)
     try:
-        return importlib.import_module(name)
+        module = importlib.import_module(name)
+        imported.add(name)
+        return module
     except ModuleNotFoundError as error:
         if error.name is None or not (name == error.name or name.startswith(f"{error.name}.")):
             raise SceneError(f"plugins: the module {name} cannot be imported: {error}") from error

@@ -16,7 +16,7 @@ import tomli_w
 from .. import scene_file
 from ..checks import count, listed, number, one_of
 from ..errors import SceneError
-from ..plugins import allowed, checked
+from ..plugins import allowed, checked_modules
 from ..scene import Scene
 
 # More runs than this are a mistake in a list: their files alone would be a burden to a folder.
@@ -91,7 +91,7 @@ def read(path: Path, plugins: Iterable[str] = ()) -> Plan:
             )
         lists, way = _lists(document.pop(scene_file.SWEEP))
         with allowed(plugins):
-            return Plan(path, document, _checked(path, document, list(_combined(lists, way))), checked(plugins))
+            return Plan(path, document, _checked(path, document, list(_combined(lists, way))), checked_modules(plugins))
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from None
 

@@ -13,7 +13,7 @@ from ..errors import FileError, SceneError
 from ..extras import needed_by
 from ..output import paths
 from ..output.lock import only_writer
-from ..plugins import checked as checked_plugins
+from ..plugins import checked_modules
 from ..run.options import cores
 from .plan import Plan, read
 from .pool import Pool
@@ -116,7 +116,7 @@ def sweep(  # noqa: PLR0913  the keywords are the public interface
     with needed_by("the table of a sweep in Python", "table"):
         import pandas  # noqa: F401
     options = SweepOptions(
-        folder, processes, threads, resume, overwrite, progress, table, plugins=checked_plugins(plugins)
+        folder, processes, threads, resume, overwrite, progress, table, plugins=checked_modules(plugins)
     )
     outcome = carry_out(path, options)
     if outcome.stopped:

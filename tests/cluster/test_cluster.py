@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +14,14 @@ import pytest
 from test_cli import command
 
 import swarm
+from swarm import scene_file
 from swarm.run import machine
 from swarm.run.admission import task_of
 from swarm.run.cluster import client as of_client
 from swarm.run.cluster import connection, local, shards, worker
 from swarm.run.options import RunOptions
 from swarm.run.progress import lines
+from swarm.run.simulation import carry_out
 
 N = 600
 SCENE = """
@@ -342,6 +345,27 @@ def test_functions_of_frames_are_given_the_particles_of_all_shards(client, tmp_p
     one, many = (end.observables["spread"] for end in ends)
     assert one.shape == (5, 3)
     assert one.tobytes() == many.tobytes() == np.array(shown[:5]).tobytes() == np.array(shown[5:]).tobytes()
+
+
+def test_code_that_a_file_names_reaches_the_workers(client, tmp_path, monkeypatch):
+    """It is in a folder that they do not know."""
+    (tmp_path / "laws_of_a_user.py").write_text(
+        "import swarm\nfrom swarm.kernel.vector import dot\n\n\nclass Damped(swarm.WallLaw):\n    e: float\n\n"
+        "    def leave(self, v, n, u, random, mass):\n        return v - (1.0 + self.e) * dot(v - u, n) * n\n"
+    )
+    path = tmp_path / "scene.toml"
+    law = '{ kind = "sphere", radius = 0.5, laws = [{ law = "laws_of_a_user:Damped", e = 0.9 }] }'
+    path.write_text(SCENE.replace('{ kind = "sphere", radius = 0.5 }', law).replace("UNTIL", "1.0"))
+    monkeypatch.chdir(tmp_path)
+    job = scene_file.read(path, ["laws_of_a_user"])
+    monkeypatch.chdir("/")
+    ends = [
+        carry_out(
+            job.scene, job.start(), job.method, replace(job.run, trajectory=tmp_path / f"{k}.h5", cluster=where)
+        ).particles.velocity
+        for k, where in enumerate((None, client))
+    ]
+    assert ends[0].tobytes() == ends[1].tobytes()
 
 
 def test_lines_of_progress_come_from_a_cluster_too(client, tmp_path, capsys):

@@ -9,6 +9,7 @@ import dataclasses
 import functools
 import itertools
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -16,6 +17,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import plugins
 from ...bodies.body import Body
 from ...bodies.state import Bodies
 from ...errors import SceneError
@@ -78,6 +80,8 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     """Write what is run, and its start."""
     import cloudpickle
 
+    for name in sorted(plugins.imported):
+        cloudpickle.register_pickle_by_value(sys.modules[name])
     body = None if task.bodies is None else task.bodies.body
     options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None, observables=None)
     whole = Whole(task.scene, task.method, options, body, bounds, start, heat_unit(task))
