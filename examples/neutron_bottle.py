@@ -108,7 +108,7 @@ def draw(one: Curve, thermal: Curve, neutrons: Curve, whole: np.ndarray, file: P
     """The curves beside their laws, and how far they are from them."""
     from .paper.plotting import BLUE, GREEN, GREY, RED, page
 
-    with page(file, "Storage of a gas that is lost at impacts", 1, 3, (11.0, 3.6)) as axes:
+    with page(file, "Storage of a gas that is lost at impacts; lines: the laws", 1, 3, (11.0, 3.6)) as axes:
         kinds = (("one speed: exponential", one, BLUE), ("Maxwellian gas", thermal, RED))
         for name, curve, color in kinds:
             axes[0].plot(curve.time, curve.law, color=color, linewidth=0.8)
