@@ -1,5 +1,6 @@
 """Laws of walls of one's own, against the laws that swarm has, closed forms and distributions."""
 
+import inspect
 import math
 from pathlib import Path
 
@@ -237,7 +238,22 @@ def test_the_numbers_of_an_impact_are_independent():
 
 
 def test_the_example_is_short():
-    assert len(lines_of(Path(own_law.__file__))) <= 20
+    laws = [one for one in vars(own_law).values() if isinstance(one, type) and issubclass(one, swarm.WallLaw)]
+    assert len(laws) == 2
+    assert all(len(inspect.getsource(law).splitlines()) <= 20 for law in laws)
+    assert len(lines_of(Path(own_law.__file__))) <= 30
+
+
+def test_the_laws_of_the_example_book_what_they_take():
+    """Some balls stick to the floor, the others come to rest, and every joule is booked."""
+    laws = [own_law.Glue(0.5, 0.05), own_law.Viscoelastic(2.0)]
+    floor = swarm.Cylinder(0.2, (0, 0, 1), 0.4, laws=laws, restitution=0.8, friction=0.3)
+    found = run([floor], G, 3.0, n=30)
+    seen, stuck = found.observables, np.isfinite(found.absorbed_time)
+    assert 0 < seen["absorbed"][-1, 0] == np.count_nonzero(stuck) < 30
+    assert seen["dissipated_energy"][-1] > 0.0
+    assert not seen["wall_heat"].any()
+    assert np.abs(balance(found) / balance(found)[0] - 1.0).max() < 1e-13
 
 
 class Into(swarm.WallLaw):
