@@ -147,26 +147,28 @@ def follow(scene, r, v, times, start=0.0, particle=0):
             break
         n, u = wall.normal(r, hit), wall.velocity(r, hit)
         w = v - u
-        b = w @ n
-        if b <= 1e-6:
+        if w @ n <= 1e-6:
             break
-        if wall.laws:
-            if abs(n[2]) < FLAT and any(type(law) is not swarm.Absorb for law in wall.laws):
-                break
-            w, stays = by_laws(wall.laws, w, n, [Stream(0, particle, count).of_law(k) for k in range(len(wall.laws))])
-            if not stays:
-                seen += [(r, v, count + 1)] * (len(times) - len(seen))
-                break
-            v = u + w
-            start, count = hit, count + 1
-            continue
-        slip = w - b * n
-        speed = np.linalg.norm(slip)
-        share = min(wall.mu * (1.0 + wall.e) * b / speed, 1.0) if speed > 0.0 else 0.0
-        v = u + (1.0 - share) * slip - wall.e * b * n
-        start, count = hit, count + 1
+        if wall.laws and abs(n[2]) < FLAT and any(type(law) is not swarm.Absorb for law in wall.laws):
+            break
+        w, stays = after(wall, w, n, particle, count)
+        if not stays:
+            seen += [(r, v, count + 1)] * (len(times) - len(seen))
+            break
+        v, start, count = u + w, hit, count + 1
     position, velocity, impacts = ([one[k] for one in seen] for k in range(3))
     return Followed(np.array(position).reshape(-1, 3), np.array(velocity).reshape(-1, 3), impacts, end)
+
+
+def after(wall, w, n, particle, count):
+    """(velocity after, whether it stays) relative to a wall with the outward normal n."""
+    if wall.laws:
+        return by_laws(wall.laws, w, n, [Stream(0, particle, count).of_law(k) for k in range(len(wall.laws))])
+    b = w @ n
+    slip = w - b * n
+    speed = np.linalg.norm(slip)
+    share = min(wall.mu * (1.0 + wall.e) * b / speed, 1.0) if speed > 0.0 else 0.0
+    return (1.0 - share) * slip - wall.e * b * n, True
 
 
 def by_laws(laws, w, n, streams):
