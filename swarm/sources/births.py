@@ -1,15 +1,18 @@
 """All births of a run, drawn before it from its seed: each source has streams of its own."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from .. import checks
+from .. import motion as motions
 from ..errors import SceneError
 from ..particles import Births, Particles
 from ..scene import Scene
-from .pieces import Floats, Random
-from .places import Points, place_of
+from ..surfaces.instant import side_of
+from .pieces import Floats, Random, distances
+from .places import Points, changes, place_of
 from .source import Source
 from .velocities import from_surface, from_volume, leads_in
 
@@ -150,24 +153,33 @@ def times_of(source: Source, random: Random, until: float) -> Floats:
 
 def _require_free(scene: Scene, name: str, times: Floats, position: Floats) -> None:
     """Raise a `SceneError` where a wall that moves, or comes and goes, is where a particle is born."""
-    changing = [i for i, one in enumerate(scene.surfaces) if one.motion is not None or one.present is not None]
-    if not changing:
-        return
-    deepest = _OUTSIDE * scene.extent()
-    alone = Scene([scene.surfaces[i] for i in changing], None, scene.period, scene.plane) if changing else scene
-    moves = any(scene.surfaces[i].motion is not None for i in changing)
-    # Between instants what does not move is as it is.
-    edges = np.array([0.0, *scene.instants, math.inf])
-    groups = np.arange(len(times)) if moves else np.searchsorted(edges, times, side="right")
-    for group in np.unique(groups):
-        some = np.flatnonzero(groups == group) if not moves else np.array([group])
-        depths = alone.distances_outside(position[:, some], float(times[some[0]]))
-        if not (depths <= deepest).all():
-            wall, which = np.unravel_index(int(np.argmax(np.where(np.isnan(depths), np.inf, depths))), depths.shape)
-            i = some[which]
+    for i, surface in enumerate(scene.surfaces):
+        if not changes(surface):
+            continue
+        depths = _outside_then(scene, i, times, position)
+        if not (depths <= _OUTSIDE * scene.extent()).all():
+            k = int(np.argmax(np.where(np.isnan(depths), np.inf, depths)))
             raise SceneError(
-                f"{name} must be free when particles come, got a birth at {times[i]:g} s at "
-                f"{tuple(position[:, i].tolist())}, {depths[wall, which]:.3g} m inside surfaces[{changing[wall]}] "
-                f"({type(scene.surfaces[changing[wall]]).__name__}) as it is then; move the source, or say with start "
-                "and stop when it is free"
+                f"{name} must be free when particles come, got a birth at {times[k]:g} s at "
+                f"{tuple(position[:, k].tolist())}, {depths[k]:.3g} m inside surfaces[{i}] ({type(surface).__name__}) "
+                "as it is then; move the source, or say with start and stop when it is free"
             )
+
+
+def _outside_then(scene: Scene, i: int, times: Floats, position: Floats) -> Floats:
+    """How far each place is outside of the admissible side of surface i at a time of its own [m]."""
+    surface = scene.surfaces[i]
+    if surface.motion is not None and scene.period is None:
+        # In the frame in which it rests.
+        rows = [motions.pose(surface.motion, t).given(position[:, [k]]) for k, t in enumerate(times.tolist())]
+        depths = side_of(surface) * distances(
+            replace(surface, motion=None), np.concatenate([position[:, :0], *rows], 1)
+        )
+        return np.where([surface.is_there(t) for t in times.tolist()], depths, -np.inf)
+    depths = np.empty(len(times))
+    # Between instants what does not move is as it is.
+    groups = np.searchsorted(scene.instants, times, side="right") if not scene.moves() else np.arange(len(times))
+    for group in np.unique(groups):
+        some = np.flatnonzero(groups == group)
+        depths[some] = scene.distances_outside(position[:, some], float(times[some[0]]))[i]
+    return depths

@@ -8,15 +8,17 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..scene import Scene
 from ..surfaces.doors import Opening
+from ..surfaces.facets.mesh import Mesh
 from ..surfaces.instant import gaps_of, side_of
 from ..surfaces.surface import Surface, volume_of
 from ..surfaces.union import Joined
 from .pieces import NEAR, Floats, Piece, Random, distances, pieces_of, points_of
 from .source import Source
 
-# Points that are tried at a time, so that a longer run has the same first births; and in all, as long as fewer than one
-# in a million is a place of a birth.
-_BATCH, _TRIES = 1 << 14, 4_000_000
+# Points that are tried at a time, so that a longer run has the same first births; fewer among meshes, of which the
+# nearest triangle of each point is looked for. And so many of these in all, as long as fewer than one in a million is a
+# place of a birth.
+_BATCH, _FEW, _MOST_BATCHES = 1 << 14, 1 << 11, 250
 # Round-off of a point of a surface, as a part of the scene's extent.
 _ROUND_OFF = 16.0 * np.finfo(np.float64).eps
 # Steps of a point onto its surface.
@@ -90,8 +92,14 @@ def _of_wall(scene: Scene, i: int, volume: bool, only: tuple[Surface, ...], name
     return Place(surface, i, volume, only, holes)
 
 
+def changes(surface: Surface) -> bool:
+    """Whether a surface, or a part of it, moves, or comes and goes."""
+    parts = surface.surfaces() if isinstance(surface, Joined) else ()
+    return surface.motion is not None or surface.reacts() or surface.present is not None or any(map(changes, parts))
+
+
 def _require_at_rest(surface: Surface, name: str) -> None:
-    if surface.motion is not None or surface.reacts() or surface.present is not None:
+    if changes(surface):
         raise SceneError(
             f"{name} must be at rest and always there, got {surface!r:.200}; leave its motion, mass, inertia and "
             "present out, or let particles come from another surface beside it"
@@ -112,8 +120,10 @@ class Points:
         self._low, self._high = self._box()
         self._extent = max(scene.extent(), place.surface.extent())
         self._pieces: list[Piece] = []
+        meshes = any(isinstance(one, Mesh) for one in (place.surface, *scene.surfaces))
+        self._batch = _FEW if meshes else _BATCH
         # Walls that move, or come and go, are looked at when a particle is born.
-        self._lasting = [i for i, one in enumerate(scene.surfaces) if one.motion is None and one.present is None]
+        self._lasting = [i for i, one in enumerate(scene.surfaces) if not changes(one)]
         if not place.volume:
             self._pieces = self._of_surface()
 
@@ -128,8 +138,8 @@ class Points:
         while count < n:
             some = self._volume(random) if self._place.volume else self._surface(random)
             found.append(some[:, : n - count])
-            count, tried = count + found[-1].shape[1], tried + _BATCH
-            if tried >= _TRIES and count < 1e-6 * tried:
+            count, tried = count + found[-1].shape[1], tried + self._batch
+            if tried >= _MOST_BATCHES * self._batch and count < 1e-6 * tried:
                 raise SceneError(self._sentence(count, tried))
         points, normals = np.concatenate(found, axis=1).reshape(2, 3, n)
         return points, normals
@@ -144,7 +154,7 @@ class Points:
     def _box(self) -> tuple[Floats, Floats]:
         """The corners of a box that all points are in."""
         scene = self._scene
-        at_rest = [one for one in scene.surfaces if one.motion is None and one.present is None]
+        at_rest = [one for one in scene.surfaces if not changes(one)]
         low, high = scene.bounds_of(at_rest)
         for one in (*self._place.only, *[self._place.surface] * self._place.volume):
             least, most = (np.array(corner, np.float64) for corner in one.bounds())
@@ -176,19 +186,21 @@ class Points:
                 f"{self._name}.where must be bounded, got {self._place.surface!r:.200} in a scene that is open to "
                 "infinity; give within=, a surface that bounds the part of it in which particles come"
             )
-        points = np.zeros((3, _BATCH))
-        points[axes] = low[axes] + (high - low)[axes] * random.random((len(axes), _BATCH))
+        points = np.zeros((3, self._batch))
+        points[axes] = low[axes] + (high - low)[axes] * random.random((len(axes), self._batch))
         kept = (self._gap(self._place.surface, points) <= 0.0) & self._is_wanted(points)
         points = points[:, kept]
         points = points[:, self._admits(points, 0.0)]
         return np.concatenate([points, np.zeros_like(points)])
 
     def _surface(self, random: Random) -> Floats:
-        surface, points = self._place.surface, points_of(self._pieces, random, _BATCH)
-        # Not what another part cuts off
-        points = points[:, np.abs(distances(surface, points)) <= NEAR * self._extent]
-        points = self._on(surface, points)
-        points = points[:, np.abs(distances(surface, points)) <= _ROUND_OFF * self._extent]
+        surface, points = self._place.surface, points_of(self._pieces, random, self._batch)
+        # Triangles are where they are drawn, and to look for the nearest of many is dear.
+        if not isinstance(surface, Mesh):
+            # Not what another part cuts off
+            points = points[:, np.abs(distances(surface, points)) <= NEAR * self._extent]
+            points = self._on(surface, points)
+            points = points[:, np.abs(distances(surface, points)) <= _ROUND_OFF * self._extent]
         points = points[:, self._is_wanted(points)]
         if self._place.holes:
             shut = [self._gap(hole, points) > 0.0 for hole in self._place.holes]

@@ -73,3 +73,34 @@ def test_a_hopper_that_is_fed_comes_to_rest_with_all_books():
     assert seen["potential_energy"][-1] == pytest.approx(-0.5 * fall * n, rel=1e-12)
     brought = seen["source_energy"][-1]
     assert seen["dissipated_energy"][-1] == pytest.approx(brought - seen["total_energy"][-1], rel=1e-12)
+
+
+def test_a_source_and_walls_that_absorb_settle_at_rate_times_life():
+    """By Cauchy's mean chord each flight lasts 4V/Av between diffuse walls, and 1/p of them are a life."""
+    speed, part, rate = 1.0, 0.2, 1500.0
+    wall = swarm.Box((0.5, 0.5, 0.5), laws=[swarm.Absorb(part), swarm.Lambert()])
+    life = 4.0 / (6.0 * speed * part)
+    source = swarm.Source(0, rate=rate, speed=speed)
+    result = swarm.simulate(
+        swarm.Scene([wall]), None, swarm.Impact(), until=12.0 * life, every=2.0 * life, sources=[source], seed=7
+    )
+    seen = result.observables
+    inside = seen["born"][:, 0] - seen["absorbed"][:, 0]
+    # From the first on, exp(-6) of it is missing: a Poisson number, independent after two lives.
+    settled = inside[3:]
+    assert np.abs(settled - rate * life).max() < 4.0 * math.sqrt(rate * life)
+    assert abs(settled.mean() - rate * life) < 4.0 * math.sqrt(rate * life / len(settled)) + 13.0
+    lives = (result.absorbed_time - result.birth_time)[result.birth_time < 6.0 * life]
+    lives = np.where(np.isnan(lives), 6.0 * life, lives)
+    assert abs(lives.mean() - life) < 4.0 * lives.std() / math.sqrt(len(lives)) + 0.003 * life
+    assert drift(seen) < 1e-13
+
+
+def test_gravity_in_a_cell_that_repeats():
+    """What falls through faces of the cell: the books know where it was born."""
+    ball = swarm.Sphere(0.2, (0.5, 0.5, 0.5), side="outside", restitution=0.8)
+    scene = swarm.Scene([ball], gravity=(0.0, 0.0, -1.0), period=(1.0, 1.0, 1.0))
+    source = swarm.Source(0, rate=500.0, temperature=1.0)
+    seen = swarm.simulate(scene, None, swarm.Impact(), until=3.0, every=0.5, sources=[source], seed=3).observables
+    assert seen["born"][-1, 0] > 1300
+    assert drift(seen) < 1e-12

@@ -165,3 +165,23 @@ def test_a_frame_with_those_that_come_later_is_no_start():
     with pytest.raises(swarm.SceneError, match=r"particle 1 .*take those that are there: .born\(\)"):
         swarm.simulate(SPHERE, some, swarm.Impact(), until=1.0)
     assert len(some.born()) == 1
+
+
+def test_a_union_with_a_part_that_moves_is_no_source_but_a_vessel_of_one():
+    arm = swarm.Cylinder(0.2, length=2.0, motion=swarm.Translation((0.05, 0.0, 0.0)))
+    scene = swarm.Scene([swarm.Union([swarm.Sphere(0.5), arm])])
+    with pytest.raises(swarm.SceneError, match="must be at rest and always there"):
+        run(scene, swarm.Source(0, **GIVEN))
+    assert len(run(scene, swarm.Source(swarm.Sphere(0.3), volume=True, **MANY)).particles) > 50
+    with pytest.raises(swarm.SceneError, match="must be free when particles come"):
+        run(scene, swarm.Source(swarm.Sphere(0.1, (0.6, 0.0, 0.0)), volume=True, **MANY))
+
+
+def test_a_wall_may_come_where_somebody_is_born_when_it_has_gone():
+    comes = swarm.Sphere(0.2, side="outside", present=[(0.3, 0.5)])
+    scene = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), comes])
+    later = swarm.Source(swarm.Sphere(0.1), volume=True, times=[0.5, 0.7], speed=1.0)
+    assert run(scene, later, every=0.25).observables["born"][:, 0].tolist() == [0, 0, 1, 2, 2]
+    before = swarm.Source(swarm.Sphere(0.1), volume=True, times=[0.25], speed=0.0)
+    with pytest.raises(swarm.RunError, match=r"must come where nobody is: at 0\.3 s particle 0"):
+        run(scene, before)
