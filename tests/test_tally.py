@@ -34,6 +34,8 @@ def require_same(one, other):
     for counts, others in zip(one.member_impacts, other.member_impacts, strict=True):
         assert counts.dtype == others.dtype == np.int64
         assert counts.tolist() == others.tolist()
+    for name, values in one.observables.items():
+        assert not name.startswith("member_") or values.tobytes() == other.observables[name].tobytes(), name
 
 
 def of_log(scene, path):
