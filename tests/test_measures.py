@@ -185,6 +185,24 @@ def test_what_they_take_is_counted_before_the_run():
         run({"all": lambda frame: np.zeros(10**7)}, until=1e5)
 
 
+def test_who_has_come_and_who_is_absorbed():
+    """A frame has those who are there: who has not come yet has no place in it, who is absorbed has a time."""
+    scene = swarm.Scene([swarm.Sphere(0.5, laws=[swarm.Absorb(0.5)])])
+    own = {
+        "there": lambda frame: frame.position.shape[1],
+        "gone": lambda frame: np.isfinite(frame.absorbed_time).sum(),
+        "inside": lambda frame: np.isfinite(frame.velocity).all(),
+    }
+    seen = swarm.simulate(
+        scene, START, swarm.Impact(), observables=own, sources=[swarm.Source(0, rate=30.0, speed=1.0)], **QUICK
+    ).observables
+    assert seen["there"].tolist() == (300 + seen["born"][:, 0]).tolist()
+    assert seen["gone"].tolist() == seen["absorbed"][:, 0].tolist()
+    assert 0 < seen["gone"][-1] < seen["there"][-1]
+    assert seen["born"][-1, 0] > 30
+    assert seen["inside"].all()
+
+
 # --- Frames ----------------------------------------------------------------------------------------------
 
 

@@ -34,6 +34,8 @@ def require_same(one, other):
     for counts, others in zip(one.member_impacts, other.member_impacts, strict=True):
         assert counts.dtype == others.dtype == np.int64
         assert counts.tolist() == others.tolist()
+    for name, values in one.observables.items():
+        assert not name.startswith("member_") or values.tobytes() == other.observables[name].tobytes(), name
 
 
 def of_log(scene, path):
@@ -189,6 +191,31 @@ def test_the_time_on_each_wall_is_that_of_what_lies_on_it():
     assert result.observables["member_residence"].sum(axis=1) == pytest.approx(
         result.observables["sliding_time"], rel=1e-14
     )
+
+
+def test_the_time_on_a_sticky_wall_is_that_in_which_nobody_flies():
+    """Between two plates at speed 1: of those who fly at the end the way from the last plate is known."""
+    plates = [swarm.Plane((1.0, 0.0, 0.0), 0.5, laws=[swarm.Sticky(0.3)]), swarm.Plane((-1.0, 0.0, 0.0), 0.5)]
+    start = swarm.Particles(np.zeros((3, 40)), np.array([[1.0], [0.0], [0.0]]) * np.ones(40))
+    for count in range(40):
+        start.position[0, count] = -0.4 + 0.02 * count
+    alone = [
+        swarm.simulate(
+            swarm.Scene(plates), swarm.Particles(start.position[:, k], start.velocity[:, k]), swarm.Impact(),
+            until=6.0, every=0.75, compile="never", member_impacts=True, seed=k,
+        )
+        for k in range(12)
+    ]  # fmt: skip
+    checked = 0
+    for k, one in enumerate(alone):
+        sticky, bare = (times.item() for times in one.member_residence)
+        x, v, n = one.particles.position[0, 0], one.particles.velocity[0, 0], int(one.impacts_per_particle[0])
+        assert bare == 0.0
+        if abs(x) < 0.5:
+            way = (0.5 - start.position[0, k]) + (n - 1) + (0.5 - x if v < 0.0 else x + 0.5)
+            assert sticky == pytest.approx(6.0 - way, abs=1e-12)
+            checked += n > 2
+    assert checked > 3
 
 
 def test_times_on_members_have_the_same_bits_for_any_threads():

@@ -196,7 +196,7 @@ def _send_off(method, walls, gravity, share, i):
     after = select(sent.keeps, before + sent.work, square(sent.v) + fall)
     heat = book_sent(laws, state, i, walls.row(wall), (before, after - sent.work), sent.lost)
     if share.counts is not None:
-        share.counts.give(wall, heat)
+        share.counts.give(wall, heat, sent.wait)
     book_work(walls, state, i, wall, sent.work)
     state.energy[i] = 0.5 * after
     put(state.velocity, 0, i, sent.v)

@@ -74,7 +74,9 @@ class Counts(Record):
         if self.stays is not None:
             self.stays.add(wall, time)
 
-    def give(self, wall, heat):
-        """Count heat that a wall has given [J]."""
+    def give(self, wall, heat, wait):
+        """Count heat that a wall has given [J], and how long a particle is to wait there [s]."""
         if self.heats is not None:
             self.heats.add(wall, heat)
+        if self.stays is not None and (wait > 0.0) & (wait < math.inf):
+            self.stays.add(wall, wait)

@@ -78,7 +78,7 @@ def _book(method, walls, share, lanes, i):
     row = walls.row(wall)
     heat = book_sent(laws, state, p, row, (lane.twice, sent.twice - sent.work), sent.lost)
     if share.counts is not None:
-        share.counts.give(wall, heat)
+        share.counts.give(wall, heat, sent.wait)
     add_work(walls, lanes.impulse, i, wall, 0.5 * sent.work)
     lane.v, lane.twice = sent.v, sent.twice
     lane.hits += 1.0

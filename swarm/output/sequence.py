@@ -62,5 +62,6 @@ class Frames(Sequence[Frame]):
 
 def values_of(trajectory: Trajectory, k: int, name: str) -> Any:
     """An array of the particles of frame k, or None where there is none of that name."""
-    read = {"impacts": trajectory.impacts, "escape_time": trajectory.escape_times}
+    read = {"impacts": trajectory.impacts, "escape_time": trajectory.escape_times,
+            "absorbed_time": trajectory.absorbed_times}  # fmt: skip
     return read[name](k) if name in read else getattr(trajectory.frame(k), name)

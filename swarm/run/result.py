@@ -39,7 +39,8 @@ class Result:
             (frames, surfaces, 3). Of bodies also "link_error", the "work" of led anchors [J], and "cavity_impulse"
             (frames, cavities) of what points carry [N s]. With member_impacts=True "member_impacts" (frames, members)
             of all members of surface 0, then of surface 1, and so on, and where particles may slide "member_residence"
-            [s], how long they slid or rested there, at an edge on the wall that they were on before; where walls heat
+            [s], how long they slid, rested or by a law waited there, at an edge on the wall that they were on before, a
+            wait from its begin on; where walls heat
             or absorb them "member_heat" [J] and "member_absorbed". Where laws of walls return a `Leave` also "absorbed"
             (frames, surfaces), how many each has absorbed so far.
             With counters "crossings" (frames, counters, 2), how many have crossed each since 0 s, out of its admissible
@@ -112,7 +113,10 @@ class Result:
 
     @property
     def member_residence(self) -> list[NDArray[np.float64]] | None:
-        """Likewise how long particles have slid or rested on each [s]; None where none may."""
+        """Likewise how long particles have slid, rested or waited on each [s]; None where none may.
+
+        A wait, of `Sticky`, counts as a whole when it begins.
+        """
         return self._of_members("member_residence")
 
     @property

@@ -101,7 +101,7 @@ CASES = {
     "members on which they slide": (sliding, {"member_impacts": True}),
     "penalty": (penalty, {"until": 0.2, "every": 0.1}),
     "loops": (loops, {"until": 0.1, "every": 0.05}),
-    "openings": (openings, {"observables": OWN}),
+    "openings": (openings, {"observables": OWN | {"gone": lambda frame: np.isfinite(frame.absorbed_time).sum()}}),
     "counters": (openings, {"counters": [swarm.Plane((0.0, 0.0, 1.0)), swarm.Sphere(0.2)]}),
     "sources": (fed, {"sources": SOURCES, "observables": OWN, "member_impacts": True}),
     "sources, every third": (fed, {"sources": SOURCES, "frames": 3}),
