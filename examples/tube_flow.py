@@ -88,17 +88,19 @@ def draw(flows: dict[float, Flow], file: Path) -> None:
             )
             axes[1].plot(flow.place, flow.density, ".-", color=color)
             axes[2].errorbar(ratio, flow.factor - FACTORS[ratio], flow.error, fmt="o", color=color)
-        axes[0].set(xlabel="time, of the run", ylabel="particles in the tube, over the most")
+        axes[0].set(xlim=(0.0, 0.6), xlabel="time, of the run", ylabel="particles in the tube, over the most")
         axes[0].legend()
         axes[1].set(xlabel="place along the tube", ylabel="density, over its mean")
         axes[2].axhline(0.0, color=GREY, linewidth=0.8)
-        axes[2].set(xscale="log", xlabel="L/R", ylabel="factor, less Clausing's")
+        axes[2].set(xscale="log", xlabel="L/R", ylabel="part that comes through, less Clausing's factor")
+        axes[2].set_xticks(list(flows), [f"{ratio:g}" for ratio in flows], minor=False)
+        axes[2].set_xticks([], minor=True)
 
 
 def main() -> None:
     """Run, draw and print."""
     ask = Asked(__doc__, "tube_flow.png", "plot")
-    ask.add_argument("--particles", type=int, default=100_000)
+    ask.add_argument("--particles", type=int, default=400_000)
     asked = ask.parse_args()
     flows = {ratio: run(asked.particles, ratio) for ratio in FACTORS}
     for ratio, flow in flows.items():

@@ -101,16 +101,11 @@ class RecordingWriter:
         self._fed = start.births is not None or bool(np.isnan(start.position).any())
         self._drawn = drawn = Drawn(len(start), body, settings.particles)
         self._at_start, self._center = drawn.points(start.position), origin_of(scene, start)
-        if body is None:
-            there = ~np.isnan(self._at_start[0])
-            start = Particles.of_frame(
-                self._at_start, drawn.points(start.velocity), drawn.points(start.mass[None])[0], None, there
-            )
-        elif settings.color != "speed":
+        if body is not None and settings.color != "speed":
             raise SceneError(
                 f"record_color must be 'speed' for bodies, got {settings.color!r}: their points exchange energy"
             )
-        self._scale, self._values = colours.colouring(settings.color, scene, method, start)
+        self.colour_by(start)
         # The number, the time and the observables of frames whose time series are still to be sent, and of that before.
         self._rows: list[tuple[int, float, dict[str, Any]]] = []
         self._before: list[tuple[int, float, dict[str, Any]]] = []
@@ -119,6 +114,16 @@ class RecordingWriter:
         self._has_doors, self._instant = scene.has_doors() and not scene.moves(), -1
         self._failed = False
         self._url = viewer.live_url(settings.live) if settings.live else None
+
+    def colour_by(self, shown: Particles) -> None:
+        """The scale of colours is that of these particles, or bodies."""
+        points = self._drawn.points
+        if self._body is None:
+            position = points(shown.position)
+            mass, there = points(shown.mass[None])[0], ~np.isnan(position[0])
+            shown = Particles.of_frame(position, points(shown.velocity), mass, None, there)
+        color, scene, method = self._settings.color, self._scene, self._method
+        self._scale, self._values = colours.colouring(color, scene, method, shown)
 
     def __enter__(self) -> WriteFrames:
         self._shapes = shapes_of(self._scene, self._at_start)
@@ -283,6 +288,9 @@ def record(trajectory: Any, path: Path | None, settings: Settings, overwrite: bo
     seen = trajectory.observed()
     scene, method, body = trajectory.scene, trajectory.method, trajectory.body
     writer = RecordingWriter(path, overwrite, scene, method, start, frames, settings, body)
+    if np.isnan(start.position[0]).all():
+        # All come during the run.
+        writer.colour_by(trajectory.frame(frames - 1))
     try:
         with writer as write:
             for first in range(0, frames, _AT_ONCE):

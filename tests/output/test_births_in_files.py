@@ -159,6 +159,10 @@ def test_recordings(path, tmp_path):
         played = Playback(file)
         positions, _colours = played.frame(2)
         assert np.isnan(positions[:, 0]).tolist() == [False] * (n + 2) + [True] * 2
+    # Where all come during the run the scale is that of those who have come.
+    with swarm.load(path) as trajectory:
+        speeds = np.linalg.norm(trajectory.frame(-1).velocity, axis=0)
+        assert 1.3 < Playback(held[0]).about["high"] / np.sqrt((speeds**2).mean()) < 1.7 or n
 
 
 def test_a_part_of_the_particles_is_kept(tmp_path):

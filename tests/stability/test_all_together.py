@@ -5,6 +5,7 @@ the bits are the same for any threads, blocks, halts, sessions and tiers.
 import numpy as np
 import pytest
 from bounded import bounded
+from conftest import rarely
 from stability.test_against_an_event_loop import (
     BOOKS,
     FRAMES,
@@ -215,10 +216,10 @@ def holds(seed, folder, certain=False):
 def has_same_bits(made, result, folder, monkeypatch):
     """Any threads and blocks, halts within frames, and sessions."""
     require_same(result, run(made, threads=2, block_size=256))
-    advance, look = Run.advance, Session.look
+    advance, look, passes = Run.advance, Session.look, [2]
 
     def halting(self, *given, **more):
-        self.halt(2)
+        self.halt(passes[0])
         return advance(self, *given, **more)
 
     def stops(self, *given):
@@ -228,14 +229,25 @@ def has_same_bits(made, result, folder, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(Run, "advance", halting)
         require_same(result, run(made))
+        passes[0] = 40
         patch.setattr(Session, "look", stops)
-        for _session in range(1000):
+        for _session in range(300):
             try:
                 require_same(result, run(made, trajectory=folder / "parts.h5", resume=True, checkpoint=1e3))
                 return
             except KeyboardInterrupt:
                 continue
     raise AssertionError("the sessions have no end")
+
+
+def hold_many(seeds, folder, monkeypatch, certain=False):
+    """Of many seeds; returns how many states were compared, and how many scenes were none."""
+    count, states, none = bounded(monkeypatch, PASSES), 0, 0
+    for seed in seeds:
+        count[0] = 0
+        _made, result, compared_ones = holds(seed, folder, certain)
+        states, none = states + compared_ones, none + (result is None)
+    return states, none
 
 
 @pytest.mark.physics
@@ -250,3 +262,40 @@ def test_some_scenes(seed, tmp_path, monkeypatch):
 def test_some_scenes_against_the_event_loop(seed, tmp_path, monkeypatch):
     bounded(monkeypatch, PASSES)
     holds(seed, tmp_path, certain=True)
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("seed", [1, 4, 7])
+def test_some_scenes_have_the_same_bits(seed, tmp_path, monkeypatch):
+    made, result, _ = holds(seed, tmp_path)
+    has_same_bits(made, result, tmp_path, monkeypatch)
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("seed", [2, *map(rarely, range(20, 26))])
+def test_kernels_that_are_compiled_have_the_same_bits(seed, tmp_path):
+    made, result, _ = holds(seed, tmp_path)
+    if result is not None:
+        require_same(result, run(made, compile="always", threads=2))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("hundred", range(5))
+def test_many_scenes(hundred, tmp_path, monkeypatch):
+    _states, none = hold_many(range(100 * hundred, 100 * hundred + 100), tmp_path, monkeypatch)
+    assert none < 20
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("hundred", range(5))
+def test_many_scenes_against_the_event_loop(hundred, tmp_path, monkeypatch):
+    states, _none = hold_many(range(100 * hundred, 100 * hundred + 100), tmp_path, monkeypatch, certain=True)
+    assert states >= 2000
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(30, 90))
+def test_many_scenes_have_the_same_bits(seed, tmp_path, monkeypatch):
+    made, result, _ = holds(seed, tmp_path)
+    if result is not None:
+        has_same_bits(made, result, tmp_path, monkeypatch)
