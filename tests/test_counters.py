@@ -364,6 +364,36 @@ def test_what_is_no_counter_is_refused(counters, sentence):
         run(SPHERE, counters)
 
 
+def test_meshes_and_prisms_are_refused():
+    corners = 0.2 * np.array([[-1.0, -1.0, -1.0], [1.0, -1.0, -1.0], [0.0, 1.0, -1.0], [0.0, 0.0, 1.0]])
+    mesh = swarm.Mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    for counter, name in ((mesh, ""), (swarm.Counter(swarm.Sphere(0.1), inside=mesh), ".inside")):
+        with pytest.raises(swarm.SceneError, match=rf"counters\[0\]{name} must not be of a Mesh, which .*from_mesh"):
+            run(SPHERE, [counter])
+    with pytest.raises(swarm.SceneError, match=r"counters\[0\] must be a surface with two sides, got Prism"):
+        run(SPHERE, [swarm.Prism(TRIANGLE, 0.3)])
+
+
+# Surfaces of other kinds, and particles of a plane.
+TRIANGLE = [(-0.2, -0.2), (0.2, -0.2), (0.0, 0.2)]
+OTHERS = {
+    "foam": (SPHERE, swarm.Spheres([[0.0, 0.0, 0.0], [0.15, 0.0, 0.0]], [0.1, 0.1], side="inside")),
+    "solid union": (SPHERE, swarm.Union([swarm.Sphere(0.1), swarm.Box((0.1,) * 3, (0.1, 0.0, 0.0))], side="outside")),
+    "bored": (SPHERE, swarm.Intersection([swarm.Sphere(0.2), swarm.Cylinder(0.05, side="outside")])),
+    "polygon": (swarm.Scene([swarm.Stadium(0.5, 0.5)], plane="z"), swarm.Polygon(TRIANGLE)),
+    "stadium": (swarm.Scene([swarm.Stadium(0.5, 0.5)], plane="z"), swarm.Stadium(0.3, 0.3)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_surfaces_of_other_kinds(name):
+    scene, surface = OTHERS[name]
+    start, result = run(scene, [surface], 30, 2.0)
+    ((out, back),) = result.observables["crossings"][-1].tolist()
+    assert out + back > 2
+    assert out - back == outside(surface, result.particles.position).sum() - outside(surface, start.position).sum()
+
+
 def test_a_volume_must_be_one():
     with pytest.raises(swarm.SceneError, match=r"inside must be a surface such as swarm.Plane, got 'all'"):
         swarm.Counter(swarm.Sphere(0.1), inside="all")

@@ -15,6 +15,7 @@ from ..particles import CROSSED, Crossed, Particles
 from ..scene import Scene
 from ..surfaces.counted import Counted, Turned, Walled
 from ..surfaces.counter import Counter
+from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many
 from ..surfaces.frames import Framed
 from ..surfaces.images import images_of
@@ -27,7 +28,7 @@ from ..surfaces.shapes.plane import PlaneNumbers
 from ..surfaces.shapes.quadratic import QuadricNumbers
 from ..surfaces.shapes.sphere import SphereNumbers, ball
 from ..surfaces.surface import Surface
-from ..surfaces.union import Union
+from ..surfaces.union import Joined, Union
 from .options import RunOptions
 
 # Of the size of a scene and of a counter, a distance that is round-off: rooms that touch are three times 1e-13 apart.
@@ -97,6 +98,9 @@ def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) ->
 
 
 def _counted(scene: Scene, name: str, counter: Counter) -> Counted:
+    _require_no_mesh(name, counter.surface, "count on")
+    if counter.inside is not None:
+        _require_no_mesh(f"{name}.inside", counter.inside, "use")
     surface = _whole(scene, name, counter.surface)
     near = _NEAR * max(scene.finite_size(), scene.extent(), _finite(surface.extent()))
     volumes = None
@@ -128,6 +132,16 @@ def _box_around(surface: Surface) -> Any:
         low, high = surface.corners()
         return low.min(axis=1), high.max(axis=1)
     return surface.bounds()
+
+
+def _require_no_mesh(name: str, surface: Surface, verb: str) -> None:
+    """Raise a `SceneError` for exact triangles: a kernel does not know how far a place is from these."""
+    parts = surface.surfaces() if isinstance(surface, Joined) else (surface,)
+    if any(isinstance(one, Mesh) for one in parts):
+        raise SceneError(
+            f"{name} must not be of a Mesh, which is known at its triangles only, got {surface!r:.200}; {verb} "
+            "swarm.from_mesh(path, spacing) instead"
+        )
 
 
 def _alone(scene: Scene, name: str, surface: Surface) -> Scene:

@@ -17,7 +17,7 @@ class Counter:
     sphere), 1 is back. A surface by itself is a counter as well: this says where on it crossings count.
 
     Args:
-        surface: any surface at rest without laws, openings and `present`.
+        surface: any surface at rest without laws, openings and `present`, but no `Mesh` and no `Prism`.
         inside: None: all crossings count. Else a volume, a surface as an opening is: those within it do, as at the
             mouth of a tube.
 
