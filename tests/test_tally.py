@@ -106,11 +106,14 @@ def test_a_run_that_is_resumed_counts_on(tmp_path):
     start = swarm.fill(SPHERE, 20, speed=1.0, seed=1)
 
     def ended(**keywords):
-        return swarm.simulate(SPHERE, start, swarm.Impact(), until=2.0, every=0.5, **more | keywords)
+        return swarm.simulate(SPHERE, start, swarm.Impact(), **{"until": 2.0, "every": 0.5} | more | keywords)
 
     with pytest.raises(swarm.SceneError, match="its member_impacts is True, got False"):
         ended(trajectory=path, resume=True, member_impacts=False)
     require_same(ended(trajectory=path, resume=True), ended())
+    # Also where it goes on for longer.
+    stopped_at(tmp_path / "longer.h5", 2, **more)
+    require_same(ended(trajectory=tmp_path / "longer.h5", resume=True, until=5.0), ended(until=5.0))
 
 
 def test_without_it_there_is_none():

@@ -145,7 +145,7 @@ class Task:
     """A run, checked; the particles are its own copy. Of bodies they are all points.
 
     Of a shard of a run `start` is a digest of all particles of that run, `first` the number of the first particle, or
-    body, of the shard, and `heat_unit` that of the whole run (`tally.heat_unit`).
+    body, of the shard, and `scales` those of the whole run (`tally.scales_of`).
     """
 
     scene: Scene
@@ -155,7 +155,7 @@ class Task:
     bodies: Bodies | None = None
     first: int = 0
     start: str = ""
-    heat_unit: float | None = None
+    scales: tuple[float, float] | None = None
 
     @property
     def is_shard(self) -> bool:

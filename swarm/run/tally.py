@@ -87,7 +87,6 @@ class Tally:
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Go on from the arrays of a checkpoint."""
-        # A run that goes on may have got another end.
         self._units = Units(**{name: float(arrays[f"member_{name}_unit"][0]) for name in self._summed()})
         self._counts = {}
         mine = self.counts()
@@ -131,26 +130,31 @@ def tally_of(task: Task) -> Tally | None:
 
 def units_of(task: Task) -> Units:
     """The units of the sums of a run."""
-    laws = task.scene.laws()
+    laws, (time, heat) = task.scene.laws(), task.scales or scales_of(task)
     are_alone = task.bodies is None and not task.scene.reacts()
     return Units(
-        _power_of_two(task.options.until) if are_alone and task.method.may_slide() else None,
-        (task.heat_unit or heat_unit(task)) if are_alone and laws is not None and laws.give_heat else None,
+        time if are_alone and task.method.may_slide() else None,
+        heat if are_alone and laws is not None and laws.give_heat else None,
     )
 
 
-def heat_unit(task: Task) -> float:
-    """The unit of heat of a run: by the energy of its particles, or that of its hottest wall if that is more."""
+def scales_of(task: Task) -> tuple[float, float]:
+    """The units of times and of heat of a run, which do not depend on its end: by the start, and its hottest wall.
+
+    A time is large if a particle crosses the scene in it, heat if it is the energy of a particle.
+    """
     v, mass, gravity = task.particles.velocity, task.particles.mass, task.scene.gravity or (0.0, 0.0, 0.0)
+    size = task.scene.finite_size()
     mean = float((0.5 * mass * (v * v).sum(axis=0)).mean())
-    fall = float(mass.mean()) * math.hypot(*gravity) * task.scene.finite_size()
+    fall = float(mass.mean()) * math.hypot(*gravity) * size
     hot = [
         float(value)
         for piece in task.scene.pieces
         for one in (piece, *piece.laws)
         if (value := getattr(one, "temperature", None)) is not None
     ]
-    return _power_of_two(max(mean, fall, *hot, 0.0) or 1.0)
+    energy = max(mean, fall, *hot, 0.0) or 1.0
+    return _power_of_two(size * math.sqrt(0.5 * float(mass.mean()) / energy)), _power_of_two(energy)
 
 
 def _power_of_two(large: float) -> float:

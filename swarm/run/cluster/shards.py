@@ -28,7 +28,7 @@ from ...particles import Absorbed, Births, Multipliers, Particles
 from ...scene import Scene
 from ..machine import End, birth_times
 from ..options import RunOptions, Task
-from ..tally import heat_unit
+from ..tally import scales_of
 
 _SUFFIX = ".shards"
 _ARRAYS = ("position", "velocity", "mass", "image")
@@ -44,7 +44,7 @@ class Whole(NamedTuple):
     body: Body | None
     bounds: list[int]  # shard k has the particles, or bodies, from bounds[k] to bounds[k + 1]
     start: str
-    heat_unit: float
+    scales: tuple[float, float]
 
 
 def folder_of(trajectory: Path) -> Path:
@@ -84,7 +84,7 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
         cloudpickle.register_pickle_by_value(sys.modules[name])
     body = None if task.bodies is None else task.bodies.body
     options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None, observables=None)
-    whole = Whole(task.scene, task.method, options, body, bounds, start, heat_unit(task))
+    whole = Whole(task.scene, task.method, options, body, bounds, start, scales_of(task))
     _replace(folder / "whole.pickle", lambda file: cloudpickle.dump(whole, file))
     for name in _ARRAYS:
         array = getattr(task.particles, name)
@@ -166,7 +166,7 @@ def task_of(folder: Path, k: int) -> tuple[Task, int]:
         bodies = Bodies.unchecked(whole.body, position, velocity)
         particles = bodies.particles()
     options = dataclasses.replace(whole.options, trajectory=file_of(folder, k))
-    of_all = whole.start, whole.heat_unit
+    of_all = whole.start, whole.scales
     return Task(whole.scene, particles, whole.method, options, bodies, first, *of_all), len(whole.bounds) - 1
 
 
