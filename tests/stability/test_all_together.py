@@ -41,6 +41,8 @@ REFUSED = (
     "must come where nobody is",
     "wait where walls move",
 )
+# A cone has a tip, into which particles slide: there a run may end with this sentence.
+TIP = "meets its walls without end, as in a cusp"
 
 
 class Damped(swarm.WallLaw):
@@ -202,7 +204,8 @@ def holds(seed, folder, certain=False):
     try:
         result = run(made, trajectory=path)
     except (swarm.SceneError, swarm.RunError) as refused:
-        if any(sentence in str(refused) for sentence in REFUSED):
+        in_tip = TIP in str(refused) and isinstance(made[0].surfaces[0], swarm.Cone)
+        if in_tip or any(sentence in str(refused) for sentence in REFUSED):
             return made, None, 0
         raise
     with swarm.load(path) as trajectory:
