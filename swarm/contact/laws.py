@@ -13,6 +13,8 @@ from ..surfaces.wall_law import leave_of, may_end, mirrored
 
 # The square of the part of speeds before and after that is none into the wall.
 _ROUND_OFF = 1e-30
+# Of |v|^2, the change by a law that is round-off of it or of the normal.
+KEPT = 1e-12
 
 
 class Laws(Record):
@@ -127,6 +129,7 @@ class Owned(Record):
     def leave(self, wall, v, n, u, random, mass):
         """`Ended` after all laws: each takes what a mirror would turn into what the one before sends."""
         stays, wait, lost, is_right = True, 0.0, 0.0, True
+        first, heat = square(v - u), 0.0
         for k, law in enumerate(self.laws_of(wall)):
             v = v if k == 0 else mirrored(v, n, u)
             left = leave_of(law.leave(v, n, u, random.of_law(k), mass))
@@ -135,17 +138,22 @@ class Owned(Record):
             wait = left.wait if k == 0 else left.wait + wait
             if law.book == "dissipated":
                 lost = square(before) - square(after) + lost
+            else:
+                heat = abs(square(before) - square(after)) + heat
             # False for NaN.
             away, speed2 = dot(after, n), square(before) + square(after)
             is_right = (((away >= 0.0) | (away * away <= _ROUND_OFF * speed2)) & (speed2 < math.inf)) & is_right
             v = left.v
+        if any(law.book == "dissipated" for law in self.each[0].laws):
+            # What the others change is round-off: then all of it is lost.
+            lost = select(heat <= KEPT * first, math.inf, lost)
         return Ended(v, stays, wait, lost, is_right & (wait >= 0.0))
 
 
 class Ended(Record):
     """The end of an impact by the laws of a wall: `Leave`, what they dissipate, and whether all velocities are right.
 
-    `lost` is twice the energy per mass, relative to the wall.
+    `lost` is twice the energy per mass, relative to the wall; without end where that is all the change there is.
     """
 
     v: Any

@@ -6,11 +6,11 @@ from ..kernel.jit import select
 from ..kernel.random import flux_maxwellian, uniforms
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, either, square
+from .laws import KEPT
 from .reflection import from_relative, given, relative, wall_velocity
 
-# Of |v|^2, the change by a law that is round-off of it or of the normal; and how far a velocity may be from the energy
-# that is kept for it.
-_ROUND_OFF, _NEAR = 1e-12, 0.1
+# How far |v|^2 may be, in parts of it, from the energy that is kept for it.
+_NEAR = 0.1
 _NORMAL = Vec(0.0, 0.0, 1.0)
 
 
@@ -103,7 +103,7 @@ def _by_law(laws, one, wall, at, arriving, random, acts):
         is_right = is_right & ((ended.wait == 0.0) | (not ended.stays))
     stays, wait = ended.stays, select(is_right & (not ended.wait < 0.0), ended.wait, 0.0)
     speed2 = square(before)
-    keeps = abs(square(after) - speed2) <= _ROUND_OFF * speed2
+    keeps = abs(square(after) - speed2) <= KEPT * speed2
     lost = math.inf if one.dissipates else select(keeps, 0.0, ended.lost)
     after = either(is_right, after, Vec(math.nan, math.nan, math.nan))
     if stays is not True:
