@@ -232,7 +232,8 @@ def summed(
     totals = np.add.reduce(np.ascontiguousarray(sums), axis=1)
     kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
     lost, lasted = totals[_ENERGY_ERROR : _ENERGY_ERROR + 2].tolist()
-    walls, crossed = np.split(totals[_ENERGY_ERROR + 2 :], [len(totals) - _ENERGY_ERROR - 2 - _COUNTED * counters])
+    last = len(totals) - _COUNTED * counters
+    walls, crossed = totals[_ENERGY_ERROR + 2 : last], totals[last:]
     pushed, heat = walls[:booked], walls[booked:]
     # The work of walls that move is booked behind their impulses.
     moves = {} if booked == len(owners) else {"wall_work": np.bincount(owners, weights=pushed[len(owners) :])}

@@ -15,7 +15,7 @@ from .. import interrupt
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
 from ..particles import Absorbed, Multipliers, Particles
-from ..snapshot import Read, Snapshot
+from ..snapshot import NOTHING, Read, Snapshot
 from .base import BaseRun
 from .bodies import BodyRun
 from .compiling import Compilations
@@ -107,7 +107,7 @@ def carry_out_task(task: Task, session: Session) -> End:
                 }
                 run.require_admissible(seen, moment)
                 read = functools.partial(getattr, run.state)
-                seen |= measures.of(number, moment, _snapshot_of(task, read, moment))
+                seen |= _measured(task, measures, number, read, moment)
                 # Those of a shard are joined to those of the others.
                 if task.is_shard:
                     seen[CHUNK_SUMS] = run.chunk_sums()
@@ -116,7 +116,7 @@ def carry_out_task(task: Task, session: Session) -> End:
                 if log is not None:
                     log.ends[number] = log.total
                 write(number, moment, run.state, seen)
-                shown = _snapshot_of(task, read, moment, copies=True)
+                shown = _snapshot_of(task, read, moment, True) if callable(task.options.progress) else NOTHING
                 show.frame(Frame(number, moment, until, seen, writer.written if writer else 0, shown))
                 shown.end()
                 if moment < until:
@@ -151,6 +151,11 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
         compilations.calls = run.calls
         session.restore(run)
         yield run, writer_of(task, session, recorder, watched.log), show, watched, measures
+
+
+def _measured(task: Task, measures: Measures, number: int, read: Read, moment: float) -> dict[str, Any]:
+    """The observables of one's own of a frame."""
+    return measures.of(number, moment, _snapshot_of(task, read, moment)) if measures else {}
 
 
 def _measures_of(task: Task, session: Session) -> Measures:
