@@ -5,8 +5,9 @@ from numpy.typing import ArrayLike
 
 from . import checks
 from .errors import SceneError
-from .particles import Floats, Particles
+from .particles import Particles
 from .scene import Scene
+from .state import Floats
 
 _BATCH = 1 << 18
 # The search ends after this many points if fewer than one in a million was admissible.

@@ -13,9 +13,9 @@ from .kernel.arrays import scratch
 from .kernel.gravity import potential
 from .kernel.jit import kernel, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
-from .particles import CROSSED, Floats, State, is_gone
 from .pieces import PartsOfRows
 from .scene import Scene
+from .state import CROSSED, Floats, State, is_gone
 from .surfaces import flights
 from .surfaces.depth import penetration
 

@@ -1,6 +1,5 @@
 """Particles: arrays with one row per component."""
 
-import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import checks, notebook
 from .columns import read_columns
 from .errors import SceneError
-
-Floats = NDArray[np.float64]
+from .state import Floats
 
 _COLUMNS = ("x", "y", "z", "vx", "vy", "vz")
 
@@ -127,137 +125,6 @@ class Births(NamedTuple):
     def there(self, moment: float) -> int:
         """The number of those, the first ones, that are there at a time [s]."""
         return int(np.searchsorted(self.time, moment, side="right"))
-
-
-class Multipliers(NamedTuple):
-    """Statistics of each particle's Uzawa loops since the start, from methods with multipliers.
-
-    Attributes:
-        sweeps: (N,) sweeps of all its contact steps together.
-        contacts: (N,) contact steps.
-        unconverged: (N,) contact steps whose loop did not reach the tolerance.
-        stored_energy: (N,) the largest V that a loop left [J].
-        remaining: (N,) the rest of the frame, in the method's unit, where a loop failed.
-    """
-
-    sweeps: NDArray[np.int64]
-    contacts: NDArray[np.int64]
-    unconverged: NDArray[np.int64]
-    stored_energy: Floats
-    remaining: Floats
-
-
-class Contacts(NamedTuple):
-    """The lasting contacts of each particle, of methods in which a particle may slide.
-
-    Attributes:
-        phase: (N,) int8, how it begins the next frame: in flight, along one wall or two, or at rest (ARRIVED).
-        walls: (2, N) the walls that hold it, as numbers; -1 for none. Two are an edge.
-        met: (N,) the wall at which it is to be decided what becomes of it.
-        step: (N,) its next sliding step [s]; 0 where the walls decide.
-        keep: (N,) the speed across its walls that it has again when it leaves them [m/s].
-        remaining: (N,) what is left of the frame where it goes from flight to contact or back [s]; 0 at its ends.
-        events: (2, N) what was left when it met a wall last, and how often it has met one since without moving on.
-        short_steps: (N,) of this frame, where several walls hold it or a cusp.
-        load: (walls, N) what each wall carries of it at rest, per mass [m/s^2].
-        sliding: (N,) how long it has slid, or rested, since the start [s].
-    """
-
-    phase: NDArray[np.int8]
-    walls: Floats
-    met: Floats
-    step: Floats
-    keep: Floats
-    remaining: Floats
-    events: Floats
-    short_steps: Floats
-    load: Floats
-    sliding: Floats
-
-
-class Absorbed(NamedTuple):
-    """The particles that walls have absorbed.
-
-    Attributes:
-        time: (N,) when each was [s], NaN of those that are not.
-        wall: (N,) int32, the number of that wall in the scene; -1 of those that are not.
-    """
-
-    time: Floats
-    wall: NDArray[np.int32]
-
-
-# What is summed up of the crossings of a counter: three components of the momentum, the energy, the slowness.
-CROSSED = 5
-
-
-class Crossed(NamedTuple):
-    """The crossings of counters by each particle since the start.
-
-    Attributes:
-        side: (counters, N) int8, 1 where it is out of the admissible side of a counter.
-        number: (2 counters, N) crossings of each counter, out of that side and back.
-        sums: (10 counters, N) of these the momentum [kg m/s], the kinetic energy [J], and the slowness 1/|v_n| [s/m].
-    """
-
-    side: NDArray[np.int8]
-    number: NDArray[np.int64]
-    sums: Floats
-
-
-class State(NamedTuple):
-    """The arrays that kernels advance.
-
-    Energies are per mass, so that the mass of a particle does not change the bits of its flight.
-    """
-
-    position: Floats  # (3, N)
-    velocity: Floats  # (3, N)
-    mass: Floats  # (N,)
-    energy: Floats  # (N,) total energy per mass [J/kg]: that of the start, less what was dissipated
-    inverse_scale: Floats  # (N,) 1/energy scale per mass, what energy errors are relative to
-    impacts: NDArray[np.int64]  # (N,) since the start
-    impulse: Floats  # (walls, N) normal impulse since the start [N s], then (walls, N) the work of walls that move [J]
-    dissipated: Floats  # (N,) energy lost since the start [J]; empty if no wall dissipates
-    multipliers: Multipliers | None
-    contacts: Contacts | None = None
-    heat: Floats | None = None  # (walls, N) energy that thermal walls gave since the start [J]; None without
-    # Where the scene repeats: the energy is that of the position in the cell, and changes with the image.
-    image: NDArray[np.int64] | None = None  # (3, N) how many cells away it is
-    carry: Floats | None = None  # (N,) what is lost of the energy by round-off at these changes
-    period: Any = None  # `Period` of the cell
-    # Where a wall has openings:
-    escape_time: Floats | None = None  # (N,) when each has passed one [s], NaN of those that are inside
-    openings: Any = None  # None, or each `Opening` of the walls
-    # Where particles come during the run, or wait on a wall:
-    starts: Floats | None = None  # (N,) the time from which each flies [s]
-    # Where a wall may absorb any, as in `Absorbed`:
-    absorbed_time: Floats | None = None
-    absorbed_wall: NDArray[np.int32] | None = None
-
-    crossed: Crossed | None = None  # where there are counters
-
-    @property
-    def absorbed(self) -> Any:
-        """`Absorbed`, or None where no wall absorbs any."""
-        time, wall = self.absorbed_time, self.absorbed_wall
-        return None if time is None or wall is None else Absorbed(time, wall)
-
-    def gone(self) -> NDArray[np.bool_]:
-        """(N,) whether each has escaped or was absorbed: where it is then it stays, whatever the walls do."""
-        found = np.zeros(self.mass.size, np.bool_)
-        for time in (self.escape_time, self.absorbed_time):
-            if time is not None:
-                found |= ~np.isnan(time[: found.size])
-        return found
-
-
-def is_gone(state, i):
-    """Whether particle i has passed an opening, or was absorbed, and is no more among the walls."""
-    escaped = False if state.escape_time is None else not math.isnan(state.escape_time[i])
-    if state.absorbed is None:
-        return escaped
-    return (not math.isnan(state.absorbed.time[i])) | escaped
 
 
 def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple[Floats, Floats, Floats]:

@@ -650,7 +650,7 @@ LAYERS = [
     ["snapshot"],
     ["checks", "columns", "notebook"],
     ["extras"],
-    ["status", "errors", "version", "interrupt"],
+    ["state", "status", "errors", "version", "interrupt"],
 ]
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 

@@ -8,7 +8,7 @@ import swarm
 from swarm import observables
 from swarm.contact import events
 from swarm.contact.regularisation import regularisation
-from swarm.particles import Contacts, State
+from swarm.state import Contacts, State
 
 # Not a whole number of chunks, nor of the columns of a chunk.
 N = observables.CHUNK + 301

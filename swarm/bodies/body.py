@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from .. import checks
 from ..errors import SceneError
 from ..motion import Motion
-from ..particles import Floats
+from ..state import Floats
 from ..surfaces.surface import Surface
 from . import checked, holding, room, tied
 from .checked import Pairs, Spring

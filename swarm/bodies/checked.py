@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import checks
 from ..errors import SceneError
-from ..particles import Floats
+from ..state import Floats
 from . import room
 
 Pairs = NDArray[np.int64]

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ..particles import Floats
+from ..state import Floats
 from . import room
 from .body import Body
 from .checked import Pairs

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from .. import checks
 from ..errors import SceneError
-from ..particles import Floats
+from ..state import Floats
 from . import checked, room
 from .body import Body, Strain
 from .checked import Pairs

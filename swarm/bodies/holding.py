@@ -8,7 +8,7 @@ import numpy as np
 from .. import checks
 from ..errors import SceneError
 from ..motion import Motion
-from ..particles import Floats
+from ..state import Floats
 from ..surfaces.fields.many import Many
 from ..surfaces.surface import SIDES, Surface
 from .checked import each, point

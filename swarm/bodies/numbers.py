@@ -9,8 +9,8 @@ from ..lanes.bodies.contacts import MOST_CONTACTS
 from ..lanes.bodies.penalty_contact import Soft
 from ..methods import AugmentedLagrangian
 from ..methods.base import Method
-from ..particles import Floats
 from ..scene import Scene
+from ..state import Floats
 from ..surfaces.surface import Surface
 from .body import Body
 from .checked import Pairs

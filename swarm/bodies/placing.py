@@ -5,8 +5,8 @@ import numpy as np
 from .. import checks
 from ..errors import SceneError
 from ..filling import bounding_box
-from ..particles import Floats
 from ..scene import Scene
+from ..state import Floats
 from .body import Body
 from .state import Bodies
 

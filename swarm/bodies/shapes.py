@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from .. import checks
 from ..errors import SceneError
-from ..particles import Floats
+from ..state import Floats
 from . import checked, covering, room
 from .body import Body
 from .checked import Pairs

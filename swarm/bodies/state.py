@@ -5,7 +5,8 @@ from numpy.typing import ArrayLike
 
 from .. import checks
 from ..errors import SceneError
-from ..particles import Floats, Particles
+from ..particles import Particles
+from ..state import Floats
 from . import checked, holding, velocities
 from .body import Body
 from .checked import Pairs

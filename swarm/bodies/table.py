@@ -16,8 +16,8 @@ from ..checks import Vector
 from ..errors import SceneError
 from ..motion import Oscillation, Rotation, Translation
 from ..motion import table_of as motion_table
-from ..particles import Floats
 from ..scene import Scene
+from ..state import Floats
 from ..surfaces import ALL_SURFACES
 from . import room, shapes
 from .body import Body, Strain

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..motion import Led, Motion, led
-from ..particles import Floats
+from ..state import Floats
 from ..surfaces.surface import Surface
 from .checked import Pairs, modes_unless_above
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..motion import led
-from ..particles import Floats
+from ..state import Floats
 from .body import Body
 from .tied import Tie, ties
 

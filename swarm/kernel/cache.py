@@ -38,7 +38,7 @@ SOURCES = (
     "lanes",
     "reacting",
     "observables.py",
-    "particles.py",
+    "state.py",
     "status.py",
 )
 

@@ -195,7 +195,7 @@ class Place(Record):
 class Share(NamedTuple):
     """The part of a frame that one thread advances."""
 
-    state: Any  # `particles.State`
+    state: Any  # `state.State`
     phase: Array  # (N,) int8, who flies, slides on one wall or on two, or has arrived
     pending: Array  # (PHASES,) int64, how many particles are left to other kernels, by their phase
     halted: Halted

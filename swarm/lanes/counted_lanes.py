@@ -7,7 +7,7 @@ from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, either, square
-from ..particles import CROSSED
+from ..state import CROSSED
 from ..surfaces.counted import slowness
 from .table import Lane, Rows, marked_lanes
 

@@ -15,7 +15,7 @@ from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, norm
-from ..particles import CROSSED
+from ..state import CROSSED
 from ..surfaces.axes import pulls
 from ..surfaces.counted import Turned
 from ..surfaces.period import has_left, into

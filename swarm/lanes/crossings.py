@@ -8,7 +8,7 @@ from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, absolute, norm, square, total
-from ..particles import CROSSED
+from ..state import CROSSED
 from ..surfaces.axes import length_of, time_out
 from ..surfaces.counted import slowness
 

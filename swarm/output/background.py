@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..particles import State
+from ..state import State
 from .layout import KEPT
 from .writer import WriteFrames, Written
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from .. import observables
 from ..errors import SceneError
 from ..methods.base import Method
-from ..particles import Floats, Particles
+from ..particles import Particles
 from ..scene import Scene
+from ..state import Floats
 
 Colours = NDArray[np.uint32]
 Values = Callable[[Floats, Floats], Floats]

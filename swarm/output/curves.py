@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..particles import Floats
+from ..state import Floats
 
 Indices = NDArray[np.int64]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
-from ..particles import Floats
+from ..state import Floats
 
 Indices = NDArray[np.int64]
 Level = Callable[[Floats], Floats]

@@ -13,8 +13,8 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import ArrayLike
 
-from ..particles import Floats
 from ..plane import along, shown_as
+from ..state import Floats
 from . import colours, series
 from .colours import Colours
 

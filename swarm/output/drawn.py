@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from ..bodies.body import Body
 from ..bodies.checked import Pairs
-from ..particles import Floats, Particles, State
+from ..particles import Particles
+from ..state import Floats, State
 from .colours import Colours, Scale, Values
 
 # Triangles whose normals differ by less lie in one face of a polyhedron, without a line between them.

@@ -16,8 +16,8 @@ from PIL import Image
 
 from .. import checks
 from ..errors import FileError, SceneError
-from ..particles import Floats
 from ..plane import shown_as
+from ..state import Floats
 from . import colours, drawing, paths
 from .drawn import Drawn
 from .shapes import Shape, shapes_of, since_start

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..particles import Floats
+from ..state import Floats
 from ..surfaces import Torus
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from ..motion import Pose
-from ..particles import Floats
 from ..scene import Scene
+from ..state import Floats
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
 from ..surfaces.openings import are_open

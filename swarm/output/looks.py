@@ -6,8 +6,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from ..particles import Floats
 from ..plane import across_of, along
+from ..state import Floats
 from . import series
 from .colours import BACKGROUND, Scale
 from .drawn import Drawn

@@ -3,8 +3,9 @@
 import numpy as np
 
 from ..errors import SceneError
-from ..particles import Floats, Particles
+from ..particles import Particles
 from ..scene import Scene
+from ..state import Floats
 
 # Of the width of a scene, how far from 0 it may be: float32 rounds positions to 4e-6 of the width there.
 _FAR = 64.0

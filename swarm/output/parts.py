@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..particles import Floats
 from ..scene import Scene
+from ..state import Floats
 from ..surfaces.fields.many import Many
 from ..surfaces.instant import box_of, side_of
 from ..surfaces.openings import sign_of

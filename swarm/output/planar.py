@@ -5,9 +5,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion import Pose, pose
-from ..particles import Floats
 from ..plane import along
 from ..scene import Scene
+from ..state import Floats
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
 from ..surfaces.instant import box_of

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from ..errors import FileError, SceneError
-from ..particles import Floats
+from ..state import Floats
 from . import paths
 from .sources import DAMAGE, DamagedError, reason, require_file
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..bodies.body import Body
 from ..methods import Method
-from ..particles import Floats
 from ..scene import Scene
+from ..state import Floats
 from ..surfaces.surface import Surface
 from ..surfaces.union import part_at
 from .named import name_of

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion import WallMotion, pose
-from ..particles import Floats
 from ..scene import Scene
+from ..state import Floats
 from ..surfaces import Spheres
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many

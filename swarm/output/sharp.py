@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..kernel.vector import vec
 from ..motion import Pose, pose
-from ..particles import Floats
+from ..state import Floats
 from ..surfaces import Torus
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.outlines.outlined import Outlined

@@ -11,8 +11,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from .. import tables
 from ..methods import Method
-from ..particles import Particles, State
+from ..particles import Particles
 from ..scene import Scene
+from ..state import State
 from ..version import VERSION
 from . import paths
 from .appended import AppendedFile, put

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..methods.base import Method
-from ..particles import State
 from ..scene import Scene
+from ..state import State
 from . import failures
 from .tiers import Tier
 from .watch import Watch

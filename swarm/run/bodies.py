@@ -16,8 +16,9 @@ from ..lanes.bodies.arrays import BodyState, Rule
 from ..lanes.bodies.contacts import MOST_CONTACTS
 from ..methods.base import Method
 from ..observables import CHUNK
-from ..particles import Floats, Particles, State
+from ..particles import Particles
 from ..scene import Scene
+from ..state import Floats, State
 from ..status import Status
 from .base import Arrays, BaseRun
 from .energies import Energies, summed

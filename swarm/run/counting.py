@@ -11,8 +11,9 @@ from ..kernel.vector import vec
 from ..lanes.counters import Counters
 from ..methods import Impact
 from ..methods.base import Method
-from ..particles import CROSSED, Crossed, Particles
+from ..particles import Particles
 from ..scene import Scene
+from ..state import CROSSED, Crossed
 from ..surfaces.counted import Counted, Turned, Walled
 from ..surfaces.counter import Counter
 from ..surfaces.facets.mesh import Mesh

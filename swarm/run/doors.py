@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..contact.events import ARRIVED, CAREFUL, EDGE, FLYING, HELD
 from ..errors import RunError
-from ..particles import Contacts
+from ..state import Contacts
 from .base import Arrays
 from .engine import Run
 from .failures import sentence_of_coming

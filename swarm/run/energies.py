@@ -10,8 +10,8 @@ from ..bodies.numbers import led_points
 from ..contact.energy import contact_energy
 from ..kernel.vector import column
 from ..lanes.bodies.arrays import Ties
-from ..particles import Floats
 from ..scene import Scene
+from ..state import Floats
 
 
 class Energies:

@@ -20,8 +20,9 @@ from ..lanes import contact_events, slide, sliding, table
 from ..lanes import log as impact_log
 from ..lanes.sending import Sending
 from ..methods.base import Method
-from ..particles import Contacts, Crossed, Multipliers, Particles, State
+from ..particles import Particles
 from ..scene import Scene
+from ..state import Contacts, Crossed, Multipliers, State
 from ..status import Status
 from . import failures
 from .base import Arrays, BaseRun, result_of

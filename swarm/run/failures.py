@@ -9,8 +9,8 @@ from ..errors import RunError
 from ..kernel.random import Stream
 from ..kernel.vector import ZERO, column
 from ..methods.base import Method
-from ..particles import State
 from ..scene import Scene
+from ..state import State
 from ..status import Status
 from ..surfaces.wall_law import leave_of, mirrored, said_of, why_wrong
 from .state import Seeding

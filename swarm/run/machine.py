@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from .. import interrupt
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
-from ..particles import Absorbed, Multipliers, Particles
+from ..particles import Particles
 from ..snapshot import NOTHING, Read, Snapshot
+from ..state import Absorbed, Multipliers
 from .base import BaseRun
 from .bodies import BodyRun
 from .compiling import Compilations

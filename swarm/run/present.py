@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..observables import CHUNK, add_up
-from ..particles import Births, Floats, State
+from ..particles import Births
+from ..state import Floats, State
 
 
 class Present:

@@ -15,11 +15,12 @@ from ..kernel.gravity import potential
 from ..kernel.heap import Heap
 from ..kernel.vector import vec
 from ..methods.base import Method
-from ..particles import Particles, State
+from ..particles import Particles
 from ..reacting import queue as events
 from ..reacting.described import freedoms_of, observed, scenery_of, walls_now
 from ..reacting.queue import CLOCK, NOW, TAKEN, Queue, Rule
 from ..scene import Scene
+from ..state import State
 from ..status import Status
 from . import failures
 from .base import Arrays, BaseRun

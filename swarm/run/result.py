@@ -14,8 +14,9 @@ from ..errors import SceneError
 from ..extras import needed_by
 from ..methods.base import Method
 from ..output import facts
-from ..particles import Multipliers, Particles
+from ..particles import Particles
 from ..scene import Scene
+from ..state import Multipliers
 
 if TYPE_CHECKING:
     import pandas

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from ..contact.events import ARRIVED, FLYING
 from ..methods.base import Method
-from ..particles import Contacts, Floats, Multipliers, Particles, State
+from ..particles import Particles
 from ..scene import Scene
+from ..state import Contacts, Floats, Multipliers, State
 
 
 class Seeding(NamedTuple):

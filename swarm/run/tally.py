@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..lanes.counts import PARTS, Counts, Sums
-from ..particles import Absorbed
+from ..state import Absorbed
 from ..surfaces.counter import Counter
 from .impacts import Impacts
 from .options import Task

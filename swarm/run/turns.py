@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from ..contact.events import ARRIVED, FLYING
 from ..lanes.arrays import Draws, Halted
-from ..particles import Contacts
+from ..state import Contacts
 from ..status import Status
 from .watch import Watch
 

@@ -7,7 +7,7 @@ import pytest
 
 from swarm.output import background
 from swarm.output.background import Background
-from swarm.particles import State
+from swarm.state import State
 
 
 class Writer:

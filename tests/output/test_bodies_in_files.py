@@ -15,7 +15,7 @@ from swarm.bodies.elastic import block
 from swarm.output import checkpoint, colours, drawing, playback, plots, recording, series, sheet, writer
 from swarm.output.drawn import Drawn
 from swarm.output.storage import Storage
-from swarm.particles import State
+from swarm.state import State
 
 BOX = swarm.Scene([swarm.Box((0.5, 0.5, 0.5))], gravity=(0.0, 0.0, -1.0))
 METHOD = swarm.Impact()

@@ -11,7 +11,7 @@ from conftest import files_limited_to
 import swarm
 from swarm.output import appended, superblock, writer
 from swarm.output.storage import Storage
-from swarm.particles import State
+from swarm.state import State
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 N = 3

@@ -24,8 +24,9 @@ from ...errors import SceneError
 from ...methods.base import Method
 from ...observables import CHUNK
 from ...output import paths
-from ...particles import Absorbed, Births, Multipliers, Particles
+from ...particles import Births, Particles
 from ...scene import Scene
+from ...state import Absorbed, Multipliers
 from ..machine import End, birth_times
 from ..options import RunOptions, Task
 from ..tally import scales_of
