@@ -252,7 +252,8 @@ def test_the_laws_of_the_example_book_what_they_take():
     seen, stuck = found.observables, np.isfinite(found.absorbed_time)
     assert 0 < seen["absorbed"][-1, 0] == np.count_nonzero(stuck) < 30
     assert seen["dissipated_energy"][-1] > 0.0
-    assert not seen["wall_heat"].any()
+    # A mirror gives round-off.
+    assert np.abs(seen["wall_heat"]).max() < 1e-13 * seen["dissipated_energy"][-1]
     assert np.abs(balance(found) / balance(found)[0] - 1.0).max() < 1e-13
 
 
