@@ -2,10 +2,10 @@
 
 import pytest
 
-from swarm.lanes import block, contact_events, slide
+from swarm.lanes import block, careful, contact_events, slide
 
 # What counts: a pass over lanes that fly or that slide, a decision at a wall, a short step.
-_COUNTED = ((block, "_pass"), (slide, "compose"), (contact_events, "_decide"), (contact_events, "_step"))
+_COUNTED = ((block, "_pass"), (slide, "compose"), (contact_events, "_decide"), (careful, "_step"))
 
 
 def bounded(monkeypatch: pytest.MonkeyPatch, most: int) -> list[int]:

@@ -12,7 +12,7 @@ from children import python
 
 import swarm
 from swarm.contact.events import CAREFUL, EVENT
-from swarm.lanes import block, contact_events, slide
+from swarm.lanes import block, careful, contact_events, slide
 from swarm.lanes.table import LANES
 from swarm.reacting import queue
 from swarm.run import reacting, turns
@@ -53,8 +53,8 @@ def test_turns_between_kernels_without_time_are_bounded(monkeypatch, every):
         return in_turn(*about)
 
     monkeypatch.setattr(contact_events, "_decide", decide)
-    monkeypatch.setattr(contact_events, "_step", in_turn)
-    monkeypatch.setattr(contact_events, "return_particle", lambda *about: None)
+    monkeypatch.setattr(careful, "_step", in_turn)
+    monkeypatch.setattr(careful, "return_particle", lambda *about: None)
     where = r"at \(0\.2, 0, 0\) m, at surfaces\[0\] \(Plane\) at 0(\.\d+|e-\d+)? s"
     with pytest.raises(swarm.RunError, match=rf"failed at particle 1: .*{NOWHERE}; it is {where}"):
         run_in_plain_python(FLOOR, TWO, **({} if every is None else {"every": every}))
@@ -66,7 +66,7 @@ def test_a_flight_that_gets_nowhere_is_bounded(monkeypatch):
 
     def nothing(*about):
         passes.append(1)
-        return False, False
+        return False, False, False
 
     monkeypatch.setattr(block, "_pass", nothing)
     with pytest.raises(swarm.RunError, match=rf"failed at particle 0: .*{NOWHERE}; it is at \(0, 0, 1\) m.* at 0 s"):
@@ -131,7 +131,7 @@ ALL_END = "WallTimeError True\nKeyboardInterrupt True\nKeyboardInterrupt True\n"
 # Turns between kernels without end.
 IN_TURN = """
 from swarm.contact.events import CAREFUL, EVENT
-from swarm.lanes import contact_events
+from swarm.lanes import careful, contact_events
 from swarm.run import turns
 turns.MOST = 10**12
 
@@ -151,8 +151,8 @@ tier, every = {tier!r}, {every!r}
 if tier == "always":
     contact_events.meet_block = again  # of all kernels only this one is not compiled
 else:
-    contact_events._decide = contact_events._step = in_turn
-    contact_events.return_particle = lambda *about: None
+    contact_events._decide = careful._step = in_turn
+    careful.return_particle = lambda *about: None
 # It chatters for 0.04 s first.
 scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, restitution=0.5)], (0.0, 0.0, -9.81))
 start = swarm.Particles([0.0, 0.0, 1e-3], [1.0, 0.0, 0.0])

@@ -10,7 +10,7 @@ from test_sessions import require_resumed_is_whole
 
 import swarm
 from swarm.contact.events import ARRIVED, CAREFUL
-from swarm.lanes import contact_events
+from swarm.lanes import careful
 from swarm.run.engine import Run
 
 HOLE = swarm.Sphere(0.05, center=(0.0, 0.0, 0.5))
@@ -139,7 +139,7 @@ def test_what_several_walls_hold_leaves_where_one_of_them_is_open():
         held.state.contacts.remaining[:], held.state.contacts.met[:] = 0.75, 0.0
         with np.errstate(all="ignore"):
             for p in (0, 1):
-                contact_events._step(held._numbers, held._walls, held._gravity, share, p)
+                careful._step(held._numbers, held._walls, held._gravity, share, p)
         assert held.state.escape_time[0] == 2.25
         assert np.isnan(held.state.escape_time[1])
         assert share.phase[0] == ARRIVED

@@ -4,33 +4,27 @@ import math
 
 import numpy as np
 
-from ..contact import crossing, events, touching
-from ..contact.doorways import leads_on, lets_through, through
-from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, FLYING, HELD
+from ..contact import crossing, events
+from ..contact.doorways import leads_on, lets_through
+from ..contact.events import CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.hold import One, Two, drift
-from ..contact.passing import hit_wall, open_wall_at
+from ..contact.passing import hit_wall
 from ..contact.reflection import given, wall_velocity
 from ..contact.sending import Arriving, send
 from ..kernel.arrays import scratch
 from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined, select
 from ..kernel.random import Stream
-from ..kernel.vector import ZERO, column, norm, put, square
-from ..status import Status
-from ..surfaces.moving import Carried
+from ..kernel.vector import column, put, square
 from . import log as impact_log
-from .accounts import book, book_sent, book_step, book_work, lose
-from .arrays import booked, speed2_scale
-from .carried import NOT_CARRIED, carry, is_carried
-from .crossings import Moment
-from .escape import absorb, escape
-from .periodic import return_particle
-from .table import LANES
+from .accounts import book, book_sent, book_work
+from .arrays import speed2_scale
+from .carried import is_carried
+from .escape import absorb, come_through, end_frame, leave
+from .one_by_one import one_by_one
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
 _OFTEN, _MOST = 64.0, 1e6
-# Short steps of a particle in a frame: seconds.
-_MOST_SHORT_STEPS = 1e7
 # It has moved on after this part of a crossing.
 _MOVED = 1e-9
 
@@ -38,31 +32,7 @@ _MOVED = 1e-9
 @long_kernel
 def meet_block(method, walls, gravity, share):
     """Decide for the particles that a thread draws: (status, particle, drawn); LOG_FULL: call it again."""
-    return _one_by_one(EVENT, _decide, (method, walls, gravity), share)
-
-
-@long_kernel
-def careful_block(method, walls, gravity, share):
-    """A short step of each particle that several walls hold: (status, particle, drawn)."""
-    return _one_by_one(CAREFUL, _take_care, (method, walls, gravity), share)
-
-
-def _one_by_one(phase, advance, scene, share):
-    """Advance the particles in a phase that a thread draws, as long as they move on."""
-    place, _live, done = impact_log.gone_on(share.log)
-    while True:
-        place = share.following(phase, place)
-        if place.is_end():
-            return Status.DONE.value, 0, place.drawn
-        if done // LANES >= share.halt[0]:
-            return Status.INTERRUPTED.value, 0, place.drawn
-        if impact_log.is_full(share.log):
-            impact_log.keep_going(share.log, place, 0, done)
-            return Status.LOG_FULL.value, 0, place.drawn
-        if not advance(*scene, share, place.i):
-            is_wrong = math.isnan(share.state.contacts.keep[place.i])
-            return select(is_wrong, Status.SENT_WRONG.value, Status.STALLED.value), place.i, place.drawn
-        place, done = place.after(), done + 1
+    return one_by_one(EVENT, _decide, (method, walls, gravity), share)
 
 
 @outlined
@@ -136,44 +106,10 @@ def _let_out(method, walls, gravity, share, i, r, v, remaining):
     if not lets_through(openings, walls, met[i], r, near):
         return False
     if leads_on(walls, met[i], r):
-        _go_through(walls, gravity, share, i, met[i], r, v)
+        come_through(walls, gravity, share, i, met[i], r, v)
     else:
-        _leave(share, i, met[i], r, v, remaining)
+        leave(share, i, met[i], r, v, remaining)
     return True
-
-
-@outlined
-def _go_through(walls, gravity, share, i, wall, r, v):
-    """Particle i flies into the room on the other side of a wall, with the speed that it has kept across its walls."""
-    state, contacts = share.state, share.state.contacts
-    first, second, keep = contacts.walls[0, i], contacts.walls[1, i], contacts.keep[i]
-    if keep > 0.0 and first >= 0.0:
-        n = walls.unit_normal(first, r)
-        n = n + walls.unit_normal(second, r) if second >= 0.0 else n
-        v = v - (keep / norm(n)) * n
-    r, v = through(walls, gravity, wall, (r, v))
-    put(state.position, 0, i, r)
-    put(state.velocity, 0, i, v)
-    contacts.keep[i], contacts.step[i] = 0.0, 0.0
-    contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
-    contacts.phase[i] = FLYING
-    share.hand_over(i, FLYING)
-
-
-@outlined
-def _leave(share, i, wall, r, v, remaining):
-    """Particle i has escaped through a wall."""
-    escape(share, i, wall, r, v, remaining)
-    _end_frame(share, i)
-
-
-def _end_frame(share, i):
-    """Nothing is left of the frame of particle i, which no wall holds."""
-    contacts = share.state.contacts
-    contacts.remaining[i], contacts.keep[i] = 0.0, 0.0
-    contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
-    contacts.phase[i] = FLYING
-    share.hand_over(i, ARRIVED)
 
 
 @outlined
@@ -208,7 +144,7 @@ def _send_off(method, walls, gravity, share, i):
             absorb(share, i, wall, remaining)
         else:
             state.starts[i] = share.moment - remaining + sent.wait
-        _end_frame(share, i)
+        end_frame(share, i)
         return True
     contacts.remaining[i] = remaining - sent.wait
     contacts.phase[i], contacts.keep[i] = FLYING, 0.0
@@ -229,121 +165,3 @@ def _spare(moving, walls, state, i, found, wall):
         taken = edge.split_at(walls, drift(moving, edge, walls, r), r, turned)
         state.impulse[walls.row(found.other), i] += taken.c * state.mass[i]
     state.impulse[walls.row(found.wall), i] += taken.b * state.mass[i]
-
-
-# --- Short steps -----------------------------------------------------------------------------------------
-
-
-def _take_care(method, walls, gravity, share, i):
-    """A short step of particle i; whether it moves on."""
-    state, contacts = share.state, share.state.contacts
-    if share.counters is None:
-        _step(method, walls, gravity, share, i)
-        if state.period is not None:
-            return_particle(state.period, walls, state, i)
-    else:
-        _count_step(method, walls, gravity, share, i)
-    r = column(state.position, 0, i)
-    closed = isinstance(walls, Carried) and _have_closed(walls, method, r, contacts.remaining[i])
-    return not closed and not contacts.short_steps[i] > _MOST_SHORT_STEPS
-
-
-@outlined
-def _count_step(method, walls, gravity, share, i):
-    """A short step of particle i, and what it crosses."""
-    state, counters, remaining = share.state, share.counters, share.state.contacts.remaining
-    left = remaining[i]
-    before = Moment(column(state.position, 0, i), column(state.velocity, 0, i), left if left > 0.0 else share.span)
-    _step(method, walls, gravity, share, i)
-    end = Moment(column(state.position, 0, i), column(state.velocity, 0, i), remaining[i])
-    counters.count_step(share, i, before, end)
-    if state.period is not None:
-        return_particle(state.period, walls, state, i)
-        back = Moment(column(state.position, 0, i), end.v, end.remaining)
-        if square(back.r - end.r) > 0.0:
-            counters.come_back(share, i, before, end.r, back)
-
-
-@outlined
-def _rest(method, walls, gravity, share, i, p, active):
-    """Let particle i rest."""
-    state, contacts = share.state, share.state.contacts
-    loses = method.laws.change_energy
-    for s in range(active.shape[1]):
-        taken = active[1, s] if loses else 0.0
-        contacts.load[s, i] = active[0, s]
-        state.impulse[s, i] += (active[0, s] * p.remaining + taken) * state.mass[i]
-    if loses:
-        # Round-off that its walls have gathered, which nothing takes back from now on
-        r = touching.inside(walls, p.r)
-        put(state.position, 0, i, r)
-        lose(state, i, p.twice, 2.0 * potential(gravity, r))
-        put(state.velocity, 0, i, ZERO)
-    contacts.sliding[i] += p.remaining
-    share.note_stay(i, p.remaining)
-    contacts.remaining[i], contacts.keep[i] = 0.0, 0.0
-    contacts.phase[i] = ARRIVED
-    share.hand_over(i, ARRIVED)
-
-
-@outlined
-def _step(method, walls, gravity, share, i):
-    state, contacts = share.state, share.state.contacts
-    impulses = scratch((booked(walls), 1), np.float64)
-    r, v, remaining = column(state.position, 0, i), column(state.velocity, 0, i), contacts.remaining[i]
-    # What is carried begins the frame so.
-    remaining = remaining if remaining > 0.0 else share.span
-    now = walls.at(remaining)
-    if state.openings is not None:
-        wall = open_wall_at(state.openings, method, now, gravity, (r, v), crossing.near(method, r))
-        if wall >= 0.0 and leads_on(now, wall, r):
-            contacts.remaining[i] = remaining
-            _go_through(now, gravity, share, i, wall, r, v)
-            return
-        if wall >= 0.0:
-            _leave(share, i, wall, r, v, remaining)
-            return
-    p = events.Particle(r, v, remaining, 2.0 * state.energy[i], speed2_scale(state, i))
-    active = scratch((2, walls.length()), np.float64)
-    if method.laws.moving is None and events.settles(method, now, gravity, p, active):
-        _rest(method, now, gravity, share, i, p, active)
-        return
-    # Step by step, where places on its way are looked at.
-    if method.laws.moving is not None and state.openings is None and state.period is None:
-        phase = carry(method, walls, gravity, state, i, p)
-        if phase != NOT_CARRIED:
-            contacts.phase[i] = CAREFUL if phase == ARRIVED else FLYING
-            contacts.step[i], contacts.keep[i] = 0.0, 0.0
-            contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
-            share.hand_over(i, phase)
-            return
-    contacts.short_steps[i] += 1.0
-    if state.openings is not None and square(v) > 0.0:
-        # A short step, where the places on its way are looked at.
-        p = p._replace(remaining=min(remaining, 2.0 * events.GRAZING * method.size / np.sqrt(events.own_speed2(p))))
-    end = events.careful(method, walls, gravity, contacts.met[i], p, impulses)
-    for s in range(impulses.shape[0]):
-        state.impulse[s, i] += impulses[s, 0] * state.mass[i]
-    put(state.position, 0, i, end.r)
-    put(state.velocity, 0, i, end.v)
-    given_work = 0.0
-    for s in range(walls.length(), impulses.shape[0]):
-        given_work += 2.0 * impulses[s, 0]
-    change = p.twice, end.twice_energy
-    book_step(walls, state, i, contacts.met[i], change, given_work, method.laws.loses)
-    contacts.sliding[i] += end.used
-    share.note_stay(i, end.used)
-    contacts.remaining[i] = max(remaining - end.used, 0.0)
-    phase = FLYING if contacts.remaining[i] > 0.0 else ARRIVED
-    contacts.phase[i], contacts.step[i], contacts.keep[i] = FLYING, 0.0, 0.0
-    share.hand_over(i, phase)
-
-
-@outlined
-def _have_closed(walls, method, r, remaining):
-    """Whether walls that move leave no place for a particle, with so much of the frame left [s]."""
-    now, deepest = walls.at(remaining), 0.0
-    number = now.numbers_near(r)
-    for i in range(number.size):
-        deepest = max(deepest, now.distance(number[i], r))
-    return deepest > events.TOUCH * method.size

@@ -4,9 +4,11 @@ import numpy as np
 
 from ..contact import crossing
 from ..contact.doorways import closeness, leads_on, lets_through, through
+from ..contact.events import ARRIVED, FLYING
 from ..contact.passing import hit_wall, open_wall_of
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
+from ..kernel.vector import norm, put
 from ..surfaces.openings import is_open
 from . import log as impact_log
 from .crossings import Moment
@@ -69,3 +71,37 @@ def is_at_opening(slide, now, i):
     lane.v = slide.with_kept(now, lane)
     lane.keep = 0.0
     return True
+
+
+@outlined
+def come_through(walls, gravity, share, i, wall, r, v):
+    """Particle i flies into the room on the other side of a wall, with the speed that it has kept across its walls."""
+    state, contacts = share.state, share.state.contacts
+    first, second, keep = contacts.walls[0, i], contacts.walls[1, i], contacts.keep[i]
+    if keep > 0.0 and first >= 0.0:
+        n = walls.unit_normal(first, r)
+        n = n + walls.unit_normal(second, r) if second >= 0.0 else n
+        v = v - (keep / norm(n)) * n
+    r, v = through(walls, gravity, wall, (r, v))
+    put(state.position, 0, i, r)
+    put(state.velocity, 0, i, v)
+    contacts.keep[i], contacts.step[i] = 0.0, 0.0
+    contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
+    contacts.phase[i] = FLYING
+    share.hand_over(i, FLYING)
+
+
+@outlined
+def leave(share, i, wall, r, v, remaining):
+    """Particle i has escaped through a wall."""
+    escape(share, i, wall, r, v, remaining)
+    end_frame(share, i)
+
+
+def end_frame(share, i):
+    """Nothing is left of the frame of particle i, which no wall holds."""
+    contacts = share.state.contacts
+    contacts.remaining[i], contacts.keep[i] = 0.0, 0.0
+    contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
+    contacts.phase[i] = FLYING
+    share.hand_over(i, ARRIVED)

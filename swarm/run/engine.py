@@ -16,7 +16,7 @@ from ..contact.hold import One, Two
 from ..errors import RunError
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
-from ..lanes import contact_events, slide, sliding, table
+from ..lanes import careful, contact_events, slide, sliding, table
 from ..lanes import log as impact_log
 from ..lanes.sending import Sending
 from ..methods.base import Method
@@ -252,7 +252,7 @@ class Run(BaseRun):
         """The kernel that advances particles in this phase, which is not flight, and its arguments."""
         common = self._numbers, self._walls, self._gravity, share
         if _KINDS[phase] is None:
-            return contact_events.meet_block if phase == EVENT else contact_events.careful_block, common
+            return contact_events.meet_block if phase == EVENT else careful.careful_block, common
         return slide.slide_block, (_KINDS[phase], *common, sliding.empty_sliding(self.state))
 
     def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:

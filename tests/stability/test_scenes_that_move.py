@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.lanes import contact_events, slide
+from swarm.lanes import careful, contact_events, slide
 
 # Rounds in contact of three particles; those of scenes here take some tens each.
 MANY = 1500
@@ -27,7 +27,7 @@ def bounded(monkeypatch):
         return called
 
     monkeypatch.setattr(contact_events, "_decide", counted(contact_events._decide))
-    monkeypatch.setattr(contact_events, "_step", counted(contact_events._step))
+    monkeypatch.setattr(careful, "_step", counted(careful._step))
     monkeypatch.setattr(slide, "_retire", counted(slide._retire))
     return rounds
 

@@ -1,0 +1,26 @@
+"""The particles in a phase, one after the other."""
+
+import math
+
+from ..kernel.jit import select
+from ..status import Status
+from . import log as impact_log
+from .table import LANES
+
+
+def one_by_one(phase, advance, scene, share):
+    """Advance the particles in a phase that a thread draws, as long as they move on."""
+    place, _live, done = impact_log.gone_on(share.log)
+    while True:
+        place = share.following(phase, place)
+        if place.is_end():
+            return Status.DONE.value, 0, place.drawn
+        if done // LANES >= share.halt[0]:
+            return Status.INTERRUPTED.value, 0, place.drawn
+        if impact_log.is_full(share.log):
+            impact_log.keep_going(share.log, place, 0, done)
+            return Status.LOG_FULL.value, 0, place.drawn
+        if not advance(*scene, share, place.i):
+            is_wrong = math.isnan(share.state.contacts.keep[place.i])
+            return select(is_wrong, Status.SENT_WRONG.value, Status.STALLED.value), place.i, place.drawn
+        place, done = place.after(), done + 1
