@@ -6,7 +6,7 @@ import numpy as np
 
 from ..contact.events import ARRIVED, EVENT
 from ..contact.uzawa import RECORDS
-from ..kernel.arrays import index, next_of
+from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, column, put
@@ -162,102 +162,6 @@ class Halted(Record):
         return self.rows[Flying.remaining.row]
 
 
-class Draws(NamedTuple):
-    """The source of the particles of a block: draw k is of those from k size to (k + 1) size, for one thread alone.
-
-    A thread draws when a lane is free, so its lanes are full until there are no more: shares of fixed size, each with
-    its own end, cost 14 % with 512 particles a share and 3 % with 4096, and leave a thread idle while the other has
-    the last one.
-    """
-
-    ticket: Array  # (1,) how many of `order` are drawn, by all threads
-    order: Array  # int64, the draws
-    size: int
-    mine: Array  # int64, the draws of this thread, in order
-
-
-class Place(Record):
-    """The position of a thread among the particles that it draws."""
-
-    i: int  # the next particle
-    stop: int  # after the last one of its draw
-    drawn: int  # draws so far
-
-    def is_end(self):
-        """Whether no particle is left."""
-        return self.i == self.stop
-
-    def after(self):
-        """The place of the particle after this one."""
-        return Place(self.i + 1, self.stop, self.drawn)
-
-
-class Share(NamedTuple):
-    """The part of a frame that one thread advances."""
-
-    state: Any  # `state.State`
-    phase: Array  # (N,) int8, who flies, slides on one wall or on two, or has arrived
-    pending: Array  # (PHASES,) int64, how many particles are left to other kernels, by their phase
-    halted: Halted
-    draws: Draws
-    halt: Array  # (1,) int64, passes after which to return
-    span: float  # in the method's unit
-    seed: int  # of random numbers
-    first: int  # the number of particle 0 in the whole run, for them
-    moment: float  # at which the frame ends [s]
-    log: Any = None  # `log.Log` of impacts
-    counts: Any = None  # `counts.Counts` of them
-    counters: Any = None  # `counters.Counters`
-
-    def watches(self):
-        """The log and the counts of impacts, if the run has any."""
-        return tuple(one for one in (self.log, self.counts) if one is not None)
-
-    def note_impact(self, method, walls, i, struck):
-        """Log and count an impact of particle i, a `log.Struck`."""
-        for watch in self.watches():
-            watch.add_row(method, walls, self.state, i, struck)
-
-    def note_stay(self, i, time):
-        """Count a time in which walls hold particle i [s]: as that of the first of them, or of the one it has met."""
-        if self.counts is not None:
-            contacts = self.state.contacts
-            first = contacts.walls[0, i]
-            self.counts.stay(select(first >= 0.0, first, contacts.met[i]), time)
-
-    def note_hops(self, wall, time):
-        """Take a time [s] that is of hops from that in which a wall holds a particle."""
-        if self.counts is not None:
-            self.counts.stay(max(wall, 0.0), -time)
-
-    def hand_over(self, i, phase):
-        """Leave particle i to the kernel of a phase."""
-        self.phase[i] = phase
-        self.pending[phase] += 1
-
-    def following(self, phase, place):
-        """The `Place` of the first particle from this one on that is in a phase, of another draw if need be.
-
-        Counts those in other phases, which other kernels advance.
-        """
-        draws, phases, pending = self.draws, self.phase, self.pending
-        i, stop, drawn = place
-        while True:
-            while i < stop and phases[i] != phase:
-                pending[phases[i]] += 1
-                i += 1
-            if i < stop:
-                return Place(i, stop, drawn)
-            k = next_of(draws.ticket)
-            if k >= draws.order.size:
-                return Place(i, i, drawn)
-            k = draws.order[k]
-            i = k * draws.size
-            stop = min(i + draws.size, phases.size)
-            draws.mine[drawn] = k
-            drawn += 1
-
-
 def empty(walls: int, given: int, period: Any = None, rows: int = Flying.ALL) -> Lanes:
     """Lanes for one block, with so many rows of what walls give, and `rows` of a particle."""
     eights = np.zeros(STRIDE // EIGHT, np.int64)
@@ -284,12 +188,6 @@ def empty(walls: int, given: int, period: Any = None, rows: int = Flying.ALL) ->
 def none_halted(rows: int) -> Halted:
     """No particle was halted; with so many rows of what walls give."""
     return Halted(np.empty(0, np.int64), np.empty((Flying.ROWS + rows, 0)))
-
-
-def take(draws: Draws, some: int) -> Array:
-    """The next `some` draws of all threads, for one."""
-    first = min(some * next_of(draws.ticket), draws.order.size)
-    return draws.order[first : first + some]
 
 
 # --- Of one particle -------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
-from .arrays import Place
+from .share import Place
 from .table import LANES, Lane, Rows
 
 # What a kernel leaves that ends with a full log: particle, stop, draws, live lanes, passes.

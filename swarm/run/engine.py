@@ -19,6 +19,7 @@ from ..lanes import block as blocks
 from ..lanes import careful, contact_events, slide, sliding, table
 from ..lanes import log as impact_log
 from ..lanes.sending import Sending
+from ..lanes.share import Draws, Share, take
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
@@ -28,6 +29,7 @@ from . import failures
 from .base import Arrays, BaseRun, result_of
 from .counting import counters_of, crossed_of
 from .impacts import Page
+from .observed import gone_of, poses_of
 from .present import Present
 from .state import Seeding, begin, have_lasted, holders_of_resting, state_of
 from .tally import Watched
@@ -148,14 +150,14 @@ class Run(BaseRun):
         else:
             # Who flies first would have drawn everything when the others are ready to slide.
             some, end = max(1, len(self._present.order) // (_PARTS * self._threads)), _DONE
-            while end[0] == Status.DONE and (order := lanes.take(draws, some)).size:
-                end = self._part(span, _again(draws, order), mine, page)
+            while end[0] == Status.DONE and (order := take(draws, some)).size:
+                end = self._part(span, draws.again(order), mine, page)
         if page is not None:
             page.close()
         self._lanes.append(mine)
         return end
 
-    def _part(self, span: float, draws: lanes.Draws, mine: lanes.Lanes, page: Page | None) -> End:
+    def _part(self, span: float, draws: Draws, mine: lanes.Lanes, page: Page | None) -> End:
         """Advance and observe a part of the particles: in flight, then at walls and along them, and again."""
         share = self._shared(span, draws)
         status, particle, drawn = self._kernel(blocks.advance_block, page)(*self._flying(share, mine))
@@ -163,7 +165,7 @@ class Run(BaseRun):
         while status == Status.DONE and any(share.pending[phase] for phase in _KINDS):
             if (over := turns.end(self._watch)) is not None:
                 return over
-            share = self._shared(span, _again(draws, draws.mine[:drawn].copy()))
+            share = self._shared(span, draws.again(draws.mine[:drawn].copy()))
             for phase in _KINDS:
                 if phase not in self._kinds and (self._phase == phase).any():
                     return int(Status.HARD_CONTACT), phase, None
@@ -222,10 +224,10 @@ class Run(BaseRun):
 
     # --- Arguments of kernels ----------------------------------------------------------------------------
 
-    def _drawing(self) -> lanes.Draws:
+    def _drawing(self) -> Draws:
         """The draws of one thread."""
         order = self._present.order
-        return lanes.Draws(self._ticket, order, self._size, np.empty(len(order), np.int64))
+        return Draws(self._ticket, order, self._size, np.empty(len(order), np.int64))
 
     def _empty_lanes(self) -> lanes.Lanes:
         rows = Sending.ROWS if self._numbers.laws.send_off else lanes.Flying.ALL
@@ -235,20 +237,20 @@ class Run(BaseRun):
         counters = self._counters
         return made if counters is None else made._replace(began=table.table(counters.rows()))
 
-    def _shared(self, span: float, draws: lanes.Draws) -> lanes.Share:
+    def _shared(self, span: float, draws: Draws) -> Share:
         """The share of a thread, with the arrays of all, and its counts."""
-        return lanes.Share(
+        return Share(
             self._present.flying(self.state), self._present.of(self._phase), np.zeros(PHASES, np.int64), self._halted,
             draws, self._watch.passes, span,
             self._seed, self._first, self._moment, None if self._impacts is None else self._impacts.example,
             None if self._tally is None else self._tally.counts(), self._counters,
         )  # fmt: skip
 
-    def _flying(self, share: lanes.Share, mine: lanes.Lanes) -> tuple[Any, ...]:
+    def _flying(self, share: Share, mine: lanes.Lanes) -> tuple[Any, ...]:
         """Arguments of `advance_block`."""
         return self._numbers, self._walls, self._gravity, self._hard, share, mine
 
-    def _lasting(self, phase: int, share: lanes.Share) -> tuple[Any, tuple[Any, ...]]:
+    def _lasting(self, phase: int, share: Share) -> tuple[Any, tuple[Any, ...]]:
         """The kernel that advances particles in this phase, which is not flight, and its arguments."""
         common = self._numbers, self._walls, self._gravity, share
         if _KINDS[phase] is None:
@@ -298,28 +300,14 @@ class Run(BaseRun):
 
     def seen(self) -> dict[str, Any]:
         seen = observables.summary(self._partial, self._seen_state(), self._owners, bool(self._kinds), self._parts)
-        is_closed = self._far == math.inf
-        escaped = 0 if is_closed else self._tier.kernel(observables.count_escaped)(*self._escaping())
-        if self.state.escape_time is not None:
-            escaped += int(np.count_nonzero(~np.isnan(self.state.escape_time)))
-        if self.state.absorbed is not None:
-            # Of each wall, of a field of each member, its surface.
-            walls = self.state.absorbed.wall
-            surfaces = self._surfaces_of_walls[walls[walls >= 0]]
-            seen["absorbed"] = np.bincount(surfaces, minlength=len(self._scene.surfaces)).astype(np.int64)
+        far = 0 if self._far == math.inf else self._tier.kernel(observables.count_escaped)(*self._escaping())
+        seen |= gone_of(self.state, int(far), self._surfaces_of_walls, len(self._scene.surfaces))
         if self._scene.moves():
-            poses = self._scene.poses(self._moment)
-            seen["wall_position"] = np.array([pose.position() for pose in poses])
-            seen["wall_orientation"] = np.array([pose.quaternion for pose in poses])
-        return {**seen, **self._present.observed(), "escaped": int(escaped)}
+            seen |= poses_of(self._scene, self._moment)
+        return seen | self._present.observed()
 
     def chunk_sums(self) -> NDArray[np.float64]:
         return self._present.sums(observables.chunk_sums(self._partial, self._seen_state(), bool(self._kinds)))
 
     def _seen_state(self) -> State:
         return self._present.seen(self.state)
-
-
-def _again(draws: lanes.Draws, order: NDArray[Any]) -> lanes.Draws:
-    """The draws of this `order`, for one thread."""
-    return draws._replace(ticket=np.zeros(1, np.int64), order=order)

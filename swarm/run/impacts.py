@@ -10,8 +10,8 @@ import tomli_w
 from numpy.typing import NDArray
 
 from ..errors import RunError
-from ..lanes.arrays import Share
 from ..lanes.log import GOING, Log
+from ..lanes.share import Share
 from ..lanes.table import LANES, STRIDE
 from ..scene import Scene
 from ..status import Status

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.events import ARRIVED, FLYING
-from ..lanes.arrays import Draws, Halted
+from ..lanes.arrays import Halted
+from ..lanes.share import Draws
 from ..state import Contacts
 from ..status import Status
 from .watch import Watch

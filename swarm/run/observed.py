@@ -1,0 +1,32 @@
+"""The observables of a frame that are no sums over its particles: how many are gone, and where walls are."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene import Scene
+from ..state import State
+
+
+def gone_of(state: State, far: int, owners: NDArray[np.int64], surfaces: int) -> dict[str, Any]:
+    """How many have escaped, `far` of them through no opening, and how many each surface has absorbed.
+
+    `owners` is the surface of each wall.
+    """
+    gone: dict[str, Any] = {"escaped": far}
+    if state.escape_time is not None:
+        gone["escaped"] += int(np.count_nonzero(~np.isnan(state.escape_time)))
+    if state.absorbed is not None:
+        walls = state.absorbed.wall
+        gone["absorbed"] = np.bincount(owners[walls[walls >= 0]], minlength=surfaces).astype(np.int64)
+    return gone
+
+
+def poses_of(scene: Scene, moment: float) -> dict[str, Any]:
+    """Where the surfaces are at a moment [s]."""
+    poses = scene.poses(moment)
+    return {
+        "wall_position": np.array([pose.position() for pose in poses]),
+        "wall_orientation": np.array([pose.quaternion for pose in poses]),
+    }
