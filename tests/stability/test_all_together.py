@@ -219,7 +219,7 @@ def holds(seed, folder, certain=False):
 def has_same_bits(made, result, folder, monkeypatch):
     """Any threads and blocks, halts within frames, and sessions."""
     require_same(result, run(made, threads=2, block_size=256))
-    advance, look, passes = Run.advance, Session.look, [2]
+    advance, look, passes = Run.advance, Session.look, [5]
 
     def halting(self, *given, **more):
         self.halt(passes[0])
