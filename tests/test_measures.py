@@ -148,7 +148,6 @@ def test_a_function_that_fails_is_named_before_anything_is_made(name, tmp_path, 
         ({"momentum_x": kinetic}, "must have another name"),
         ({"mine": spectrum, "mine_0": kinetic}, r"observables\['mine_0'\] must have another name"),
     ],
-    ids=str,
 )
 def test_names_and_what_is_no_function_are_refused(given, sentence):
     with pytest.raises(swarm.SceneError, match=sentence):
