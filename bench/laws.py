@@ -1,4 +1,4 @@
-"""Laws of walls: what an impact costs in a sphere under each, beside none, and what the first call compiles."""
+"""Laws of walls and counters: what an impact costs in a sphere with each, beside none, and first calls."""
 
 import tempfile
 import time
@@ -53,17 +53,25 @@ LAWS: dict[str, tuple[dict[str, Any], float | None]] = {
     "Absorb, then Lambert": ({"laws": [swarm.Absorb(1e-12), swarm.Lambert()]}, None),
     "one's own Lambert": ({"laws": [Diffuse(1.0)]}, 25.0),
 }
+# Surfaces that count, beside what they cost as walls.
+COUNTED: dict[str, swarm.Sphere | swarm.Plane | swarm.Box] = {
+    "plane": swarm.Plane((1.0, 0.0, 0.0), 0.1),
+    "ball": swarm.Sphere(0.1, side="outside"),
+    "box": swarm.Box((0.1, 0.1, 0.1), side="outside"),
+}
 _FIRST_CALLS = "none", "Lambert", "CercignaniLampis", "one's own Lambert"
 
 
-def _impact(wall: dict[str, Any], count: int, threads: int = 1) -> Callable[[], float]:
-    """Nanoseconds of processor time an impact."""
-    scene = swarm.Scene([swarm.Sphere(0.5, **wall)])
+def _impact(walls: list[Any], count: int, **keywords: Any) -> Callable[[], float]:
+    """Nanoseconds of processor time an impact, on one thread."""
+    scene = swarm.Scene(walls)
     start = swarm.fill(scene, count, speed=1.0, seed=1)
 
     def measure() -> float:
         began = time.process_time()
-        run = swarm.simulate(scene, start, swarm.Impact(), until=0.7 * _IMPACTS, compile="always", threads=threads)
+        run = swarm.simulate(
+            scene, start, swarm.Impact(), until=0.7 * _IMPACTS, compile="always", threads=1, **keywords
+        )
         return (time.process_time() - began) / float(run.observables["impacts"][-1]) * 1e9
 
     return measure
@@ -81,12 +89,28 @@ def _unbooked(count: int, until: float) -> tuple[float, float]:
 def main(quick: bool = False) -> None:
     """Measure and report."""
     count, rounds = (20, 1) if quick else (4000, 7)
-    found = in_turn({name: _impact(wall, count) for name, (wall, _bar) in LAWS.items()}, rounds)
+    runs = {name: _impact([swarm.Sphere(0.5, **wall)], count) for name, (wall, _bar) in LAWS.items()}
+    for name, surface in COUNTED.items():
+        runs[f"a {name} that is a wall"] = _impact([swarm.Sphere(0.5), surface], count)
+        runs[f"a {name} that counts"] = _impact([swarm.Sphere(0.5)], count, counters=[surface])
+    found = in_turn(runs, rounds)
     rows: list[Row] = []
     for name, (_wall, bar) in LAWS.items():
         best, median = found[name]
         told = "" if bar is None else f"{bar:g}"
         rows.append(Row(f"{name}, an impact", best, median, "ns", told, best / found["none"][0]))
+    for name in COUNTED:
+        wall, counter = f"a {name} that is a wall", f"a {name} that counts"
+        rows.append(Row(f"{wall}, an impact", *found[wall], "ns"))
+        rows.append(
+            Row(
+                f"{counter}, an impact",
+                *found[counter],
+                "ns",
+                f"{found[wall][0]:.3g}",
+                found[counter][0] / found[wall][0],
+            )
+        )
     impacts, unbooked = _unbooked(count, 10.0 if quick else 2.2e4)
     rows.append(Row(f"energy that no book has, {impacts:.2g} impacts", unbooked, unbooked, "of all", "1e-13"))
     for name in () if quick else _FIRST_CALLS:

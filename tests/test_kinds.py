@@ -293,6 +293,12 @@ def test_the_order_of_surfaces_changes_no_bit_and_what_is_given_to_each_is_its_o
         assert other.particles.position.tobytes() == first.particles.position.tobytes()
         assert other.particles.velocity.tobytes() == first.particles.velocity.tobytes()
         for what, values in first.observables.items():
+            if what.startswith("member_"):
+                # Those of each surface, one surface behind the other.
+                assert [one.tolist() for one in getattr(other, what)] == [
+                    getattr(first, what)[i].tolist() for i in order
+                ]
+                continue
             listed = values[:, order] if what in BY_SURFACE else values
             assert np.asarray(other.observables[what]).tobytes() == np.ascontiguousarray(listed).tobytes(), what
         if logs:
@@ -302,9 +308,7 @@ def test_the_order_of_surfaces_changes_no_bit_and_what_is_given_to_each_is_its_o
                 assert listed["member"].tolist() == table["member"].tolist()
                 assert listed["impulse"].tobytes() == table["impulse"].tobytes()
                 assert log.scene == scene
-            assert [members.tolist() for members in other.member_impacts] == [
-                first.member_impacts[i].tolist() for i in order
-            ]
+            assert other.member_impacts is not None
 
 
 def test_a_history_has_its_columns_in_the_order_of_the_surfaces():
