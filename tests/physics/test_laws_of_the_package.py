@@ -80,7 +80,7 @@ def test_lambert_for_a_share():
 def test_a_law_that_keeps_the_speed_keeps_the_energy_to_the_last_digit(gravity):
     """Of each particle over thousands of impacts: round-off of a law does not add up."""
     scene = swarm.Scene([swarm.Sphere(0.5, laws=[swarm.Lambert(0.7)])], gravity)
-    start = swarm.fill(scene, 50, speed=3.0, seed=1)
+    start = swarm.fill(scene, 15, speed=3.0, seed=1)
     result = swarm.simulate(scene, start, swarm.Impact(), until=1000.0, every=100.0)
     seen = result.observables
     assert (result.impacts_per_particle > 2000).all()
@@ -165,8 +165,8 @@ def test_heat_between_two_plates(a):
     ]  # fmt: skip
     scene = swarm.Scene(plates, None, (1.0, 1.0, None))
     rng = np.random.default_rng(3)
-    place = rng.uniform(-0.4, 0.4, (3, 2000)) + np.array([[0.5], [0.5], [0.0]])
-    start = swarm.Particles(place, rng.normal(size=(3, 2000)))
+    place = rng.uniform(-0.4, 0.4, (3, 1000)) + np.array([[0.5], [0.5], [0.0]])
+    start = swarm.Particles(place, rng.normal(size=(3, 1000)))
     seen = swarm.simulate(scene, start, swarm.Impact(), until=400.0, every=40.0, seed=2).observables
     assert drift(seen) < 1e-13
     # After the first tenth, in which the gas comes to its state.
