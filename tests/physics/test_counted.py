@@ -8,7 +8,7 @@ import pytest
 import swarm
 
 # Standard errors within which a mean is.
-_ERRORS = 4.0
+_ERRORS = 3.0
 
 
 def run(scene, start, until, counters, **keywords):
