@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .motion import Guide, Oscillation, Path, Rotation, Translation
     from .output.impact_log import ImpactLog, load_impacts
     from .output.trajectory import Trajectory, load
+    from .pairs import Pairs
     from .particles import Particles
     from .run.result import Result
     from .run.simulation import simulate
@@ -79,6 +80,7 @@ _HOMES = {
     "motion": ("Guide", "Oscillation", "Path", "Rotation", "Translation"),
     "output.impact_log": ("ImpactLog", "load_impacts"),
     "output.trajectory": ("Trajectory", "load"),
+    "pairs": ("Pairs",),
     "particles": ("Particles",),
     "scene": ("Scene",),
     "sources.source": ("Source",),
@@ -101,7 +103,7 @@ __all__ = [
     "Absorb", "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CercignaniLampis",
     "CompleteError", "Cone", "ContactHistory", "Counter", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids",
     "FileError", "Formula", "Frame", "Guide", "Impact", "ImpactLog", "Intersection", "Lambert", "Leave", "Mesh",
-    "Midpoint", "Opening", "Oscillation", "OwnSurface", "Paraboloid", "Particles", "Path", "Penalty", "Plane",
+    "Midpoint", "Opening", "Oscillation", "OwnSurface", "Pairs", "Paraboloid", "Particles", "Path", "Penalty", "Plane",
     "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab",
     "Source", "Sphere", "Spheres", "Stadium", "Sticky", "Strain", "SwarmError", "Torus", "Trajectory", "Translation",
     "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history",

@@ -216,15 +216,6 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
     raise _too_large(name, f", got shape {given.shape}, which takes", _DOUBLE * given.size)
 
 
-def no_radius(value: Any) -> None:
-    """Raise a `SceneError` if a radius of particles is given."""
-    if value is not None:
-        raise SceneError(
-            f"radius must be None, got {value!r:.200}: particles are points and do not meet one another; the walls may "
-            "be moved in by the radius, or a body may be placed (swarm.place)"
-        )
-
-
 def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
     """`value` if it is one of `choices`; otherwise the error names the closest of them."""
     known = list(choices)

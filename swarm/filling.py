@@ -59,7 +59,8 @@ def fill(
     n = checks.count("n", n)
     checks.particles_fit("n", n)
     seed = checks.count("seed", seed, least=0)
-    checks.no_radius(radius)
+    if radius is not None:
+        raise SceneError("radius of fill is to come")
     if (speed is None) == (temperature is None):
         came = "neither" if speed is None else "both"
         raise SceneError(f"fill needs one of speed and temperature, got {came}")

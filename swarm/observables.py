@@ -110,7 +110,9 @@ def observe(law, walls, gravity, state, drawn, size, partial):
                     e = _energies(law, walls.at(0.0), gravity, m, r, v)
                     p = m * v
                     error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
-                    depth = select(is_gone(state, i), 0.0, penetration(walls.at(0.0), r))
+                    now = walls.at(0.0)
+                    met = now if state.balls is None else now.grown(state.balls.radius[i])
+                    depth = select(is_gone(state, i), 0.0, penetration(met, r))
                     sums[_KINETIC, j] += m * e.kinetic
                     sums[_POTENTIAL, j] += m * _whole_fall(state.period, state, i, e.fall)
                     sums[_CONTACT, j] += m * e.stored

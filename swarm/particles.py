@@ -22,15 +22,17 @@ class Particles:
         velocity: (3, N) or (3,) [m/s].
         mass: one number or (N,) [kg], above 0.
         image: (3, N) whole numbers, or None: in a scene with a period, how many cells away each particle is.
-        radius: None: particles are points and do not meet one another.
+        radius: one number or (N,) [m], above 0: particles are balls, which meet one another, and walls with their
+            surface; None: they are points and do not meet.
+        spin: (3, N), (3,) or None: of balls the angular velocity [rad/s]; None where nothing turns them.
 
     The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], in a plane the area [m^2], or
     None. Arrays that are
     assigned later are checked and converted in the same way when a run starts.
 
     Raises:
-        SceneError: wrong shapes, no particle, a value that is not finite or beyond 1e100, a mass not from 1e-100 to
-            1e100, a radius.
+        SceneError: wrong shapes, no particle, a value that is not finite or beyond 1e100, a mass or a radius not from
+            1e-100 to 1e100, a spin without a radius.
 
     >>> len(Particles([[0.0, 0.1], [0.0, 0.0], [0.0, 0.0]], np.ones((3, 2))))
     2
@@ -46,16 +48,18 @@ class Particles:
         velocity: ArrayLike,
         mass: ArrayLike = 1.0,
         image: ArrayLike | None = None,
-        radius: object = None,
+        radius: ArrayLike | None = None,
+        spin: ArrayLike | None = None,
     ) -> None:
-        checks.no_radius(radius)
         checked = _checked(position, velocity, mass)
         self.position, self.velocity, self.mass = (np.array(array, order="C") for array in checked)
         self.image = None if image is None else _images(image, len(self))
+        self.radius = None if radius is None else np.array(_each("radius", radius, len(self), "m"), order="C")
+        self.spin = None if spin is None else np.array(_spins(spin, radius, len(self)), order="C")
 
     def copy(self) -> "Particles":
         """The same particles, checked again, with arrays of their own."""
-        return Particles(self.position, self.velocity, self.mass, self.image)
+        return Particles(self.position, self.velocity, self.mass, self.image, self.radius, self.spin)
 
     def __len__(self) -> int:
         return int(self.position.shape[1])
@@ -82,7 +86,9 @@ class Particles:
         """
         there = ~np.isnan(self.position[0])
         image = None if self.image is None else self.image[:, there]
-        return Particles(self.position[:, there], self.velocity[:, there], self.mass[there], image)
+        radius = None if self.radius is None else self.radius[there]
+        spin = None if self.spin is None else self.spin[:, there]
+        return Particles(self.position[:, there], self.velocity[:, there], self.mass[there], image, radius, spin)
 
     @classmethod
     def of_frame(
@@ -129,21 +135,37 @@ class Births(NamedTuple):
 
 def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """The three arrays as floats, in shapes that go together."""
-    rows, speeds, masses = _rows("position", position), _rows("velocity", velocity), checks.array("mass", mass)
+    rows, speeds = _rows("position", position), _rows("velocity", velocity)
     n = rows.shape[1]
     if speeds.shape[1] != n:
         raise SceneError(f"velocity must have the shape of position, (3, {n}), got {speeds.shape}")
-    if masses.ndim > 1 or (masses.ndim == 1 and masses.size != n):
-        raise SceneError(f"mass must be one number or have shape ({n},), got shape {masses.shape}")
-    masses = np.broadcast_to(masses, (n,))
+    return rows, speeds, _each("mass", mass, n, "kg")
+
+
+def _each(name: str, value: ArrayLike, n: int, unit: str) -> Floats:
+    """A number above 0 for each of n particles."""
+    given = checks.array(name, value)
+    if given.ndim > 1 or (given.ndim == 1 and given.size != n):
+        raise SceneError(f"{name} must be one number or have shape ({n},), got shape {given.shape}")
+    given = np.broadcast_to(given, (n,))
     # NaN compares as false.
-    if not (masses.min() >= checks.SMALLEST and masses.max() <= checks.LARGEST):
-        first = int(np.argmin((masses >= checks.SMALLEST) & (masses <= checks.LARGEST)))
+    if not (given.min() >= checks.SMALLEST and given.max() <= checks.LARGEST):
+        first = int(np.argmin((given >= checks.SMALLEST) & (given <= checks.LARGEST)))
         raise SceneError(
-            f"mass must be a finite number above 0, got {masses[first]:g} for particle {first}; it may be from "
-            f"{checks.SMALLEST:g} to {checks.LARGEST:g} kg"
+            f"{name} must be a finite number above 0, got {given[first]:g} for particle {first}; it may be from "
+            f"{checks.SMALLEST:g} to {checks.LARGEST:g} {unit}"
         )
-    return rows, speeds, masses
+    return given
+
+
+def _spins(value: ArrayLike, radius: ArrayLike | None, n: int) -> Floats:
+    """The argument `spin`, checked."""
+    if radius is None:
+        raise SceneError("spin must be None without a radius, a point does not turn; give a radius too")
+    rows = _rows("spin", value)
+    if rows.shape[1] != n:
+        raise SceneError(f"spin must have the shape of position, (3, {n}), got {rows.shape}")
+    return rows
 
 
 def _images(value: ArrayLike, n: int) -> NDArray[np.int64]:

@@ -15,6 +15,7 @@ from . import plane as planes
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .kernel.vector import Vec
+from .pairs import Pairs, checked_pairs
 from .pieces import Pieces, doorways_of_pieces, volumes_of_pieces
 from .surfaces import required
 from .surfaces import rotation as rotations
@@ -50,6 +51,7 @@ class Scene(Pieces):
         plane: None, or "x", "y" or "z": a billiard of two dimensions, whose particles stay in the plane x, y or z = 0.
             Walls stand upright on it. `fill` and all pictures are of the plane, and what is said of volumes and areas
             holds for areas and lengths: `Particles.volume` is an area [m^2], pressures are per length [N/m].
+        pairs: None, or `Pairs`, what particles that have a radius do to one another; None: they keep the energy.
 
     Raises:
         SceneError: no surface, more than 24 walls with their images, surfaces that leave no volume, or one that does
@@ -64,6 +66,7 @@ class Scene(Pieces):
     gravity: checks.Vector | None
     period: Lengths | None
     plane: str | None
+    pairs: Pairs | None
     # Of every surface what of it reaches into the cell: itself alone where nothing repeats.
     _images: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
     # The volumes in which every piece is open.
@@ -76,6 +79,7 @@ class Scene(Pieces):
         gravity: Sequence[float] | None = None,
         period: Sequence[float | None] | None = None,
         plane: str | None = None,
+        pairs: Pairs | None = None,
     ) -> None:
         surfaces = (surfaces,) if isinstance(surfaces, Surface) else tuple(surfaces)
         if not surfaces:
@@ -90,7 +94,7 @@ class Scene(Pieces):
         lengths, plane = lengths_of(period), planes.checked(plane)
         named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
         images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
-        checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, _images=images)
+        checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, pairs=checked_pairs(pairs), _images=images)
         volumes = volumes_of_pieces(surfaces, images, lengths)
         checks.assign(self, _volumes=volumes, _doorways=doorways_of_pieces(images, volumes))
         self._require_few_walls("")
@@ -114,7 +118,7 @@ class Scene(Pieces):
 
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults, with the first of many surfaces."""
-        given = {"gravity": self.gravity, "period": self.period, "plane": self.plane}
+        given = {"gravity": self.gravity, "period": self.period, "plane": self.plane, "pairs": self.pairs}
         rest = "".join(f", {name}={value!r}" for name, value in given.items() if value is not None)
         return f"Scene([{', '.join(notebook.shortened(self.surfaces))}]{rest})"
 
@@ -193,7 +197,7 @@ class Scene(Pieces):
                 rows = tuple(map(tuple, rotations.matrix(turn).tolist()))
                 held = motions.Placed(tuple(np.array(positions)[i].tolist()), turn, rows)
                 surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
-        return Scene(surfaces, self.gravity, self.period, self.plane)
+        return Scene(surfaces, self.gravity, self.period, self.plane, self.pairs)
 
     def walls(self, moment: float = 0.0, own: Sequence[Surface] | None = None) -> Walls:
         """The surfaces as kernels take them, by their kinds, in the frame, or its piece, that ends at a moment [s].

@@ -85,6 +85,22 @@ class Crossed(NamedTuple):
     sums: Floats
 
 
+class Balls(NamedTuple):
+    """What particles with a radius have besides.
+
+    Attributes:
+        radius: (N,) [m].
+        collisions: (N,) with other particles since the start; each counts for both.
+        virial: (1,) the sum of r_ij . J_ij over all collisions since the start [J s].
+        spin: (3, N) angular velocity [rad/s], or None where nothing turns them.
+    """
+
+    radius: Floats
+    collisions: NDArray[np.int64]
+    virial: Floats
+    spin: Floats | None = None
+
+
 class State(NamedTuple):
     """The arrays that kernels advance.
 
@@ -116,6 +132,7 @@ class State(NamedTuple):
     absorbed_wall: NDArray[np.int32] | None = None
 
     crossed: Crossed | None = None  # where there are counters
+    balls: Balls | None = None  # where particles have a radius
 
     @property
     def absorbed(self) -> Any:

@@ -67,7 +67,8 @@ def changed(value, mass=1.0):
         (lambda: swarm.Particles(GOOD, GOOD, [1.0, 2.0, 3.0]), ["mass", "shape (2,)", "(3,)"]),
         (lambda: swarm.Particles(GOOD, GOOD, np.ones((2, 1))), ["mass", "shape (2,)", "(2, 1)"]),
         (lambda: swarm.Particles(GOOD, GOOD, "heavy"), ["mass", "number"]),
-        (lambda: swarm.Particles(GOOD, GOOD, radius=0.1), ["radius must be None", "0.1", "points", "do not meet"]),
+        (lambda: swarm.Particles(GOOD, GOOD, radius=0.0), ["radius must be", "above 0", "particle 0"]),
+        (lambda: swarm.Particles(GOOD, GOOD, spin=GOOD), ["spin must be None without a radius"]),
     ],
 )
 def test_errors_name_the_argument(build, parts):

@@ -18,6 +18,7 @@ from ..surfaces.instant import gaps_of, gradient_of
 from ..surfaces.shapes.cone import Cone
 from ..surfaces.shapes.quadric import Quadric
 from . import passing, workload
+from .balls import require_balls
 from .counting import require_counters, require_no_counters
 from .options import RunOptions, Task
 from .with_bodies import require_method_of_bodies, require_walls_of_bodies
@@ -77,6 +78,7 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
     _require_instants(scene, particles, method, options)
     _require_precision(scene, particles, options)
     method.check(scene, particles)
+    require_balls(scene, particles, method, options)
     require_counters(scene, particles, method, options)
     assert times.every is not None
     method.span("until", times.until)

@@ -19,9 +19,11 @@ from ..snapshot import NOTHING, Read, Snapshot
 from ..state import Absorbed, Multipliers
 from .base import BaseRun
 from .bodies import BodyRun
+from .colliding import CollidingRun
 from .compiling import Compilations
 from .doors import DoorRun
 from .engine import Run
+from .grains import GrainsRun
 from .impacts import log_of
 from .measures import Measures
 from .options import Task
@@ -194,10 +196,13 @@ def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
         bodies = BodyRun(task.scene, task.bodies, task.particles, task.method, *how, task.first)
         bodies.tally = watched.tally
         return bodies
+    if task.particles.radius is not None:
+        kind = CollidingRun if task.method.is_rigid() else GrainsRun
+        return kind(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
     if task.scene.reacts():
         return ReactingRun(task.scene, task.particles, task.method, *how, watched.tally)
-    kind = DoorRun if task.scene.has_doors() else Run
-    return kind(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
+    alone = DoorRun if task.scene.has_doors() else Run
+    return alone(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
 
 
 def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> End:

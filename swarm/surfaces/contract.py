@@ -118,6 +118,15 @@ class Smooth(AtRest):
         n = self.gradient(r)
         return r - (self.phi(r) / square(n)) * n
 
+    # --- Of balls ---
+
+    def grown(self, radius):
+        """The wall that the centre of a ball meets: the parallel surface, so far in the admissible side.
+
+        A record of its own, whose `distance` is exact there; `radius` is a number of a kernel, 0 or more.
+        """
+        raise NotImplementedError
+
     # --- Flight ---
 
     def first_hit(self, r, v):

@@ -59,6 +59,10 @@ class Walls(Record):
     # Whether some move other than uniformly, or as a field.
     accelerate = False
 
+    def grown(self, radius):
+        """The walls that the centre of a ball of this radius meets."""
+        return self._replace(each=tuple(wall.grown(radius) for wall in self.each))
+
     def at(self, remaining):
         """The walls when so much of the frame is left [s]: themselves, where none moves."""
         return self

@@ -1,0 +1,1 @@
+"""Impacts of balls on one another and on walls, in order of time."""

@@ -1,0 +1,1 @@
+"""Steps of soft balls that press on one another and on walls."""

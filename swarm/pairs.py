@@ -1,0 +1,48 @@
+"""What particles with a radius do to one another."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from . import checks
+from .errors import SceneError
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """The impact of two particles that have a radius, for the whole scene.
+
+    Args:
+        restitution: e in [0, 1]: the normal velocity of two particles that meet turns from u_n into -e u_n; 1 keeps the
+            energy.
+        friction: Coulomb's coefficient between particles, 0 or more; of Penalty, where particles then have a spin.
+        contact_duration: t_c [s], of Impact: two particles, one of which met another less than this before, meet
+            without a loss, so that losing impacts never become infinitely many in a time. 0: never; None: the method
+            chooses.
+
+    Raises:
+        SceneError: an argument is out of its range.
+
+    >>> Pairs(restitution=0.9)
+    Pairs(restitution=0.9, friction=0.0, contact_duration=None)
+    """
+
+    restitution: float = 1.0
+    friction: float = 0.0
+    contact_duration: float | None = None
+
+    def __post_init__(self) -> None:
+        restitution = checks.number("pairs.restitution", self.restitution, "a number from 0 to 1")
+        if not 0.0 <= restitution <= 1.0:
+            raise SceneError(f"pairs.restitution must be from 0 to 1, got {restitution:g}")
+        checks.assign(
+            self, restitution=restitution, friction=checks.magnitude("pairs.friction", self.friction),
+            contact_duration=None if self.contact_duration is None
+            else checks.magnitude("pairs.contact_duration", self.contact_duration),
+        )  # fmt: skip
+
+
+def checked_pairs(value: Any) -> Pairs | None:
+    """The argument `pairs` of a scene."""
+    if value is not None and not isinstance(value, Pairs):
+        raise SceneError(f"pairs must be a swarm.Pairs, got {type(value).__name__}")
+    return value
