@@ -22,14 +22,19 @@ _POSITIVE = {"mass", "radius", "length", "half_x", "half_y", "half_z", "a", "b",
 
 # The names of all that runs have, which functions of one's own cannot take.
 NAMES = frozenset((
-    "absorbed", "angular_momentum", "born", "cavity_impulse", "chunk_sums", "contact_energy", "crossed_energy",
+    "absorbed", "angular_momentum", "born", "cavity_impulse", "chunk_sums", "collision_rate", "collisions",
+    "contact_energy", "crossed_energy",
     "crossed_momentum", "crossed_slowness", "crossings", "dissipated_energy", "energy_error", "escaped", "impacts",
     "impulse",
     "kinetic_energy", "link_error", "max_penetration", "member_absorbed", "member_heat", "member_impacts",
-    "member_residence", "momentum", "part_heat", "part_impulse", "potential_energy", "sliding", "sliding_time",
+    "member_residence", "momentum", "part_heat", "part_impulse", "potential_energy", "pressure", "rotational_energy",
+    "sliding", "sliding_time",
     "source_energy", "sweeps", "time", "total_energy", "unconverged", "wall_energy", "wall_heat",
     "wall_orientation", "wall_position", "wall_spin", "wall_velocity", "wall_work", "work",
 ))  # fmt: skip
+
+# Those that are no number at the start, where there is no frame before, and where no volume is known.
+MAY_BE_NAN = frozenset(("collision_rate", "pressure"))
 
 # What the last axis of an observable, or of a column of a log, is where it is neither a surface nor a cavity.
 COMPONENTS = dict.fromkeys(
@@ -45,6 +50,7 @@ COMPONENTS = dict.fromkeys(
         "velocity_after",
         "slip",
         "image",
+        "spin",
     ),
     ("x", "y", "z"),
 ) | {"wall_orientation": ("w", "x", "y", "z")}

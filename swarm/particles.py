@@ -59,7 +59,9 @@ class Particles:
 
     def copy(self) -> "Particles":
         """The same particles, checked again, with arrays of their own."""
-        return Particles(self.position, self.velocity, self.mass, self.image, self.radius, self.spin)
+        made = Particles(self.position, self.velocity, self.mass, self.image, self.radius, self.spin)
+        made.volume = self.volume
+        return made
 
     def __len__(self) -> int:
         return int(self.position.shape[1])

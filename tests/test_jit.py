@@ -639,7 +639,7 @@ LAYERS = [
     ["observables", "history"],
     ["colliding", "grains"],
     ["lanes", "reacting"],
-    ["methods"],
+    ["ball_numbers", "methods"],
     ["scene"],
     ["pairs", "pieces"],
     ["volume"],

@@ -38,13 +38,15 @@ _OBSERVABLES: dict[str, tuple[int | None, ...]] = {
     **dict.fromkeys(("energy_error", "max_penetration", "impacts", "escaped", "unconverged"), ()),
     "impulse": (None,),
 }
+# Of balls.
+_OF_BALLS = ("collisions", "collision_rate", "pressure", "rotational_energy")
 # Of each part of the unions of a scene.
 _OF_PARTS = ("part_impulse", "part_heat")
 # Of each counter.
 _OF_COUNTERS = ("crossings", "crossed_momentum", "crossed_energy", "crossed_slowness")
 # Likewise, but files of older versions have none of them, or only those of bodies.
 _LATER: dict[str, tuple[int | None, ...]] = {
-    **dict.fromkeys(("sliding", "sliding_time", "link_error", "work", "source_energy"), ()),
+    **dict.fromkeys(("sliding", "sliding_time", "link_error", "work", "source_energy", *_OF_BALLS), ()),
     **dict.fromkeys(("absorbed", "wall_heat", "wall_work", "wall_energy", *_OF_PARTS), (None,)),
     **dict.fromkeys(("wall_position", "wall_velocity", "wall_spin"), (None, 3)),
     "wall_orientation": (None, 4),

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..columns import MAY_BE_NAN
 from ..errors import SceneError
 from ..particles import Particles
 from . import layout
@@ -84,7 +85,7 @@ class Trajectory(Presented):
             for name in group:
                 with self._reading(f"its observable {name}"):
                     read = group[name]["value"][some]
-                    seen[name] = read if name in own else finite(read)
+                    seen[name] = read if name in own or name in MAY_BE_NAN else finite(read)
         return seen
 
     @property

@@ -48,6 +48,11 @@ class Result:
             side and back; what they carried, "crossed_momentum" (frames, counters, 2, 3) [kg m/s] and "crossed_energy"
             (frames, counters, 2) [J]; and "crossed_slowness", the sum of 1/|v_n| [s/m]. A flux is a difference over
             frames; see `Counter`.
+            Of particles with a radius also "collisions", how many pairs have met since 0 s, and, of the frame before,
+            "collision_rate", pairs that met a second [1/s], and "pressure" [Pa, in a plane N/m], by the virial,
+            (2 K + sum r_ij . J_ij/dt)/(d V), NaN at the start and where no volume is known: V is `particles.volume`, or
+            the cell of a scene without surfaces; where they have a spin "rotational_energy" [J], which "total_energy"
+            includes as "angular_momentum" does the spins.
             With sources "born" (frames, sources), how many have come, and "source_energy" [J], what they have brought;
             who comes later is in no observable.
         wall_time: seconds the run took in all its sessions, compilation included.

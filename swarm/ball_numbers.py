@@ -1,0 +1,128 @@
+"""Observables of balls: how often they meet one another, the pressure by the virial, the energy of their spins."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .particles import Particles
+from .scene import Scene
+from .state import Floats, State
+
+# The moment of inertia of a ball is so much of m R^2, in a plane too.
+INERTIA = 0.4
+# What is kept of the last frame.
+_LAST = "time", "collisions", "virial", "kinetic", "action", "collision_rate", "pressure"
+
+
+def inertias(mass: Floats, radius: Floats) -> Floats:
+    """The moments of inertia of balls [kg m^2], (N,)."""
+    return np.asarray(INERTIA * mass * radius * radius)
+
+
+def rotational_energy(mass: Floats, radius: Floats, spin: Floats | None) -> float:
+    """The energy of the spins of balls [J]; 0 without spins."""
+    return 0.0 if spin is None else float(0.5 * (inertias(mass, radius) * (spin * spin).sum(axis=0)).sum())
+
+
+def balls_volume(scene: Scene, radius: Floats) -> float:
+    """The volume of all balls [m^3], in a scene with a plane the area of the discs [m^2]."""
+    if scene.plane is not None:
+        return float(math.pi * (radius * radius).sum())
+    return float(4.0 / 3.0 * math.pi * (radius**3).sum())
+
+
+def room_of(scene: Scene, particles: Particles) -> float:
+    """The volume that particles have [m^3], in a plane the area: that they were filled into, else of the cell.
+
+    NaN where neither is known.
+    """
+    if particles.volume is not None:
+        return particles.volume
+    lengths = [None if scene.period is None else scene.period[k] for k in scene.axes()]
+    # Solids in a cell take some of it, which only `fill` knows.
+    if all(length is not None for length in lengths) and not scene.surfaces:
+        return float(np.prod([float(length or 0.0) for length in lengths]))
+    return math.nan
+
+
+class BallNumbers:
+    """The observables of balls from frame to frame: an engine tells it each frame once, when it is done.
+
+    Args:
+        scene: whose volume it is, of three dimensions or of two.
+        particles: at the start.
+
+    >>> import swarm
+    >>> from swarm.state import Balls, State
+    >>> scene = swarm.Scene([swarm.Sphere(1.0)])
+    >>> one = swarm.Particles((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), radius=0.1)
+    >>> one.volume = 4.0
+    >>> none, balls = np.zeros(1), Balls(one.radius, np.zeros(1, np.int64), np.zeros(1))
+    >>> state = State(one.position, one.velocity, one.mass, none, none, balls.collisions, none, none, None, balls=balls)
+    >>> numbers = BallNumbers(scene, one)
+    >>> numbers.frame(state, 0.0, 4.5)
+    >>> numbers.frame(state, 2.0, 4.5)
+    >>> numbers.seen(state)
+    {'collisions': 0, 'collision_rate': 0.0, 'pressure': 0.75}
+    """
+
+    def __init__(self, scene: Scene, particles: Particles) -> None:
+        self._dimensions, self._room = len(scene.axes()), room_of(scene, particles)
+        self._last = np.zeros(len(_LAST))
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """What a run that goes on needs, for `BaseRun.arrays`."""
+        return {"ball_numbers": self._last}
+
+    def frame(self, state: State, moment: float, kinetic: float, action: float | None = None) -> None:
+        """Take a frame that is done.
+
+        Args:
+            state: at the frame.
+            moment: of the frame [s]; 0 is the start.
+            kinetic: energy of the translation at the frame [J].
+            action: its integral since the start [J s]; None: by the trapezoidal rule over frames, which is exact where
+                it does not change.
+        """
+        balls = state.balls
+        assert balls is not None
+        last = dict(zip(_LAST, self._last.tolist(), strict=True))
+        collisions, virial = _collisions(state), float(balls.virial[0])
+        span = moment - last["time"]
+        rate = pressure = math.nan
+        if moment > 0.0:
+            if action is None:
+                action = last["action"] + 0.5 * span * (last["kinetic"] + kinetic)
+            rate = (collisions - last["collisions"]) / span
+            given = 2.0 * (action - last["action"]) + virial - last["virial"]
+            pressure = given / (span * self._dimensions * self._room)
+        self._last[:] = moment, collisions, virial, kinetic, action or 0.0, rate, pressure
+
+    def seen(self, state: State) -> dict[str, Any]:
+        """The observables of the last frame that only balls have."""
+        balls = state.balls
+        assert balls is not None
+        found = {"collisions": _collisions(state), "collision_rate": float(self._last[-2])}
+        found |= {"pressure": float(self._last[-1])}
+        if balls.spin is not None:
+            found["rotational_energy"] = rotational_energy(state.mass, balls.radius, balls.spin)
+        return found
+
+    def added(self, seen: dict[str, Any], state: State) -> dict[str, Any]:
+        """The observables of a frame, `seen` of points, of balls: with those above, and with spins in the sums."""
+        mine, balls = self.seen(state), state.balls
+        if balls is None or balls.spin is None:
+            return {**seen, **mine}
+        turning = (inertias(state.mass, balls.radius) * balls.spin).sum(axis=1)
+        return {
+            **seen, **mine, "total_energy": seen["total_energy"] + mine["rotational_energy"],
+            "angular_momentum": seen["angular_momentum"] + turning,
+        }  # fmt: skip
+
+
+def _collisions(state: State) -> int:
+    """How many pairs have met since the start: both of each have counted it."""
+    assert state.balls is not None
+    return int(state.balls.collisions[: state.mass.size].sum()) // 2
