@@ -209,7 +209,13 @@ def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
 
 
 def add_up(values: NDArray[Any], n: int, sums: Floats) -> None:
-    """Sums of values (rows, n) over chunks into sums (rows, chunks)."""
+    """Sums of values (rows, n) over chunks into sums (rows, chunks).
+
+    Of values (rows, 1), which are those of all particles, into the first chunk.
+    """
+    if values.shape[1] < n:
+        sums[:, :1] = values
+        return
     whole = n // CHUNK
     if whole:
         np.add.reduce(values[:, : whole * CHUNK].reshape(-1, whole, CHUNK), axis=2, out=sums[:, :whole])

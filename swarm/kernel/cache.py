@@ -37,6 +37,7 @@ SOURCES = (
     "methods",
     "lanes",
     "reacting",
+    "colliding",
     "observables.py",
     "state.py",
     "status.py",

@@ -5,6 +5,7 @@ from ..methods import Impact, Penalty
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
+from .instants import require_instants_of_balls
 from .options import RunOptions
 
 
@@ -22,3 +23,4 @@ def require_balls(scene: Scene, particles: Particles, method: Method, options: R
             f"radius of the particles must be None with {type(method).__name__}, got radii; Impact and Penalty know "
             "particles that meet"
         )
+    require_instants_of_balls(scene, particles, method, options)

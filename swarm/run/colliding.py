@@ -1,18 +1,187 @@
 """The run of balls that meet one another and walls at instants."""
 
+import itertools
+import math
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from .. import observables
+from ..ball_numbers import BallNumbers
+from ..colliding import events
+from ..colliding.described import box_of, epoch_of, flock_of
+from ..colliding.events import CLOCK, EPOCHS, LENGTH, Books, Rule
+from ..errors import RunError
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
-from .base import BaseRun
+from ..state import Balls, State
+from ..status import Status
+from . import failures
+from .base import Arrays, BaseRun
 from .state import Seeding
 from .tally import Watched
+from .tiers import Tier
+
+# Fewer balls than this are written sooner than another thread is awake.
+_FEW = 4096
+# So many balls are aimed at a time, compiled and in plain Python: in some 0.1 s, from one look at the halt to the next.
+_AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 64
 
 
 class CollidingRun(BaseRun):
-    """The run of balls that meet one another and walls at instants."""
+    """The run of balls that meet one another and walls at instants; the arrays of the particles become its state."""
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None, compile: str,
         seeding: Seeding, watched: Watched,
     ) -> None:  # fmt: skip
-        raise NotImplementedError
+        assert particles.radius is not None
+        n, rows = len(particles), len(scene.owners())
+        self._box, self._radius = box_of(scene, particles, 0.0), float(particles.radius.max())
+        loses = self._box.laws.may_dissipate or self._box.laws.loses or self._box.loss is not None
+        balls = Balls(particles.radius, np.zeros(n, np.int64), np.zeros(1))
+        # Times are those of the start of each flight: so what is written at frames is no part of the motion.
+        self.state = State(
+            particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n),
+            np.zeros(n, np.int64), np.zeros((2 * rows, 1)), np.zeros(n if loses else 0), None, None,
+            image=particles.image, period=scene.cell(), balls=balls,
+        )  # fmt: skip
+        pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, self._box, n)
+        super().__init__(scene, method, n, pool, tier, seeding.first)
+        self._flock = flock_of(particles, self._box.grid, self._box.loss is not None)
+        state = self.state
+        self._tally = watched.tally
+        counts = None if self._tally is None else self._tally.of_thread(0).impacts
+        self._books = Books(
+            state.impulse, state.dissipated, state.impacts, balls.collisions, balls.virial, state.image, counts
+        )
+        self._clock = np.zeros(CLOCK)
+        self._clock[LENGTH] = epoch_of(scene, particles)
+        self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
+        self._threads = threads if n >= _FEW else 1
+        self._numbers = BallNumbers(scene, particles)
+        self._ends = np.zeros(2)  # of the frame, and of the one before [s]
+        self._start = np.zeros(1)
+        self._choose_tier()
+
+    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+        latest = self._limit(latest)
+        began = time.perf_counter()
+        self._ends[:] = moment, moment - span
+        taking: Any = self._box, self._flock, self._books, self._clock, Rule(moment, self._watch.passes)
+        ((status, ball),) = self._called(events.take, [taking], latest)
+        self._cut_short = status == Status.INTERRUPTED
+        if not self._cut_short and status == Status.DONE:
+            self._show(moment)
+        self._tier.spend(time.perf_counter() - began)
+        self._watch.end()
+        if status not in (Status.DONE, Status.INTERRUPTED):
+            raise RunError(self._failed(Status(status), int(ball), moment - span))
+        if not self._cut_short:
+            self._observe(moment)
+        return not self._cut_short
+
+    def _show(self, moment: float) -> None:
+        """Write the arrays of a frame."""
+        self._in_parts(events.show, self._box, self._flock, self.state, self._since(moment), count=self.state.mass.size)
+
+    def _since(self, moment: float) -> float:
+        """A moment in the time of the epoch [s]."""
+        return float(moment - self._clock[EPOCHS] * self._clock[LENGTH])
+
+    def _in_parts(self, kernel: Any, *arguments: Any, count: int) -> None:
+        """Call a kernel for so many balls, a part of them in each thread."""
+        threads = 1 if self._tier.is_plain else self._threads
+        ends = np.linspace(0, count, threads + 1).astype(int).tolist()
+        self._called(kernel, [(*arguments, *part) for part in itertools.pairwise(ends)], math.inf)
+
+    def _failed(self, status: Status, ball: int, before: float) -> str:
+        r, _v = self._flock.at(self._box.pull, ball, self._flock.time(ball))
+        return (
+            f"the frame after {before:g} s failed at particle {ball}: {status.sentence}; it is at "
+            f"({', '.join(f'{x:.6g}' for x in r)}) m at {self._now():.9g} s"
+        )
+
+    def _now(self) -> float:
+        """The time of the next event since the start [s]."""
+        return float(self._clock[EPOCHS] * self._clock[LENGTH] + self._flock.key[0])
+
+    def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+        part, box, flock = (0, 0), self._box, self._flock
+        yield events.mark, (box, self._radius, *part)
+        yield events.begin, (box, flock, *part)
+        yield events.order, (flock,)
+        yield events.take, (box, flock, self._books, self._clock, Rule(0.0, self._watch.passes))
+        yield events.show, (box, flock, self.state, 0.0, *part)
+        yield observables.observe, self._observing()
+
+    def _observing(self) -> tuple[Any, ...]:
+        drawn = np.arange(len(self._partial))
+        return None, self._box.walls, self._box.pull, self.state, drawn, observables.CHUNK, self._partial
+
+    def observe(self) -> None:
+        self._begin()
+        self._show(0.0)
+        self._observe(0.0)
+        self._start[0] = _balance(self._summary())
+
+    def _begin(self) -> None:
+        """Find what is next for every ball."""
+        n, began = self.state.mass.size, time.perf_counter()
+        size = _AT_ONCE_PLAIN if self._tier.is_plain else _AT_ONCE
+        self._in_parts(events.mark, self._box, self._radius, count=int(self._box.grid.x.count) + 2)
+        for first in range(0, n, size):
+            aiming: Any = self._box, self._flock, first, min(first + size, n)
+            self._called(events.begin, [aiming], math.inf)
+        ordering: Any = (self._flock,)
+        self._called(events.order, [ordering], math.inf)
+        self._tier.spend(time.perf_counter() - began)
+
+    def _observe(self, moment: float) -> None:
+        self._tier.kernel(observables.observe)(*self._observing())
+        self._numbers.frame(self.state, moment, self._summary()["kinetic_energy"])
+
+    def _summary(self) -> dict[str, Any]:
+        return observables.summary(self._partial, self.state, self._owners, lasts=False, parts=self._parts)
+
+    def seen(self) -> dict[str, Any]:
+        seen = self._summary()
+        scale = seen["kinetic_energy"] + seen["dissipated_energy"] + abs(seen["potential_energy"])
+        seen["energy_error"] = abs(_balance(seen) - self._start[0]) / scale if scale > 0.0 else 0.0
+        escaped = int((np.sqrt((self.state.position**2).sum(axis=0)) > self._far).sum())
+        return self._numbers.added({**seen, "escaped": escaped}, self.state)
+
+    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
+        failures.require_admissible(self._scene, self.state, seen, self._deepest, moment, self._first)
+
+    def share_done(self, span: float) -> float:
+        return min(1.0, max(0.0, (self._now() - float(self._ends[1])) / span))
+
+    def arrays(self) -> Arrays:
+        flock, state = self._flock, self.state
+        found = {
+            "flight": flock.flight, "event": flock.event, "key": flock.key, "item": flock.item, "head": flock.head,
+            "impulse": state.impulse, "dissipated": state.dissipated, "impacts": state.impacts,
+            "collisions": self._books.collisions, "virial": self._books.virial, "clock": self._clock,
+            "start": self._start, "position": state.position, "velocity": state.velocity, "energy": state.energy,
+            **self._numbers.arrays(),
+        }  # fmt: skip
+        some = {"last": flock.last, "image": state.image}
+        found |= {name: array for name, array in some.items() if array is not None}
+        return found if self._tally is None else {**found, **self._tally.arrays()}
+
+    def restore(self, arrays: Arrays, cut_short: bool) -> None:
+        self.observe()
+        super().restore(arrays, cut_short)
+        if self._tally is not None:
+            self._books.counts[:] = arrays["member_impacts"]
+
+
+def _balance(seen: dict[str, Any]) -> float:
+    """The energy of all, with what was lost."""
+    kept: float = seen["total_energy"] + seen["dissipated_energy"]
+    return kept

@@ -133,6 +133,9 @@ class PlaneNumbers(Flat):
 
     leaves_once = True
 
+    def grown(self, radius):
+        return self._replace(offset=self.offset - radius)
+
     def first_hit(self, r, v):
         approach = dot(self.normal, v)
         time = (self.offset - self.inner(r)) / approach

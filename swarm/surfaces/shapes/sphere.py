@@ -94,6 +94,10 @@ class SphereNumbers(Distance, ExactChord):
         k = 0.5 * self.curvature * self.curvature
         return r - ((square(d) - self.radius2) * k) * d
 
+    def grown(self, radius):
+        one = self.radius - self.side * radius
+        return self._replace(radius=one, radius2=one * one, curvature=self.side / one)
+
     def may_reach(self, low, high):
         return square(highest(highest(low - self.center, self.center - high), ZERO)) <= self.radius2
 

@@ -1,0 +1,77 @@
+"""What a run knows of each ball between two events: two lines of the cache, and its node of the queue.
+
+One line is the flight: position and velocity at a time, which is that of the last impact. The other one is what is
+next. Both hold whole numbers too, as views of the same memory.
+"""
+
+from typing import Any, NamedTuple
+
+from ..kernel.arrays import index
+from ..kernel.gravity import accelerated, displacement
+from ..kernel.jit import Array
+from ..kernel.vector import Vec
+
+# Numbers of a row, and whole numbers in the same memory.
+FLOATS, WHOLES = 8, 16
+# Of a flight: position [m], velocity [m/s], their time [s since the epoch].
+_X, _V, _TIME = 0, 3, 6
+# Of what is next [s since the epoch]: a collision, the end of the cell, a wall; and which wall.
+MEETS, LEAVES, DUE, WALL = 0, 1, 2, 3
+# Whole numbers of a flight: the next ball in its cell; of what is next: with whom it collides and how often that one's
+# velocity had changed then, how often its own has, the ball before it in its cell, its node in the queue, its cell.
+NEXT = 14
+PARTNER, SEEN, STAMP, BEFORE, NODE, CELL = 8, 9, 10, 11, 12, 13
+# Of no ball.
+NOBODY = -1
+
+
+class Flock(NamedTuple):
+    """The balls of a run."""
+
+    flight: Array  # (8 N) numbers of flights
+    link: Array  # (16 N) int32, the same memory
+    event: Array  # (8 N) numbers of what is next
+    tag: Array  # (16 N) int32, the same memory
+    key: Array  # (N) of the nodes of the queue: the time of what is next
+    item: Array  # (N) int32, the ball of each node
+    head: Array  # int32, the first ball in each cell
+    last: Any = None  # (N) when each lost energy or met somebody last [s since the epoch]; None where nothing loses any
+
+    def time(self, i):
+        """The time of its last impact."""
+        return self.flight[index(FLOATS * i + _TIME)]
+
+    def place(self, i):
+        """Its position then."""
+        return self._vector(i, _X)
+
+    def velocity(self, i):
+        """Its velocity then."""
+        return self._vector(i, _V)
+
+    def _vector(self, i, k):
+        row = FLOATS * i + k
+        return Vec(self.flight[index(row)], self.flight[index(row + 1)], self.flight[index(row + 2)])
+
+    def at(self, pull, i, now):
+        """Its position and its velocity at a time, in flight."""
+        way, v = now - self.time(i), self.velocity(i)
+        return self.place(i) + displacement(pull, v, way), accelerated(pull, v, way)
+
+    def put(self, i, now, r, v):
+        """Store its flight from a time on."""
+        row = FLOATS * i
+        for k, value in enumerate((*r, *v, now)):
+            self.flight[index(row + k)] = value
+
+    def turn(self, i, v):
+        """Give it another velocity."""
+        for k, value in enumerate(v):
+            self.flight[index(FLOATS * i + _V + k)] = value
+        self.tag[index(WHOLES * i + STAMP)] += 1
+
+    def next_of(self, i):
+        """When the first of what is next comes."""
+        row = FLOATS * i
+        soonest = min(self.event[index(row + MEETS)], self.event[index(row + LEAVES)])
+        return min(soonest, self.event[index(row + DUE)])
