@@ -177,7 +177,7 @@ class Pieces(Volume):
         number = {part: k for k, part in enumerate(self.parts)}
         of_pieces = [number.get(part, -1) for part in self._parts_of_pieces]
         rows = [(i, of_pieces[i] if member < 0 else member) for i, member in self.order.members(self.pieces)]
-        return np.array([(self.owners_of_pieces[i], member) for i, member in rows]).T
+        return np.array([(self.owners_of_pieces[i], member) for i, member in rows], np.int64).reshape(-1, 2).T
 
     def names_laws(self) -> bool:
         """Whether a law of a wall is known by its name alone, as from a file that was read without its code."""

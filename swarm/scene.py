@@ -41,7 +41,7 @@ class Scene(Pieces):
     """Rigid surfaces, whose admissible sides intersect in the volume that holds the particles, and gravity.
 
     Args:
-        surfaces: at least one surface.
+        surfaces: at least one surface; none where the cell repeats in every direction, for balls.
         gravity: None, or three numbers (gx, gy, gz) [m/s^2], each at most 1e100.
         period: None, or three lengths (Lx, Ly, Lz) [m] of a cell that repeats without end, None for a direction in
             which it does not: what leaves [0, L) through a face comes back through the other one, and is counted. A
@@ -82,8 +82,6 @@ class Scene(Pieces):
         pairs: Pairs | None = None,
     ) -> None:
         surfaces = (surfaces,) if isinstance(surfaces, Surface) else tuple(surfaces)
-        if not surfaces:
-            raise SceneError("surfaces must hold at least one surface, got none")
         for i, surface in enumerate(surfaces):
             if not isinstance(surface, Surface):
                 raise SceneError(f"surfaces[{i}] must be a surface such as swarm.Sphere, got {surface!r}")
@@ -92,6 +90,11 @@ class Scene(Pieces):
         for i, part in enumerate(pull or ()):
             checks.magnitude(f"|gravity[{i}]|", abs(part))
         lengths, plane = lengths_of(period), planes.checked(plane)
+        if not surfaces and not planes.repeats_along_all(plane, lengths):
+            raise SceneError(
+                "surfaces must hold at least one surface, or the scene must repeat in every direction, got none; give "
+                "the walls, or a period (Lx, Ly, Lz)"
+            )
         named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
         images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
         checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, pairs=checked_pairs(pairs), _images=images)

@@ -38,7 +38,7 @@ class Volume:
 
     def size(self) -> float:
         """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""
-        smallest = min(surface.size() for surface in self.surfaces)
+        smallest = min((surface.size() for surface in self.surfaces), default=math.inf)
         if math.isfinite(smallest):
             return smallest
         low, high = self.bounds()
@@ -78,9 +78,8 @@ class Volume:
             rows, _image = into_cell(self.period, rows)
         away = np.full(np.shape(rows)[1:], -math.inf)
         each = zip(self.surfaces, self._images, strict=True)
-        return np.array(
-            [gaps_of(images, rows, time).max(axis=0) if one.is_there(time) else away for one, images in each]
-        )
+        found = [gaps_of(images, rows, time).max(axis=0) if one.is_there(time) else away for one, images in each]
+        return np.array(found).reshape(len(found), *away.shape)
 
     def admits(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not."""

@@ -12,6 +12,11 @@ from .options import RunOptions
 def require_balls(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> None:
     """Raise a `SceneError` where particles with a radius do not go with the scene, the method or the options."""
     if particles.radius is None:
+        if not scene.surfaces:
+            raise SceneError(
+                "surfaces must hold at least one surface for particles without a radius, which meet nothing else, got "
+                "none; give the walls, or give the particles a radius"
+            )
         if scene.pairs is not None:
             raise SceneError(
                 "pairs must be None where particles have no radius, points do not meet one another, got "
