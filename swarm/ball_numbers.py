@@ -33,7 +33,7 @@ def balls_volume(scene: Scene, radius: Floats) -> float:
     return float(4.0 / 3.0 * math.pi * (radius**3).sum())
 
 
-def room_of(scene: Scene, particles: Particles) -> float:
+def volume_of(scene: Scene, particles: Particles) -> float:
     """The volume that particles have [m^3], in a plane the area: that they were filled into, else of the cell.
 
     NaN where neither is known.
@@ -69,7 +69,7 @@ class BallNumbers:
     """
 
     def __init__(self, scene: Scene, particles: Particles) -> None:
-        self._dimensions, self._room = len(scene.axes()), room_of(scene, particles)
+        self._dimensions, self._room = len(scene.axes()), volume_of(scene, particles)
         self._last = np.zeros(len(_LAST))
 
     def arrays(self) -> dict[str, NDArray[Any]]:

@@ -7,11 +7,15 @@ from . import checks
 from .errors import SceneError
 from .particles import Particles
 from .scene import Scene
+from .sequential import Room, place_balls, require_packing, require_size
 from .state import Floats
 
 _BATCH = 1 << 18
 # The search ends after this many points if fewer than one in a million was admissible.
 _TRIES = 20_000_000
+# Of balls the volume is estimated from as many admissible points, to 0.1 %.
+_POINTS = 1 << 18
+_INSTEAD = "the particles as arrays or a CSV file"
 
 
 def fill(
@@ -23,7 +27,7 @@ def fill(
     mass: ArrayLike = 1.0,
     seed: int = 0,
     exact: bool = False,
-    radius: object = None,
+    radius: ArrayLike | None = None,
 ) -> Particles:
     """N particles, uniform in the admissible volume, with isotropic or Maxwellian velocities.
 
@@ -40,15 +44,17 @@ def fill(
         exact: True: the velocities are scaled together, so that the mean kinetic energy is 3/2 temperature (in a plane
             1 temperature) to round-off. Their mean momentum stays as it is drawn, of the order of
             sqrt(mass temperature/n): walls change it, and to take it out would leave fewer than 3 n degrees of freedom.
-        radius: None: particles are points and do not meet one another.
+        radius: one number or (n,) [m], above 0: balls, at places where they overlap neither one another nor the walls,
+            one after the other, the largest first; None: points, which do not meet one another.
 
     Returns:
-        The particles; their `volume` is the admissible volume [m^3], estimated from the random points; in a scene with
-        a plane all of them are in it, and it is the admissible area [m^2].
+        The particles; their `volume` is the admissible volume of points [m^3], estimated from the random points; in a
+        scene with a plane all of them are in it, and it is the admissible area [m^2].
 
     Raises:
         SceneError: an argument is out of its range, both or neither of speed and temperature are given, the
-            volume is open, exact without a temperature, a radius, or too thin for random points to find it.
+            volume is open, exact without a temperature, too thin for random points to find it, or too full: balls fill
+            at most 0.35 of it at random places, discs in a plane 0.5; `pack` makes more of them.
 
     >>> import swarm
     >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
@@ -59,8 +65,6 @@ def fill(
     n = checks.count("n", n)
     checks.particles_fit("n", n)
     seed = checks.count("seed", seed, least=0)
-    if radius is not None:
-        raise SceneError("radius of fill is to come")
     if (speed is None) == (temperature is None):
         came = "neither" if speed is None else "both"
         raise SceneError(f"fill needs one of speed and temperature, got {came}")
@@ -72,8 +76,11 @@ def fill(
         raise SceneError("exact must be False with speed, got True: it scales velocities to a temperature")
     random = np.random.default_rng(seed)
     # Checks the masses too; velocities follow, since a Maxwellian needs the masses.
-    points, volume = _points(scene, n, random)
-    particles = Particles(points, np.zeros((3, n)), mass)
+    if radius is None:
+        points, volume = _points(scene, n, random)
+        particles = Particles(points, np.zeros((3, n)), mass)
+    else:
+        particles, volume = _balls(scene, Particles(np.zeros((3, n)), np.zeros((3, n)), mass, None, radius), random)
     particles.volume = volume
     particles.image = None if scene.period is None else np.zeros((3, n), np.int64)
     normal = np.zeros((3, n))
@@ -86,6 +93,22 @@ def fill(
             normal *= np.sqrt(len(scene.axes()) * n / (normal**2).sum())
         particles.velocity = normal * np.sqrt(temperature / particles.mass)
     return particles
+
+
+def _balls(scene: Scene, particles: Particles, random: np.random.Generator) -> tuple[Particles, float]:
+    """Balls where they overlap nothing, and the volume."""
+    assert particles.radius is not None
+    require_size(scene, particles.radius)
+    room = room_of(scene, random)
+    require_packing(scene, particles.radius, room)
+    particles.position = place_balls(scene, particles.radius, room, random)
+    return particles, room.volume
+
+
+def room_of(scene: Scene, random: np.random.Generator) -> Room:
+    """The volume of a scene, from random points."""
+    _points_of_it, volume = _points(scene, _POINTS, random)
+    return Room(*bounding_box(scene, "fill", _INSTEAD), volume)
 
 
 def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]:
@@ -101,7 +124,7 @@ def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]
 
 def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, float]:
     """Admissible points, and the volume from their share of the random points of the bounding box."""
-    low, high = bounding_box(scene, "fill", "the particles as arrays or a CSV file")
+    low, high = bounding_box(scene, "fill", _INSTEAD)
     points, found, tried, admissible = np.empty((3, n)), 0, 0, 0
     axes = scene.axes()
     box = float(np.prod((high - low)[axes]))

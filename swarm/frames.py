@@ -97,6 +97,24 @@ class Frame:
         found: NDArray[np.int64] | None = self._read("image")
         return found
 
+    @property
+    def radius(self) -> NDArray[np.float64] | None:
+        """(N,) of balls [m], else None."""
+        found: NDArray[np.float64] | None = self._read("radius")
+        return found
+
+    @property
+    def spin(self) -> NDArray[np.float64] | None:
+        """(3, N) of balls that turn [rad/s], else None."""
+        found: NDArray[np.float64] | None = self._read("spin")
+        return found
+
+    @property
+    def collisions(self) -> NDArray[np.int64] | None:
+        """(N,) how often each ball has met another one since 0 s; None of points."""
+        found: NDArray[np.int64] | None = self._read("collisions")
+        return found
+
     def _read(self, name: str) -> Any:
         return self.arrays.read(name, f"frame {self.number}")
 

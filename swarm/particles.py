@@ -12,6 +12,7 @@ from .errors import SceneError
 from .state import Floats
 
 _COLUMNS = ("x", "y", "z", "vx", "vy", "vz")
+_SPINS = ("wx", "wy", "wz")
 
 
 class Particles:
@@ -105,15 +106,25 @@ class Particles:
     def from_csv(cls, path: str | Path) -> "Particles":
         """Particles from a CSV file with columns x, y, z, vx, vy, vz and optionally mass, in any order.
 
+        Of balls it has a column radius, and may have wx, wy, wz of their spins.
+
         Raises:
             SceneError: the file cannot be read, a column is missing or unknown, or a cell is not a number; names
                 file, row and column.
         """
-        columns = read_columns(path, _COLUMNS, ("mass",), "particle")
+        columns = read_columns(path, _COLUMNS, ("mass", "radius", *_SPINS), "particle")
+        spins = [columns[name] for name in _SPINS if name in columns]
+        if spins and (len(spins) < len(_SPINS) or "radius" not in columns):
+            raise SceneError(
+                f"{path}: expected the columns {', '.join(_SPINS)} of spins all together and with radius, got "
+                f"{', '.join(columns)}"
+            )
         return cls(
             [columns[name] for name in _COLUMNS[:3]],
             [columns[name] for name in _COLUMNS[3:]],
             columns.get("mass", 1.0),
+            radius=columns.get("radius"),
+            spin=spins or None,
         )
 
 

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from .bodies.state import Bodies
     from .bodies.table import Made
 
-_TABLES = ("gravity", "period", "plane", "particles", "body", "source", "counter", "surface", "method", "run")
+_SCENE = ("gravity", "period", "plane", "pairs")
+_TABLES = (*_SCENE, "particles", "body", "source", "counter", "surface", "method", "run")
 SWEEP = "sweep"
 _SAVED = {"checkpoint": 60.0}
 
@@ -41,6 +42,7 @@ class ParticlesTable:
     mass: float | None = None
     seed: int | None = None
     exact: bool | None = None
+    radius: float | list[float] | None = None
     source: str | None = dataclasses.field(default=None, metadata={"key": "from"})
     frame: int | None = None
 
@@ -56,6 +58,7 @@ class ParticlesTable:
             mass=1.0 if self.mass is None else self.mass,
             seed=self.seed or 0,
             exact=bool(self.exact),
+            radius=self.radius,
         )
 
 
@@ -189,9 +192,7 @@ def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None 
         raise SceneError("particles: expected a [particles] or a [body] table, got both")
     if not {"particles", "body", "source"} & set(document):
         raise SceneError("particles: expected a [particles] or a [body] table, or a [[source]], got neither")
-    scene = scene or tables.scene_of(
-        _with_bodies(document.get("surface"), path), *(document.get(key) for key in ("gravity", "period", "plane"))
-    )
+    scene = scene or tables.scene_of(_with_bodies(document.get("surface"), path), *map(document.get, _SCENE))
     sources = run_tables.sources_of(document["source"], scene) if "source" in document else ()
     counters = run_tables.counters_of(document["counter"]) if "counter" in document else ()
     return Job(
@@ -276,12 +277,8 @@ def _body(table: Any) -> "BodiesFile | Made":
 
 
 def _particles(given: Any) -> ParticlesTable:
-    if isinstance(given, dict) and "radius" in given:
-        raise SceneError(
-            "particles.radius: must not be given: particles are points and do not meet one another; remove it"
-        )
     table = tables.convert(given, ParticlesTable, "particles")
-    filled = ("count", "speed", "temperature", "mass", "seed", "exact")
+    filled = ("count", "speed", "temperature", "mass", "seed", "exact", "radius")
     if table.source is None:
         if table.frame is not None:
             raise SceneError('particles.frame: needs from = "FILE.h5"')

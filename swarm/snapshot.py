@@ -19,8 +19,8 @@ class Snapshot:
     """The arrays of particles at a frame by their names, each read once and never to be written.
 
     Args:
-        read: gives "position", "velocity", "mass", "impacts", and "image",
-            "escape_time" and "absorbed_time" or None for each.
+        read: gives "position", "velocity", "mass", "impacts", and "image", "escape_time", "absorbed_time",
+            "radius", "spin" and "collisions" or None for each.
         gravity: [m/s^2], or None.
         period: of the scene [m], or None.
         there: how many of them, the first ones, are there; None for all.

@@ -140,6 +140,27 @@ class State(NamedTuple):
         time, wall = self.absorbed_time, self.absorbed_wall
         return None if time is None or wall is None else Absorbed(time, wall)
 
+    @property
+    def radius(self) -> Floats | None:
+        """Of balls [m], (N,)."""
+        return None if self.balls is None else self.balls.radius
+
+    @property
+    def spin(self) -> Floats | None:
+        """Of balls that turn [rad/s], (3, N)."""
+        return None if self.balls is None else self.balls.spin
+
+    @property
+    def collisions(self) -> NDArray[np.int64] | None:
+        """Of balls, (N,) how many each has had with others since the start."""
+        return None if self.balls is None else self.balls.collisions
+
+    def having(self, **arrays: NDArray[Any]) -> "State":
+        """The state with other arrays, also in place of those of balls."""
+        mine: dict[str, Any] = {name: array for name, array in arrays.items() if name in self._fields}
+        balls = {name: array for name, array in arrays.items() if name not in mine}
+        return self._replace(**mine, balls=None if self.balls is None else self.balls._replace(**balls))
+
     def gone(self) -> NDArray[np.bool_]:
         """(N,) whether each has escaped or was absorbed: where it is then it stays, whatever the walls do."""
         found = np.zeros(self.mass.size, np.bool_)

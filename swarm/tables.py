@@ -19,6 +19,7 @@ from .errors import SceneError
 from .law_tables import table_of_group, table_of_law, with_laws
 from .methods import ALL_METHODS, Method
 from .motion import table_of as motion_table
+from .pairs import Pairs
 from .scene import Scene
 from .surfaces import ALL_SURFACES, OwnSurface, Surface
 from .surfaces.doors import Opening
@@ -30,12 +31,22 @@ NESTED = ("openings", "part")
 _LONG, _ARRAY = 1000, "sha256:"
 
 
-def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None) -> Scene:
-    """A scene from its tables: a list of surface tables; gravity, the period and the plane, or None."""
+def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None, pairs: Any = None) -> Scene:
+    """A scene from its tables: a list of surface tables; gravity, the period, the plane and the pairs, or None."""
     if not isinstance(surfaces, list) or not surfaces:
         raise SceneError("surface: expected at least one [[surface]] table, got none")
     built = [surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
-    return Scene(surfaces=built, gravity=gravity, period=period, plane=plane)
+    met = None if pairs is None else _pairs_of(pairs)
+    return Scene(surfaces=built, gravity=gravity, period=period, plane=plane, pairs=met)
+
+
+def _pairs_of(table: Any) -> Pairs:
+    """What particles with a radius do to one another, from the table [pairs]."""
+    try:
+        return convert(table, Pairs, "pairs")
+    except SceneError as error:
+        # The checks of `Pairs` name the key by its full path.
+        raise SceneError(str(error).replace("pairs.pairs.", "pairs.")) from None
 
 
 def surface_of(table: Any, where: str) -> Surface:
@@ -139,7 +150,9 @@ def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str,
     # TOML has no None.
     period = {} if scene.period is None else {"period": [length or False for length in scene.period]}
     plane = {} if scene.plane is None else {"plane": scene.plane}
-    return {**gravity, **period, **plane, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
+    given = {} if scene.pairs is None else {key: one for key, one in vars(scene.pairs).items() if one is not None}
+    pairs = {} if scene.pairs is None else {"pairs": given}
+    return {**gravity, **period, **plane, **pairs, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
 
 
 def _kept(cls: type[Any]) -> list[dataclasses.Field[Any]]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import swarm
+from swarm.cells import overlaps_of
 
 # The statistics of N points are off by a few 1/sqrt(N).
 N = 40_000
@@ -140,3 +141,74 @@ def test_a_volume_too_thin_to_find_is_refused(monkeypatch):
     scene = swarm.Scene([swarm.Sphere(1.0), swarm.Sphere(1.0 - 1e-8, side="outside")])
     with pytest.raises(swarm.SceneError, match=r"admissible points in .* tries.*below 1e-6"):
         swarm.fill(scene, 1000, speed=1.0)
+
+
+# --- Balls -----------------------------------------------------------------------------------------------
+
+BALLS = {
+    "sphere": swarm.Scene([swarm.Sphere(1.0)]),
+    "box": swarm.Scene([swarm.Box((1.0, 0.5, 0.5))]),
+    "obstacle": swarm.Scene([swarm.Sphere(1.0), swarm.Sphere(0.3, side="outside")]),
+    "cell": swarm.Scene([swarm.Sphere(0.1, (0.0, 0.0, 0.0), side="outside")], period=(1.0, 1.0, 1.0)),
+    "table": swarm.Scene([swarm.Stadium(0.5, 1.0)], plane="z"),
+}
+
+
+def radius_of(scene, packing, n):
+    volume = swarm.fill(scene, 1, speed=1.0).volume
+    share = packing * volume / n
+    return math.sqrt(share / math.pi) if scene.plane else (0.75 * share / math.pi) ** (1.0 / 3.0)
+
+
+@pytest.mark.parametrize("scene", BALLS.values(), ids=BALLS)
+@pytest.mark.parametrize("packing", [0.05, 0.25])
+def test_balls_overlap_neither_one_another_nor_walls(scene, packing):
+    n = 150
+    radius = radius_of(scene, packing, n) * np.linspace(0.6, 1.2, n)
+    particles = swarm.fill(scene, n, speed=2.0, radius=radius, seed=5)
+    assert particles.radius.tolist() == radius.tolist()
+    assert (scene.distances_outside(particles.position) <= -radius).all()
+    assert overlaps_of(particles.position, radius, scene.period) is None
+    again = swarm.fill(scene, n, speed=2.0, radius=radius, seed=5)
+    assert np.array_equal(again.position, particles.position)
+    assert np.array_equal(again.velocity, particles.velocity)
+    assert not np.array_equal(swarm.fill(scene, n, speed=2.0, radius=radius, seed=6).position, particles.position)
+    assert np.sqrt((particles.velocity**2).sum(axis=0)) == pytest.approx(2.0)
+    if scene.plane:
+        assert not particles.position[2].any()
+        assert not particles.velocity[2].any()
+
+
+def test_few_small_balls_are_uniform():
+    """Their density is that of points: <|r|^2> = 3/5 of a ball of radius 1 that their centres have."""
+    found = swarm.fill(BALLS["sphere"], 3000, speed=1.0, radius=0.001, seed=1).position
+    assert (found**2).sum(axis=0).mean() == pytest.approx(0.6 * 0.999**2, abs=4.0 * 0.27 / math.sqrt(3000))
+
+
+def test_the_volume_is_that_of_points():
+    box = swarm.fill(BALLS["box"], 100, speed=1.0, radius=0.05)
+    assert box.volume == pytest.approx(2.0, rel=1e-12)
+
+
+def test_points_have_the_bits_that_they_had():
+    points = swarm.fill(BALLS["sphere"], 3, speed=1.0, seed=1)
+    assert points.radius is None
+    assert np.array_equal(points.position, swarm.fill(BALLS["sphere"], 3, speed=1.0, seed=1, radius=None).position)
+
+
+@pytest.mark.parametrize(
+    ("scene", "n", "radius", "sentence"),
+    [
+        ("box", 100, 0.12, r"radius must leave a packing of at most 0.35 to random places, got 100 balls of 0.12 m in "
+         r"2 m\^3, a packing of 0.3619; use fewer or smaller balls, or swarm.pack"),
+        ("table", 10, 0.3, "radius must leave a packing of at most 0.5 to random places, got 10 discs of 0.3 m in"),
+        ("box", 2, 0.51, r"radius must leave a place within the walls, which are 1 m apart along y, got 0.51 m of"),
+        ("box", 3, 0.499, "fill found places for 1 of 3 balls|packing of at most"),
+        ("box", 2, 0.0, "radius must be a finite number above 0, got 0 for particle 0"),
+        ("box", 2, [0.1, -0.1], "radius must be a finite number above 0, got -0.1 for particle 1"),
+        ("box", 2, [0.1, 0.1, 0.1], r"radius must be one number or have shape \(2,\), got shape \(3,\)"),
+    ],
+)  # fmt: skip
+def test_balls_that_do_not_fit_are_one_sentence(scene, n, radius, sentence):
+    with pytest.raises(swarm.SceneError, match=sentence):
+        swarm.fill(BALLS[scene], n, speed=1.0, radius=radius)

@@ -103,6 +103,14 @@ def test_mass_is_one_where_there_is_no_column(table):
     assert (table("x,y,z,vx,vy,vz\n1,2,3,4,5,6\n").mass == [1.0]).all()
 
 
+def test_balls_have_a_radius_and_may_have_a_spin(table):
+    balls = table("radius,x,y,z,vx,vy,vz\n0.5,1,2,3,4,5,6\n0.2,1,2,3,4,5,6\n")
+    assert (balls.radius == [0.5, 0.2]).all()
+    assert balls.spin is None
+    turning = table("x,y,z,vx,vy,vz,radius,wz,wx,wy\n1,2,3,4,5,6,0.5,9,7,8\n")
+    assert (turning.spin == [[7.0], [8.0], [9.0]]).all()
+
+
 @pytest.mark.parametrize("options", [{"encoding": "utf-8-sig"}, {"newline": "\r\n"}], ids=repr)
 def test_files_from_spreadsheets(table, options):
     assert len(table("x,y,z,vx,vy,vz\n1,2,3,4,5,6\n", **options)) == 1
@@ -123,6 +131,9 @@ def test_files_from_spreadsheets(table, options):
         ("x,y,z,vx,vy,vz\n1,2,3,4,5,inf\n", ["row 2", "column 'vz'", "'inf'"]),
         ("x,y,z,vx,vy,vz\n1,2,3,4,5,6\n\n1,2,3\n", ["row 4", "6 cells", "got 3"]),
         ("x,y,z,vx,vy,vz,mass\n1,2,3,4,5,6,-1\n", ["row 2", "column 'mass'", "above 0", "'-1'"]),
+        ("x,y,z,vx,vy,vz,radius\n1,2,3,4,5,6,0\n", ["row 2", "column 'radius'", "above 0", "'0'"]),
+        ("x,y,z,vx,vy,vz,radius,wx\n1,2,3,4,5,6,1,1\n", ["wx, wy, wz of spins all together and with radius"]),
+        ("x,y,z,vx,vy,vz,wx,wy,wz\n1,2,3,4,5,6,1,1,1\n", ["wx, wy, wz of spins all together and with radius"]),
         ("x,y,z,vx,vy,vz\n1,2,3,4,5," + 200_000 * "6" + "\n", ["cannot read", "field larger than field limit"]),
     ],
 )

@@ -261,7 +261,12 @@ def test_shipped_scenes_are_read(path):
         ),
         (SPHERE, formula("x**2 + y**2 + zz**2 - 1"), r"surface\[0\]\.phi has an unknown name 'zz'"),
         (SPHERE, formula("open(x) - 1"), r"surface\[0\]\.phi must call only sqrt"),
-        ("speed = 0.5", "speed = 0.5\nradius = 0.1", r"particles\.radius: .*particles are points and do not meet"),
+        ("speed = 0.5", "speed = 0.5\nradius = 0.0", r"\[particles\]: radius must be a finite number above 0, got 0"),
+        ("speed = 0.5", "speed = 0.5\nradius = [0.1, 0.2]", r"\[particles\]: radius must be one number or have shape"),
+        ("speed = 0.5", 'speed = 0.5\nradius = "wide"', r"particles\.radius: expected float \| array \| null, got str"),
+        ("speed = 0.5", "speed = 0.5\n[pairs]\nrestitution = 1.5", r"pairs\.restitution must be from 0 to 1, got 1\.5"),
+        ("speed = 0.5", "speed = 0.5\n[pairs]\nbounce = 1", r"pairs\.bounce: unknown key, expected 'restitution'"),
+        ("speed = 0.5", "speed = 0.5\n[pairs]\nfriction = true", r"pairs\.friction: expected float, got bool"),
         ("speed = 0.5", "speed = 0.5\nexact = true", r"\[particles\]: exact must be False with speed"),
         ("speed = 0.5", "temperature = 0.5\nexact = 1", r"particles\.exact"),
         (SPHERE, formula("x.real - 1"), r"surface\[0\]\.phi must not have an attribute"),
@@ -283,6 +288,26 @@ def test_bad_input_names_the_key(tmp_path, old, new, message):
 def test_an_exact_temperature(tmp_path):
     particles = read(tmp_path, GOOD.replace("speed = 0.5", "temperature = 0.5\nexact = true")).start()
     assert 0.5 * (particles.velocity**2).sum() / 10 == pytest.approx(0.75, rel=1e-14)
+
+
+def test_balls(tmp_path):
+    text = GOOD.replace("speed = 0.5", "speed = 0.5\nradius = 0.01") + "\n[pairs]\nrestitution = 0.9\nfriction = 0.2\n"
+    job = read(tmp_path, text)
+    assert job.scene.pairs == swarm.Pairs(0.9, 0.2)
+    assert job.start().radius.tolist() == [0.01] * 10
+    radii = [0.001 * k for k in range(1, 11)]
+    assert read(tmp_path, text.replace("= 0.01", f"= {radii}")).start().radius.tolist() == radii
+    # Written back, as a trajectory has it.
+    table = tables.scene_table(job.scene)
+    assert table["pairs"] == {"restitution": 0.9, "friction": 0.2}
+    assert tables.scene_of(table["surface"], None, pairs=table["pairs"]).pairs == job.scene.pairs
+
+
+def test_balls_from_a_file(tmp_path):
+    (tmp_path / "start.csv").write_text("x,y,z,vx,vy,vz,radius,wx,wy,wz\n0.1,0,0,1,0,0,0.2,1,2,3\n")
+    particles = read(tmp_path, GOOD.replace("count = 10\nspeed = 0.5", 'from = "start.csv"')).start()
+    assert particles.radius.tolist() == [0.2]
+    assert particles.spin.T.tolist() == [[1.0, 2.0, 3.0]]
 
 
 def test_particles_from_files(tmp_path):

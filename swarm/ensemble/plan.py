@@ -28,7 +28,7 @@ _DIGITS = 12
 STEM = re.compile(rf"[0-9a-f]{{{_DIGITS}}}")
 _COMBINE, _WAYS = "combine", ("product", "zip")
 # Keys of a document that make its scene.
-_SCENE = ("surface", "gravity", "period", "plane")
+_SCENE = ("surface", "gravity", "period", "plane", "pairs")
 # Keys of a document that name files, whose content is part of what is computed.
 _FILES = ("from", "file")
 

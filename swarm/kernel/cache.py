@@ -38,6 +38,7 @@ SOURCES = (
     "lanes",
     "reacting",
     "colliding",
+    "cells.py",
     "observables.py",
     "state.py",
     "status.py",

@@ -68,7 +68,7 @@ class Several:
 
 
 def _some(state: State, kept: slice) -> State:
-    return state._replace(**{name: getattr(state, name)[..., kept] for name in _copied(state)})
+    return state.having(**{name: getattr(state, name)[..., kept] for name in _copied(state)})
 
 
 def _copied(state: State) -> list[str]:
@@ -123,7 +123,7 @@ class Background:
             raise self._problem
         some = _some(state, self._kept)
         if copy is None:
-            copy = some._replace(**{name: np.empty_like(getattr(some, name)) for name in _copied(some)})
+            copy = some.having(**{name: np.empty_like(getattr(some, name)) for name in _copied(some)})
         for name in _copied(some):
             np.copyto(getattr(copy, name), getattr(some, name))
         if self._born is not None:

@@ -103,7 +103,8 @@ def digest_of(particles: Particles, body: str = "") -> str:
     """A digest that identifies particles, or the points of bodies together with the text of the body."""
     digest = hashlib.sha256(body.encode())
     born = None if particles.births is None else particles.births.time
-    for array in (particles.position, particles.velocity, particles.mass, particles.image, born):
+    balls = particles.radius, particles.spin
+    for array in (particles.position, particles.velocity, particles.mass, particles.image, born, *balls):
         if array is not None:
             digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()[:16]

@@ -19,13 +19,15 @@ _PARTICLES = {
     layout.COUNTS: ("impacts_per_particle", "1"),
     layout.ESCAPES: (layout.ESCAPES, "s"),
     layout.ABSORBED: (layout.ABSORBED, "s"),
+    layout.COLLISIONS: ("collisions_per_particle", "1"),
+    layout.SPINS: (layout.SPINS, "rad s-1"),
 }
 # Of observables by the end of their name, in this order; of all others "1".
 _UNITS = {
     "angular_momentum": "kg m2 s-1", "momentum": "kg m s-1", "impulse": "N s", "energy_error": "1", "energy": "J",
     "penetration": "m", "heat": "J", "work": "J", "time": "s", "position": "m", "velocity": "m s-1", "spin": "rad s-1",
     "residence": "s",
-    "slowness": "s m-1",
+    "slowness": "s m-1", "pressure": "Pa", "collision_rate": "s-1",
 }  # fmt: skip
 _AXES = ("x", "y", "z")
 
@@ -71,7 +73,7 @@ def dataset_of(trajectory: Any) -> xr.Dataset:
             coordinates["particle"] = everything["id"][()]
             data["mass"] = ("particle", everything["mass"][()], {"units": "kg"})
             kept = [name for name in _PARTICLES if name in everything]
-            for name, unit in zip(layout.BIRTHS, ("s", "1"), strict=True):
+            for name, unit in zip((*layout.BIRTHS, layout.RADII), ("s", "1", "m"), strict=True):
                 if name in everything:
                     data[name] = ("particle", everything[name][()], {"units": unit})
         for name in kept:

@@ -15,10 +15,12 @@ from .sources import DamagedError
 # when it was absorbed [s], where they may absorb it.
 PARTS, COUNTS, IMAGES, ESCAPES = ("position", "velocity"), "impacts", "image", "escape_time"
 ABSORBED = "absorbed_time"
+# Of balls: how often each has met another one, its spin where balls turn, and its radius, which stays.
+COLLISIONS, SPINS, RADII = "collisions", "spin", "radius"
 _INTEGER, _REAL, _NUMBER = "iu", "f", "iuf"
 _ELEMENTS: dict[str, tuple[str, tuple[int, ...]]] = {
     **dict.fromkeys(PARTS, (_REAL, (3,))), COUNTS: (_INTEGER, ()), IMAGES: (_INTEGER, (3,)), ESCAPES: (_REAL, ()),
-    ABSORBED: (_REAL, ()),
+    ABSORBED: (_REAL, ()), COLLISIONS: (_INTEGER, ()), SPINS: (_REAL, (3,)),
 }  # fmt: skip
 KEPT = tuple(_ELEMENTS)
 # Of each particle of a run with sources: when it came [s], and the number of its source, -1 of those of the start.
@@ -69,9 +71,9 @@ def frames(file: Any, path: Path) -> int:
     for name in (f"parameters/{text}" for text in texts):
         if name in file and (h5py.check_string_dtype(dataset(file, name).dtype) is None or file[name].shape != ()):
             raise ValueError(f"{name} must be a text")
-    for name in ("parameters/seed", "parameters/copies"):
-        if name in file:
-            dataset(file, name, _INTEGER, ())
+    for name, kinds in (("seed", _INTEGER), ("copies", _INTEGER), ("volume", _REAL)):
+        if f"parameters/{name}" in file:
+            dataset(file, f"parameters/{name}", kinds, ())
     count = int(dataset(file, "parameters/particles", _INTEGER, ())[()])
     time = dataset(file, "parameters/time", _REAL, (None,))
     n = int(time.shape[0])
@@ -123,7 +125,7 @@ def _require_particles(file: Any, n: int, count: int, path: Path) -> None:
     require_fits(kept, len(kept), path)
     if (ids := dataset(file, "particles/all/id", _INTEGER, (None,))).shape != kept.shape:
         raise ValueError(f"particles/all/id must have {len(kept)} entries, got {ids.shape}")
-    for name, kind in zip(BIRTHS, (_REAL, _INTEGER), strict=True):
+    for name, kind in zip((*BIRTHS, RADII), (_REAL, _INTEGER, _REAL), strict=True):
         if f"particles/all/{name}" in file:
             dataset(file, f"particles/all/{name}", kind, kept.shape)
     for name, (kinds, width) in _ELEMENTS.items():

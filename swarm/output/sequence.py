@@ -62,6 +62,8 @@ class Frames(Sequence[Frame]):
 
 def values_of(trajectory: Trajectory, k: int, name: str) -> Any:
     """An array of the particles of frame k, or None where there is none of that name."""
+    if name == "collisions" and trajectory.radius is None:
+        return None
     read = {"impacts": trajectory.impacts, "escape_time": trajectory.escape_times,
-            "absorbed_time": trajectory.absorbed_times}  # fmt: skip
+            "absorbed_time": trajectory.absorbed_times, "collisions": trajectory.collisions}  # fmt: skip
     return read[name](k) if name in read else getattr(trajectory.frame(k), name)

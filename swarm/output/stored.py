@@ -92,7 +92,7 @@ class Stored:
             own = any(surface["kind"] == "own" or plugins.is_named(surface["kind"]) for surface in every)
         # An OwnSurface is not damage: the error says that no file holds it.
         with contextlib.nullcontext() if own else self._reading("its scene"):
-            return tables.scene_of(surfaces, *(table.get(key) for key in ("gravity", "period", "plane")))
+            return tables.scene_of(surfaces, *map(table.get, ("gravity", "period", "plane", "pairs")))
 
     @property
     def method(self) -> Method:

@@ -3,7 +3,8 @@
 particles/all/{position,velocity,impacts}/{step,time,value}, value (frames, N, 3), of impacts (frames, N), since the
 start; where the scene repeats also particles/all/image, (frames, N, 3), and particles/all/box/edges, (frames, 3); where
 walls have openings particles/all/escape_time, (frames, N) [s], NaN of those inside, and where they may absorb also
-absorbed_time; particles/all/{mass,id} (N,), and
+absorbed_time; of balls particles/all/radius (N,), particles/all/collisions (frames, N), and where they turn
+particles/all/spin (frames, N, 3) [rad/s]; particles/all/{mass,id} (N,), and
 of a run with sources particles/all/{birth_time,birth_source} (N,), where who comes later is at NaN;
 observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
 number that were run, parameters/start, a digest of them at the start, parameters/seed, of thermal walls, and
@@ -128,11 +129,17 @@ class Trajectory(Presented):
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
             position, velocity = (everything[f"{name}/value"][k].T for name in layout.PARTS)
-            image = everything[f"{layout.IMAGES}/value"][k].T if layout.IMAGES in everything else None
+            image, spin = (
+                everything[f"{name}/value"][k].T if name in everything else None
+                for name in (layout.IMAGES, layout.SPINS)
+            )
             there = self._there(file, k)
             if there is not None:
                 return Particles.of_frame(position, velocity, everything["mass"][()], image, there)
-            return Particles(position, velocity, everything["mass"][()], image)
+            radius = everything[layout.RADII][()] if layout.RADII in everything else None
+            found = Particles(position, velocity, everything["mass"][()], image, radius, spin)
+            found.volume = float(file["parameters/volume"][()]) if "parameters/volume" in file else None
+            return found
 
     def columns(self, k: int) -> dict[str, NDArray[Any]]:
         """The columns of frame k as they are on file, a row a particle: "position", "velocity", "impacts", ..."""
@@ -177,6 +184,18 @@ class Trajectory(Presented):
             if (counts < 0).any():
                 raise ValueError(f"expected 0 or more, got {counts.min()} of particle {counts.argmin()}")
         return np.asarray(counts)
+
+    def collisions(self, k: int) -> NDArray[np.int64]:
+        """How often each of the balls of frame k has met another one since the start, (N,).
+
+        Raises:
+            SceneError: the particles have no radius.
+        """
+        k, name = self._number(k), f"particles/all/{layout.COLLISIONS}"
+        if not self._has(name):
+            raise SceneError(f"{self.path} keeps no collisions: its particles have no radius, and do not meet")
+        with self._reading(f"the collisions of frame {k}") as file:
+            return np.asarray(file[f"{name}/value"][k].astype(np.int64))
 
     def escape_times(self, k: int) -> NDArray[np.float64]:
         """Times at which the particles of frame k have passed an opening of a wall [s], (N,); NaN of those inside."""
@@ -240,6 +259,14 @@ class Trajectory(Presented):
         """Whether particles come during the run."""
         with self._reading("the births of its particles") as file:
             return self._comes(file)
+
+    @property
+    def radius(self) -> NDArray[np.float64] | None:
+        """The radii of the particles that the file keeps [m], (N,); None of points."""
+        if not self._has(f"particles/all/{layout.RADII}"):
+            return None
+        with self._reading("the radii of its particles") as file:
+            return finite(file[f"particles/all/{layout.RADII}"][()], "particle")
 
     @property
     def birth_time(self) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ from ..state import State
 from ..version import VERSION
 from . import paths
 from .appended import AppendedFile, put
-from .layout import ABSORBED, ARRAYS, BIRTHS, COUNTS, ESCAPES, IMAGES, KEPT, PARTS
+from .layout import ABSORBED, ARRAYS, BIRTHS, COLLISIONS, COUNTS, ESCAPES, IMAGES, KEPT, PARTS, RADII, SPINS
 from .storage import Storage
 
 if TYPE_CHECKING:
@@ -68,6 +68,7 @@ class TrajectoryWriter(AppendedFile):
         self._kept = storage.kept(identity.get("first", 0))
         self._count, self._mass, self._text = len(particles), particles.mass[self._kept], scene_text
         self._identity, self._births = identity, particles.births
+        self._radius, self._turns, self._volume = particles.radius, particles.spin is not None, particles.volume
         self._edges: Any = None
 
     def __enter__(self) -> WriteFrames:
@@ -91,10 +92,7 @@ class TrajectoryWriter(AppendedFile):
         long = {f"{ARRAYS}/{name}": values for name, values in arrays.items()}
         for name, value in {**texts, **long, "particles": self._count, **self._identity}.items():
             parameters[name] = value
-        if self._text is not None:
-            parameters["scene_file"] = self._text
-        if self._bodies is not None:
-            parameters["body"], parameters["copies"] = body_text(self._bodies.body), len(self._bodies)
+        self._describe(parameters)
         self._step = parameters.create_dataset("frame", (0,), np.int64, maxshape=(None,), chunks=(1024,))
         self._time = parameters.create_dataset("time", (0,), np.float64, maxshape=(None,), chunks=(1024,))
         self._values: dict[str, Any] = {}
@@ -115,6 +113,8 @@ class TrajectoryWriter(AppendedFile):
             everything[BIRTHS[0]], everything[BIRTHS[1]] = (
                 values[self._kept] for values in (self._births.time, self._births.source)
             )
+        if self._radius is not None:
+            everything[RADII] = self._radius[self._kept]
         if self._bodies is not None:
             bonds = file.create_dataset("connectivity/bonds", data=self._bodies.bonds())
             bonds.attrs["particles_group"] = everything.ref
@@ -122,8 +122,19 @@ class TrajectoryWriter(AppendedFile):
         kept += [(IMAGES, (3,), np.int64)] * (repeats is not None)
         kept += [(COUNTS, (), np.int64), *[(ESCAPES, (), np.float64)] * any(self._scene.volumes)]
         kept += [(ABSORBED, (), np.float64)] * self._scene.may_absorb()
+        kept += [(COLLISIONS, (), np.int64)] * (self._radius is not None)
+        kept += [(SPINS, (3,), self._storage.precision)] * self._turns
         for name, width, kind in kept:
             self._make_particles(name, (n, *width), kind)
+
+    def _describe(self, parameters: Any) -> None:
+        """Write what only some runs have."""
+        if self._text is not None:
+            parameters["scene_file"] = self._text
+        if self._bodies is not None:
+            parameters["body"], parameters["copies"] = body_text(self._bodies.body), len(self._bodies)
+        if self._radius is not None and self._volume is not None:
+            parameters["volume"] = self._volume
 
     def _make_particles(self, name: str, shape: tuple[int, ...], kind: Any) -> None:
         """The element of the particles of this name."""
@@ -171,7 +182,7 @@ class TrajectoryWriter(AppendedFile):
                 self._begin()
             for name, dataset in self._values.items():
                 parts = [getattr(state, name) for state in states]
-                put(dataset, first, parts if name in (COUNTS, ESCAPES, ABSORBED) else rows(parts, dataset.dtype))
+                put(dataset, first, parts if parts[0].ndim == 1 else rows(parts, dataset.dtype))
             if self._edges is not None:
                 put(self._edges, first, [_edges_of(self._scene)] * len(frames))
             for name, dataset in self._observables.items():

@@ -18,7 +18,7 @@ from ..surfaces.instant import gaps_of, gradient_of
 from ..surfaces.shapes.cone import Cone
 from ..surfaces.shapes.quadric import Quadric
 from . import passing, workload
-from .balls import require_balls
+from .balls import require_apart, require_balls
 from .counting import require_counters, require_no_counters
 from .options import RunOptions, Task
 from .with_bodies import require_method_of_bodies, require_walls_of_bodies
@@ -68,6 +68,7 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
             f"{scene.period}; use Impact() with contact_step = 0"
         )
     check_surfaces(method, scene)
+    require_balls(scene, start, method, options)
     if options.compile != "never":
         counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
         walls = [one for surface in scene.surfaces for one in (surface, *surface.open_volumes())]
@@ -78,7 +79,6 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
     _require_instants(scene, particles, method, options)
     _require_precision(scene, particles, options)
     method.check(scene, particles)
-    require_balls(scene, particles, method, options)
     require_counters(scene, particles, method, options)
     assert times.every is not None
     method.span("until", times.until)
@@ -86,10 +86,18 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
     require_start(scene, particles)
     # Who comes later is born inside the walls as they are then.
     if start is not None:
-        _require_inside(scene, start)
-        _require_normals(scene, start)
+        _require_place(scene, start, method)
     workload.require_few_impacts(scene, particles, method, times.until, times.every)
     return Task(scene, particles, method, options)
+
+
+def _require_place(scene: Scene, start: Particles, method: Method) -> None:
+    """Raise a `SceneError` where a particle cannot be where it is at the start, or fly from there."""
+    if start.radius is not None:
+        require_apart(scene, start, method)
+        return
+    _require_inside(scene, start)
+    _require_normals(scene, start)
 
 
 def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
@@ -98,6 +106,8 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
         raise SceneError(
             "member_impacts must be False with bodies that carry cavities, which are no surfaces of the scene, got True"
         )
+    if scene.pairs is not None:
+        raise SceneError(f"pairs must be None with bodies, which do not meet one another, got {scene.pairs}")
     if scene.period is not None:
         raise SceneError(
             f"period must be None with bodies, whose points would be torn apart by the faces, got {scene.period}; use "

@@ -1,17 +1,29 @@
 """Checks of particles with a radius before a run starts."""
 
+import numpy as np
+
+from ..cells import overlaps_of
 from ..errors import SceneError
 from ..methods import Impact, Penalty
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
+from ..sequential import require_size
 from .instants import require_instants_of_balls
 from .options import RunOptions
 
+# Balls overlap by round-off of their places at the start: this many times that of the largest coordinate.
+_ROUND_OFF = 64.0 * np.finfo(np.float64).eps
+# Soft balls may press on one another and on walls at the start: by so much of the radius of the smaller one.
+_PRESSED = 0.2
 
-def require_balls(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> None:
-    """Raise a `SceneError` where particles with a radius do not go with the scene, the method or the options."""
-    if particles.radius is None:
+
+def require_balls(scene: Scene, particles: Particles | None, method: Method, options: RunOptions) -> None:
+    """Raise a `SceneError` where particles with a radius do not go with the scene, the method or the options.
+
+    Where contacts turn balls that have no spin, they get one of 0.
+    """
+    if particles is None or particles.radius is None:
         if not scene.surfaces:
             raise SceneError(
                 "surfaces must hold at least one surface for particles without a radius, which meet nothing else, got "
@@ -28,4 +40,95 @@ def require_balls(scene: Scene, particles: Particles, method: Method, options: R
             f"radius of the particles must be None with {type(method).__name__}, got radii; Impact and Penalty know "
             "particles that meet"
         )
+    _require_method(scene, particles, method)
+    _require_options(options)
     require_instants_of_balls(scene, particles, method, options)
+    require_size(scene, particles.radius)
+    if particles.spin is None and _may_turn(scene, method):
+        particles.spin = np.zeros_like(particles.position)
+
+
+def _may_turn(scene: Scene, method: Method) -> bool:
+    if method.is_rigid():
+        return False
+    return (scene.pairs is not None and scene.pairs.friction > 0.0) or any(one.friction for one in scene.surfaces)
+
+
+def _require_method(scene: Scene, particles: Particles, method: Impact | Penalty) -> None:
+    pairs = scene.pairs
+    if isinstance(method, Penalty):
+        if method.gradient != "composite":
+            raise SceneError(
+                f'gradient must be "composite" where particles have a radius, got "{method.gradient}"; leave it out'
+            )
+        if pairs is not None and pairs.contact_duration is not None:
+            raise SceneError(
+                "pairs.contact_duration must be None with Penalty, whose contacts last as long as they do, got "
+                f"{pairs.contact_duration:g} s; leave it out, or use Impact"
+            )
+        return
+    if method.contact_step > 0.0:
+        raise SceneError(
+            f"contact_step must be 0 where particles have a radius, got {method.contact_step:g}; leave it out"
+        )
+    if pairs is not None and pairs.friction > 0.0:
+        raise SceneError(
+            f"pairs.friction must be 0 with Impact, which has none between particles, got {pairs.friction:g}; use "
+            "Penalty, or leave it out"
+        )
+    if particles.spin is not None:
+        raise SceneError(
+            "spin must be None with Impact, whose impacts turn no ball, got spins; use Penalty, or set spin to None"
+        )
+
+
+def _require_options(options: RunOptions) -> None:
+    """Raise a `SceneError` for options of particles that are independent of one another."""
+    given = {
+        "cluster": options.cluster is not None, "sources": bool(options.sources), "counters": bool(options.counters),
+        "member_impacts": options.member_impacts,
+    }  # fmt: skip
+    for name, is_given in given.items():
+        if is_given:
+            raise SceneError(
+                f"{name} must be left out where particles have a radius, got {getattr(options, name)!r:.100}; it is "
+                "of points, which do not meet one another"
+            )
+
+
+def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
+    """Raise a `SceneError` where balls overlap one another, or are outside their walls, at the start."""
+    radius = particles.radius
+    assert radius is not None
+    magnitude = max(float(np.abs(particles.position).max()), scene.finite_size())
+    _require_within(scene, particles, radius, _ROUND_OFF * magnitude, method.is_rigid())
+    found = overlaps_of(particles.position, radius, scene.period)
+    if found is None:
+        return
+    i, k = found.pair
+    smaller = min(radius[i], radius[k])
+    if found.depth <= (_ROUND_OFF * magnitude if method.is_rigid() else _PRESSED * smaller):
+        return
+    pressed = "" if method.is_rigid() else f" (soft balls may by {_PRESSED:g} of the smaller radius)"
+    raise SceneError(
+        f"particles must not overlap at the start{pressed}, got {found.number} pairs that do, most particles {i} and "
+        f"{k}, by {found.depth:.6g} m: their centres are {radius[i] + radius[k] - found.depth:.6g} m apart, their "
+        f"radii {radius[i]:g} and {radius[k]:g} m; move them apart, or let swarm.fill or swarm.pack place them"
+    )
+
+
+def _require_within(scene: Scene, particles: Particles, radius: np.ndarray, close: float, is_rigid: bool) -> None:
+    distances = scene.distances_outside(particles.position) + radius
+    # Where phi is not a number a ball is outside.
+    wrong = ~(distances <= (close if is_rigid else close + _PRESSED * radius))
+    outside = np.flatnonzero(wrong.any(axis=0))
+    if not outside.size:
+        return
+    first = int(outside[0])
+    wall = int(np.argmax(np.where(np.isnan(distances[:, first]), np.inf, distances[:, first])))
+    when = "" if scene.surfaces[wall].motion is None else ", as it is at 0 s"
+    raise SceneError(
+        f"particles must start inside their walls, got {outside.size} of {len(particles)} outside; the first is "
+        f"particle {first} at {tuple(particles.position[:, first].tolist())}, whose radius of {radius[first]:g} m "
+        f"reaches {distances[wall, first]:.6g} m beyond surfaces[{wall}] ({type(scene.surfaces[wall]).__name__}){when}"
+    )

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("swarm")
 # The observable that holds the sums over chunks of a shard: those of all shards are joined from it.
 CHUNK_SUMS = "chunk_sums"
+_OF_PARTICLES = "position", "velocity", "mass", "image", "radius", "spin"
 # So many frames are packed into arrays: as Python objects they take 3 kB each.
 _PACKED = 1024
 _UNWATCHED = Watched()
@@ -57,6 +58,7 @@ class End(NamedTuple):
     escape_time: NDArray[np.float64]
     absorbed: Absorbed | None
     birth_time: NDArray[np.float64]
+    collisions: NDArray[np.int64] | None = None
 
 
 class Columns:
@@ -176,8 +178,9 @@ def _measures_of(task: Task, session: Session) -> Measures:
 
 def start_of(task: Task) -> Snapshot:
     """The particles of a run at its start."""
-    arrays: dict[str, Any] = {name: getattr(task.particles, name) for name in ("position", "velocity", "mass", "image")}
+    arrays: dict[str, Any] = {name: getattr(task.particles, name) for name in _OF_PARTICLES}
     arrays["impacts"] = np.zeros(len(task.particles), np.int64)
+    arrays["collisions"] = None if task.particles.radius is None else np.zeros(len(task.particles), np.int64)
     return _snapshot_of(task, arrays.get, 0.0)
 
 
@@ -217,6 +220,7 @@ def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> End:
         np.full(len(task.particles), np.nan) if state.escape_time is None else state.escape_time,
         state.absorbed,
         birth_times(task.particles),
+        state.collisions,
     )
 
 

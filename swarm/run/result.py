@@ -64,6 +64,7 @@ class Result:
         bodies: the bodies at `until`, or None; then `particles` are all their points.
         scene, method: as they were run.
         birth_time: (N,) when each came [s], 0 of those of the start.
+        collisions_per_particle: (N,) how often each has met another one; None of points, which do not meet.
     """
 
     particles: Particles
@@ -78,6 +79,7 @@ class Result:
     scene: Scene | None = None
     method: Method | None = None
     birth_time: NDArray[np.float64] | None = None
+    collisions_per_particle: NDArray[np.int64] | None = None
 
     def __repr__(self) -> str:
         seen, frames = self.observables, len(self.observables["time"])
@@ -85,6 +87,7 @@ class Result:
             f"{len(self.particles)} particles" if self.bodies is None else repr(self.bodies),
             f"{frames} frame{'s' * (frames != 1)} to {seen['time'][-1]:g} s",
             f"{int(seen['impacts'][-1])} impacts",
+            *([f"{int(seen['collisions'][-1])} collisions"] if "collisions" in seen else []),
             f"energy error {seen['energy_error'].max():.1e}",
             f"penetration {seen['max_penetration'].max():.1e} m",
             f"{self.wall_time:.2f} s",

@@ -1,0 +1,215 @@
+"""Balls in lists by cells, where each finds those that it overlaps, whatever sizes they have.
+
+Balls of one size up to twice that are in cells of one level, as wide as the largest of them. Those that are no larger
+than the smallest ball of a level find all that they overlap of it in the 27 cells around their own.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import cache
+from .kernel.arrays import index
+from .kernel.jit import Array, kernel, outlined, select
+from .kernel.vector import Vec, column
+from .state import Floats
+
+# So few places are looked at in plain Python, before a compiler is done.
+_FEW = 300
+
+
+class Cells(NamedTuple):
+    """The lists: balls enter them in the order of their sizes, from the largest on."""
+
+    position: Array  # (3, N) of those that have entered
+    radius: Array  # (N,)
+    level: Array  # (N,)
+    first: Array  # (cells,) the last ball that has entered, or -1
+    others: Array  # (N,) behind each ball in the list of its cell, or -1
+    begin: Array  # (levels,) the number of the first cell
+    shape: Array  # (levels, 3) cells along each axis
+    inverse: Array  # (levels, 3) 1/width of a cell
+    low: Array  # (3,) the lowest corner
+    period: Array  # (3,) of a direction that repeats, else 0
+    repeats: Array  # (3,) 1/period, or 0
+
+
+def order_of(radius: Floats) -> NDArray[np.int64]:
+    """The numbers of balls from the largest to the smallest."""
+    return np.argsort(-radius, kind="stable")
+
+
+def empty_cells(low: Floats, high: Floats, period: tuple[float | None, ...] | None, radius: Floats) -> Cells:
+    """The lists of balls of these radii in a box, none of which has entered."""
+    sizes = np.unique(np.floor(np.log2(radius.max() / radius)).astype(np.int64), return_inverse=True)
+    level, n = np.asarray(sizes[1]), radius.size
+    lengths = np.array([length or 0.0 for length in period or (None,) * 3])
+    extent = np.maximum(np.where(lengths > 0.0, lengths, high - low), 0.0)
+    begin, shapes, inverses, cells = [], [], [], 0
+    for k in range(len(sizes[0])):
+        mine = radius[level == k]
+        # Not many more cells than balls: of a few in a large volume most would be empty.
+        width = np.full(3, 2.0 * mine.max())
+        wide = extent > width
+        room = float(np.prod(extent[wide] / width[wide])) / max(2.0 * mine.size, 64.0)
+        width[wide] *= max(1.0, room) ** (1.0 / max(1, int(wide.sum())))
+        shape = np.maximum(1, np.floor(np.minimum(extent / width, 2.0**20))).astype(np.int64)
+        begin.append(cells)
+        shapes.append(shape)
+        inverses.append(shape / np.where(extent > 0.0, extent, 1.0))
+        cells += int(shape.prod())
+    return Cells(
+        np.zeros((3, n)), radius, level, np.full(cells, -1, np.int64), np.full(n, -1, np.int64), np.array(begin),
+        np.array(shapes), np.array(inverses), np.where(lengths > 0.0, 0.0, low), lengths,
+        np.where(lengths > 0.0, 1.0 / np.where(lengths > 0.0, lengths, 1.0), 0.0),
+    )  # fmt: skip
+
+
+# --- Kernels ---------------------------------------------------------------------------------------------
+
+
+def _layer(cells, level, axis, x):
+    """The layer of cells in which a coordinate is."""
+    place = np.floor((x - cells.low[axis]) * cells.inverse[level, axis])
+    return int(min(max(place, 0.0), cells.shape[level, axis] - 1.0))
+
+
+def _around(cells, level, axis, x):
+    """The layers around one, from the first to the one after the last; they may go on beyond a period."""
+    count, middle = cells.shape[level, axis], _layer(cells, level, axis, x)
+    repeats = (cells.period[axis] > 0.0) & (count > 2)
+    return select(repeats, middle - 1, max(middle - 1, 0)), select(repeats, middle + 2, min(middle + 2, count))
+
+
+def _wrapped(layer, count):
+    return select(layer < 0, layer + count, select(layer >= count, layer - count, layer))
+
+
+def _apart(cells, axis, x):
+    """A difference of coordinates, of the nearest images."""
+    return x - cells.period[axis] * np.floor(x * cells.repeats[axis] + 0.5)
+
+
+@outlined
+def _met(cells, r, radius, stops):
+    """Of the balls that overlap one at r: (how many, the number of the deepest or -1, by how much).
+
+    If it `stops`, the first one is enough.
+    """
+    count, deepest, most = 0, -1, 0.0
+    for k in range(cells.begin.size):
+        level = index(k)
+        nx, ny, nz = cells.shape[level, 0], cells.shape[level, 1], cells.shape[level, 2]
+        x, x_end = _around(cells, level, 0, r.x)
+        y, y_end = _around(cells, level, 1, r.y)
+        z, z_end = _around(cells, level, 2, r.z)
+        for i in range(x, x_end):
+            for j in range(y, y_end):
+                row = (_wrapped(i, nx) * ny + _wrapped(j, ny)) * nz + cells.begin[level]
+                for layer in range(z, z_end):
+                    m = cells.first[index(row + _wrapped(layer, nz))]
+                    while m >= 0:
+                        at = index(m)
+                        dx = _apart(cells, 0, cells.position[0, at] - r.x)
+                        dy = _apart(cells, 1, cells.position[1, at] - r.y)
+                        dz = _apart(cells, 2, cells.position[2, at] - r.z)
+                        wide = cells.radius[at] + radius
+                        square = dx * dx + dy * dy + dz * dz
+                        if square < wide * wide:
+                            count += 1
+                            depth = wide - math.sqrt(square)
+                            if depth > most:
+                                deepest, most = m, depth
+                            if stops:
+                                return count, deepest, most
+                        m = cells.others[at]
+    return count, deepest, most
+
+
+def _enter(cells, i, r):
+    """Ball i is at r from now on."""
+    level = index(cells.level[i])
+    x, y, z = _layer(cells, level, 0, r.x), _layer(cells, level, 1, r.y), _layer(cells, level, 2, r.z)
+    cell = index((x * cells.shape[level, 1] + y) * cells.shape[level, 2] + z + cells.begin[level])
+    cells.position[0, i] = r.x
+    cells.position[1, i] = r.y
+    cells.position[2, i] = r.z
+    cells.others[i] = cells.first[cell]
+    cells.first[cell] = i
+
+
+@kernel
+def _find_free(cells, points, radius, free):
+    """Whether balls at points (3, n) would overlap none that has entered, into `free`."""
+    for i in range(points.shape[1]):
+        count, _deepest, _most = _met(cells, column(points, 0, i), radius[i], True)
+        free[i] = count == 0
+
+
+@kernel
+def _enter_free(cells, points, numbers, done):
+    """Let balls of these numbers enter at points (3, n) where they overlap none, those that are not `done`."""
+    for i in range(points.shape[1]):
+        number = index(numbers[i])
+        if not done[number]:
+            r = Vec(points[0, i], points[1, i], points[2, i])
+            count, _deepest, _most = _met(cells, r, cells.radius[number], True)
+            if count == 0:
+                _enter(cells, number, r)
+                done[number] = True
+
+
+@kernel
+def _enter_all(cells, points, order, found):
+    """Let all balls enter, in this order: `found` gets how many pairs overlap, the deepest pair, and by how much."""
+    for i in range(order.size):
+        number = index(order[i])
+        r = column(points, 0, number)
+        count, deepest, most = _met(cells, r, cells.radius[number], False)
+        found[0] += count
+        if most > found[3]:
+            found[1], found[2], found[3] = order[i], deepest, most
+        _enter(cells, number, r)
+
+
+# --- In arrays -------------------------------------------------------------------------------------------
+
+
+class Overlaps(NamedTuple):
+    """The pairs of balls that overlap."""
+
+    number: int
+    pair: tuple[int, int]  # those that overlap most, the smaller number first
+    depth: float  # by how much these do [m]
+
+
+def find_free(cells: Cells, points: Floats, radius: Floats) -> NDArray[np.bool_]:
+    """Whether balls at points (3, n) would overlap none that has entered."""
+    free = np.empty(points.shape[1], np.bool_)
+    _tier(_find_free, points)(cells, points, radius, free)
+    return free
+
+
+def enter_free(cells: Cells, points: Floats, numbers: NDArray[np.int64], done: NDArray[np.bool_]) -> None:
+    """Let balls of these numbers, which may come again, enter at points (3, n) where they overlap none.
+
+    `done` says which have entered; they are to be no larger than these.
+    """
+    _tier(_enter_free, points)(cells, points, numbers, done)
+
+
+def overlaps_of(position: Floats, radius: Floats, period: tuple[float | None, ...] | None = None) -> Overlaps | None:
+    """The overlaps of balls at positions (3, N), with their images where these repeat; None where there are none."""
+    low, high = position.min(axis=1), position.max(axis=1)
+    cells, found = empty_cells(low, high, period, radius), np.zeros(4)
+    _tier(_enter_all, position)(cells, position, order_of(radius), found)
+    if found[0] == 0.0:
+        return None
+    first, second = sorted((int(found[1]), int(found[2])))
+    return Overlaps(int(found[0]), (first, second), float(found[3]))
+
+
+def _tier(kernel: Any, points: Floats) -> Any:
+    return cache.in_python(kernel) if points.shape[1] <= _FEW else kernel

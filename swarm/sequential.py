@@ -1,0 +1,141 @@
+"""Balls at random places where they overlap neither one another nor walls: random sequential addition."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .ball_numbers import balls_volume
+from .cells import Cells, empty_cells, enter_free, find_free, order_of
+from .errors import SceneError
+from .scene import Scene
+from .state import Floats
+
+# The largest packings, in space and in a plane. Random sequential addition ends at 0.384 and 0.547, where a place for
+# the last takes longer and longer.
+_DENSEST = {3: 0.35, 2: 0.5}
+_ABOUT = 1.01
+# A cell that repeats holds a ball and its nearest image apart: this many radii.
+_APART = 4.0
+# A ball that is as wide as its vessel but for round-off fits.
+_CLOSE = 1e-12
+# Places that are tried together, and of so many balls.
+_MOST, _LEAST, _WINDOW = 1 << 18, 256, 1 << 16
+# The search ends after this many places for each of the balls: of 0.35 it takes 160, of 0.5 in a plane 90.
+_TRIES, _ALWAYS = 4000, 2_000_000
+
+
+class Room(NamedTuple):
+    """What is known of a volume: a box around it (3, 1), and how large it is."""
+
+    low: Floats
+    high: Floats
+    volume: float
+
+
+def require_size(scene: Scene, radius: Floats) -> None:
+    """Raise a `SceneError` for a ball larger than its vessel or its cell."""
+    largest = int(radius.argmax())
+    ball = f"{radius[largest]:g} m of particle {largest}"
+    for k, length in enumerate(scene.period or ()):
+        if length is not None and length < _APART * radius[largest]:
+            raise SceneError(
+                f"radius must be at most a quarter of period[{k}] = {length:g} m, so that a ball is far from its "
+                f"image, got {ball}; use smaller balls, or a larger cell"
+            )
+    low, high = (np.array(corner) for corner in scene.bounds())
+    for k in scene.axes():
+        repeats = scene.period is not None and scene.period[k] is not None
+        if not repeats and 2.0 * radius[largest] > (1.0 + _CLOSE) * (high - low)[k]:
+            raise SceneError(
+                f"radius must leave a place within the walls, which are {(high - low)[k]:g} m apart along {'xyz'[k]}, "
+                f"got {ball}; use smaller balls, or a larger vessel"
+            )
+
+
+def require_packing(scene: Scene, radius: Floats, room: Room, most: float | None = None) -> float:
+    """The packing of balls in a volume; a `SceneError` where it is more than can be filled at random, or `most`."""
+    axes = len(scene.axes())
+    packing = balls_volume(scene, radius) / room.volume
+    densest = _DENSEST[axes] if most is None else most
+    # The volume is an estimate.
+    if packing > _ABOUT * densest:
+        raise SceneError(
+            f"radius must leave a packing of at most {densest:g} to random places, got {told(scene, radius, room)}; "
+            "use fewer or smaller balls, or swarm.pack, which grows them up to 0.6"
+        )
+    return packing
+
+
+def told(scene: Scene, radius: Floats, room: Room) -> str:
+    """Balls in a volume, for a sentence."""
+    unit, kind = ("m^3", "balls") if scene.plane is None else ("m^2", "discs")
+    size = f"{radius[0]:g} m" if radius.min() == radius.max() else f"{radius.min():g} to {radius.max():g} m"
+    return (
+        f"{radius.size} {kind} of {size} in {room.volume:.4g} {unit}, a packing of "
+        f"{balls_volume(scene, radius) / room.volume:.4g}"
+    )
+
+
+def place_balls(scene: Scene, radius: Floats, room: Room, random: np.random.Generator) -> Floats:
+    """Places (3, N) of balls of these radii, uniform among those where they overlap nothing, one after the other.
+
+    The largest come first: a place for them is rare among the small ones.
+
+    Raises:
+        SceneError: no place was found for some of them.
+    """
+    cells = empty_cells(room.low.ravel(), room.high.ravel(), scene.period, radius)
+    waiting, done = order_of(radius), np.zeros(radius.size, np.bool_)
+    tried, fitting, share = 0, 0, 1.0
+    while waiting.size:
+        some = waiting[:_WINDOW]
+        numbers = np.resize(some, max(_LEAST, min(_MOST, int(2.0 * some.size / share))))
+        points = _points(scene, room, numbers.size, random)
+        within = _enter(scene, cells, points, numbers, done)
+        left = waiting[~done[waiting]]
+        placed = waiting.size - left.size
+        tried, fitting, waiting = tried + numbers.size, fitting + within, left
+        share = max(placed / numbers.size, 1e-6)
+        if tried > _ALWAYS + _TRIES * radius.size and waiting.size:
+            raise _full(scene, radius, room, done, tried, fitting)
+    return np.ascontiguousarray(cells.position)
+
+
+def _points(scene: Scene, room: Room, n: int, random: np.random.Generator) -> Floats:
+    points, axes = np.zeros((3, n)), scene.axes()
+    points[axes] = room.low[axes] + (room.high - room.low)[axes] * random.random((len(axes), n))
+    return points
+
+
+def _enter(scene: Scene, cells: Cells, points: Floats, numbers: NDArray[np.int64], done: NDArray[np.bool_]) -> int:
+    """Let balls of these numbers enter where they overlap nothing: how many of the places are within the walls."""
+    # Most places overlap a ball where many have entered, which is looked up faster than where the walls are.
+    radius: Floats = cells.radius[numbers]  # type: ignore[assignment]
+    free = np.flatnonzero(find_free(cells, points, radius))
+    free = free[admits(scene, points[:, free], radius[free])]
+    enter_free(cells, points[:, free], numbers[free], done)
+    return int(free.size)
+
+
+def admits(scene: Scene, points: Floats, radius: Floats) -> NDArray[np.bool_]:
+    """Whether balls at points (3, N) are within the walls."""
+    found = scene.admits(points)
+    found[found] = (scene.distances_outside(points[:, found]) <= -radius[found]).all(axis=0)
+    return found
+
+
+def _full(
+    scene: Scene, radius: Floats, room: Room, done: NDArray[np.bool_], tried: int, fitting: int
+) -> SceneError:  # fmt: skip
+    first = int(order_of(radius)[0])
+    if not done.any() and not fitting:
+        return SceneError(
+            f"radius must leave a place within the walls, got {radius[first]:g} m of particle {first}, for which none "
+            f"of {tried} random places is; use smaller balls, or a larger vessel"
+        )
+    reached = balls_volume(scene, radius[done]) / room.volume
+    return SceneError(
+        f"fill found places for {int(done.sum())} of {radius.size} balls, a packing of {reached:.4g}, in {tried} "
+        f"tries, got {told(scene, radius, room)}; use fewer or smaller balls, or swarm.pack, which grows them up to 0.6"
+    )
