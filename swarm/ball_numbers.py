@@ -41,8 +41,8 @@ def volume_of(scene: Scene, particles: Particles) -> float:
     if particles.volume is not None:
         return particles.volume
     lengths = [None if scene.period is None else scene.period[k] for k in scene.axes()]
-    # Solids in a cell take some of it, which only `fill` knows.
-    if all(length is not None for length in lengths) and not scene.surfaces:
+    # Surfaces in a cell take some of it, which only `fill` knows.
+    if not scene.surfaces:
         return float(np.prod([float(length or 0.0) for length in lengths]))
     return math.nan
 

@@ -33,7 +33,9 @@ _LONG, _ARRAY = 1000, "sha256:"
 
 def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None, pairs: Any = None) -> Scene:
     """A scene from its tables: a list of surface tables; gravity, the period, the plane and the pairs, or None."""
-    if not isinstance(surfaces, list) or not surfaces:
+    # A scene that repeats in every direction may have none.
+    surfaces = [] if surfaces is None and period is not None else surfaces
+    if not isinstance(surfaces, list) or not (surfaces or period is not None):
         raise SceneError("surface: expected at least one [[surface]] table, got none")
     built = [surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
     met = None if pairs is None else _pairs_of(pairs)

@@ -303,6 +303,13 @@ def test_balls(tmp_path):
     assert tables.scene_of(table["surface"], None, pairs=table["pairs"]).pairs == job.scene.pairs
 
 
+def test_balls_in_a_cell_without_walls(tmp_path):
+    text = "period = [1.0, 1.0, 1.0]\n" + GOOD.replace("speed = 0.5", "speed = 0.5\nradius = 0.01")
+    job = read(tmp_path, text.replace('[[surface]]\nkind = "sphere"\nradius = 0.5\n', ""))
+    assert job.scene == swarm.Scene([], period=(1.0, 1.0, 1.0))
+    assert len(job.start()) == 10
+
+
 def test_balls_from_a_file(tmp_path):
     (tmp_path / "start.csv").write_text("x,y,z,vx,vy,vz,radius,wx,wy,wz\n0.1,0,0,1,0,0,0.2,1,2,3\n")
     particles = read(tmp_path, GOOD.replace("count = 10\nspeed = 0.5", 'from = "start.csv"')).start()

@@ -42,8 +42,8 @@ def require_balls(scene: Scene, particles: Particles | None, method: Method, opt
         )
     _require_method(scene, particles, method)
     _require_options(options)
-    require_instants_of_balls(scene, particles, method, options)
     require_size(scene, particles.radius)
+    require_instants_of_balls(scene, particles, method, options)
     if particles.spin is None and _may_turn(scene, method):
         particles.spin = np.zeros_like(particles.position)
 
@@ -101,7 +101,8 @@ def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
     radius = particles.radius
     assert radius is not None
     magnitude = max(float(np.abs(particles.position).max()), scene.finite_size())
-    _require_within(scene, particles, radius, _ROUND_OFF * magnitude, method.is_rigid())
+    if scene.surfaces:
+        _require_within(scene, particles, radius, _ROUND_OFF * magnitude, method.is_rigid())
     found = overlaps_of(particles.position, radius, scene.period)
     if found is None:
         return
