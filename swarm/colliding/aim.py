@@ -6,17 +6,30 @@ one before it.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
-from ..kernel.arrays import index
-from ..kernel.jit import outlined
+import numpy as np
+
+from ..kernel.arrays import index, unwritten
+from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, square
 from ..surfaces import flights
-from .rows import CELL, DUE, FLOATS, MEETS, NEXT, NOBODY, PARTNER, SEEN, STAMP, WALL, WHOLES
+from .rows import DUE, FACE, FLOATS, MEETS, NOBODY, PARTNER, RADIUS, SEEN, STAMP, WALL, WHOLES
 
+# So many balls of a cell are copied without a branch, and so many are looked at at once.
+_FEW, _MOST = 4, 128
+# Of the cells around a ball: those beyond no face alone.
+_ANY = 6
 # No wall is asked for in a cell that is far from all.
 UNKNOWN = -2.0
+
+
+class Known(NamedTuple):
+    """A collision of a ball: when [s since the epoch], and with whom."""
+
+    time: Any
+    mate: Any
 
 
 class Alike(Record):
@@ -46,12 +59,12 @@ class Alike(Record):
 class Various(Record):
     """Balls of any radii and masses."""
 
-    radius: Any  # (N,)
-    mass: Any  # (N,)
+    flight: Array  # rows of flights
+    mass: Array  # (N,)
 
     def radius_of(self, i):
         """Its radius [m]."""
-        return self.radius[index(i)]
+        return self.flight[index(FLOATS * i + RADIUS)]
 
     def mass_of(self, i):
         """Its mass [kg]."""
@@ -73,22 +86,33 @@ def between(grid, r, other):
     return Vec(*(axis.nearest(b - a) for axis, a, b in zip(grid.axes(), r, other, strict=True)))
 
 
-def meeting(b, u, touching2):
-    """How long two balls fly that are b apart and move apart by u before they touch, without cancellation."""
-    closing, time = dot(b, u), math.inf
-    if closing < 0.0:
-        gap = square(b) - touching2
-        discriminant = closing * closing - square(u) * gap
-        if discriminant > 0.0:
-            time = gap / (math.sqrt(discriminant) - closing)
-            # Closer by round-off
-            time = max(time, 0.0)
-    return time
+def meeting(closing, gap, discriminant):
+    """How long two balls fly before they touch, without cancellation; where they are too near by round-off, 0."""
+    time = gap / (math.sqrt(discriminant) - closing)
+    return select(time > 0.0, time, 0.0)
+
+
+class Sight(NamedTuple):
+    """Two balls, as one sees the other: b.u, b^2 less what it is where they touch, and a fourth of a discriminant."""
+
+    closing: Any
+    gap: Any
+    discriminant: Any
+
+    def meets(self):
+        """Whether they will touch."""
+        return (self.closing < 0.0) & (self.discriminant > 0.0)
+
+
+def sight(b, u, touching2):
+    """The `Sight` of a ball that is b away and moves by u."""
+    closing, gap = dot(b, u), square(b) - touching2
+    return Sight(closing, gap, closing * closing - square(u) * gap)
 
 
 @outlined
-def meeting_of_any(grid, r, other, u, touching2):
-    """`meeting` of a ball with any image of another one, where these are few and far from one another."""
+def _meeting_of_any(grid, r, other, u, touching2):
+    """When a ball meets any image of another one, where these are few and far from one another."""
     soonest = math.inf
     for kx in range(3):
         for ky in range(3):
@@ -98,40 +122,125 @@ def meeting_of_any(grid, r, other, u, touching2):
                     for k, axis in zip((kx, ky, kz), grid.axes(), strict=True)
                 )
                 b = Vec(*(one - two + shift for one, two, shift in zip(other, r, shifts, strict=True)))
-                soonest = min(meeting(b, u, touching2), soonest)
+                seen = sight(b, u, touching2)
+                if seen.meets():
+                    soonest = min(meeting(*seen), soonest)
     return soonest
 
 
 @outlined
-def find_partner(box, flock, i, now):
-    """Find the next collision of a ball: whether there is one."""
-    grid, pull = box.grid, box.pull
+def _soonest(box, flock, i, now, near, count, known):
+    """The soonest collision of ball i: that which is `known`, or one with the first `count` balls `near` it.
+
+    First come those that fly to one another, without a branch, then the roots of these few.
+    """
+    grid, pull, found = box.grid, box.pull, 0
     r, v = flock.at(pull, i, now)
-    row = WHOLES * i + CELL
-    cx, cy, cz = flock.tag[index(row)], flock.tag[index(row + 1)], flock.tag[index(row + 2)]
-    first, mate = math.inf, NOBODY
-    for kx in range(3):
-        plane = grid.x.offset[index(cx + kx - 1)]
-        for ky in range(3):
-            line = grid.y.offset[index(cy + ky - 1)] + plane
-            for kz in range(3):
-                j = flock.head[index(grid.z.offset[index(cz + kz - 1)] + line)]
-                while j >= 0:
-                    if j != i:
-                        other, w = flock.at(pull, j, now)
-                        touching2 = box.kinds.touching2(i, j)
-                        if grid.few is None:
-                            time = now + meeting(between(grid, r, other), w - v, touching2)
-                        else:
-                            time = now + meeting_of_any(grid, r, other, w - v, touching2)
-                        sooner = (time < first) | ((time == first) & (j < mate))
-                        if sooner and time <= flock.event[index(FLOATS * j + MEETS)] and time < math.inf:
-                            first, mate = time, j
-                    j = flock.link[index(WHOLES * j + NEXT)]
-    flock.event[index(FLOATS * i + MEETS)], flock.tag[index(WHOLES * i + PARTNER)] = first, mate
-    if mate >= 0:
-        flock.tag[index(WHOLES * i + SEEN)] = flock.tag[index(WHOLES * mate + STAMP)]
-    return mate >= 0
+    some, seen = unwritten(_MOST, np.int32), unwritten((3, _MOST), np.float64)
+    for k in range(count):
+        j = near[index(k)]
+        other, w = flock.at(pull, j, now)
+        one = sight(between(grid, r, other), w - v, box.kinds.touching2(i, j))
+        some[index(found)] = j
+        for row, value in enumerate(one):
+            seen[row, index(found)] = value
+        found += select(one.meets(), 1, 0)
+    first, mate = known
+    for k in range(found):
+        j = some[index(k)]
+        time = now + meeting(seen[0, index(k)], seen[1, index(k)], seen[2, index(k)])
+        sooner = (time < first) | ((time == first) & (j < mate))
+        if sooner and time <= flock.event[index(FLOATS * j + MEETS)]:
+            first, mate = time, j
+    return Known(first, mate)
+
+
+@outlined
+def _soonest_of_images(box, flock, i, now, near, count, known):
+    """`_soonest` where a ball may meet several images of another one."""
+    r, v = flock.at(box.pull, i, now)
+    first, mate = known
+    for k in range(count):
+        j = near[index(k)]
+        other, w = flock.at(box.pull, j, now)
+        time = now + _meeting_of_any(box.grid, r, other, w - v, box.kinds.touching2(i, j))
+        sooner = (time < first) | ((time == first) & (j < mate))
+        if sooner and time < math.inf and time <= flock.event[index(FLOATS * j + MEETS)]:
+            first, mate = time, j
+    return Known(first, mate)
+
+
+def _looked_at(box, flock, i, now, near, count, known):
+    ask = _soonest if box.grid.few is None else _soonest_of_images
+    return ask(box, flock, i, now, near, count, known)
+
+
+@outlined
+def _look_through(box, flock, i, now, near, row, known):
+    """The `Known` collision with those of a cell, at this row, beyond the first few, too."""
+    count, done = flock.room[index(row)], _FEW
+    while done < count:
+        some = min(count - done, _MOST)
+        for k in range(some):
+            near[index(k)] = flock.room[index(row + 1 + done + k)]
+        known = _looked_at(box, flock, i, now, near, some, known)
+        done += some
+    return known
+
+
+def _around(box, flock, i, now, face, known):
+    """The `Known` collision of ball i with all balls in the cells around its own, or only in those beyond a face.
+
+    The first few of each cell are copied at once, also where there are less, so that no branch of the processor is
+    foretold from how many balls are in a cell.
+    """
+    grid, room, found = box.grid, flock.room, 0
+    near, rest = unwritten(27 * _FEW + _FEW, np.int32), unwritten(_MOST, np.int32)
+    step = 2 * (face & 1) - 1
+    lows = tuple(select((face >> 1) == k, step, -1) for k in range(3))
+    highs = tuple(select((face >> 1) == k, step + 1, 2) for k in range(3))
+    cx, cy, cz = flock.cell(i)
+    for kx in range(cx + lows[0], cx + highs[0]):
+        plane = grid.x.offset[index(kx)]
+        for ky in range(cy + lows[1], cy + highs[1]):
+            line = grid.y.offset[index(ky)] + plane
+            for kz in range(cz + lows[2], cz + highs[2]):
+                row = grid.stride * (grid.z.offset[index(kz)] + line)
+                count = room[index(row)]
+                for k in range(_FEW):
+                    near[index(found + k)] = room[index(row + 1 + k)]
+                found += min(count, _FEW)
+                if count > _FEW:
+                    known = _look_through(box, flock, i, now, rest, row, known)
+    return _looked_at(box, flock, i, now, near, found, known)
+
+
+def _keep(flock, i, known):
+    flock.event[index(FLOATS * i + MEETS)], flock.tag[index(WHOLES * i + PARTNER)] = known.time, known.mate
+    if known.mate >= 0:
+        flock.tag[index(WHOLES * i + SEEN)] = flock.tag[index(WHOLES * known.mate + STAMP)]
+
+
+@outlined
+def find_partner(box, flock, i, now):
+    """Find the next collision of a ball."""
+    _keep(flock, i, _around(box, flock, i, now, _ANY, Known(math.inf, NOBODY)))
+
+
+@outlined
+def look_ahead(box, flock, i, now):
+    """Look whether a ball that has come into a cell collides sooner with those that are near now: whether it does."""
+    row = FLOATS * i + MEETS
+    if box.grid.few is None:
+        face = flock.tag[index(WHOLES * i + FACE)]
+        before = Known(flock.event[index(row)], flock.tag[index(WHOLES * i + PARTNER)])
+        known = _around(box, flock, i, now, face, before)
+        sooner = (known.time < before.time) | (known.mate != before.mate)
+        if sooner:
+            _keep(flock, i, known)
+        return sooner
+    find_partner(box, flock, i, now)
+    return True
 
 
 def tell_partner(flock, i):

@@ -1,4 +1,4 @@
-"""Cells, each with a list of the balls whose centres are in it: who meets whom before one of them leaves its cell.
+"""Cells, each with the balls whose centres are in it: who meets whom before one of them leaves its cell.
 
 No cell is shorter than the largest diameter, so that balls that touch are in the same cell or in neighbours. Each axis
 has one cell more at either end, which is empty, or stands for the one at the other end where the scene repeats. The
@@ -14,7 +14,7 @@ from ..kernel.record import Record
 from ..kernel.vector import Vec
 from ..surfaces.course import rise_time
 from ..surfaces.walls import Field
-from .rows import BEFORE, CELL, FLOATS, LEAVES, NEXT, NOBODY, WHOLES
+from .rows import CELL, FACE, FLOATS, LEAVES, WHOLES
 
 
 class Axis(Record):
@@ -62,6 +62,7 @@ class Grid(Record):
     y: Axis
     z: Axis
     near: Array  # bool, whether a ball in a cell may touch a wall
+    stride: int  # of the row of a cell: one more than how many balls it has room for
     few: Any = None  # 1.0 where some axis has so few cells that two images of a ball may be near another one
 
     def axes(self):
@@ -70,64 +71,62 @@ class Grid(Record):
 
     def number(self, i, flock):
         """The number of the cell of a ball."""
-        row, found = WHOLES * i + CELL, 0
-        for k, axis in enumerate(self.axes()):
-            found = axis.offset[index(flock.tag[index(row + k)])] + found
+        found = 0
+        for axis, k in zip(self.axes(), flock.cell(i), strict=True):
+            found = axis.offset[index(k)] + found
         return found
 
 
 def until_exit(grid, pull, flock, i, now):
-    """Find when a ball leaves its cell, from a time on."""
+    """Find when and by which face a ball leaves its cell, from a time on."""
     r, v = flock.at(pull, i, now)
-    first, a = math.inf, (None, None, None) if pull is None else pull
-    for k, axis in enumerate(grid.axes()):
-        time, _up = axis.until_end(r[k], v[k], a[k], flock.tag[index(WHOLES * i + CELL + k)])
-        first = min(time, first)
-    flock.event[index(FLOATS * i + LEAVES)] = now + first
-
-
-def take_out(grid, flock, i):
-    """Remove a ball from the list of its cell."""
-    before, after = flock.tag[index(WHOLES * i + BEFORE)], flock.link[index(WHOLES * i + NEXT)]
-    if before >= 0:
-        flock.link[index(WHOLES * before + NEXT)] = after
-    else:
-        flock.head[index(grid.number(i, flock))] = after
-    if after >= 0:
-        flock.tag[index(WHOLES * after + BEFORE)] = before
-
-
-def put_in(grid, flock, i):
-    """Add a ball to the list of its cell, as the first."""
-    cell = grid.number(i, flock)
-    after = flock.head[index(cell)]
-    flock.link[index(WHOLES * i + NEXT)], flock.tag[index(WHOLES * i + BEFORE)] = after, NOBODY
-    if after >= 0:
-        flock.tag[index(WHOLES * after + BEFORE)] = i
-    flock.head[index(cell)] = i
-
-
-def cross(grid, pull, flock, i, now):
-    """Bring a ball into the cell that it enters now: (axis, by the upper face, how many periods it goes back)."""
-    r, v = flock.at(pull, i, now)
-    first, which, rises, a = math.inf, 0, False, (None, None, None) if pull is None else pull
-    for k, axis in enumerate(grid.axes()):
-        time, up = axis.until_end(r[k], v[k], a[k], flock.tag[index(WHOLES * i + CELL + k)])
+    first, face, a = math.inf, 0, (None, None, None) if pull is None else pull
+    for k, (axis, cell) in enumerate(zip(grid.axes(), flock.cell(i), strict=True)):
+        time, up = axis.until_end(r[k], v[k], a[k], cell)
         sooner = time < first
-        first, which, rises = select(sooner, time, first), select(sooner, k, which), select(sooner, up, rises)
-    take_out(grid, flock, i)
-    turns = 0
-    for k, axis in enumerate(grid.axes()):
+        first, face = select(sooner, time, first), select(sooner, 2 * k + select(up, 1, 0), face)
+    flock.event[index(FLOATS * i + LEAVES)] = now + first
+    flock.tag[index(WHOLES * i + FACE)] = face
+
+
+def _take_out(grid, flock, i, cell):
+    """Remove a ball from its cell; the last one takes its place."""
+    row = grid.stride * cell
+    last = flock.room[index(row)]
+    for k in range(1, last):
+        if flock.room[index(row + k)] == i:
+            flock.room[index(row + k)] = flock.room[index(row + last)]
+    flock.room[index(row)] = last - 1
+
+
+def cross(grid, flock, i):
+    """Bring a ball into the cell that it enters now: (the axis, by how many periods it goes back, whether it has room).
+
+    Where there is none, nothing is done.
+    """
+    face, old = flock.tag[index(WHOLES * i + FACE)], grid.number(i, flock)
+    which, step = face >> 1, 2 * (face & 1) - 1
+    new, turns, cell = old, 0, 0
+    for k, (axis, here) in enumerate(zip(grid.axes(), flock.cell(i), strict=True)):
         if which == k:
-            row = index(WHOLES * i + CELL + k)
-            cell = flock.tag[row] + select(rises, 1, -1)
+            cell = here + step
             if axis.period is not None:
                 turns = select(cell > axis.count, 1, select(cell < 1, -1, 0))
                 cell -= turns * axis.count
+            new = old + axis.offset[index(cell)] - axis.offset[index(here)]
+    row = grid.stride * new
+    taken = flock.room[index(row)] + 1
+    fits = taken < grid.stride
+    if fits:
+        _take_out(grid, flock, i, old)
+        # Where an axis has one cell it is the same one.
+        taken = flock.room[index(row)] + 1
+        flock.room[index(row)], flock.room[index(row + taken)] = taken, i
+        flock.tag[index(WHOLES * i + CELL + which)] = cell
+        for k, axis in enumerate(grid.axes()):
+            if axis.period is not None and which == k:
                 flock.flight[index(FLOATS * i + k)] -= turns * axis.period
-            flock.tag[row] = cell
-    put_in(grid, flock, i)
-    return which, rises, turns
+    return which, turns, fits
 
 
 # --- At the start ----------------------------------------------------------------------------------------

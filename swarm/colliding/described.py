@@ -14,7 +14,8 @@ from .aim import Alike, Various
 from .cells import Axis, Grid
 from .events import Box
 from .meet import Loss
-from .rows import BEFORE, CELL, FLOATS, NEXT, NOBODY, WHOLES, Flock
+from .queue import FIRST, SPARE
+from .rows import CELL, FLOATS, RADIUS, WHOLES, Flock
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +27,8 @@ _SPACING = 0.8
 _CELLS, _FEW = 2.0, 64
 # Of fewer cells along a period a ball may have two images of another one in its own cell and its neighbours.
 _IMAGES = 4
+# The least numbers in the row of a cell: how many balls, and these.
+_LEAST = 8
 # Balls fly this part of the scene in an epoch, about.
 _EPOCH = 0.125
 # t_c where none is given is this part of the time in which balls fly their diameter.
@@ -36,25 +39,43 @@ def flock_of(particles: Particles, grid: Grid, loses: bool) -> Flock:
     """The balls at the start, in their cells."""
     n = len(particles)
     flight, event = aligned(FLOATS * n), aligned(FLOATS * n)
-    tag, link = event.view(np.int32), flight.view(np.int32)
-    rows = flight.reshape(n, FLOATS)
-    rows[:, :3], rows[:, 3:6] = particles.position.T, particles.velocity.T
+    tag = event.view(np.int32)
+    rows, whole = flight.reshape(n, FLOATS), tag.reshape(n, WHOLES)
+    rows[:, :3], rows[:, 3:6], rows[:, RADIUS] = particles.position.T, particles.velocity.T, particles.radius
     event.reshape(n, FLOATS)[:, :3] = math.inf
-    whole, chain = tag.reshape(n, WHOLES), link.reshape(n, WHOLES)
-    cells = np.zeros(n, np.int64)
     for k, axis in enumerate(grid.axes()):
-        where = np.clip(np.floor((particles.position[k] - axis.low) / axis.width), 0, axis.count - 1).astype(np.int32)
+        where = np.clip(np.floor((particles.position[k] - axis.low) / axis.width), 0, axis.count - 1)
         whole[:, CELL + k] = where + 1
-        cells += axis.offset[where + 1]
-    head = np.full(grid.near.size, NOBODY, np.int32)
-    order = np.argsort(cells, kind="stable")
-    same = cells[order[1:]] == cells[order[:-1]]
-    chain[:, NEXT], whole[:, BEFORE] = NOBODY, NOBODY
-    chain[order[:-1][same], NEXT], whole[order[1:][same], BEFORE] = order[1:][same], order[:-1][same]
-    starts = order[np.append(True, ~same)]
-    head[cells[starts]] = starts
+    key, item = np.full(n + SPARE, math.inf), np.zeros(n + SPARE, np.int32)
+    item[FIRST : FIRST + n] = np.arange(n)
     last = np.full(n, -math.inf) if loses else None
-    return Flock(flight, link, event, tag, np.zeros(n), np.arange(n, dtype=np.int32), head, last)
+    node = np.arange(FIRST, FIRST + n, dtype=np.int32)
+    return Flock(flight, event, tag, node, aligned_copy(key), item, np.empty(0, np.int32), last)
+
+
+def with_room(flock: Flock, grid: Grid) -> tuple[Flock, Grid]:
+    """The balls in cells that have room for all, and for some more."""
+    n, cells = flock.number(), 0
+    whole = flock.tag.reshape(n, WHOLES)
+    for k, axis in enumerate(grid.axes()):
+        cells = cells + axis.offset[whole[:, CELL + k]]
+    order = np.argsort(cells, kind="stable").astype(np.int32)
+    numbers, first, counts = np.unique(np.asarray(cells)[order], return_index=True, return_counts=True)
+    stride = max(_LEAST, 2 * grid.stride)
+    while stride < int(counts.max()) + 2:
+        stride *= 2
+    room = np.zeros((grid.near.size, stride), np.int32)
+    room[numbers, 0] = counts
+    place = np.arange(n) - np.repeat(first, counts)
+    room[np.repeat(numbers, counts), 1 + place] = order
+    return flock._replace(room=aligned_copy(room.ravel())), grid._replace(stride=stride)
+
+
+def aligned_copy(values: NDArray[Any]) -> NDArray[Any]:
+    """A copy that begins with a line of the cache."""
+    made = aligned(-(-values.nbytes // 8)).view(values.dtype)[: values.size]
+    made[:] = values
+    return made
 
 
 def aligned(size: int) -> Floats:
@@ -64,25 +85,26 @@ def aligned(size: int) -> Floats:
     return made[first : first + size]
 
 
-def box_of(scene: Scene, particles: Particles, moment: float) -> Box:
-    """What the balls are in."""
+def described(scene: Scene, particles: Particles) -> tuple[Box, Flock]:
+    """What the balls are in, and these at the start."""
     assert particles.radius is not None
     laws = scene.laws() or NONE
     pairs = scene.pairs or Pairs()
     loss = None
     if pairs.restitution < 1.0 or laws.restitution is not None:
         loss = Loss(pairs.restitution, duration_of(pairs, particles))
-    walls = scene.walls(moment)
-    return Box(walls, laws, scene.pull(), grid_of(scene, particles), kinds_of(particles), loss)
+    grid = grid_of(scene, particles)
+    flock, grid = with_room(flock_of(particles, grid, loss is not None), grid)
+    return Box(scene.walls(0.0), laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss), flock
 
 
-def kinds_of(particles: Particles) -> Any:
+def kinds_of(particles: Particles, flight: Any) -> Any:
     """The radii and masses of balls."""
     radius, mass = particles.radius, particles.mass
     assert radius is not None
     if np.ptp(radius) == 0.0 and np.ptp(mass) == 0.0:
         return Alike(float(radius[0]), float(mass[0]), (2.0 * float(radius[0])) ** 2)
-    return Various(radius, mass)
+    return Various(flight, mass)
 
 
 def duration_of(pairs: Pairs, particles: Particles) -> float:
@@ -94,10 +116,10 @@ def duration_of(pairs: Pairs, particles: Particles) -> float:
     return _DURATION * 2.0 * float(particles.radius.min()) / speed if speed > 0.0 else 0.0
 
 
-def epoch_of(scene: Scene, particles: Particles) -> float:
+def epoch_of(scene: Scene, particles: Particles, grid: Grid) -> float:
     """The length of an epoch [s], a power of two."""
     speed = math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))
-    size = _EPOCH * scene.finite_size()
+    size = _EPOCH * max(axis.width * axis.count for axis in grid.axes())
     if scene.gravity is not None:
         speed = max(speed, math.sqrt(size * math.hypot(*scene.gravity)))
     return float(2.0 ** math.floor(math.log2(size / speed))) if speed > 0.0 else 1.0
@@ -131,7 +153,7 @@ def grid_of(scene: Scene, particles: Particles) -> Grid:
         axes.append(Axis(float(low[k]), cell, int(counts[k]), offset, length, last))
         stride *= int(counts[k]) + 2
     few = any(axis.period is not None and axis.count < _IMAGES for axis in axes)
-    return Grid(*reversed(axes), np.ones(stride, np.bool_), 1.0 if few else None)
+    return Grid(*reversed(axes), np.ones(stride, np.bool_), 0, 1.0 if few else None)
 
 
 def _region(scene: Scene, particles: Particles) -> tuple[Floats, Floats]:

@@ -17,20 +17,20 @@ from ..kernel.jit import Array, long_kernel, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import put, square
 from ..status import Status
-from .aim import find_partner, find_wall, forget_wall, tell_partner
+from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .cells import cross, mark_near, until_exit
 from .meet import met
-from .queue import build, requeue
-from .rows import DUE, FLOATS, LEAVES, MEETS, NODE, PARTNER, SEEN, STAMP, WALL, WHOLES
+from .queue import FIRST, build, requeue
+from .rows import DUE, FLOATS, LEAVES, MEETS, MET, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
 
-# Of a clock: how many epochs have ended, their length [s], events and collisions so far, the last ones at one time.
+# Of a clock: how many epochs have ended, their length [s], events and collisions so far, those at one time.
 EPOCHS, LENGTH, EVENTS, COLLISIONS, SAME, CLOCK = 0, 1, 2, 3, 4, 5
 # So many events a ball between which no time passes: then time does not pass at all.
 _AT_ONCE = 1000
 
 
 class Box(Record):
-    """What the balls are in: walls and their laws, gravity, cells, what kinds of balls, what is lost of their energy."""
+# Of a clock: how many epochs have ended, their length [s], events and collisions so far; events at one time now.
 
     walls: Any
     laws: Any
@@ -47,7 +47,6 @@ class Books(NamedTuple):
     impulse: Array  # (2 walls, 1)
     dissipated: Array  # (N,), or none
     impacts: Array  # (N,)
-    collisions: Array  # (N,)
     virial: Array  # (1,)
     image: Any = None  # (3, N) where the scene repeats
     counts: Any = None  # (walls,) impacts on each, where they are counted
@@ -71,17 +70,12 @@ def _aim(box, flock, i, now):
     find_partner(box, flock, i, now)
 
 
-def _queue(flock, i):
-    """Bring a ball to its place in the queue."""
-    requeue(flock, i, flock.tag[index(WHOLES * i + NODE)], flock.next_of(i))
-
-
 def _queue_both(flock, i):
     """Bring a ball to its place in the queue, and its partner, if that is told."""
-    _queue(flock, i)
+    requeue(flock, i)
     told = tell_partner(flock, i)
     if told >= 0:
-        _queue(flock, told)
+        requeue(flock, told)
 
 
 @outlined
@@ -94,13 +88,12 @@ def _collide(box, flock, books, clock, i, now):
     else:
         # The one with the smaller number first
         one, other = min(i, j), max(i, j)
-        for k in (one, other):
-            r, v = flock.at(box.pull, k, now)
-            flock.put(k, now, r, v)
-        blow = met(box, flock, one, other, now)
-        flock.turn(one, blow.one)
-        flock.turn(other, blow.other)
-        _book_collision(flock, books, clock, (one, other), blow, now)
+        r, v = flock.at(box.pull, one, now)
+        there, w = flock.at(box.pull, other, now)
+        blow = met(box, flock, (one, r, v), (other, there, w), now)
+        flock.put(one, now, r, blow.one)
+        flock.put(other, now, there, blow.other)
+        _book(flock, books, clock, (one, other), blow, now)
         flock.event[index(FLOATS * other + MEETS)] = math.inf
         _aim(box, flock, one, now)
         _queue_both(flock, one)
@@ -108,11 +101,11 @@ def _collide(box, flock, books, clock, i, now):
         _queue_both(flock, other)
 
 
-def _book_collision(flock, books, clock, pair, blow, now):
+def _book(flock, books, clock, pair, blow, now):
     clock[COLLISIONS] += 1.0
     books.virial[0] += blow.virial
     for k in pair:
-        books.collisions[index(k)] += 1
+        flock.tag[index(WHOLES * k + MET)] += 1
         if books.dissipated.size > 0:
             books.dissipated[index(k)] += 0.5 * blow.lost
         if flock.last is not None:
@@ -132,8 +125,7 @@ def _bounce(box, flock, books, i, now):
         if now - flock.last[index(i)] < box.loss.duration:
             bounce = exact(box.laws._replace(restitution=None), walls, box.pull, wall, r, v, energy)
         flock.last[index(i)] = now
-    flock.put(i, now, r, v)
-    flock.turn(i, bounce.v)
+    flock.put(i, now, r, bounce.v)
     books.impulse[index(int(walls.row(wall))), 0] += m * bounce.impulse
     if books.dissipated.size > 0:
         books.dissipated[index(i)] += 0.5 * m * (twice - bounce.twice_energy)
@@ -151,22 +143,28 @@ def _at_wall(box, flock, books, i, now):
     else:
         forget_wall(box, flock, i)
         find_wall(box, flock, i, now)
-        _queue(flock, i)
+        requeue(flock, i)
 
 
 @outlined
 def _enter(box, flock, books, i, now):
-    """The way of a ball into the next cell."""
-    which, _rises, turns = cross(box.grid, box.pull, flock, i, now)
-    if books.image is not None:
-        books.image[index(which), index(i)] += turns
-    if turns != 0:
-        # There it meets other images of the walls.
-        forget_wall(box, flock, i)
-    until_exit(box.grid, box.pull, flock, i, now)
-    find_wall(box, flock, i, now)
-    find_partner(box, flock, i, now)
-    _queue_both(flock, i)
+    """The way of a ball into the next cell: whether there is room for it."""
+    which, turns, fits = cross(box.grid, flock, i)
+    if fits:
+        if books.image is not None:
+            books.image[index(which), index(i)] += turns
+        if turns != 0:
+            # There it meets other images of the walls.
+            forget_wall(box, flock, i)
+        found = look_ahead(box, flock, i, now)
+        until_exit(box.grid, box.pull, flock, i, now)
+        find_wall(box, flock, i, now)
+        requeue(flock, i)
+        if found:
+            told = tell_partner(flock, i)
+            if told >= 0:
+                requeue(flock, told)
+    return fits
 
 
 # --- Of all ----------------------------------------------------------------------------------------------
@@ -202,9 +200,9 @@ def _begin_epoch(flock, clock, now):
     number = float(int(now / clock[LENGTH]))
     shift = number * clock[LENGTH]
     clock[EPOCHS] += number
-    for i in range(flock.item.size):
+    for i in range(flock.number()):
         row = FLOATS * i
-        flock.flight[index(row + 6)] -= shift
+        flock.flight[index(row + TIME)] -= shift
         for k in (MEETS, LEAVES, DUE):
             flock.event[index(row + k)] -= shift
         if flock.last is not None:
@@ -217,13 +215,14 @@ def _begin_epoch(flock, clock, now):
 def take(box, flock, books, clock, rule):
     """Take event after event until the end of the frame: (status, ball).
 
-    INTERRUPTED after so many events as the rule says; it goes on with the same bits.
+    LEASE_ENDED where a cell has no room for one ball more: give all cells more, and call it again. INTERRUPTED after so
+    many events as the rule says; it goes on with the same bits.
     """
     end, taken = rule.end - clock[EPOCHS] * clock[LENGTH], 0
-    most = float(_AT_ONCE * flock.item.size)
+    most = float(_AT_ONCE * flock.number())
     before = -math.inf
     while True:
-        i, now = flock.item[0], flock.key[0]
+        i, now = flock.item[FIRST], flock.key[FIRST]
         if not now < end:
             return Status.DONE.value, 0
         if taken >= rule.halt[0]:
@@ -244,8 +243,9 @@ def take(box, flock, books, clock, rule):
                 _collide(box, flock, books, clock, i, now)
             elif flock.event[index(row + DUE)] <= now:
                 _at_wall(box, flock, books, i, now)
-            else:
-                _enter(box, flock, books, i, now)
+            elif not _enter(box, flock, books, i, now):
+                clock[EVENTS] -= 1.0
+                return Status.LEASE_ENDED.value, i
 
 
 @long_kernel
@@ -261,4 +261,5 @@ def show(box, flock, state, end, first, last):
                 x = select(x < 0.0, 0.0, select(x >= cells.period, cells.last, x))
             state.position[axis, i] = x
         put(state.velocity, 0, i, v)
+        state.balls.collisions[i] = flock.tag[index(WHOLES * k + MET)]
         state.energy[i] = 0.5 * square(v) + potential(box.pull, r)

@@ -38,13 +38,14 @@ def turned(u, n, closing, distance2, restitution):
     now = square(w)
     miss = square(u) - lost - now
     near = (abs(miss) <= _NEAR * now) & (now > 0.0)
-    return w * (1.0 + select(near, 0.5 * miss / select(near, now, 1.0), 0.0)), lost
+    # 1 + a part of the round-off would be off itself, and to one side.
+    return w + select(near, 0.5 * miss / select(near, now, 1.0), 0.0) * w, lost
 
 
-def met(box, flock, i, j, now):
-    """The `Met` of two balls that touch now, whose flights begin now."""
-    b, v, w = between(box.grid, flock.place(i), flock.place(j)), flock.velocity(i), flock.velocity(j)
-    u = w - v
+def met(box, flock, one, two, now):
+    """The `Met` of two balls that touch now, each as its number, its position and its velocity."""
+    (i, r, v), (j, other, w) = one, two
+    b, u = between(box.grid, r, other), w - v
     closing, distance2 = dot(b, u), square(b)
     restitution: Any = None
     if box.loss is not None:

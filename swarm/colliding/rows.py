@@ -1,7 +1,7 @@
 """What a run knows of each ball between two events: two lines of the cache, and its node of the queue.
 
 One line is the flight: position and velocity at a time, which is that of the last impact. The other one is what is
-next. Both hold whole numbers too, as views of the same memory.
+next; it holds whole numbers too, as a view of the same memory.
 """
 
 from typing import Any, NamedTuple
@@ -13,14 +13,13 @@ from ..kernel.vector import Vec
 
 # Numbers of a row, and whole numbers in the same memory.
 FLOATS, WHOLES = 8, 16
-# Of a flight: position [m], velocity [m/s], their time [s since the epoch].
-_X, _V, _TIME = 0, 3, 6
+# Of a flight: position [m], velocity [m/s], their time [s since the epoch], the radius [m].
+_X, _V, TIME, RADIUS = 0, 3, 6, 7
 # Of what is next [s since the epoch]: a collision, the end of the cell, a wall; and which wall.
 MEETS, LEAVES, DUE, WALL = 0, 1, 2, 3
-# Whole numbers of a flight: the next ball in its cell; of what is next: with whom it collides and how often that one's
-# velocity had changed then, how often its own has, the ball before it in its cell, its node in the queue, its cell.
-NEXT = 14
-PARTNER, SEEN, STAMP, BEFORE, NODE, CELL = 8, 9, 10, 11, 12, 13
+# Whole numbers of what is next: with whom it collides, and how often that one's velocity had changed then; how often
+# its own has, and how often it has collided; its cell; by which face it leaves that.
+PARTNER, SEEN, STAMP, MET, CELL, FACE = 8, 9, 10, 11, 12, 15
 # Of no ball.
 NOBODY = -1
 
@@ -29,17 +28,21 @@ class Flock(NamedTuple):
     """The balls of a run."""
 
     flight: Array  # (8 N) numbers of flights
-    link: Array  # (16 N) int32, the same memory
     event: Array  # (8 N) numbers of what is next
     tag: Array  # (16 N) int32, the same memory
-    key: Array  # (N) of the nodes of the queue: the time of what is next
-    item: Array  # (N) int32, the ball of each node
-    head: Array  # int32, the first ball in each cell
+    node: Array  # (N) int32, its place in the queue
+    key: Array  # of the nodes of the queue: the time of what is next
+    item: Array  # int32, the ball of each node
+    room: Array  # int32 of each cell: how many balls are in it, and these
     last: Any = None  # (N) when each lost energy or met somebody last [s since the epoch]; None where nothing loses any
+
+    def number(self):
+        """The number of balls."""
+        return self.node.size
 
     def time(self, i):
         """The time of its last impact."""
-        return self.flight[index(FLOATS * i + _TIME)]
+        return self.flight[index(FLOATS * i + TIME)]
 
     def place(self, i):
         """Its position then."""
@@ -59,16 +62,16 @@ class Flock(NamedTuple):
         return self.place(i) + displacement(pull, v, way), accelerated(pull, v, way)
 
     def put(self, i, now, r, v):
-        """Store its flight from a time on."""
+        """Store its flight from a time on, with another velocity."""
         row = FLOATS * i
         for k, value in enumerate((*r, *v, now)):
             self.flight[index(row + k)] = value
-
-    def turn(self, i, v):
-        """Give it another velocity."""
-        for k, value in enumerate(v):
-            self.flight[index(FLOATS * i + _V + k)] = value
         self.tag[index(WHOLES * i + STAMP)] += 1
+
+    def cell(self, i):
+        """The numbers of its cell along the axes."""
+        row = WHOLES * i + CELL
+        return self.tag[index(row)], self.tag[index(row + 1)], self.tag[index(row + 2)]
 
     def next_of(self, i):
         """When the first of what is next comes."""

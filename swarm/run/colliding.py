@@ -12,8 +12,9 @@ import numpy as np
 from .. import observables
 from ..ball_numbers import BallNumbers
 from ..colliding import events
-from ..colliding.described import box_of, epoch_of, flock_of
+from ..colliding.described import described, epoch_of, with_room
 from ..colliding.events import CLOCK, EPOCHS, LENGTH, Books, Rule
+from ..colliding.queue import FIRST
 from ..errors import RunError
 from ..methods.base import Method
 from ..particles import Particles
@@ -41,7 +42,8 @@ class CollidingRun(BaseRun):
     ) -> None:  # fmt: skip
         assert particles.radius is not None
         n, rows = len(particles), len(scene.owners())
-        self._box, self._radius = box_of(scene, particles, 0.0), float(particles.radius.max())
+        self._radius = float(particles.radius.max())
+        self._box, self._flock = described(scene, particles)
         loses = self._box.laws.may_dissipate or self._box.laws.loses or self._box.loss is not None
         balls = Balls(particles.radius, np.zeros(n, np.int64), np.zeros(1))
         # Times are those of the start of each flight: so what is written at frames is no part of the motion.
@@ -52,15 +54,12 @@ class CollidingRun(BaseRun):
         )  # fmt: skip
         pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, self._box, n)
         super().__init__(scene, method, n, pool, tier, seeding.first)
-        self._flock = flock_of(particles, self._box.grid, self._box.loss is not None)
-        state = self.state
+        state, self._balls = self.state, balls
         self._tally = watched.tally
         counts = None if self._tally is None else self._tally.of_thread(0).impacts
-        self._books = Books(
-            state.impulse, state.dissipated, state.impacts, balls.collisions, balls.virial, state.image, counts
-        )
+        self._books = Books(state.impulse, state.dissipated, state.impacts, balls.virial, state.image, counts)
         self._clock = np.zeros(CLOCK)
-        self._clock[LENGTH] = epoch_of(scene, particles)
+        self._clock[LENGTH] = epoch_of(scene, particles, self._box.grid)
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._threads = threads if n >= _FEW else 1
         self._numbers = BallNumbers(scene, particles)
@@ -72,8 +71,12 @@ class CollidingRun(BaseRun):
         latest = self._limit(latest)
         began = time.perf_counter()
         self._ends[:] = moment, moment - span
-        taking: Any = self._box, self._flock, self._books, self._clock, Rule(moment, self._watch.passes)
-        ((status, ball),) = self._called(events.take, [taking], latest)
+        status = ball = int(Status.LEASE_ENDED)
+        while status == Status.LEASE_ENDED:
+            taking: Any = self._box, self._flock, self._books, self._clock, Rule(moment, self._watch.passes)
+            ((status, ball),) = self._called(events.take, [taking], latest)
+            if status == Status.LEASE_ENDED:
+                self._make_room()
         self._cut_short = status == Status.INTERRUPTED
         if not self._cut_short and status == Status.DONE:
             self._show(moment)
@@ -84,6 +87,11 @@ class CollidingRun(BaseRun):
         if not self._cut_short:
             self._observe(moment)
         return not self._cut_short
+
+    def _make_room(self) -> None:
+        """More room in the cells."""
+        self._flock, grid = with_room(self._flock, self._box.grid)
+        self._box = self._box._replace(grid=grid)
 
     def _show(self, moment: float) -> None:
         """Write the arrays of a frame."""
@@ -108,7 +116,7 @@ class CollidingRun(BaseRun):
 
     def _now(self) -> float:
         """The time of the next event since the start [s]."""
-        return float(self._clock[EPOCHS] * self._clock[LENGTH] + self._flock.key[0])
+        return float(self._clock[EPOCHS] * self._clock[LENGTH] + self._flock.key[FIRST])
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         part, box, flock = (0, 0), self._box, self._flock
@@ -164,9 +172,10 @@ class CollidingRun(BaseRun):
     def arrays(self) -> Arrays:
         flock, state = self._flock, self.state
         found = {
-            "flight": flock.flight, "event": flock.event, "key": flock.key, "item": flock.item, "head": flock.head,
+            "flight": flock.flight, "event": flock.event, "node": flock.node, "key": flock.key, "item": flock.item,
+            "room": flock.room,
             "impulse": state.impulse, "dissipated": state.dissipated, "impacts": state.impacts,
-            "collisions": self._books.collisions, "virial": self._books.virial, "clock": self._clock,
+            "collisions": self._balls.collisions, "virial": self._books.virial, "clock": self._clock,
             "start": self._start, "position": state.position, "velocity": state.velocity, "energy": state.energy,
             **self._numbers.arrays(),
         }  # fmt: skip
@@ -176,6 +185,8 @@ class CollidingRun(BaseRun):
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
+        while self._flock.room.size < arrays["room"].size:
+            self._make_room()
         super().restore(arrays, cut_short)
         if self._tally is not None:
             self._books.counts[:] = arrays["member_impacts"]
