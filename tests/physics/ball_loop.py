@@ -69,7 +69,7 @@ class _Loop:
         self.e, self.duration = self.number(pairs.restitution), self.number(pairs.contact_duration or 0.0)
         self.epsilon = 2.0**-52 if module is math else module.eps
         walls = Walls(self.number, module, self.epsilon, scene.period)
-        self.walls = [wall for k, one in enumerate(scene.surfaces) for wall in walls.of(one, k)]
+        self.walls = [wall for one in scene.surfaces for wall in walls.of(one)]
         n = len(self.mass)
         zero, self.last = self.number(0), self.number(last)
         self.now, self.time, self.met = zero, [zero] * n, [-self.number("inf")] * n
