@@ -15,7 +15,6 @@ class Wall(NamedTuple):
     normal: Callable[[Any], Any]  # the unit normal there, into the wall
     parts: tuple[Any, ...]
     e: float
-    surface: int
 
 
 class Walls:
