@@ -32,7 +32,8 @@ _LONG, _ARRAY = 1000, "sha256:"
 
 def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None) -> Scene:
     """A scene from its tables: a list of surface tables; gravity, the period and the plane, or None."""
-    if not isinstance(surfaces, list) or not surfaces:
+    surfaces = [] if surfaces is None and period is not None else surfaces
+    if not isinstance(surfaces, list) or not (surfaces or period is not None):
         raise SceneError("surface: expected at least one [[surface]] table, got none")
     built = [surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
     return Scene(surfaces=built, gravity=gravity, period=period, plane=plane)

@@ -96,8 +96,10 @@ def a_scene(seed):
         for make in makers:
             motion = a_motion(random) if moves and not flat and random.random() < 0.7 else None
             surfaces += make(motion=motion, **law)
-    pairs = swarm.Pairs(restitution=float(random.choice([1.0, 1.0, 0.9, 0.6])), contact_duration=0.0)
-    scene = swarm.Scene(surfaces, gravity, period, "z" if flat else None, pairs if random.random() < 0.7 else None)
+    pairs = swarm.Pairs(
+        restitution=float(random.choice([1.0, 1.0, 0.9, 0.6])), contact_duration=float(random.choice([1e-4, 1e-2]))
+    )
+    scene = swarm.Scene(surfaces, gravity, period, "z" if flat else None, pairs)
     sizes = [(0.08,), (0.05, 0.1), (0.02, 0.06, 0.15)][random.integers(3)]
     position, radius = balls_in(scene, random.choice(sizes, NUMBER), seed)
     n = len(radius)
