@@ -19,7 +19,7 @@ from ..kernel.vector import put, square
 from ..status import Status
 from .aim import find_partner, find_wall, forget_wall, tell_partner
 from .cells import cross, mark_near, until_exit
-from .meet import met
+from .meet import met, squared
 from .queue import build, requeue
 from .rows import DUE, FLOATS, LEAVES, MEETS, NODE, PARTNER, SEEN, STAMP, WALL, WHOLES
 
@@ -133,7 +133,7 @@ def _bounce(box, flock, books, i, now):
             bounce = exact(box.laws._replace(restitution=None), walls, box.pull, wall, r, v, energy)
         flock.last[index(i)] = now
     flock.put(i, now, r, v)
-    flock.turn(i, bounce.v)
+    flock.turn(i, squared(bounce.v, bounce.twice_energy - 2.0 * potential(box.pull, r)))
     books.impulse[index(int(walls.row(wall))), 0] += m * bounce.impulse
     if books.dissipated.size > 0:
         books.dissipated[index(i)] += 0.5 * m * (twice - bounce.twice_energy)
