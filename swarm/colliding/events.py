@@ -19,7 +19,7 @@ from ..kernel.vector import put, square
 from ..status import Status
 from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .cells import cross, mark_near, until_exit
-from .meet import met
+from .meet import met, squared
 from .queue import FIRST, build, requeue
 from .rows import DUE, FLOATS, LEAVES, MEETS, MET, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
 
@@ -30,7 +30,7 @@ _AT_ONCE = 1000
 
 
 class Box(Record):
-# Of a clock: how many epochs have ended, their length [s], events and collisions so far; events at one time now.
+    """What the balls are in: walls and their laws, gravity, cells, what kinds of balls, what is lost of their energy."""
 
     walls: Any
     laws: Any
@@ -125,7 +125,7 @@ def _bounce(box, flock, books, i, now):
         if now - flock.last[index(i)] < box.loss.duration:
             bounce = exact(box.laws._replace(restitution=None), walls, box.pull, wall, r, v, energy)
         flock.last[index(i)] = now
-    flock.put(i, now, r, bounce.v)
+    flock.put(i, now, r, squared(bounce.v, bounce.twice_energy - 2.0 * potential(box.pull, r)))
     books.impulse[index(int(walls.row(wall))), 0] += m * bounce.impulse
     if books.dissipated.size > 0:
         books.dissipated[index(i)] += 0.5 * m * (twice - bounce.twice_energy)

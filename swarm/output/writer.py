@@ -168,7 +168,9 @@ class TrajectoryWriter(AppendedFile):
         """A time-dependent H5MD element."""
         group = self._file.create_group(name)
         group["step"], group["time"] = self._step, self._time
-        return group.create_dataset("value", (0, *shape), kind, maxshape=(None, *shape), chunks=chunks, **options)
+        # Of a scene without walls there is nothing about each wall, and a chunk holds something.
+        most, chunks = tuple(length or None for length in shape), tuple(length or 1 for length in chunks)
+        return group.create_dataset("value", (0, *shape), kind, maxshape=(None, *most), chunks=chunks, **options)
 
     def _write(self, frames: list[Written]) -> None:
         with self._writing(f"frame {frames[0][0]}"):

@@ -69,7 +69,7 @@ class _Loop:
         self.e, self.duration = self.number(pairs.restitution), self.number(pairs.contact_duration or 0.0)
         self.epsilon = 2.0**-52 if module is math else module.eps
         walls = Walls(self.number, module, self.epsilon, scene.period)
-        self.walls = [wall for k, one in enumerate(scene.surfaces) for wall in walls.of(one, k)]
+        self.walls = [wall for one in scene.surfaces for wall in walls.of(one)]
         n = len(self.mass)
         zero, self.last = self.number(0), self.number(last)
         self.now, self.time, self.met = zero, [zero] * n, [-self.number("inf")] * n
@@ -159,8 +159,7 @@ class _Loop:
             self._move(k, self.now)
         r = self.r[i] - self.r[j] - pair[1]
         n = r / self._length(r)
-        rests = self.now - max(self.met[i], self.met[j]) < self.duration
-        e = self.number(1) if rests else self.e
+        e = self._restitution(self.e, i, j)
         b, reduced = (self.v[i] - self.v[j]) @ n, self.mass[i] * self.mass[j] / (self.mass[i] + self.mass[j])
         impulse = -(1 + e) * b * reduced
         self.v[i] = self.v[i] + impulse / self.mass[i] * n
@@ -293,7 +292,8 @@ class _Loop:
         time, wall, _clear = hit
         self._move(i, time)
         here, turn, u = self._as_given(wall, self.r[i], time)
-        n, e = turn @ wall.normal(here), self.number(wall.e)
+        n, e = turn @ wall.normal(here), self._restitution(self.number(wall.e), i)
+        self.met[i] = time
         b = (self.v[i] - u) @ n
         before = self.v[i] @ self.v[i]
         self.v[i] = self.v[i] - (1 + e) * b * n
@@ -302,6 +302,11 @@ class _Loop:
         self.left[i] = wall
         self.impacts += 1
         self.events.append((time, i, WALL))
+
+    def _restitution(self, e, *balls):
+        """That of an impact of balls; who met anything less than the contact duration before keeps its energy."""
+        recent = max(self.met[k] for k in balls)
+        return self.number(1) if self.now - recent < self.duration else e
 
     def _length(self, v):
         return self.module.sqrt(v @ v)

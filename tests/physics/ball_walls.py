@@ -15,7 +15,6 @@ class Wall(NamedTuple):
     normal: Callable[[Any], Any]  # the unit normal there, into the wall
     parts: tuple[Any, ...]
     e: float
-    surface: int
 
 
 class Walls:
@@ -31,7 +30,7 @@ class Walls:
     def __init__(self, number, module, epsilon, period):
         self.number, self.module, self.epsilon, self.period = number, module, epsilon, period
 
-    def of(self, one, k):
+    def of(self, one):
         """The walls of a surface: distances from its outside, of points on the admissible side."""
         parts, e = parts_of(one.motion), one.restitution
         kind, side = type(one).__name__, getattr(one, "side", "inside")
@@ -40,7 +39,7 @@ class Walls:
             "Cylinder": self._cylinder, "Capsule": self._capsule, "Torus": self._torus, "Cone": self._cone,
             "Ellipsoid": self._ellipsoid,
         }  # fmt: skip
-        return [Wall(distance, normal, parts, e, k) for distance, normal in makers[kind](one, side)]
+        return [Wall(distance, normal, parts, e) for distance, normal in makers[kind](one, side)]
 
     def _vector(self, given):
         return np.array([self.number(x) for x in given])
