@@ -36,6 +36,7 @@ SOURCES = (
     "contact",
     "methods",
     "lanes",
+    "grains",
     "reacting",
     "colliding",
     "cells.py",

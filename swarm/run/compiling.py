@@ -18,6 +18,11 @@ _WORDS = {
     "predict": "impacts on walls that react",
     "take": "the order of impacts",
     "arrive": "the end of a frame",
+    "list_pairs": "balls near one another",
+    "list_walls": "balls near walls",
+    "march": "balls that press on one another",
+    "stored": "the energy of contacts",
+    "show": "frames of balls",
     "settle": "walls that react, at the end of a frame",
 }
 

@@ -1,18 +1,224 @@
 """The run of soft balls, which press on one another and on walls in fixed steps."""
 
+import math
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from .. import observables
+from ..ball_numbers import BallNumbers
+from ..errors import RunError
+from ..grains import arrays, energy, lists
+from ..grains.arrays import DONE, SINCE, SKIN, X
+from ..grains.booking import Books
+from ..grains.described import matter_of
+from ..grains.drags import kept_drags, set_drags
+from ..grains.step import Rule, World, march
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
-from .base import BaseRun
+from ..state import Balls, State
+from ..status import Status
+from .base import Arrays, BaseRun
 from .state import Seeding
 from .tally import Watched
+from .tiers import Tier
+
+# The first skin of the lists, of the radius of the smallest ball. In a skin a ball may move by half of it.
+_SKIN = 0.2
+# Room in the lists: so many pairs of each ball, and balls at walls, which become so many times as many.
+_PAIRS, _AT_WALLS, _MORE = 6, 1, 1.5
+# A skin of so many radii of the largest ball is no list any more.
+_WIDEST = 16.0
 
 
 class GrainsRun(BaseRun):
-    """The run of soft balls, which press on one another and on walls in fixed steps."""
+    """The run of soft balls; the arrays of the particles become a part of its state."""
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None, compile: str,
         seeding: Seeding, watched: Watched,
     ) -> None:  # fmt: skip
-        raise NotImplementedError
+        n, walls = len(particles), len(scene.owners())
+        radius = particles.radius
+        assert radius is not None
+        self._matter = matter_of(scene, method)
+        rubs, spin = self._matter.rubs, particles.spin
+        if spin is None and rubs:
+            spin = np.zeros((3, n))
+        balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
+        loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
+        self.state = State(
+            particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
+            np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None, balls=balls,
+        )  # fmt: skip
+        self._walls = scene.walls(0.0)
+        pool, tier = ThreadPoolExecutor(1, "swarm"), Tier(compile, (self._matter, self._walls), n)
+        super().__init__(scene, method, n, pool, tier)
+        state = self.state
+        books = Books(
+            balls.collisions, state.impacts, state.impulse, state.dissipated, balls.virial, np.zeros(1, np.int64)
+        )
+        self._world = World(
+            arrays.grains_of(state.position, state.velocity, radius, state.mass),
+            arrays.near_of(n, walls, _PAIRS * n, _AT_WALLS * n), arrays.touches_of(walls, _PAIRS * n, _AT_WALLS * n),
+            books,
+        )  # fmt: skip
+        self._clock = np.zeros(arrays.CLOCK)
+        self._clock[SKIN] = _SKIN * radius.min()
+        self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
+        self._start = self._scale = self._stored = math.nan
+        self._numbers = BallNumbers(scene, particles)
+        self._choose_tier()
+        self._list()
+
+    # --- Lists ---------------------------------------------------------------------------------------------
+
+    def _list(self) -> None:
+        """List anew what is near, where all are now."""
+        matter, clock, grains, kernel = self._matter, self._clock, self._world.grains, self._tier.kernel
+        kept = kept_drags(self._world)
+        reach = 2.0 * float(grains.place[:, arrays.RADIUS].max()) + clock[SKIN]
+        cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, matter.period)
+        for rows in (grains.number, grains.place, grains.speed, grains.spin):
+            if rows is not None:
+                rows[:] = rows[order]
+        near = self._world.near
+        while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, clock)) > near.mate.size:
+            near = self._make_room(pairs, near.slot.size)
+        while (at := kernel(lists.list_walls)(self._walls, grains, near, clock)) > near.slot.size:
+            near = self._make_room(near.mate.size, at)
+        set_drags(self._world, kept)
+        clock[SINCE] = 0.0
+
+    def _make_room(self, pairs: int, touching: int) -> arrays.Near:
+        """Make room for so many pairs, and balls at walls, and some more."""
+        near, n, walls, rubs = self._world.near, len(self.state.mass), len(self._owners), self._matter.rubs
+        wanted = (pairs, near.mate.size), (touching, near.slot.size)
+        pairs, touching = (have if need <= have else int(_MORE * need) for need, have in wanted)
+        made = arrays.near_of(n, walls, pairs, touching, rubs)
+        for old, new in zip(near, made, strict=True):
+            if old is not None:
+                new[: len(old)] = old
+        self._world = self._world._replace(near=made, touches=arrays.touches_of(walls, pairs, touching, rubs))
+        return made
+
+    def _list_again(self) -> None:
+        """List anew in a step, with a wider skin where the lists do not even hold for one."""
+        if self._clock[SINCE] == 0.0:
+            self._clock[SKIN] *= 2.0
+            largest = self.state.balls.radius.max()  # type: ignore[union-attr]
+            if not self._clock[SKIN] <= _WIDEST * largest:
+                raise RunError(self._too_far(float(largest)))
+        self._list()
+
+    def _too_far(self, largest: float) -> str:
+        speed = self._world.grains.speed
+        squares = (speed[:, :3] ** 2 + speed[:, 3:6] ** 2).sum(axis=1)
+        k = int(np.argmax(np.where(np.isnan(squares), np.inf, squares)))
+        return (
+            f"a step failed at particle {self._world.grains.number[k]}: it moves by more than {0.5 * _WIDEST:g} radii "
+            f"of the largest ball, {largest:g} m, in a step of {self._matter.h:g} s; use a smaller dt"
+        )
+
+    # --- A frame -------------------------------------------------------------------------------------------
+
+    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+        self._walls = self._scene.walls(self._method.instant(moment))
+        if not self._cut_short:
+            self._clock[DONE] = 0.0
+        latest = self._limit(latest)
+        status, rule = Status.LEASE_ENDED.value, Rule(span, self._watch.passes)
+        began = time.perf_counter()
+        while status == Status.LEASE_ENDED:
+            (status,) = self._called(march, [(self._matter, self._walls, self._world, self._clock, rule)], latest)
+            if status == Status.LEASE_ENDED:
+                self._list_again()
+        self._tier.spend(time.perf_counter() - began)
+        self._watch.end()
+        self._cut_short = status == Status.INTERRUPTED
+        if status == Status.UNSOLVED:
+            raise RunError(self._unsolved(moment - (span - self._clock[DONE]) * self._matter.h))
+        if not self._cut_short:
+            self._observe(moment)
+        return not self._cut_short
+
+    def _unsolved(self, moment: float) -> str:
+        return (
+            f"the step at {moment:.9g} s failed: the impulses of its contacts did not converge; a smaller dt than "
+            f"{self._matter.h:g} s, or a softer penalty, helps"
+        )
+
+    def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+        world, matter = self._world, self._matter
+        cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
+        yield lists.list_pairs, (matter.period, world.grains, world.near, cells, self._clock)
+        yield lists.list_walls, (self._walls, world.grains, world.near, self._clock)
+        yield march, (matter, self._walls, world, self._clock, Rule(0.0, self._watch.passes))
+        yield energy.stored, (matter, self._walls, world.grains, world.near)
+        yield energy.show, (world.grains, self.state)
+        yield observables.observe, self._observing()
+
+    def _observing(self) -> tuple[Any, ...]:
+        drawn = np.arange(len(self._partial))
+        return None, self._walls, self._matter.pull, self.state, drawn, observables.CHUNK, self._partial
+
+    def observe(self) -> None:
+        self._observe(0.0)
+        seen = self._summary()
+        self._start, self._scale = _balance(seen), self._scale_of(seen)
+
+    def _observe(self, moment: float) -> None:
+        world, kernel = self._world, self._tier.kernel
+        kernel(energy.show)(world.grains, self.state)
+        self._stored = kernel(energy.stored)(self._matter, self._walls, world.grains, world.near)
+        kernel(observables.observe)(*self._observing())
+        self._numbers.frame(self.state, moment, self._summary()["kinetic_energy"])
+
+    def _summary(self) -> dict[str, Any]:
+        seen = observables.summary(self._partial, self.state, self._owners, lasts=False, parts=self._parts)
+        seen["contact_energy"] = self._stored
+        seen["total_energy"] += self._stored
+        return self._numbers.added(seen, self.state)
+
+    def _scale_of(self, seen: dict[str, Any]) -> float:
+        """What the error of the energy is relative to: kinetic and contact energy, and what weight may make of them."""
+        pull = 0.0 if self._scene.gravity is None else math.hypot(*self._scene.gravity)
+        weight = float(self.state.mass.sum()) * pull * self._scene.finite_size()
+        return float(seen["kinetic_energy"] + seen["contact_energy"] + weight)
+
+    def seen(self) -> dict[str, Any]:
+        seen = self._summary()
+        scale = max(self._scale, self._scale_of(seen))
+        seen["energy_error"] = abs(_balance(seen) - self._start) / scale if scale > 0.0 else 0.0
+        return {**seen, "escaped": int((np.sqrt((self.state.position**2).sum(axis=0)) > self._far).sum())}
+
+    def share_done(self, span: float) -> float:
+        return float(self._clock[DONE] / span)
+
+    def arrays(self) -> Arrays:
+        world = self._world
+        kept = {
+            f"{name}.{part}": array
+            for name in ("grains", "near", "books")
+            for part, array in getattr(world, name)._asdict().items()
+            if array is not None
+        }
+        return {**kept, **self._numbers.arrays(), "clock": self._clock}
+
+    def restore(self, arrays: Arrays, cut_short: bool) -> None:
+        self.observe()
+        self._make_room(arrays["near.mate"].size, arrays["near.slot"].size)
+        super().restore(arrays, cut_short)
+        energies: Any = self._tier.kernel(energy.show)
+        energies(self._world.grains, self.state)
+
+
+def _balance(seen: dict[str, Any]) -> float:
+    """The energy of all, with what was lost and without the work of walls that are moved."""
+    work = seen.get("wall_work")
+    kept: float = seen["total_energy"] + seen["dissipated_energy"] - (0.0 if work is None else work.sum())
+    return kept

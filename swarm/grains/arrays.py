@@ -1,0 +1,98 @@
+"""The arrays of soft balls: of each ball a row or two, of each contact of a step one, in the order of the balls' cells.
+
+A row is one line of the cache. Balls that are beside one another are so in memory, so that most contacts find theirs
+there.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..kernel.jit import Array
+from ..kernel.vector import Vec
+
+# Columns of `Grains.place`: the centre, what round-off has taken of it, the radius, 1/mass.
+X, LOST, RADIUS, LIGHTNESS = 0, 3, 6, 7
+# Columns of `Grains.speed`: at the start of a step, and at its end.
+BEFORE, AFTER = 0, 3
+# Columns of `Touches.rows`: s0, from one centre to the other at the start of a step, or the centre; |s0|, or the inner
+# function of the wall; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
+# inverse of the mass that moves; the damping; and where there is friction its impulse, and the place in the lists.
+START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, DRAG, LISTED = 0, 3, 4, 5, 6, 9, 12, 13, 14, 17
+COLUMNS, COLUMNS_OF_FRICTION = 16, 24
+# Of a clock: the steps of the frame that are done, and those since pairs were listed; the skin of the lists [m].
+DONE, SINCE, SKIN, CLOCK = 0, 1, 2, 3
+
+
+class Grains(NamedTuple):
+    """Each ball, in the order of cells."""
+
+    number: Array  # (N,) that of its particle
+    place: Array  # (N, 8)
+    speed: Array  # (N, 8)
+    listed: Array  # (N, 4) where it was when pairs were listed
+    spin: Any  # (N, 8) angular velocities, as `speed`; None where there is no friction
+
+
+class Near(NamedTuple):
+    """What is near: of each ball those after it, of each wall the balls."""
+
+    first: Array  # (N + 1,) where the pairs of each ball begin
+    mate: Array  # (room,) int32, the other ball of each pair
+    is_on: Array  # (room,) bool, whether it is among the contacts of this step
+    wall_first: Array  # (walls + 1,)
+    slot: Array  # (room of walls,) int32
+    wall_is_on: Array
+    drag: Any  # (room, 3) the impulse of friction of each pair in the last step, or None
+    wall_drag: Any
+
+
+class Touches(NamedTuple):
+    """The contacts of a step: of pairs, and of walls."""
+
+    rows: Array  # (room, COLUMNS)
+    ends: Array  # (room, 2) int32, the two balls
+    wall_rows: Array
+    wall_ends: Array  # (room of walls,) int32, the ball
+    wall_spans: Array  # (2, walls) where those of each wall begin in `wall_rows`, and how many there are
+    used: Array  # (1,) how many rows are of pairs
+
+
+def vector_at(rows: Any, c: Any, k: Any) -> Vec:
+    """The vector in three columns of a row."""
+    return Vec(rows[c, k], rows[c, k + 1], rows[c, k + 2])
+
+
+def set_vector(rows: Any, c: Any, k: Any, a: Vec) -> None:
+    """Store a vector into three columns of a row."""
+    rows[c, k], rows[c, k + 1], rows[c, k + 2] = a.x, a.y, a.z
+
+
+def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = None) -> Grains:
+    """The rows of balls, in the order of their numbers."""
+    n = len(mass)
+    place, speed = np.zeros((n, 8)), np.zeros((n, 8))
+    place[:, X : X + 3], speed[:, BEFORE : BEFORE + 3] = position.T, velocity.T
+    place[:, RADIUS], place[:, LIGHTNESS] = radius, 1.0 / mass
+    turning = None if spin is None else np.zeros((n, 8))
+    if turning is not None:
+        turning[:, BEFORE : BEFORE + 3] = spin.T
+    return Grains(np.arange(n), place, speed, np.zeros((n, 4)), turning)
+
+
+def near_of(n: int, walls: int, pairs: int, touching: int, has_friction: bool = False) -> Near:
+    """Room for so many pairs, and for so many balls at walls."""
+    drags = (np.zeros((pairs, 3)), np.zeros((touching, 3))) if has_friction else (None, None)
+    return Near(
+        np.zeros(n + 1, np.int64), np.zeros(pairs, np.int32), np.zeros(pairs, np.bool_),
+        np.zeros(walls + 1, np.int64), np.zeros(touching, np.int32), np.zeros(touching, np.bool_), *drags,
+    )  # fmt: skip
+
+
+def touches_of(walls: int, pairs: int, touching: int, has_friction: bool = False) -> Touches:
+    """Room for the contacts of so many pairs, and of so many balls at walls."""
+    columns = COLUMNS_OF_FRICTION if has_friction else COLUMNS
+    return Touches(
+        np.zeros((pairs, columns)), np.zeros((pairs, 2), np.int32), np.zeros((touching, columns)),
+        np.zeros(touching, np.int32), np.zeros((2, walls), np.int64), np.zeros(1, np.int64),
+    )  # fmt: skip

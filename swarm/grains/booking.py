@@ -1,0 +1,69 @@
+"""What the contacts of a step did: impulses on walls and their works, the virial, what was dissipated, who has met."""
+
+from typing import NamedTuple
+
+from ..kernel.arrays import index
+from ..kernel.jit import Array, outlined
+from ..kernel.vector import dot, norm
+from ..surfaces.posed import Posed
+from .arrays import AFTER, COAST, GAP, IMPULSE, PUSH, RADIUS, SIZE, START, vector_at
+from .contacts import closing, rising
+
+
+class Books(NamedTuple):
+    """The sums since the start, by the numbers of particles, and those of all."""
+
+    collisions: Array  # (N,) int64
+    impacts: Array  # (N,) int64
+    impulse: Array  # (walls, N) [N s], then (walls, N) the work of walls that move [J]
+    dissipated: Array  # (N,) [J]
+    virial: Array  # (1,) [J s]
+    sweeps: Array  # (1,) int64
+
+
+def _lost(matter, push, gap, change):
+    """The energy that the damper of a contact takes [J]."""
+    force, _slope = matter.law.energy_slope(gap, gap + change)
+    return (push / matter.h - force) * change
+
+
+@outlined
+def book_pairs(matter, grains, touches, books):
+    """Book the contacts of pairs."""
+    rows, speed, half = touches.rows, grains.speed, 0.5 * matter.h
+    for k in range(touches.used[0]):
+        c = index(k)
+        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
+        one, other = index(grains.number[i]), index(grains.number[j])
+        s0, impulse = vector_at(rows, c, START), vector_at(rows, c, IMPULSE)
+        move = vector_at(rows, c, COAST) + half * (vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
+        way = closing(s0, rows[c, SIZE], move)
+        books.virial[0] += dot(s0 + 0.5 * move, impulse)
+        begins = (rows[c, GAP] <= 0.0) & (rows[c, GAP] + way.change > 0.0)
+        books.collisions[one] += begins
+        books.collisions[other] += begins
+        if matter.pairs.damping is not None:
+            lost = 0.5 * _lost(matter, rows[c, PUSH], rows[c, GAP], way.change)
+            books.dissipated[one] += lost
+            books.dissipated[other] += lost
+
+
+@outlined
+def book_wall(matter, law, wall, grains, touches, books, number):
+    """Book the contacts with a wall."""
+    rows, speed, half, begin = touches.wall_rows, grains.speed, 0.5 * matter.h, touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        one, gap, push = index(grains.number[i]), rows[c, GAP], rows[c, PUSH]
+        move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
+        own = wall.grown(grains.place[i, RADIUS])
+        way = rising(own, vector_at(rows, c, START), rows[c, SIZE], move)
+        books.impacts[one] += (gap <= 0.0) & (gap + way.change > 0.0)
+        books.impulse[index(number), one] += norm(vector_at(rows, c, IMPULSE))
+        if isinstance(wall, Posed):
+            # What it gives is what the ball gains and the contact stores or loses.
+            given = dot(vector_at(rows, c, IMPULSE), move) + push * way.change
+            books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given / matter.h
+        if law.damping is not None:
+            books.dissipated[one] += _lost(matter, push, gap, way.change)

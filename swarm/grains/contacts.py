@@ -1,0 +1,286 @@
+"""The contacts of a step: their impulses, which depend on one another, one contact after the other to convergence.
+
+With the vector s from one centre to the other at both ends of a step, the gap g = R_i + R_j - |s| and V of
+contact/regularisation.py, the impulse on i is the composite discrete gradient of V with q = |s|^2,
+    J = -h (V1 - V0)/(q1 - q0) (s0 + s1) = h V[g0, g1] (s0 + s1)/(|s0| + |s1|),
+as q is quadratic; so J.(s1 - s0)/h = -(V1 - V0), and a wall is the same with its own q and discrete gradient.
+A damper adds C (Phi1 - Phi0)/h to V[g0, g1], and the sum is no less than 0: what it takes is 0 or more, for Phi grows
+with g. Where two balls meet alone the restitution then is the same at any speed, for any exponent: see `damping_of`.
+"""
+
+import math
+from typing import Any
+
+from ..kernel.arrays import index
+from ..kernel.jit import outlined, select
+from ..kernel.record import Record
+from ..kernel.vector import absolute, dot, square, total
+from ..surfaces.posed import Posed
+from .arrays import (
+    AFTER,
+    BEFORE,
+    COAST,
+    DAMPING,
+    DRAG,
+    EASE,
+    GAP,
+    IMPULSE,
+    LIGHTNESS,
+    LISTED,
+    LOST,
+    PUSH,
+    RADIUS,
+    SIZE,
+    START,
+    X,
+    set_vector,
+    vector_at,
+)
+from .cell import nearest
+
+_TINY = 1e-300
+
+
+class Losses(Record):
+    """What is lost at a contact."""
+
+    damping: Any  # None, or what is multiplied with the root of the mass that moves
+    friction: Any  # None, or Coulomb's coefficient
+
+
+class Matter(Record):
+    """What is the same for all balls and all steps."""
+
+    law: Any  # the regularisation
+    pull: Any  # gravity, or None
+    h: float  # the step [s]
+    pairs: Any  # their `Losses`
+    walls: Any  # of each wall the same
+    period: Any  # `Lengths`, or None
+
+    @property
+    def rubs(self):
+        """Whether there is any friction: a constant for the compiler."""
+        return any(one.friction is not None for one in (self.pairs, *self.walls))
+
+
+# --- The law of a contact --------------------------------------------------------------------------------
+
+
+def pressed(matter, damping, gap, change):
+    """The impulse at a contact whose gap changes so in a step, 0 or more, and its derivative by the change."""
+    h = matter.h
+    force, stiffness = matter.law.energy_slope(gap, gap + change)
+    if damping is not None:
+        slope, bend = matter.law.constraint_slope(gap, gap + change)
+        c = damping / h
+        force = force + c * slope * change
+        stiffness = stiffness + c * (slope + bend * change)
+    return select(force > 0.0, h * force, 0.0), h * stiffness
+
+
+def damper(own, rows, c):
+    """The damping in a row, None where there is none."""
+    return None if own is None else rows[c, DAMPING]
+
+
+def lasting(gap):
+    """1 where a contact of this gap has been one in the step before, else 0: then what is kept of it is old."""
+    return select(gap > 0.0, 1.0, 0.0)
+
+
+def worse(off, worst):
+    """The larger one of two errors, NaN where one is."""
+    return select((off <= worst) | (worst != worst), worst, off)
+
+
+def improved(push, wanted, slope, ease):
+    """A Newton step of the size of an impulse; `ease` is how much the gap falls for each of it."""
+    new = push + (wanted - push) / (1.0 + select(slope > 0.0, ease * slope, 0.0))
+    return select(new > 0.0, new, 0.0)
+
+
+# --- Of pairs --------------------------------------------------------------------------------------------
+
+
+class Closing(Record):
+    """Two balls in a step: s0 + s1 over |s0| + |s1|, and the change of the gap."""
+
+    along: Any
+    change: float
+
+
+def closing(s0, size, move):
+    """The `Closing` of two balls at s0, of that size, whose s changes by `move`."""
+    both = s0 + s0 + move
+    risen = dot(move, both)
+    q1 = size * size + risen
+    inverse = 1.0 / (size + math.sqrt(select(q1 > 0.0, q1, 0.0)))
+    return Closing(inverse * both, -inverse * risen)
+
+
+def apart(matter, place, i, j):
+    """The vector from ball j to ball i, with what round-off has taken of their places."""
+    s = nearest(matter.period, vector_at(place, i, X), vector_at(place, j, X))
+    return s + (vector_at(place, i, LOST) - vector_at(place, j, LOST))
+
+
+@outlined
+def gather_pairs(matter, grains, near, touches):
+    """Add the pairs that are in contact at an end of the step to its contacts; how many are new."""
+    place, speed, half = grains.place, grains.speed, 0.5 * matter.h
+    rows, count = touches.rows, touches.used[0]
+    first = count
+    for a in range(place.shape[0]):
+        i = index(a)
+        here, radius = vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER), place[i, RADIUS]
+        for k in range(near.first[i], near.first[i + 1]):
+            b = near.mate[index(k)]
+            j = index(b)
+            s0 = apart(matter, place, i, j)
+            move = half * (here - (vector_at(speed, j, BEFORE) + vector_at(speed, j, AFTER)))
+            reach, q0 = radius + place[j, RADIUS], square(s0)
+            is_in = (min(q0, square(s0 + move)) < reach * reach) & (not near.is_on[index(k)])
+            if is_in:
+                near.is_on[index(k)] = True
+                c, size = index(count), math.sqrt(q0)
+                touches.ends[c, 0], touches.ends[c, 1] = a, b
+                set_vector(rows, c, START, s0)
+                rows[c, SIZE], rows[c, GAP] = size, reach - size
+                set_vector(rows, c, COAST, half * (vector_at(speed, i, BEFORE) - vector_at(speed, j, BEFORE)))
+                ease = place[i, LIGHTNESS] + place[j, LIGHTNESS]
+                rows[c, EASE] = ease
+                if matter.pairs.damping is not None:
+                    rows[c, DAMPING] = matter.pairs.damping / math.sqrt(ease)
+                way = closing(s0, size, move)
+                rows[c, PUSH], _slope = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
+                set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
+                if matter.pairs.friction is not None:
+                    rows[c, LISTED] = k
+                    set_vector(rows, c, DRAG, vector_at(near.drag, index(k), 0) * lasting(rows[c, GAP]))
+                count += 1
+    touches.used[0] = count
+    return count - first
+
+
+@outlined
+def sweep_pairs(matter, grains, touches):
+    """Improve the impulse of each pair in turn; the largest change of one, relative to what moves there."""
+    rows, speed, half, worst = touches.rows, grains.speed, 0.5 * matter.h, 0.0
+    for k in range(touches.used[0]):
+        c = index(k)
+        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
+        v, u, ease = vector_at(speed, i, AFTER), vector_at(speed, j, AFTER), rows[c, EASE]
+        way = closing(vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * (v - u))
+        wanted, slope = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
+        push = improved(rows[c, PUSH], wanted, slope, half * ease)
+        new = push * way.along
+        more = new - vector_at(rows, c, IMPULSE)
+        rows[c, PUSH] = push
+        set_vector(rows, c, IMPULSE, new)
+        set_vector(speed, i, AFTER, v + more * grains.place[i, LIGHTNESS])
+        set_vector(speed, j, AFTER, u - more * grains.place[j, LIGHTNESS])
+        off = total(absolute(more)) / (push + (total(absolute(v)) + total(absolute(u))) / ease + _TINY)
+        worst = worse(off, worst)
+    return worst
+
+
+@outlined
+def push_pairs(matter, grains, touches):
+    """Add the impulses of the pairs to the velocities at the end of the step."""
+    rows, place, speed = touches.rows, grains.place, grains.speed
+    for k in range(touches.used[0]):
+        c = index(k)
+        i, j, impulse = index(touches.ends[c, 0]), index(touches.ends[c, 1]), vector_at(rows, c, IMPULSE)
+        if matter.pairs.friction is not None:
+            impulse = impulse + vector_at(rows, c, DRAG)
+        set_vector(speed, i, AFTER, vector_at(speed, i, AFTER) + impulse * place[i, LIGHTNESS])
+        set_vector(speed, j, AFTER, vector_at(speed, j, AFTER) - impulse * place[j, LIGHTNESS])
+
+
+# --- Of walls --------------------------------------------------------------------------------------------
+
+
+def rising(wall, r0, q0, move):
+    """The `Closing` of a ball at r0 and a wall over a step, where the centre moves so."""
+    r1 = r0 + move
+    gradient = wall.discrete_gradient(r0, r1)
+    if isinstance(wall, Posed) and wall.pose.turn is not None:
+        risen = wall.end_inner(r1) - q0
+    else:
+        risen = dot(gradient, move - wall.displacement())
+    slope, _bend = wall.gap_slope(q0, q0 + risen)
+    return Closing(-slope * gradient, slope * risen)
+
+
+@outlined
+def gather_at_wall(matter, law, wall, grains, near, touches, given):
+    """Add the balls that are in a wall at an end of the step to its contacts; how many are new."""
+    place, speed, half, rows = grains.place, grains.speed, 0.5 * matter.h, touches.wall_rows
+    number, begin = given
+    count = touches.wall_spans[1, number]
+    first, start = count, touches.wall_spans[0, number]
+    for k in range(begin, near.wall_first[number + 1]):
+        a = near.slot[index(k)]
+        i = index(a)
+        r0, own = vector_at(place, i, X), wall.grown(place[i, RADIUS])
+        coast = half * vector_at(speed, i, BEFORE)
+        move = coast + half * vector_at(speed, i, AFTER)
+        q0 = own.inner(r0)
+        is_in = (own.level_of(q0) > 0.0) | (own.level_of(own.end_inner(r0 + move)) > 0.0)
+        if is_in & (not near.wall_is_on[index(k)]):
+            near.wall_is_on[index(k)] = True
+            c = index(start + count)
+            touches.wall_ends[c] = a
+            set_vector(rows, c, START, r0)
+            # What round-off has taken of the place, along the normal.
+            steep, _bend = own.gap_slope(q0, q0)
+            lost = dot(own.discrete_gradient(r0, r0), vector_at(place, i, LOST))
+            rows[c, SIZE], rows[c, GAP] = q0, own.gap_of(q0) + steep * lost
+            set_vector(rows, c, COAST, coast)
+            rows[c, EASE] = place[i, LIGHTNESS]
+            if law.damping is not None:
+                rows[c, DAMPING] = law.damping / math.sqrt(place[i, LIGHTNESS])
+            way = rising(own, r0, q0, move)
+            rows[c, PUSH], _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
+            set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
+            if law.friction is not None:
+                rows[c, LISTED] = k
+                set_vector(rows, c, DRAG, vector_at(near.wall_drag, index(k), 0) * lasting(rows[c, GAP]))
+            count += 1
+    touches.wall_spans[1, number] = count
+    return count - first
+
+
+@outlined
+def sweep_wall(matter, law, wall, grains, touches, number):
+    """Improve the impulse of each ball at a wall; the largest change of one, relative to what moves there."""
+    rows, speed, half, worst = touches.wall_rows, grains.speed, 0.5 * matter.h, 0.0
+    begin = touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        v, ease, own = vector_at(speed, i, AFTER), rows[c, EASE], wall.grown(grains.place[i, RADIUS])
+        way = rising(own, vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * v)
+        wanted, slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
+        push = improved(rows[c, PUSH], wanted, slope, half * ease * square(way.along))
+        new = push * way.along
+        more = new - vector_at(rows, c, IMPULSE)
+        rows[c, PUSH] = push
+        set_vector(rows, c, IMPULSE, new)
+        set_vector(speed, i, AFTER, v + more * ease)
+        off = total(absolute(more)) / (push + total(absolute(v)) / ease + _TINY)
+        worst = worse(off, worst)
+    return worst
+
+
+@outlined
+def push_walls(law, grains, touches, number):
+    """Add the impulses of a wall to the velocities at the end of the step."""
+    rows, speed, begin = touches.wall_rows, grains.speed, touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i, impulse = index(touches.wall_ends[c]), vector_at(rows, c, IMPULSE)
+        if law.friction is not None:
+            impulse = impulse + vector_at(rows, c, DRAG)
+        set_vector(speed, i, AFTER, vector_at(speed, i, AFTER) + impulse * rows[c, EASE])

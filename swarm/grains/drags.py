@@ -1,0 +1,67 @@
+"""The impulses of friction of the last step, carried over when lists are made anew."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Drags(NamedTuple):
+    """The impulses that are not 0, by their pairs of particles, in ascending order; and those at walls."""
+
+    pair: NDArray[np.int64]
+    drag: NDArray[np.float64]  # (pairs, 3) on the particle with the smaller number
+    at_wall: NDArray[np.int64]
+    wall_drag: NDArray[np.float64]
+
+
+def _pairs(world: Any) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Of each listed pair a number that only it has, and 1 or -1 where its first particle has the larger number."""
+    number, near = world.grains.number, world.near
+    first, count = near.first, int(near.first[-1])
+    one = number[np.repeat(np.arange(len(number)), np.diff(first))]
+    other = number[near.mate[:count]]
+    key = np.minimum(one, other) * len(number) + np.maximum(one, other)
+    return key, np.where(one < other, 1.0, -1.0)
+
+
+def _at_walls(world: Any) -> NDArray[np.int64]:
+    """Of each ball that is listed at a wall a number that only they have."""
+    number, near = world.grains.number, world.near
+    first, count = near.wall_first, int(near.wall_first[-1])
+    wall = np.repeat(np.arange(len(first) - 1), np.diff(first))
+    return np.asarray(wall * len(number) + number[near.slot[:count]], np.int64)
+
+
+def kept_drags(world: Any) -> Drags | None:
+    """The impulses of friction that lists hold, None where there is no friction."""
+    near = world.near
+    if near.drag is None:
+        return None
+    key, sign = _pairs(world)
+    return Drags(*_sorted(key, near.drag[: key.size] * sign[:, None]), *_sorted(_at_walls(world), near.wall_drag))
+
+
+def _sorted(key: NDArray[np.int64], drag: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Those that are not 0 in the order of their keys."""
+    acts = np.flatnonzero(drag[: key.size].any(axis=1))
+    order = acts[np.argsort(key[acts])]
+    return key[order], drag[order]
+
+
+def set_drags(world: Any, kept: Drags | None) -> None:
+    """Give them to new lists."""
+    if kept is None:
+        return
+    near = world.near
+    key, sign = _pairs(world)
+    near.drag[: key.size] = _found(key, kept.pair, kept.drag) * sign[:, None]
+    at = _at_walls(world)
+    near.wall_drag[: at.size] = _found(at, kept.at_wall, kept.wall_drag)
+
+
+def _found(key: NDArray[np.int64], known: NDArray[np.int64], drag: NDArray[np.float64]) -> NDArray[np.float64]:
+    if not known.size:
+        return np.zeros((key.size, 3))
+    place = np.minimum(np.searchsorted(known, key), known.size - 1)
+    return np.where((known[place] == key)[:, None], drag[place], 0.0)

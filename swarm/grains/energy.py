@@ -1,0 +1,45 @@
+"""What contacts store at a frame, and the frame as others see it."""
+
+from ..kernel.arrays import index
+from ..kernel.jit import long_kernel, outlined
+from ..kernel.vector import norm
+from .arrays import BEFORE, RADIUS, X, vector_at
+from .contacts import apart
+
+
+@outlined
+def _stored_at_wall(matter, wall, grains, near, number):
+    place, stored = grains.place, 0.0
+    for k in range(near.wall_first[number], near.wall_first[number + 1]):
+        i = index(near.slot[index(k)])
+        own = wall.grown(place[i, RADIUS])
+        stored += matter.law.stored_energy(own.gap_of(own.inner(vector_at(place, i, X))))
+    return stored
+
+
+@long_kernel
+def stored(matter, walls, grains, near):
+    """The energy that all contacts store now [J]."""
+    place, total = grains.place, 0.0
+    for a in range(place.shape[0]):
+        i = index(a)
+        for k in range(near.first[i], near.first[i + 1]):
+            j = index(near.mate[index(k)])
+            gap = place[i, RADIUS] + place[j, RADIUS] - norm(apart(matter, place, i, j))
+            total += matter.law.stored_energy(gap)
+    for k, wall in enumerate(walls.at(0.0).each):
+        total += _stored_at_wall(matter, wall, grains, near, k)
+    return total
+
+
+@long_kernel
+def show(grains, state):
+    """Copy where balls are, and how fast, into the state, in the order of the particles."""
+    for k in range(grains.number.size):
+        i = index(k)
+        one = index(grains.number[i])
+        for axis in range(3):
+            state.position[axis, one] = grains.place[i, X + axis]
+            state.velocity[axis, one] = grains.speed[i, BEFORE + axis]
+            if grains.spin is not None:
+                state.balls.spin[axis, one] = grains.spin[i, BEFORE + axis]

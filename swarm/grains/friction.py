@@ -1,0 +1,227 @@
+"""Coulomb's friction at the contacts of a step, and spins.
+
+With s the mean of the vector between the centres at both ends of a step, R = R_i + R_j and the impulse J on ball i, the
+twist T = s x J/R turns both balls the same way, I_i (w1 - w0) = -R_i T and I_j (w1 - w0) = -R_j T: the arms add up to
+s, so that angular momentum is conserved. The slip is u = v_i - v_j - (R_i w_i + R_j w_j) x s/R across s, and with its
+mean over the step friction does the work J.u. At a wall the arm is the radius, and the wall's own velocity counts.
+
+It sticks where an impulse within mu times the normal one leaves no slip at the end of the step: a pile at rest does not
+creep. Else it slides, with that impulse against the mean slip, or with less where less leaves no mean slip: it never
+gives energy there.
+"""
+
+import math
+
+from ..kernel.arrays import index
+from ..kernel.jit import outlined, select
+from ..kernel.record import Record
+from ..kernel.vector import ZERO, Vec, absolute, cross, dot, square, total
+from ..surfaces.posed import Posed
+from .arrays import (
+    AFTER,
+    BEFORE,
+    COAST,
+    DRAG,
+    EASE,
+    IMPULSE,
+    LIGHTNESS,
+    LISTED,
+    PUSH,
+    RADIUS,
+    SIZE,
+    START,
+    set_vector,
+    vector_at,
+)
+from .contacts import closing, rising, worse
+
+# 1/(2/5), of the moment of inertia of a ball.
+_ROUNDNESS = 2.5
+_TINY = 1e-300
+
+
+class Slip(Record):
+    """The slip at the start and at the end of a step, across the contact, and how it changes with an impulse there."""
+
+    first: Vec
+    last: Vec
+    ease: float
+
+
+def across(a, n):
+    """What of a vector is across another one."""
+    return a - (dot(a, n) / square(n)) * n
+
+
+def rubbed(slip, drag, limit):
+    """The impulse of friction of no more than a limit, from the last one and the slip with it."""
+    stick = drag - slip.last * (1.0 / slip.ease)
+    still = stick - slip.first * (1.0 / slip.ease)
+    size = math.sqrt(square(still))
+    part = select(size > limit, limit / select(size > 0.0, size, 1.0), 1.0)
+    sticks = square(stick) <= limit * limit
+    return select(sticks, 1.0, 0.0) * stick + select(sticks, 0.0, part) * still
+
+
+# --- Of pairs --------------------------------------------------------------------------------------------
+
+
+def _turning(grains, i, j, column):
+    """R_i w_i + R_j w_j"""
+    place, spin = grains.place, grains.spin
+    return vector_at(spin, i, column) * place[i, RADIUS] + vector_at(spin, j, column) * place[j, RADIUS]
+
+
+def arm_of(way, size, change, reach):
+    """s/R of two balls, from their `Closing`, |s0| and the change of the gap."""
+    # s0 + s1 is `along` times |s0| + |s1|
+    return way.along * (0.5 * (2.0 * size - change) / reach)
+
+
+@outlined
+def rub_pairs(matter, grains, touches):
+    """Improve the friction of each pair in turn; the largest change of one, relative to what moves there."""
+    rows, place, speed, spin, half = touches.rows, grains.place, grains.speed, grains.spin, 0.5 * matter.h
+    worst = 0.0
+    for k in range(touches.used[0]):
+        c = index(k)
+        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
+        v, u, ease, size = vector_at(speed, i, AFTER), vector_at(speed, j, AFTER), rows[c, EASE], rows[c, SIZE]
+        coast, radius, other = vector_at(rows, c, COAST), place[i, RADIUS], place[j, RADIUS]
+        way = closing(vector_at(rows, c, START), size, coast + half * (v - u))
+        arm = arm_of(way, size, way.change, radius + other)
+        first = coast * (1.0 / half) - cross(_turning(grains, i, j, BEFORE), arm)
+        last = v - u - cross(_turning(grains, i, j, AFTER), arm)
+        slip = Slip(across(first, way.along), across(last, way.along), ease * (1.0 + _ROUNDNESS * square(arm)))
+        before = vector_at(rows, c, DRAG)
+        new = rubbed(slip, across(before, way.along), matter.pairs.friction * rows[c, PUSH])
+        more = new - before
+        set_vector(rows, c, DRAG, new)
+        one, two = place[i, LIGHTNESS], place[j, LIGHTNESS]
+        set_vector(speed, i, AFTER, v + more * one)
+        set_vector(speed, j, AFTER, u - more * two)
+        twist = cross(arm, more)
+        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (_ROUNDNESS * one / radius))
+        set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (_ROUNDNESS * two / other))
+        off = total(absolute(more)) / (rows[c, PUSH] + (total(absolute(v)) + total(absolute(u))) / ease + _TINY)
+        worst = worse(off, worst)
+    return worst
+
+
+@outlined
+def twist_pairs(matter, grains, touches):
+    """Add the twists of all pairs to the spins at the end of the step, whose velocities there are final."""
+    rows, place, speed, spin, half = touches.rows, grains.place, grains.speed, grains.spin, 0.5 * matter.h
+    for k in range(touches.used[0]):
+        c = index(k)
+        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
+        move = vector_at(rows, c, COAST) + half * (vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
+        twist = twist_of(rows, c, move, place[i, RADIUS] + place[j, RADIUS])
+        one, two = place[i, LIGHTNESS] / place[i, RADIUS], place[j, LIGHTNESS] / place[j, RADIUS]
+        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (_ROUNDNESS * one))
+        set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (_ROUNDNESS * two))
+
+
+def twist_of(rows, c, move, reach):
+    """s x J/R of a pair, whose s changes by `move`: with all of J, so that no angular momentum is lost at all."""
+    s = vector_at(rows, c, START) + 0.5 * move
+    return cross(s * (1.0 / reach), vector_at(rows, c, IMPULSE) + vector_at(rows, c, DRAG))
+
+
+# --- Of walls --------------------------------------------------------------------------------------------
+
+
+def _carried(wall, r0, r1):
+    """Twice the mean velocity of a wall's surface over a step, and that at its end."""
+    if not isinstance(wall, Posed):
+        return ZERO, ZERO
+    last = wall._replace(pose=wall.end).velocity(r1)
+    return wall.velocity(r0) + last, last
+
+
+def _facing(wall, grains, rows, c, i, move):
+    """The unit normal of a contact with a wall, and `_carried` of the wall at the contact."""
+    radius, r0 = grains.place[i, RADIUS], vector_at(rows, c, START)
+    own = wall.grown(radius)
+    way = rising(own, r0, rows[c, SIZE], move)
+    n = way.along * (1.0 / math.sqrt(square(way.along)))
+    return n, _carried(own, r0 - radius * n, r0 + move - radius * n)
+
+
+@outlined
+def rub_wall(matter, law, wall, grains, touches, number):
+    """Improve the friction of each ball at a wall; the largest change of one, relative to what moves there."""
+    rows, speed, spin, half, worst = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h, 0.0
+    begin = touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        v, w, ease, radius = (
+            vector_at(speed, i, AFTER),
+            vector_at(spin, i, AFTER),
+            rows[c, EASE],
+            grains.place[i, RADIUS],
+        )
+        coast = vector_at(rows, c, COAST)
+        n, (both, last) = _facing(wall, grains, rows, c, i, coast + half * v)
+        first = coast * (1.0 / half) - (both - last) - radius * cross(vector_at(spin, i, BEFORE), n)
+        slip = Slip(across(first, n), across(v - last - radius * cross(w, n), n), ease * (1.0 + _ROUNDNESS))
+        before = vector_at(rows, c, DRAG)
+        new = rubbed(slip, across(before, n), law.friction * rows[c, PUSH])
+        more = new - before
+        set_vector(rows, c, DRAG, new)
+        set_vector(speed, i, AFTER, v + more * ease)
+        set_vector(spin, i, AFTER, w - cross(n, more) * (_ROUNDNESS * ease / radius))
+        worst = worse(total(absolute(more)) / (rows[c, PUSH] + total(absolute(v)) / ease + _TINY), worst)
+    return worst
+
+
+@outlined
+def twist_wall(matter, wall, grains, touches, number):
+    """Add the twists of a wall to the spins at the end of the step, whose velocities there are final."""
+    rows, speed, spin, half = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h
+    begin = touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
+        n, _velocities = _facing(wall, grains, rows, c, i, move)
+        turned = cross(n, vector_at(rows, c, DRAG)) * (_ROUNDNESS * rows[c, EASE] / grains.place[i, RADIUS])
+        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - turned)
+
+
+@outlined
+def book_rubbing(matter, wall, grains, near, touches, books, number):
+    """Book what friction takes of balls at a wall, what the wall gives by it, and keep it."""
+    rows, speed, spin, half = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h
+    begin = touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        one, drag = index(grains.number[i]), vector_at(rows, c, DRAG)
+        set_vector(near.wall_drag, index(int(rows[c, LISTED])), 0, drag)
+        move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
+        n, (both, _last) = _facing(wall, grains, rows, c, i, move)
+        turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
+        gained = dot(drag, move) / matter.h - 0.5 * grains.place[i, RADIUS] * dot(cross(n, drag), turned)
+        given = 0.5 * dot(drag, both)
+        books.dissipated[one] += given - gained
+        if isinstance(wall, Posed):
+            books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given
+
+
+@outlined
+def book_rubbing_pairs(matter, grains, near, touches, books):
+    """Book what friction takes of pairs, and keep its impulses for the next step."""
+    rows, speed, half, place = touches.rows, grains.speed, 0.5 * matter.h, grains.place
+    for k in range(touches.used[0]):
+        c = index(k)
+        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
+        move = vector_at(rows, c, COAST) + half * (vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
+        twist = twist_of(rows, c, move, place[i, RADIUS] + place[j, RADIUS])
+        turned = _turning(grains, i, j, BEFORE) + _turning(grains, i, j, AFTER)
+        drag = vector_at(rows, c, DRAG)
+        set_vector(near.drag, index(int(rows[c, LISTED])), 0, drag)
+        gained = dot(drag, move) / matter.h - 0.5 * dot(twist, turned)
+        books.dissipated[index(grains.number[i])] -= 0.5 * gained
+        books.dissipated[index(grains.number[j])] -= 0.5 * gained

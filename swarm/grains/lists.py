@@ -1,0 +1,157 @@
+"""Lists of what is near: balls in the order of cells, the pairs of each within a reach, the balls near each wall.
+
+A ball looks for those after it in the rows of cells around it; a row is one part of the order where nothing repeats.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernel.arrays import index
+from ..kernel.jit import Array, long_kernel, outlined
+from ..kernel.vector import square
+from ..surfaces.posed import Posed
+from .arrays import RADIUS, SKIN, X, vector_at
+from .cell import nearest
+
+# More cells than this along an axis, of which three numbers still make one.
+_MOST_CELLS = 1 << 20
+
+
+class Cells(NamedTuple):
+    """The cells of one time: of each ball its cell as a number, in order; how many numbers a row and a layer have."""
+
+    key: Array  # (N,) int64
+    counts: Array  # (3,) of cells along each axis
+    strides: Array  # (3,)
+    wraps: Array  # (3,) bool, where the first cell is beside the last
+
+
+def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[Cells, NDArray[np.int64]]:
+    """The `Cells` of balls at centres (N, 3), no narrower than a reach, and the order of balls by them."""
+    low, high = centres.min(axis=0), centres.max(axis=0)
+    wraps = np.zeros(3, np.bool_)
+    for k, length in enumerate(period or ()):
+        if length is not None:
+            low[k], high[k], wraps[k] = 0.0, length, True
+    counts = np.clip(np.floor((high - low) / reach), 1, _MOST_CELLS).astype(np.int64)
+    width = np.where(high > low, (high - low) / counts, 1.0)
+    cell = np.clip(np.floor((centres - low) / width), 0, counts - 1).astype(np.int64) + 1
+    # A cell without balls on each side: no row runs into the next one.
+    strides = np.array([1, counts[0] + 2, (counts[0] + 2) * (counts[1] + 2)], np.int64)
+    key = cell @ strides
+    order = np.argsort(key, kind="stable")
+    return Cells(key[order], counts, strides, wraps), order
+
+
+def _first_from(key, wanted):
+    """The first place in ascending numbers where one is no less than what is wanted."""
+    low, high = 0, key.size
+    while low < high:
+        middle = (low + high) // 2
+        if key[index(middle)] < wanted:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+def _beside(cells, k, here, step):
+    """The number of a cell along an axis that is one step beside another one."""
+    there = here + step
+    if cells.wraps[k]:
+        count = cells.counts[k]
+        there = count if there < 1 else (1 if there > count else there)
+    return there
+
+
+def _is_again(cells, k, step):
+    """Whether a step along an axis leads to a cell that another step has led to: of few cells that wrap."""
+    return bool(cells.wraps[k]) & ((cells.counts[k] < 2) & (step != 0) | (cells.counts[k] < 3) & (step < 0))
+
+
+@outlined
+def _list_between(period, grains, near, span, i, found):
+    """List the pairs of ball i with those after it between two places; how many are listed then."""
+    place, (begin, end, skin) = grains.place, span
+    here, radius = vector_at(place, i, X), place[i, RADIUS]
+    for k in range(begin, end):
+        j = index(k)
+        s = nearest(period, here, vector_at(place, j, X))
+        reach = radius + place[j, RADIUS] + skin
+        if square(s) < reach * reach:
+            if found < near.mate.size:
+                near.mate[index(found)] = k
+            found += 1
+    return found
+
+
+@long_kernel
+def list_pairs(period, grains, near, cells, clock):
+    """List all pairs that are nearer than the sum of their radii and the skin; how many there are, listed or not."""
+    key, strides, found = cells.key, cells.strides, 0
+    for a in range(key.size):
+        i = index(a)
+        near.first[i] = found
+        z = key[i] // strides[2]
+        y = (key[i] - z * strides[2]) // strides[1]
+        x = key[i] - z * strides[2] - y * strides[1]
+        for up in range(-1, 2):
+            for aside in range(-1, 2):
+                if _is_again(cells, 2, up) or _is_again(cells, 1, aside):
+                    continue
+                row = _beside(cells, 2, z, up) * strides[2] + _beside(cells, 1, y, aside) * strides[1]
+                if cells.wraps[0]:
+                    for along in range(-1, 2):
+                        if not _is_again(cells, 0, along):
+                            found = _list_cells(
+                                period,
+                                grains,
+                                near,
+                                (cells, clock[SKIN], a, found),
+                                row + _beside(cells, 0, x, along),
+                                0,
+                            )
+                elif row + x + 1 >= key[i]:
+                    found = _list_cells(period, grains, near, (cells, clock[SKIN], a, found), row + x, 1)
+    near.first[index(key.size)] = found
+    return found
+
+
+def _list_cells(period, grains, near, given, middle, around):
+    """List the pairs of a ball with those after it in some cells of a row; how many are listed then."""
+    cells, skin, a, found = given
+    begin = max(_first_from(cells.key, middle - around), a + 1)
+    end = _first_from(cells.key, middle + around + 1)
+    return _list_between(period, grains, near, (begin, end, skin), index(a), found)
+
+
+@outlined
+def _list_at_wall(wall, grains, near, skin, found):
+    """List the balls near a wall, of one that moves all; how many are listed then."""
+    place, always = grains.place, isinstance(wall, Posed)
+    for k in range(place.shape[0]):
+        i = index(k)
+        # A distance to first order, which may be off by half of itself.
+        if always or wall.grown(place[i, RADIUS]).distance(vector_at(place, i, X)) > -2.0 * skin:
+            if found < near.slot.size:
+                near.slot[index(found)] = k
+            found += 1
+    return found
+
+
+@long_kernel
+def list_walls(walls, grains, near, clock):
+    """List the balls near each wall; how many there are, listed or not."""
+    found = 0
+    for k, wall in enumerate(walls.at(0.0).each):
+        near.wall_first[k] = found
+        found = _list_at_wall(wall, grains, near, clock[SKIN], found)
+    near.wall_first[len(walls.each)] = found
+    for k in range(grains.place.shape[0]):
+        i = index(k)
+        grains.listed[i, 0], grains.listed[i, 1], grains.listed[i, 2] = (
+            grains.place[i, X], grains.place[i, X + 1], grains.place[i, X + 2],
+        )  # fmt: skip
+    return found

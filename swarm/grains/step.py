@@ -1,0 +1,229 @@
+"""Steps of soft balls, from frame to frame.
+
+A step gathers who may be in contact, solves for the impulses, and looks whether anybody else has come into contact by
+them. Its end follows from its impulses, each of which is there twice with opposite signs: momentum does not depend on
+how well they are solved.
+"""
+
+from typing import Any, NamedTuple
+
+from ..kernel.arrays import index
+from ..kernel.gravity import accelerated
+from ..kernel.jit import Array, long_kernel, outlined
+from ..kernel.vector import square
+from ..status import Status
+from .arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, X, set_vector, vector_at
+from .booking import book_pairs, book_wall
+from .contacts import gather_at_wall, gather_pairs, push_pairs, push_walls, sweep_pairs, sweep_wall, worse
+from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
+
+# A sweep that changes no impulse by more than this part is the last one; also one that gains no more than half of the
+# one before, if that is round-off of what many large impulses leave of one another.
+_SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
+# Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them.
+_RUBBED = 1e-7
+_MOST_SWEEPS = 1000
+
+
+class Rule(NamedTuple):
+    """The length of the frame in steps, and after how many to stop."""
+
+    span: float
+    halt: Array  # (1,)
+
+
+class World(NamedTuple):
+    """The arrays of the run that a step changes."""
+
+    grains: Any
+    near: Any
+    touches: Any
+    books: Any
+
+
+# --- Of one step -----------------------------------------------------------------------------------------
+
+
+@outlined
+def _begin(matter, grains, skin):
+    """The velocities at the end of a step as at its start; whether all may move so within the lists."""
+    place, speed, listed, farthest = grains.place, grains.speed, grains.listed, 0.0
+    for k in range(place.shape[0]):
+        i = index(k)
+        v = vector_at(speed, i, BEFORE)
+        set_vector(speed, i, AFTER, v)
+        farthest = worse(square(vector_at(place, i, X) + v * matter.h - vector_at(listed, i, X)), farthest)
+    return farthest <= 0.25 * skin * skin
+
+
+@outlined
+def _fly(matter, grains):
+    """The velocities at the end of a step without contacts."""
+    speed, spin = grains.speed, grains.spin
+    for k in range(speed.shape[0]):
+        i = index(k)
+        if spin is not None:
+            set_vector(spin, i, AFTER, vector_at(spin, i, BEFORE))
+        set_vector(speed, i, AFTER, accelerated(matter.pull, vector_at(speed, i, BEFORE), matter.h))
+
+
+def _gather(matter, walls, world):
+    """Add who is in contact; how many are new."""
+    grains, near, touches, _books = world
+    new = gather_pairs(matter, grains, near, touches)
+    for k, wall in enumerate(walls.each):
+        found = gather_at_wall(matter, matter.walls[k], wall, grains, near, touches, (k, near.wall_first[k]))
+        new += found
+    return new
+
+
+def _push(matter, walls, world):
+    """The velocities at the end of a step by all impulses, and the spins."""
+    grains, touches = world.grains, world.touches
+    _fly(matter, grains)
+    push_pairs(matter, grains, touches)
+    for k in range(len(walls.each)):
+        push_walls(matter.walls[k], grains, touches, k)
+    if matter.rubs:
+        if matter.pairs.friction is not None:
+            twist_pairs(matter, grains, touches)
+        for k, wall in enumerate(walls.each):
+            if matter.walls[k].friction is not None:
+                twist_wall(matter, wall, grains, touches, k)
+
+
+def _sweep(matter, walls, world):
+    """Improve all normal impulses; the largest change."""
+    worst = sweep_pairs(matter, world.grains, world.touches)
+    for k, wall in enumerate(walls.each):
+        worst = worse(sweep_wall(matter, matter.walls[k], wall, world.grains, world.touches, k), worst)
+    return worst
+
+
+def _rub(matter, walls, world):
+    """Improve the impulses of friction; the largest change."""
+    worst = 0.0
+    if matter.pairs.friction is not None:
+        worst = worse(rub_pairs(matter, world.grains, world.touches), worst)
+    for k, wall in enumerate(walls.each):
+        if matter.walls[k].friction is not None:
+            worst = worse(rub_wall(matter, matter.walls[k], wall, world.grains, world.touches, k), worst)
+    return worst
+
+
+@outlined
+def _solve(matter, walls, world):
+    """Sweep until the impulses solve the step; whether they do."""
+    sweeps = 0
+    if matter.rubs:
+        # Friction first, to fewer digits: then it is given, and what is to be exact depends on the others alone.
+        worst = 1.0
+        while sweeps < _MOST_SWEEPS and not worst <= _RUBBED:
+            worst = _sweep(matter, walls, world)
+            worst = worse(_rub(matter, walls, world), worst)
+            sweeps += 1
+        if not worst <= _RUBBED:
+            return False
+    before, most = 1.0, sweeps + _MOST_SWEEPS
+    while sweeps < most:
+        worst = _sweep(matter, walls, world)
+        sweeps += 1
+        if worst <= _SOLVED or (worst <= _NEARLY and worst >= _GAIN * before):
+            world.books.sweeps[0] += sweeps
+            return True
+        before = worst
+    return False
+
+
+def _forget(walls, world):
+    """No contacts yet."""
+    near, touches = world.near, world.touches
+    touches.used[0] = 0
+    near.is_on[:] = False
+    near.wall_is_on[:] = False
+    for k in range(len(walls.each)):
+        touches.wall_spans[0, k], touches.wall_spans[1, k] = near.wall_first[k], 0
+
+
+@outlined
+def _stays(matter, grains, skin):
+    """Whether all are at the end of a step within the lists."""
+    place, speed, listed, farthest, half = grains.place, grains.speed, grains.listed, 0.0, 0.5 * matter.h
+    for k in range(place.shape[0]):
+        i = index(k)
+        move = (vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)) * half
+        farthest = worse(square(vector_at(place, i, X) + move - vector_at(listed, i, X)), farthest)
+    return farthest <= 0.25 * skin * skin
+
+
+@outlined
+def _arrive(matter, grains):
+    """All at the end of the step."""
+    place, speed, half = grains.place, grains.speed, 0.5 * matter.h
+    for k in range(place.shape[0]):
+        i = index(k)
+        v, r = vector_at(speed, i, AFTER), vector_at(place, i, X)
+        move = (vector_at(speed, i, BEFORE) + v) * half + vector_at(place, i, LOST)
+        end = r + move
+        set_vector(place, i, X, end)
+        set_vector(place, i, LOST, move - (end - r))
+        set_vector(speed, i, BEFORE, v)
+        if grains.spin is not None:
+            set_vector(grains.spin, i, BEFORE, vector_at(grains.spin, i, AFTER))
+
+
+def _book(matter, walls, world):
+    """Book what the contacts of the step did."""
+    grains, near, touches, books = world
+    book_pairs(matter, grains, touches, books)
+    if matter.pairs.friction is not None:
+        book_rubbing_pairs(matter, grains, near, touches, books)
+    for k, wall in enumerate(walls.each):
+        book_wall(matter, matter.walls[k], wall, grains, touches, books, k)
+        if matter.walls[k].friction is not None:
+            book_rubbing(matter, wall, grains, near, touches, books, k)
+
+
+def _step(matter, walls, world, skin):
+    """One step: its `Status`; LEASE_ENDED where the lists do not hold over it, and nothing has changed."""
+    grains = world.grains
+    if not _begin(matter, grains, skin):
+        return Status.LEASE_ENDED.value
+    _forget(walls, world)
+    _gather(matter, walls, world)
+    more = 1
+    while more > 0:
+        _push(matter, walls, world)
+        if not _solve(matter, walls, world):
+            return Status.UNSOLVED.value
+        _push(matter, walls, world)
+        more = _gather(matter, walls, world)
+    if not _stays(matter, grains, skin):
+        return Status.LEASE_ENDED.value
+    _book(matter, walls, world)
+    _arrive(matter, grains)
+    return Status.DONE.value
+
+
+# --- Of a frame ------------------------------------------------------------------------------------------
+
+
+@long_kernel
+def march(matter, walls, world, clock, rule):
+    """Take step after step until the end of the frame: the `Status`.
+
+    LEASE_ENDED where lists are to be made anew: then call this again. INTERRUPTED after so many steps as the rule says;
+    it goes on with the same bits.
+    """
+    taken = 0
+    while clock[DONE] < rule.span:
+        if taken >= rule.halt[0]:
+            return Status.INTERRUPTED.value
+        left = (rule.span - clock[DONE]) * matter.h
+        status = _step(matter, walls.during(left, left - matter.h), world, clock[SKIN])
+        if status != Status.DONE.value:
+            return status
+        taken += 1
+        clock[DONE] += 1.0
+        clock[SINCE] += 1.0
+    return Status.DONE.value

@@ -1,0 +1,98 @@
+"""Soft balls that meet one another: closed forms, and what is conserved at any step."""
+
+import math
+
+import numpy as np
+import pytest
+from grains_runs import ROOM, cloud, ran
+
+import swarm
+from swarm.errors import RunError
+from swarm.grains import arrays, lists
+from swarm.grains.cell import Lengths, nearest
+from swarm.kernel.vector import Vec
+
+RADIUS, MASS, ALPHA, SPEED = 0.01, 0.002, 1e5, 1.0
+
+
+def two_balls(dt, exponent=1.5, speed=SPEED):
+    """A head-on collision, which begins at once, with a frame at each step."""
+    position, velocity = np.zeros((3, 2)), np.zeros((3, 2))
+    position[0], velocity[0] = (-RADIUS, RADIUS), (0.5 * speed, -0.5 * speed)
+    start = swarm.Particles(position, velocity, MASS, radius=RADIUS)
+    return start, swarm.Penalty(dt, ALPHA, exponent)
+
+
+def closest_and_duration(exponent, speed=SPEED):
+    """Of m* g'' = -alpha g^a: the deepest gap from the energy, and the time by Gamma functions."""
+    mass, a = MASS / 2, exponent
+    deepest = (mass * speed**2 * (a + 1) / (2 * ALPHA)) ** (1 / (a + 1))
+    p = 1 / (a + 1)
+    return deepest, 2 * math.sqrt(math.pi) * math.gamma(1 + p) / math.gamma(0.5 + p) * deepest / speed
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
+def test_two_balls_meet_as_the_closed_form_says(exponent):
+    """Order 2: half the step makes a fourth of the error."""
+    deepest, duration = closest_and_duration(exponent)
+    errors = []
+    for steps in (64, 128):
+        start, method = two_balls(duration / steps, exponent)
+        result = ran(ROOM, start, method, duration)
+        assert result.observables["collisions"].tolist() == [0, 1]
+        half = ran(ROOM, start, method, duration / 2)
+        stored = ALPHA / (exponent + 1) * deepest ** (exponent + 1)
+        gap = 2 * RADIUS - abs(half.particles.position[0] @ (1, -1))
+        # At the end of the contact the balls are where they touched, and fly apart.
+        end = 2 * RADIUS - abs(result.particles.position[0] @ (1, -1))
+        errors.append((abs(gap - deepest) / deepest, abs(end) / deepest))
+        assert half.observables["contact_energy"][-1] == pytest.approx(stored, rel=0.02)
+        assert result.observables["energy_error"].max() < 1e-14
+    (closest, late), (closest_half, late_half) = errors
+    assert closest_half < 1e-3
+    assert closest / closest_half > 3.5
+    assert late / late_half > 3.0
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.5])
+@pytest.mark.parametrize("dt", [0.002, 0.02])
+def test_energy_momentum_and_angular_momentum_are_conserved_at_any_step(exponent, dt):
+    result = ran(ROOM, cloud(), swarm.Penalty(dt, 200.0, exponent), 0.4, every=0.1)
+    seen = result.observables
+    assert seen["collisions"][-1] > 10
+    assert seen["contact_energy"].max() > 0.01 * seen["kinetic_energy"][0]
+    assert seen["energy_error"].max() < 1e-13
+    scale = (result.particles.mass * np.sqrt((result.particles.velocity**2).sum(axis=0))).sum()
+    assert abs(seen["momentum"] - seen["momentum"][0]).max() < 1e-14 * scale
+    assert abs(seen["angular_momentum"] - seen["angular_momentum"][0]).max() < 1e-14 * 5.0 * scale
+
+
+def test_a_step_that_is_far_too_long_ends_the_run_with_a_sentence():
+    start, _method = two_balls(1e-3)
+    with pytest.raises(RunError, match="smaller dt"):
+        ran(ROOM, start, swarm.Penalty(1.0, ALPHA), 1.0)
+
+
+@pytest.mark.parametrize("period", [None, (4.0, None, 3.0), (2.3, 2.3, 2.3), (1.1, 5.0, None)])
+def test_the_lists_are_those_of_all_pairs(period):
+    random = np.random.default_rng(5)
+    n, skin = 200, 0.1
+    lengths = None if period is None else Lengths(*period)
+    centres = random.uniform(0.0, [one or 5.0 for one in period or (4.0, 3.0, 5.0)], (n, 3))
+    radius = random.uniform(0.05, 0.2, n)
+    grains = arrays.grains_of(centres.T, np.zeros((3, n)), radius, np.ones(n))
+    near, clock = arrays.near_of(n, 1, 40 * n, n), np.array([0.0, 0.0, skin])
+    cells, order = lists.cells_of(grains.place[:, :3], 0.4 + skin, lengths)
+    for rows in (grains.number, grains.place):
+        rows[:] = rows[order]
+    found = lists.list_pairs(lengths, grains, near, cells, clock)
+    pairs = [
+        frozenset((grains.number[i], grains.number[j]))
+        for i in range(n)
+        for j in near.mate[near.first[i] : near.first[i + 1]]
+    ]
+    assert len(pairs) == len(set(pairs)) == found
+    apart = np.array([[np.linalg.norm(nearest(lengths, Vec(*r), Vec(*s))) for s in centres] for r in centres])
+    reach = radius[:, None] + radius + skin
+    expected = {frozenset((i, j)) for i in range(n) for j in range(i) if apart[i, j] < reach[i, j]}
+    assert set(pairs) == expected
