@@ -30,7 +30,7 @@ _AT_ONCE = 1000
 
 
 class Box(Record):
-    """What the balls are in: walls and their laws, gravity, cells, what kinds of balls, what is lost of their energy."""
+    """What the balls are in: walls and their laws, gravity, cells, kinds of balls, what is lost of their energy."""
 
     walls: Any
     laws: Any

@@ -75,10 +75,6 @@ class SphereNumbers(Distance, ExactChord):
     curvature: float  # side/R
     side: float
 
-    def grown(self, radius):
-        width = self.radius - self.side * radius
-        return self._replace(radius=width, radius2=width * width, curvature=self.side / width)
-
     def inner(self, r):
         return square(r - self.center)
 
