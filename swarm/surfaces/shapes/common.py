@@ -32,6 +32,10 @@ class Distance(contract.Smooth):
     def clearance(self, r):
         return -self.gap_of(self.inner(r))
 
+    def grown(self, radius):
+        width = self.radius - self.side * radius
+        return self._replace(radius=width, radius2=width * width)
+
     def near_radius2(self, q):
         """radius^2, or that of a thicker one that is near: from afar round-off of the level is that of the distance."""
         return select(q > _AFAR * self.radius2, q * (1.0 / _AFAR), self.radius2)
