@@ -41,6 +41,9 @@ class Pieces(Volume):
     # Those in which it is where another room of its union is behind it.
     _doorways: tuple[tuple[Surface, ...], ...]
 
+    # The largest radius of the balls in the scene [m]; None: its particles are points.
+    _largest: float | None = None
+
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""
         raise NotImplementedError
@@ -70,7 +73,8 @@ class Pieces(Volume):
     def _groups(self) -> list[Members]:
         """The surfaces that kernels take as fields."""
         repeated = None if self.period is None else corners_of(self.period)
-        return [members_of([self.pieces[i] for i in group], repeated) for group in self.order.groups]
+        groups = ([self.pieces[i] for i in group] for group in self.order.groups)
+        return [members_of(group, repeated, self._largest) for group in groups]
 
     @cached_property
     def volumes(self) -> tuple[tuple[Surface, ...], ...]:

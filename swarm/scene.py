@@ -183,6 +183,25 @@ class Scene(Pieces):
         made._require_few_walls(f" with {what}")
         return made
 
+    def of_balls(self, radii: NDArray[np.float64] | None) -> "Scene":
+        """The scene whose walls are those that balls with these radii meet; itself without them.
+
+        What their centres meet are `walls().grown(radius)`.
+        """
+        if radii is None:
+            return self
+        largest, made = float(radii.max()), copy.copy(self)
+        made.__dict__.update(_largest=largest)
+        made.__dict__.pop("_groups", None)
+        if self.period is not None:
+            images = self._images_of_balls(largest)
+            volumes = volumes_of_pieces(self.surfaces, images, self.period)
+            checks.assign(made, _images=images, _volumes=volumes, _doorways=doorways_of_pieces(images, volumes))
+            for name in ("pieces", "owners_of_pieces", "order", "volumes", "instants"):
+                made.__dict__.pop(name, None)
+            made._require_few_walls(f" with balls of a radius of {largest:g} m")
+        return made
+
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""
         return self._moves
@@ -210,12 +229,12 @@ class Scene(Pieces):
         if self.moves():
             fields, others = ([self.pieces[i] for i in some] for some in (self.order.fields, self.order.alone()))
             rooms = [[[self.pieces[i] for i in room] for room in union] for union in self.order.unions]
-            return self._upright(with_rooms(carried(fields, others, moment), rooms))
+            return self._upright(with_rooms(carried(fields, others, moment, self._largest), rooms))
         if own is not None:
             return walls_in(self.order, self.pieces, self._groups, own, lambda members: members)
         there = tuple(was_there(piece.present, moment) for piece in self.pieces)
         if there not in self._walls:
-            made = walls_in(self.order, self.pieces, self._groups, (), self._taken, moment)
+            made = walls_in(self.order, self.pieces, self._groups, (), self._taken, moment, self._largest)
             self._walls[there] = self._upright(made)
         return self._walls[there]
 
@@ -234,7 +253,8 @@ class Scene(Pieces):
             return None
         pulls = self.gravity or (0.0, 0.0, 0.0)
         falls = [0.0 if length is None else -pull * length for pull, length in zip(pulls, self.period, strict=True)]
-        return cell_in(self.period, self.surfaces, self._has_fields(), Vec(*falls) if any(falls) else None)
+        fall = Vec(*falls) if any(falls) else None
+        return cell_in(self.period, self.surfaces, self._has_fields(), fall, self._largest or 0.0)
 
     def pull(self) -> Gravity | None:
         """Gravity as kernels take it."""

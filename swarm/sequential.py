@@ -121,9 +121,8 @@ def _enter(scene: Scene, cells: Cells, points: Floats, numbers: NDArray[np.int64
 def admits(scene: Scene, points: Floats, radius: Floats) -> NDArray[np.bool_]:
     """Whether balls at points (3, N) are within the walls."""
     found = scene.admits(points)
-    if not scene.surfaces:
-        return found
-    found[found] = (scene.distances_outside(points[:, found]) <= -radius[found]).all(axis=0)
+    if scene.surfaces:
+        found[found] = scene.admits(points[:, found], radius[found])
     return found
 
 

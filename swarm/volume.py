@@ -12,7 +12,7 @@ from .particles import Particles
 from .plane import across_of
 from .surfaces.facets.mesh import Mesh
 from .surfaces.fields.many import Many
-from .surfaces.images import Lengths, cell_of, into_cell
+from .surfaces.images import Lengths, cell_of, images_of, into_cell
 from .surfaces.instant import box_of, gaps_of, gradient_of, has_room, planes_of
 from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.surface import UNBOUNDED, Box, Surface
@@ -68,11 +68,15 @@ class Volume:
         lengths = np.array([length or 0.0 for length in self.period])
         return np.asarray(particles.position + particles.image * lengths[:, None])
 
-    def gaps(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+    def gaps(
+        self, points: ArrayLike, time: float = 0.0, radius: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
         """Signed gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0.
 
-        That of a surface that is not there then is minus infinity.
+        That of a surface that is not there then is minus infinity. With a radius (N,) points are the centres of balls.
         """
+        if radius is not None:
+            return self.distances_outside(points, time, radius)
         rows = checks.array("points", points)
         if self.period is not None:
             rows, _image = into_cell(self.period, rows)
@@ -81,8 +85,15 @@ class Volume:
         found = [gaps_of(images, rows, time).max(axis=0) if one.is_there(time) else away for one, images in each]
         return np.array(found).reshape(len(found), *away.shape)
 
-    def admits(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not."""
+    def admits(
+        self, points: NDArray[np.float64], radius: NDArray[np.float64] | None = None
+    ) -> NDArray[np.bool_]:
+        """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not.
+
+        With a radius (N,) points are the centres of balls.
+        """
+        if radius is not None:
+            return np.asarray((self.distances_outside(points, 0.0, radius) <= 0.0).all(axis=0))
         rows = points if self.period is None else into_cell(self.period, points)[0]
         admitted = np.ones(rows.shape[1], np.bool_)
         for image in (image for images in self._images for image in images if image.is_there(0.0)):
@@ -94,14 +105,19 @@ class Volume:
                 admitted &= gaps_of((image,), rows, 0.0)[0] <= 0.0
         return admitted
 
-    def distances_outside(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+    def distances_outside(
+        self, points: ArrayLike, time: float = 0.0, radius: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
         """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside.
 
-        That of a surface that is not there at this time [s] is minus infinity.
+        That of a surface that is not there at this time [s] is minus infinity. With a radius (N,) points are the
+        centres of balls: how far they reach outside.
         """
         rows = checks.array("points", points)
         if self.period is not None:
             rows, _image = into_cell(self.period, rows)
+        if radius is not None:
+            return self._reaching_outside(rows, time, radius)
         found = []
         for surface, images in zip(self.surfaces, self._images, strict=True):
             if not surface.is_there(time):
@@ -113,8 +129,39 @@ class Volume:
                 found.append((gaps_of(images, rows, time) / np.maximum(slopes, np.finfo(np.float64).tiny)).max(axis=0))
         return np.array(found)
 
-    def outside(self, points: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
-        """Which of the points (3, N) are farther outside than this distance [m], or where phi is not a number."""
+    def _reaching_outside(
+        self, points: NDArray[np.float64], time: float, radius: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """How far balls at points (3, N), with their radii (N,), reach outside of every surface: (surfaces, N) [m]."""
+        away = np.full(points.shape[1], -math.inf)
+        images = self._images_of_balls(float(radius.max(initial=0.0)))
+        return np.array([
+            np.max([one.reaching_outside(points, radius, time) for one in several], axis=0)
+            if surface.is_there(time) else away
+            for surface, several in zip(self.surfaces, images, strict=True)
+        ]).reshape(len(self.surfaces), points.shape[1])  # fmt: skip
+
+    def _images_of_balls(self, largest: float) -> tuple[tuple[Surface, ...], ...]:
+        """What of every surface balls in the cell meet, with radii up to the largest one [m]."""
+        if self.period is None:
+            return self._images
+        known: dict[float, tuple[tuple[Surface, ...], ...]] = self.__dict__.setdefault("_images_by_radius", {})
+        # Those of larger balls are as right.
+        largest = min((one for one in known if one >= largest), default=largest)
+        if largest not in known:
+            named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(self.surfaces)]
+            known[largest] = tuple(tuple(images_of(one, self.period, name, largest)) for one, name in named)
+        return known[largest]
+
+    def outside(
+        self, points: NDArray[np.float64], distance: float, radius: NDArray[np.float64] | None = None
+    ) -> NDArray[np.intp]:
+        """Which of the points (3, N) are farther outside than this distance [m], or where phi is not a number.
+
+        With a radius (N,) points are the centres of balls.
+        """
+        if radius is not None:
+            return np.flatnonzero(~(self.distances_outside(points, 0.0, radius) <= distance).all(axis=0))
         found = []
         # In batches, so that NumPy's intermediate results stay in the processor's cache.
         for begin in range(0, points.shape[1], _BATCH):

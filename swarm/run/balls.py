@@ -41,6 +41,7 @@ def require_balls(scene: Scene, particles: Particles | None, method: Method, opt
             "particles that meet"
         )
     _require_method(scene, particles, method)
+    require_shapes(scene)
     _require_options(options)
     require_size(scene, particles.radius)
     require_instants_of_balls(scene, particles, method, options)
@@ -119,7 +120,7 @@ def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
 
 
 def _require_within(scene: Scene, particles: Particles, radius: np.ndarray, close: float, is_rigid: bool) -> None:
-    distances = scene.distances_outside(particles.position) + radius
+    distances = scene.distances_outside(particles.position, 0.0, radius)
     # Where phi is not a number a ball is outside.
     wrong = ~(distances <= (close if is_rigid else close + _PRESSED * radius))
     outside = np.flatnonzero(wrong.any(axis=0))
@@ -133,3 +134,15 @@ def _require_within(scene: Scene, particles: Particles, radius: np.ndarray, clos
         f"particle {first} at {tuple(particles.position[:, first].tolist())}, whose radius of {radius[first]:g} m "
         f"reaches {distances[wall, first]:.6g} m beyond surfaces[{wall}] ({type(scene.surfaces[wall]).__name__}){when}"
     )
+
+
+def require_shapes(scene: Scene) -> None:
+    """Raise a `SceneError` where balls may not meet a surface of the scene."""
+    for i, surface in enumerate(scene.surfaces):
+        why = surface.holds_balls()
+        if why is not None:
+            raise SceneError(
+                f"surfaces[{i}] must be one that particles with a radius may meet, got {type(surface).__name__}, "
+                f"{why}; they may meet Sphere, Plane, Slab, Box, Cylinder, Capsule, Torus and Cone, and fields of "
+                "these; make it of such surfaces, or leave the radius out"
+            )

@@ -127,6 +127,11 @@ class Smooth(AtRest):
         """
         raise NotImplementedError
 
+    @property
+    def holds_balls(self):
+        """Whether the surface has a `grown`: a constant for the compiler."""
+        return self.gives("grown")
+
     # --- Flight ---
 
     def first_hit(self, r, v):

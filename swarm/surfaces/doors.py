@@ -201,9 +201,12 @@ class Timed(Record):
         return select(self.open > 0.0, value, other)
 
 
-def walls_then(surface: Any, moment: float) -> tuple[Any, ...]:
-    """The walls of a surface as kernels take them in the frame, or the piece of one, that ends at a moment [s]."""
-    walls: tuple[Any, ...] = surface.walls()
+def walls_then(surface: Any, moment: float, largest: float | None = None) -> tuple[Any, ...]:
+    """The walls of a surface as kernels take them in the frame, or the piece of one, that ends at a moment [s].
+
+    Of points, or of balls whose radii are this one at most [m].
+    """
+    walls: tuple[Any, ...] = surface.walls() if largest is None else surface.walls_of_balls(largest)
     if surface.present is None:
         return walls
     there = was_there(surface.present, moment)

@@ -67,6 +67,7 @@ _CONSTANTS = (
     "lacks_bend",
     "chord_sweeps",
     "leaves_once",
+    "holds_balls",
 )
 
 
@@ -76,6 +77,9 @@ class Framed(Smooth):
     A class of frames gives the ways in, such as `place_in`, and out, as far as its surfaces are asked, and overrides
     what depends on more than its arguments.
     """
+
+    def grown(self, radius):
+        return self._replace(body=self.body.grown(radius))
 
     def seen_in(self, seen):
         """A particle as the wall sees it, in the frame of the body."""

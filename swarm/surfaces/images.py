@@ -26,13 +26,14 @@ _POINTS, _NO_SLOPE = 256, 1e-14
 _ROUND_OFF = 1e-12
 
 
-def images_of(surface: Surface, period: Lengths, name: str) -> list[Surface]:
+def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0) -> list[Surface]:
     """The surface and its images, as far as they reach into the cell; itself where it is the same along the period.
 
     Args:
         surface: as it is given.
         period: lengths of the cell [m], None where it does not repeat.
         name: of the surface, for the error.
+        largest: the largest radius of a ball [m], which a solid so near to a face meets across it; 0 of points.
 
     Raises:
         SceneError: the surface is neither bounded along the period nor the same all along it, it is longer than the
@@ -40,15 +41,16 @@ def images_of(surface: Surface, period: Lengths, name: str) -> list[Surface]:
     """
     _require_place(surface, period, name)
     if isinstance(surface, Outlined):
-        _require_within(surface, period, name)
+        _require_within(surface, period, name, largest if surface.is_solid() else 0.0)
         return [surface]
     if isinstance(surface, Many):
-        return [_many_images(surface, period, name)]
+        return [_many_images(surface, period, name, largest)]
     low, high = body_of(surface).bounds() if surface.is_solid() else surface.bounds()
     shifts: list[list[float]] = [[0.0], [0.0], [0.0]]
     for k, length in enumerate(period):
         if length is not None and not is_same_along(surface, k, period):
-            shifts[k] = _shifts(surface, (low[k], high[k]), length, f"{name} ({type(surface).__name__})", k)
+            said = f"{name} ({type(surface).__name__})"
+            shifts[k] = _shifts(surface, (low[k], high[k]), length, said, k, largest)
     found = [_shifted(surface, shift) for shift in itertools.product(*shifts)]
     if len(found) > 1 and any(isinstance(one, Rotation) for one in parts_of(surface.motion)):
         raise SceneError(
@@ -58,18 +60,19 @@ def images_of(surface: Surface, period: Lengths, name: str) -> list[Surface]:
     return found
 
 
-def _require_within(surface: Outlined, period: Lengths, name: str) -> None:
-    """Raise a `SceneError` where an outline reaches over a face of the cell."""
+def _require_within(surface: Outlined, period: Lengths, name: str, largest: float) -> None:
+    """Raise a `SceneError` where an outline, or a ball that touches it, reaches over a face of the cell."""
     low, high = (corner[:, 0] for corner in surface.corners())
+    low, high, near = low - largest, high + largest, f" with a ball of a radius of {largest:g} m" * (largest > 0.0)
     for k, length in enumerate(period):
         if length is not None and not (low[k] >= -_ROUND_OFF * length and high[k] <= (1.0 + _ROUND_OFF) * length):
             raise SceneError(
                 f"{name} ({type(surface).__name__}) must be within the cell, from 0 to period[{k}] = {length:g} m, got "
-                f"one from {low[k]:.4g} to {high[k]:.4g} m; move it there"
+                f"one{near} from {low[k]:.4g} to {high[k]:.4g} m; move it there"
             )
 
 
-def _many_images(field: Many, period: Lengths, name: str) -> Many:
+def _many_images(field: Many, period: Lengths, name: str, largest: float) -> Many:
     """A field with the images of its bodies, as far as they reach into the cell."""
     low, high = field.corners()
     shifts = [np.zeros((1, 3))]
@@ -82,13 +85,14 @@ def _many_images(field: Many, period: Lengths, name: str) -> Many:
                 f"period[{k}] must be as long as each solid at least, got {length:g}, shorter than body {bad[0]} of "
                 f"{name} ({type(field).__name__}), which is {high[k, bad[0]] - low[k, bad[0]]:g} long"
             )
-        first, last = math.floor(-high[k].max() / length), math.ceil(1.0 - low[k].min() / length)
+        first = math.floor(-(high[k].max() + largest) / length)
+        last = math.ceil(1.0 - (low[k].min() - largest) / length)
         steps = np.zeros((last - first + 1, 3))
         steps[:, k] = length * np.arange(first, last + 1)
         shifts.append(steps)
     # A step along one axis after the other
     every = [np.sum(parts, axis=0) for parts in itertools.product(*shifts)]
-    near = np.array([[math.inf if length is None else _NEAR * length] for length in period])
+    near = np.array([[math.inf if length is None else _NEAR * length + largest] for length in period])
     far = near + np.array([[0.0 if length is None else length] for length in period])
     found = []
     for shift in every:
@@ -99,7 +103,9 @@ def _many_images(field: Many, period: Lengths, name: str) -> Many:
     return field.images(which, centers, corners_of(period))
 
 
-def _shifts(surface: Surface, ends: tuple[float, float], length: float, name: str, k: int) -> list[float]:
+def _shifts(
+    surface: Surface, ends: tuple[float, float], length: float, name: str, k: int, largest: float
+) -> list[float]:
     """The multiples of the period along one axis that bring a bounded surface into the cell."""
     low, high = ends
     if not (math.isfinite(low) and math.isfinite(high)):
@@ -120,7 +126,7 @@ def _shifts(surface: Surface, ends: tuple[float, float], length: float, name: st
             f"{high - low:g} long"
         )
     # From the image whose upper end is the lowest in the cell
-    near = _NEAR * length
+    near = _NEAR * length + largest
     first, last = math.ceil((-near - high) / length), math.floor((length + near - low) / length)
     return [n * length for n in range(first, last + 1)]
 

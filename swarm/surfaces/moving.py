@@ -24,6 +24,10 @@ class Moving(Record):
 
     posed, accelerates = Posed, True
 
+    def grown(self, radius):
+        """What the centre of a ball meets."""
+        return self._replace(body=self.body.grown(radius))
+
     def count(self):
         """The number of walls of a field."""
         return self.body.count()
@@ -87,10 +91,15 @@ def _during(wall, last, remaining, after):
 # --- From a description ----------------------------------------------------------------------------------
 
 
-def carried(fields: Sequence[Surface], surfaces: Sequence[Surface], moment: float) -> Walls:
-    """The walls of a scene in the frame that ends at a moment [s]; those of fields are before all others."""
-    of_surfaces = [walls_of(surface, moment) for surface in surfaces]
-    all_walls = (*(Field(walls_of(field, moment)[0]) for field in fields), *itertools.chain(*of_surfaces))
+def carried(
+    fields: Sequence[Surface], surfaces: Sequence[Surface], moment: float, largest: float | None = None
+) -> Walls:
+    """The walls of a scene in the frame that ends at a moment [s]; those of fields are before all others.
+
+    Of points, or of balls whose radii are this one at most [m].
+    """
+    of_surfaces = [walls_of(surface, moment, largest) for surface in surfaces]
+    all_walls = (*(Field(walls_of(field, moment, largest)[0]) for field in fields), *itertools.chain(*of_surfaces))
     if all(surface.motion is None for surface in (*fields, *surfaces)):
         return Walls(all_walls)
     if fields:
@@ -106,9 +115,9 @@ def _may_stride(walls: list[Any]) -> bool:
     return walls[0].drive.track is None and all(wall.body.has_levels for wall in walls)
 
 
-def walls_of(surface: Surface, moment: float) -> list[Any]:
-    """The walls of a surface in the frame that ends at a moment [s]."""
-    first, *others = walls_then(surface, moment)
+def walls_of(surface: Surface, moment: float, largest: float | None = None) -> list[Any]:
+    """The walls of a surface in the frame that ends at a moment [s], as `carried` takes them."""
+    first, *others = walls_then(surface, moment, largest)
     if surface.motion is None:
         return [first, *others]
     drive = drive_of(surface, moment)

@@ -169,7 +169,9 @@ def _has_gone(period, step, s):
 # --- From a description ----------------------------------------------------------------------------------
 
 
-def cell_in(period: Lengths, surfaces: Sequence[Surface], fields: bool, fall: Vec | None) -> Period:
+def cell_in(
+    period: Lengths, surfaces: Sequence[Surface], fields: bool, fall: Vec | None, largest: float = 0.0
+) -> Period:
     """The cell as kernels take it.
 
     Args:
@@ -177,6 +179,7 @@ def cell_in(period: Lengths, surfaces: Sequence[Surface], fields: bool, fall: Ve
         surfaces: all of the scene, without their images.
         fields: whether kernels take some of them as fields, which are known in the cell alone.
         fall: the potential energy per mass of one image along each axis, or None.
+        largest: the largest radius of a ball [m], 0 of points.
     """
     # The places of openings are known in the cell alone.
     if any(one.openings for one in surfaces):
@@ -184,7 +187,7 @@ def cell_in(period: Lengths, surfaces: Sequence[Surface], fields: bool, fall: Ve
     free = [not fields and length is not None and _are_same(surfaces, [k], period) for k, length in enumerate(period)]
     x, y, z = (Free(length) if is_free and length else length for length, is_free in zip(period, free, strict=True))
     across = [k for k, length in enumerate(period) if length is not None and not free[k]]
-    return Period(x, y, z, fall, _gaps(period, surfaces, across, fields) if across else None)
+    return Period(x, y, z, fall, _gaps(period, surfaces, across, fields, largest) if across else None)
 
 
 def _are_same(surfaces: Sequence[Surface], axes: Sequence[int], period: Lengths) -> bool:
@@ -192,13 +195,16 @@ def _are_same(surfaces: Sequence[Surface], axes: Sequence[int], period: Lengths)
     return all(not isinstance(one, Many) and is_same_along(one, k, period, least=0.0) for one in surfaces for k in axes)
 
 
-def _gaps(period: Lengths, surfaces: Sequence[Surface], across: Sequence[int], fields: bool) -> Gaps | None:
+def _gaps(
+    period: Lengths, surfaces: Sequence[Surface], across: Sequence[int], fields: bool, largest: float
+) -> Gaps | None:
     """The gaps along the axes `across`, along which not all walls are the same; None where walls with images move."""
     repeated = [one for one in surfaces if not _are_same([one], across, period)]
     if any(one.motion is not None for one in repeated):
         return None
     boxes = [_corners(one) for one in repeated]
     low, high = (np.concatenate(ends, axis=1) for ends in zip(*boxes, strict=True))
+    low, high = low - largest, high + largest
     least = _AMONG_FIELDS if fields else _NARROWEST
     x, y, z = (
         _beside(low[k], high[k]) if length is None else _gap(low[k], high[k], length, least) if k in across else None

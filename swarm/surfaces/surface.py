@@ -121,6 +121,19 @@ class Surface:
         """As kernels take it: one record for a smooth surface, one for each smooth part of a cavity with edges."""
         return (rotations.rotated(self.rotation, self.numbers()),)
 
+    def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
+        """As many walls, in the same order, as kernels take them where particles are balls: each has a `grown`.
+
+        No radius of a ball is above the `largest` [m].
+        """
+        return self.walls()
+
+    def holds_balls(self) -> str | None:
+        """None where balls may meet the surface, else half a sentence that says why they may not."""
+        if all(getattr(wall, "holds_balls", False) for wall in self.walls_of_balls(0.0)):
+            return None
+        return "whose parallel surface is not known"
+
     def open_volumes(self, between: bool = False) -> tuple["Surface", ...]:
         """The volumes of its openings, each present while that is open: those of walls between rooms, or others."""
         return tuple(volume_of(one) for one in self.openings if (isinstance(one, Opening) and one.between) == between)
@@ -192,6 +205,18 @@ class Surface:
             largest = np.argmax([wall.phi(rows) for wall in self.walls()], axis=0)
         found = np.asarray(np.choose(largest, parts))
         return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+
+    def reaching_outside(
+        self, points: NDArray[np.float64], radius: NDArray[np.float64], time: float = 0.0
+    ) -> NDArray[np.float64]:
+        """How far balls at points (3, N), with their radii (N,), reach out of the admissible side (N,) [m].
+
+        Below 0 within, and not a number where they are nowhere.
+        """
+        rows = self._own_rows(points, time)
+        with np.errstate(all="ignore"):
+            walls = [wall.grown(0.0) for wall in self.walls_of_balls(0.0)]
+            return np.asarray(np.maximum.reduce([wall.side * wall.phi(rows) for wall in walls]) + radius)
 
     def _own_rows(self, points: ArrayLike, time: float) -> Vec:
         """Points of the scene in the frame in which the surface is given."""

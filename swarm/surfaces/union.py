@@ -123,6 +123,20 @@ class Joined(Surface):
         """The walls of these."""
         return tuple(itertools.chain(*(surface.walls() for surface in self.surfaces())))
 
+    def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
+        return tuple(itertools.chain(*(surface.walls_of_balls(largest) for surface in self.surfaces())))
+
+    def holds_balls(self) -> str | None:
+        if len(self.rooms) > 1:
+            return f"of {len(self.rooms)} rooms, which have edges where they meet, at which balls would turn"
+        whys = ((surface, surface.holds_balls()) for surface in self.surfaces())
+        return next((f"with a {type(surface).__name__}, {why}" for surface, why in whys if why is not None), None)
+
+    def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
+        there = [surface for surface in self.surfaces() if surface.is_there(time)]
+        away = np.full(points.shape[1], -math.inf)
+        return np.asarray(np.max([away, *(one.reaching_outside(points, radius, time) for one in there)], axis=0))
+
     # --- For users ---------------------------------------------------------------------------------------
 
     def size(self) -> float:

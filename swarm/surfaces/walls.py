@@ -18,6 +18,10 @@ class Field(Record):
 
     members: Any
 
+    def grown(self, radius):
+        """The walls that the centre of a ball meets."""
+        return self._replace(members=self.members.grown(radius))
+
     def count(self):
         """Their number."""
         return self.members.count()
@@ -31,6 +35,10 @@ class Following(Record):
     """A wall that moves with the one before it: both are of one surface."""
 
     body: Any
+
+    def grown(self, radius):
+        """What the centre of a ball meets."""
+        return self._replace(body=self.body.grown(radius))
 
 
 class Touched(Record):

@@ -60,10 +60,16 @@ class Spheres(Many):
     @cached_property
     def members(self) -> Members:
         """The field as kernels take it."""
+        field = self._field(None)
+        return field if self.is_solid() else Foam(*field)
+
+    def _members_of_balls(self, largest: float) -> Members:
+        return self._field(largest)
+
+    def _field(self, largest: float | None) -> Members:
         table = aligned(np.column_stack([self.centers, self.radii]))
         made = ball if self.is_solid() else cavity
-        field = field_of(made(vec(table[0, :3]), table[0, 3]), table, self.corners, self.repeated)
-        return field if self.is_solid() else Foam(*field)
+        return field_of(made(vec(table[0, :3]), table[0, 3]), table, self.corners, self.repeated, largest)
 
 
 @dataclass(frozen=True, repr=False, eq=False)

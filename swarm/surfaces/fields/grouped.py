@@ -136,22 +136,23 @@ def order_of(
 
 def walls_in(
     order: Order, surfaces: Sequence[Surface], groups: Sequence[Members], own: Sequence[Surface],
-    taken: Callable[[Members], Members], moment: float = 0.0,
+    taken: Callable[[Members], Members], moment: float = 0.0, largest: float | None = None,
 ) -> Walls:  # fmt: skip
     """The walls of a scene in which nothing moves, and of a body's own surfaces, in the frame that ends at a moment.
 
-    `groups` are the order's fields, and `taken` says how kernels take a field that is always there.
+    `groups` are the order's fields, and `taken` says how kernels take a field that is always there. They are those of
+    points, or of balls whose radii are the `largest` at most [m].
     """
-    fields = (Field(_field(surfaces[i], taken, moment)) for i in order.fields)
+    fields = (Field(_field(surfaces[i], taken, moment, largest)) for i in order.fields)
     listed = (Listed(taken(group)) for group in groups)
-    others = (wall for i in order.others for wall in walls_then(surfaces[i], moment))
-    joined = (wall for i in order.alone()[len(order.others) :] for wall in walls_then(surfaces[i], moment))
+    others = (wall for i in order.others for wall in walls_then(surfaces[i], moment, largest))
+    joined = (wall for i in order.alone()[len(order.others) :] for wall in walls_then(surfaces[i], moment, largest))
     rooms = [[[surfaces[i] for i in room] for room in union] for union in order.unions]
     return with_rooms(Walls((*fields, *listed, *others, *all_walls(own).each, *joined)), rooms)
 
 
-def _field(surface: Surface, taken: Callable[[Members], Members], moment: float) -> Members:
-    (members,) = walls_then(surface, moment)
+def _field(surface: Surface, taken: Callable[[Members], Members], moment: float, largest: float | None) -> Members:
+    (members,) = walls_then(surface, moment, largest)
     return taken(members) if surface.present is None else members
 
 

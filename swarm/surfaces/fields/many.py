@@ -19,7 +19,7 @@ from ..patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
 from .grid import MARGIN, Floats, Grid, cells_of, one_cell
-from .members import Few, Members, alike, gathered, nearest, table_of, within
+from .members import Few, GrownLike, Members, alike, gathered, nearest, table_of, touched, within
 
 # So many bodies are looked at one after the other by all lanes together, where flights are straight: in a sphere an
 # impact among 10, 24 and 40 balls takes 18, 37 and 57 ns, from cell to cell 55, 73 and 91. Of other bodies, which take
@@ -136,11 +136,35 @@ class Many(Surface):
     def walls(self) -> tuple[Members]:
         return (self.members,)
 
+    def walls_of_balls(self, largest: float) -> tuple[Members]:
+        made: dict[float, Members] = self.__dict__.setdefault("_of_balls", {})
+        # The cells of larger balls are as right.
+        largest = min((one for one in made if one >= largest), default=largest)
+        if largest not in made:
+            made[largest] = self._members_of_balls(largest)
+        return (made[largest],)
+
+    def _members_of_balls(self, largest: float) -> Members:
+        return members_of(self.solids(), self.repeated, largest)
+
+    def holds_balls(self) -> str | None:
+        if self.is_foam():
+            return "whose cavities have edges where they meet, at which balls would turn"
+        return self.solids()[0].holds_balls()
+
     def contain(self, points: Floats) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is in a body: cheaper than phi, which asks for the nearest one."""
         found = np.empty(points.shape[1], np.bool_)
         with np.errstate(all="ignore"):
             within(self.members, np.ascontiguousarray(points), found)
+        return found
+
+    def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
+        rows = self._own_rows(points, time)
+        found = np.empty(points.shape[1])
+        with np.errstate(all="ignore"):
+            (members,) = self.walls_of_balls(float(radius.max(initial=0.0)))
+            touched(members, np.ascontiguousarray(rows), np.ascontiguousarray(radius, np.float64), found)
         return found
 
     # --- For users ---------------------------------------------------------------------------------------
@@ -175,19 +199,33 @@ class Many(Surface):
         return found.reshape(4, *np.shape(rows.x))
 
 
-def members_of(surfaces: Sequence[Surface], repeated: tuple[Floats, Floats] | None) -> Members:
-    """Solid surfaces of one kind as one field; in a scene whose cell repeats, with the corners of that."""
-    bodies = alike([surface.walls()[0] for surface in surfaces])
-    return field_of(bodies[0], table_of(bodies), lambda: _corners_of(surfaces), repeated)
+def members_of(
+    surfaces: Sequence[Surface], repeated: tuple[Floats, Floats] | None, largest: float | None = None
+) -> Members:
+    """Solid surfaces of one kind as one field; in a scene whose cell repeats, with the corners of that.
+
+    Of points, or of balls whose radii are the `largest` at most [m].
+    """
+    if largest is None:
+        bodies = alike([surface.walls()[0] for surface in surfaces])
+    else:
+        bodies = alike([surface.walls_of_balls(largest)[0] for surface in surfaces])
+    return field_of(bodies[0], table_of(bodies), lambda: _corners_of(surfaces), repeated, largest)
 
 
 def field_of(
-    like: Any, table: Floats, corners: Callable[[], tuple[Floats, Floats]], repeated: tuple[Floats, Floats] | None
-) -> Members:
+    like: Any, table: Floats, corners: Callable[[], tuple[Floats, Floats]], repeated: tuple[Floats, Floats] | None,
+    largest: float | None = None,
+) -> Members:  # fmt: skip
     """The field of the bodies of a table, with their bounds."""
     if len(table) <= _IN_ONE_CELL:
         return Members(like, table, one_cell(len(table)))
-    return Members(like, table, grid_of(like, table, corners(), repeated))
+    if largest is None:
+        return Members(like, table, grid_of(like, table, corners(), repeated))
+    low, high = corners()
+    # In the cells that a ball's centre is in where it touches them
+    grown = GrownLike(like, largest)
+    return Members(like, table, grid_of(grown, table, (low - largest, high + largest), repeated))
 
 
 def in_straight_flights(members: Members, repeats: bool) -> Members:

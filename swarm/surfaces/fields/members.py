@@ -12,6 +12,8 @@ from ...kernel.jit import Array, kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, put
 from .. import flights
+from ..balls.rounded import Rounded
+from ..balls.tube import Tube
 from ..facets.facet import Shared
 from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers
@@ -24,7 +26,19 @@ from .grid import Grid, aligned, cell_of, until_next
 # The rows of a rotation that turns nothing.
 _UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
 # What has fields of its own in a table, beside vectors and balls.
-_KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, Rotated, SolidNumbers)
+_KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, Rotated, SolidNumbers, Rounded, Tube)
+
+
+class GrownLike(Record):
+    """The numbers of one of the bodies of a field, whose walls the centre of a ball with this radius meets."""
+
+    body: Any
+    radius: float
+
+    @property
+    def lacks_bend(self):
+        """Whether they cannot move other than uniformly."""
+        return self.body.lacks_bend
 
 
 class Members(Record):
@@ -41,6 +55,15 @@ class Members(Record):
     def lacks_bend(self):
         """Whether they cannot move other than uniformly."""
         return self.like.lacks_bend
+
+    @property
+    def holds_balls(self):
+        """Whether balls may meet them: a constant for the compiler."""
+        return self.like.holds_balls
+
+    def grown(self, radius):
+        """The field that the centre of a ball meets."""
+        return self._replace(like=GrownLike(self.like, radius))
 
     def time_scale(self):
         """A time in which their motion changes little [s]."""
@@ -113,6 +136,8 @@ def member(members, m):
 
 def gathered(like, table, m, k):
     """Numbers of one kind with `like`, from row m of a table, from column k on."""
+    if isinstance(like, GrownLike):
+        return gathered(like.body, table, m, k).grown(like.radius)
     if isinstance(like, SphereNumbers):
         # Four numbers of it are half a line of the cache; the others follow from them.
         made = cavity if isinstance(like, SphereCavity) else ball
@@ -130,6 +155,8 @@ def gathered(like, table, m, k):
 
 def width(like):
     """The number of columns: a constant for the compiler."""
+    if isinstance(like, GrownLike):
+        return width(like.body)
     if isinstance(like, (SphereNumbers, Shared)):
         return 4 if isinstance(like, SphereNumbers) else 0
     return sum(map(width, like)) if isinstance(like, tuple) else 0 if like is None else 1
@@ -294,3 +321,10 @@ def within(members, points, found):
         for k in range(grid.first[cell], grid.first[cell + index(1)]):
             inside = inside or member(members, index(grid.entries[k])).phi(r) < 0.0
         found[i] = inside
+
+
+@kernel
+def touched(members, points, radius, found):
+    """How far balls at points (3, N) with their radii (N,) reach into any body, into `found`; -inf if none is near."""
+    for i in range(points.shape[1]):
+        found[i] = members.grown(radius[i]).deepest_in_cell(column(points, 0, i))

@@ -42,6 +42,8 @@ class Side(Framed):
     place_in = end_in = velocity_in = way_in = vector_in = gravity_in = same
     place_out = end_out = normal_out = vector_out = same
 
+    holds_balls = False
+
     # A fall is at a part of the quadric; its level alone does not say when it hits.
     is_quartic = may_be_far = in_steps = False
 

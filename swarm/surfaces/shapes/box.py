@@ -10,6 +10,7 @@ from ...checks import Vector, length, one_of, vector
 from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations
+from ..balls.rounded import RoundBox
 from ..surface import Box as Bounds
 from ..surface import HalfSpace, Surface, box_around, farthest, rotated_box, side_sign
 from .plane import PlaneNumbers
@@ -64,6 +65,12 @@ class Box(Surface):
         if self.side == "inside":
             return tuple(parts)
         return (body(parts, math.hypot(*self.center)),)
+
+    def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
+        if not self.is_solid():
+            return self.walls()
+        box = RoundBox(vec(self.own_center()), vec(self.half_widths), 0.0, 0.0, -1.0)
+        return (rotations.rotated(self.rotation, box),)
 
     def open_faces(self) -> list[HalfSpace]:
         axes = rotations.matrix(self.rotation).T

@@ -6,7 +6,10 @@ from typing import Any
 
 from ...checks import Vector, number
 from ...errors import SceneError
-from ...kernel.vector import Vec
+from ...kernel.vector import Vec, vec
+from .. import rotation as rotations
+from ..balls.rounded import RoundCone
+from ..balls.tip import Nappes, TipPlane
 from ..surface import UNBOUNDED, Box, HalfSpace, farthest
 from .plane import PlaneNumbers
 from .quadratic import QuadricNumbers, quadric_numbers
@@ -69,6 +72,15 @@ class Cone(Revolved):
             return PlaneNumbers(Vec(-x, -y, -z), -offset), nappes
         # As a solid, the half-space above the apex: what is admissible of it is below.
         return (body((nappes, PlaneNumbers(Vec(x, y, z), offset)), math.hypot(*self.center)),)
+
+    def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
+        sine, cosine = math.sin(self.half_angle), math.cos(self.half_angle)
+        if self.is_solid():
+            round_ = RoundCone(vec(self.own_center()), sine, cosine, 0.0, 0.0, -1.0)
+            return (rotations.rotated(self.turn(), round_),)
+        plane, _nappes = self.walls()
+        nappes = Nappes(self.numbers(), Vec(0.0, 0.0, 1.0), sine, cosine)
+        return TipPlane(plane, 1.0 / sine), rotations.rotated(self.turn(), nappes)
 
     def size(self) -> float:
         return math.inf

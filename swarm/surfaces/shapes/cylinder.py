@@ -6,7 +6,10 @@ from typing import Any
 
 from ...checks import Vector
 from ...checks import length as checked_length
+from ...kernel.vector import vec
 from .. import rotation as rotations
+from ..balls.rounded import RoundCan
+from ..balls.tube import tube_of
 from ..surface import Box, HalfSpace, box_around, extents, farthest, side_sign
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
@@ -58,6 +61,14 @@ class Cylinder(Revolved):
             return around
         parts = (*around, self._caps(self.length))
         return parts if self.side == "inside" else (body(parts, math.hypot(*self.center)),)
+
+    def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
+        center, side = vec(self.own_center()), side_sign(self.side)
+        if self.length is not None and self.is_solid():
+            can = RoundCan(center, self.radius, 0.5 * self.length, 0.0, 0.0, side)
+            return (rotations.rotated(self.turn(), can),)
+        around = rotations.rotated(self.turn(), tube_of(center, self.radius, side))
+        return (around,) if self.length is None else (around, self._caps(self.length))
 
     def size(self) -> float:
         return self.radius if self.length is None else min(self.radius, 0.5 * self.length)

@@ -216,10 +216,6 @@ class SlabNumbers(Distance, ExactChord):
         outside = select(x > 0.0, up, down)
         return select(self.side > 0.0, min(up, down), outside)
 
-    def grown(self, radius):
-        one = self.radius - self.side * radius
-        return self._replace(radius=one, radius2=one * one)
-
     def discrete_gradient(self, r0, r1):
         # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
         return self.scaled(self.off(r0) + self.off(r1))

@@ -75,6 +75,10 @@ class SphereNumbers(Distance, ExactChord):
     curvature: float  # side/R
     side: float
 
+    def grown(self, radius):
+        width = self.radius - self.side * radius
+        return self._replace(radius=width, radius2=width * width, curvature=self.side / width)
+
     def inner(self, r):
         return square(r - self.center)
 
@@ -93,10 +97,6 @@ class SphereNumbers(Distance, ExactChord):
         # 1/(2 R^2)
         k = 0.5 * self.curvature * self.curvature
         return r - ((square(d) - self.radius2) * k) * d
-
-    def grown(self, radius):
-        one = self.radius - self.side * radius
-        return self._replace(radius=one, radius2=one * one, curvature=self.side / one)
 
     def may_reach(self, low, high):
         return square(highest(highest(low - self.center, self.center - high), ZERO)) <= self.radius2
