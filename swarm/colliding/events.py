@@ -30,7 +30,7 @@ _AT_ONCE = 1000
 
 
 class Box(Record):
-# Of a clock: how many epochs have ended, their length [s], events and collisions so far; events at one time now.
+    # Of a clock: how many epochs have ended, their length [s], events and collisions so far; events at one time now.
 
     walls: Any
     laws: Any

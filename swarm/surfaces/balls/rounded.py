@@ -1,8 +1,8 @@
 """Convex solids that balls meet: all that is within the radius of a ball from the body, with its edges round.
 
 phi = sqrt(q) - radius is the distance; q, the inner function, is the squared distance from the body. The vector e from
-its nearest point changes by no more than r does, so that 0 <= H <= I. The body is behind the plane on that point, across
-e: safe steps are those to planes, which are Newton's.
+its nearest point changes by no more than r does, so that 0 <= H <= I. The body is behind the plane on that point,
+across e: safe steps are those to planes, which are Newton's.
 """
 
 import math
