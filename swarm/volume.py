@@ -85,9 +85,7 @@ class Volume:
         found = [gaps_of(images, rows, time).max(axis=0) if one.is_there(time) else away for one, images in each]
         return np.array(found).reshape(len(found), *away.shape)
 
-    def admits(
-        self, points: NDArray[np.float64], radius: NDArray[np.float64] | None = None
-    ) -> NDArray[np.bool_]:
+    def admits(self, points: NDArray[np.float64], radius: NDArray[np.float64] | None = None) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not.
 
         With a radius (N,) points are the centres of balls.

@@ -69,7 +69,7 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
         )
     check_surfaces(method, scene)
     require_balls(scene, start, method, options)
-    scene = scene if start is None else scene.of_balls(start.radius)
+    scene = scene.of_balls(None if start is None else start.radius)
     if options.compile != "never":
         counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
         walls = [one for surface in scene.surfaces for one in (surface, *surface.open_volumes())]
