@@ -44,8 +44,8 @@ def _require_laws(scene: Scene) -> None:
     for name, value in (*named, *(() if scene.pairs is None else [("pairs", scene.pairs.restitution)])):
         if value < MOST_DAMPED:
             raise SceneError(
-                f"{name}.restitution must be {MOST_DAMPED:g} or more with Penalty, whose dampers are the harder the less "
-                f"they give back, got {value:g}"
+                f"{name}.restitution must be {MOST_DAMPED:g} or more with Penalty, whose dampers grow as it "
+                f"becomes less, got {value:g}"
             )
 
 
