@@ -6,16 +6,16 @@ s, so that angular momentum is conserved. The slip is u = v_i - v_j - (R_i w_i +
 mean over the step friction does the work J.u. At a wall the arm is the radius, and the wall's own velocity counts.
 
 It sticks where an impulse within mu times the normal one leaves no slip at the end of the step: a pile at rest does not
-creep. Else it slides, with that impulse against the mean slip, or with less where less leaves no mean slip: it never
-gives energy there.
+creep. Else it slides, with that impulse against the slip at the end: against the mean one a contact that turns round
+within a step has no impulse that its neighbours can rely on, and sweeps over dense piles go round in circles. So a
+slip that turns round may gain a little in that step, which is booked as what is lost.
 """
 
 import math
 
 from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
-from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, absolute, cross, dot, square, total
+from ..kernel.vector import ZERO, absolute, cross, dot, square, total
 from ..surfaces.posed import Posed
 from .arrays import (
     AFTER,
@@ -40,27 +40,16 @@ _ROUNDNESS = 2.5
 _TINY = 1e-300
 
 
-class Slip(Record):
-    """The slip at the start and at the end of a step, across the contact, and how it changes with an impulse there."""
-
-    first: Vec
-    last: Vec
-    ease: float
-
-
 def across(a, n):
     """What of a vector is across another one."""
     return a - (dot(a, n) / square(n)) * n
 
 
-def rubbed(slip, drag, limit):
-    """The impulse of friction of no more than a limit, from the last one and the slip with it."""
-    stick = drag - slip.last * (1.0 / slip.ease)
-    still = stick - slip.first * (1.0 / slip.ease)
-    size = math.sqrt(square(still))
-    part = select(size > limit, limit / select(size > 0.0, size, 1.0), 1.0)
-    sticks = square(stick) <= limit * limit
-    return select(sticks, 1.0, 0.0) * stick + select(sticks, 0.0, part) * still
+def rubbed(drag, slip, ease, limit):
+    """The impulse of friction of no more than a limit, from the last one, the slip at the end with it, and its ease."""
+    stick = drag - slip * (1.0 / ease)
+    size = math.sqrt(square(stick))
+    return stick * select(size > limit, limit / select(size > 0.0, size, 1.0), 1.0)
 
 
 # --- Of pairs --------------------------------------------------------------------------------------------
@@ -90,11 +79,9 @@ def rub_pairs(matter, grains, touches):
         coast, radius, other = vector_at(rows, c, COAST), place[i, RADIUS], place[j, RADIUS]
         way = closing(vector_at(rows, c, START), size, coast + half * (v - u))
         arm = arm_of(way, size, way.change, radius + other)
-        first = coast * (1.0 / half) - cross(_turning(grains, i, j, BEFORE), arm)
-        last = v - u - cross(_turning(grains, i, j, AFTER), arm)
-        slip = Slip(across(first, way.along), across(last, way.along), ease * (1.0 + _ROUNDNESS * square(arm)))
-        before = vector_at(rows, c, DRAG)
-        new = rubbed(slip, across(before, way.along), matter.pairs.friction * rows[c, PUSH])
+        slip = across(v - u - cross(_turning(grains, i, j, AFTER), arm), way.along)
+        before, limit = vector_at(rows, c, DRAG), matter.pairs.friction * rows[c, PUSH]
+        new = rubbed(across(before, way.along), slip, ease * (1.0 + _ROUNDNESS * square(arm)), limit)
         more = new - before
         set_vector(rows, c, DRAG, new)
         one, two = place[i, LIGHTNESS], place[j, LIGHTNESS]
@@ -163,11 +150,10 @@ def rub_wall(matter, law, wall, grains, touches, number):
             grains.place[i, RADIUS],
         )
         coast = vector_at(rows, c, COAST)
-        n, (both, last) = _facing(wall, grains, rows, c, i, coast + half * v)
-        first = coast * (1.0 / half) - (both - last) - radius * cross(vector_at(spin, i, BEFORE), n)
-        slip = Slip(across(first, n), across(v - last - radius * cross(w, n), n), ease * (1.0 + _ROUNDNESS))
+        n, (_both, last) = _facing(wall, grains, rows, c, i, coast + half * v)
+        slip = across(v - last - radius * cross(w, n), n)
         before = vector_at(rows, c, DRAG)
-        new = rubbed(slip, across(before, n), law.friction * rows[c, PUSH])
+        new = rubbed(across(before, n), slip, ease * (1.0 + _ROUNDNESS), law.friction * rows[c, PUSH])
         more = new - before
         set_vector(rows, c, DRAG, new)
         set_vector(speed, i, AFTER, v + more * ease)

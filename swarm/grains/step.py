@@ -21,7 +21,7 @@ from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twi
 # one before, if that is round-off of what many large impulses leave of one another.
 _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 # Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them.
-_RUBBED = 1e-7
+_RUBBED = 1e-3
 _MOST_SWEEPS = 1000
 
 

@@ -43,8 +43,9 @@ class SoftWalls(base.Method):
         object.__setattr__(self, "exponent", checks.at_least("exponent", self.exponent, 1.0))
 
     def check(self, scene: Scene, particles: Particles) -> None:
-        base.check_laws(type(self).__name__, scene)
-        base.check_motions(type(self).__name__, scene)
+        if particles.radius is None:
+            base.check_laws(type(self).__name__, scene)
+            base.check_motions(type(self).__name__, scene)
         check_solids(scene, particles, self.dt)
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..bodies.state import Bodies
 from ..errors import SceneError
-from ..methods import Impact
+from ..methods import Impact, Penalty
 from ..methods.base import Method, check_surfaces
 from ..motion import Path, parts_of
 from ..motion.given import require_angles
@@ -62,7 +62,8 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
         )
     # The arrays of Particles may have been changed since it checked them.
     start = None if particles is None else _in_the_cell(scene, particles.copy(), options.times.until)
-    if scene.period is not None and not method.knows_period():
+    are_balls = start is not None and start.radius is not None
+    if scene.period is not None and not method.knows_period() and not (are_balls and isinstance(method, Penalty)):
         raise SceneError(
             f"period must be None with {method}, whose steps do not end where a particle leaves the cell, got "
             f"{scene.period}; use Impact() with contact_step = 0"

@@ -11,6 +11,7 @@ from ..scene import Scene
 from ..sequential import require_size
 from .instants import require_instants_of_balls
 from .options import RunOptions
+from .soft import require_soft_balls
 
 # Balls overlap by round-off of their places at the start: this many times that of the largest coordinate.
 _ROUND_OFF = 64.0 * np.finfo(np.float64).eps
@@ -45,6 +46,7 @@ def require_balls(scene: Scene, particles: Particles | None, method: Method, opt
     _require_options(options)
     require_size(scene, particles.radius)
     require_instants_of_balls(scene, particles, method, options)
+    require_soft_balls(scene, particles, method)
     if particles.spin is None and _may_turn(scene, method):
         particles.spin = np.zeros_like(particles.position)
 

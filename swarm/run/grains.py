@@ -63,8 +63,9 @@ class GrainsRun(BaseRun):
             balls.collisions, state.impacts, state.impulse, state.dissipated, balls.virial, np.zeros(1, np.int64)
         )
         self._world = World(
-            arrays.grains_of(state.position, state.velocity, radius, state.mass),
-            arrays.near_of(n, walls, _PAIRS * n, _AT_WALLS * n), arrays.touches_of(walls, _PAIRS * n, _AT_WALLS * n),
+            arrays.grains_of(state.position, state.velocity, radius, state.mass, spin if rubs else None),
+            arrays.near_of(n, walls, _PAIRS * n, _AT_WALLS * n, rubs),
+            arrays.touches_of(walls, _PAIRS * n, _AT_WALLS * n, rubs),
             books,
         )  # fmt: skip
         self._clock = np.zeros(arrays.CLOCK)
