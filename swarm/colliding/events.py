@@ -30,7 +30,7 @@ _AT_ONCE = 1000
 
 
 class Box(Record):
-# Of a clock: how many epochs have ended, their length [s], events and collisions so far; events at one time now.
+    """What the balls are in: walls and their laws, gravity, cells, what kinds of balls, what is lost of their energy."""
 
     walls: Any
     laws: Any
