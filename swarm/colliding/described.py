@@ -80,7 +80,9 @@ def aligned_copy(values: NDArray[Any]) -> NDArray[Any]:
 
 def aligned(size: int) -> Floats:
     """An array of zeros that begins with a line of the cache."""
-    made = np.zeros(size + 8)
+    # Of zeros NumPy asks the system for no large pages.
+    made = np.empty(size + 8)
+    made.fill(0.0)
     first = -(made.ctypes.data // 8) % 8
     return made[first : first + size]
 
