@@ -73,6 +73,7 @@ class Particles:
     def _repr_html_(self) -> str:
         speeds = np.sqrt((self.velocity**2).sum(axis=0))
         held = dict(zip("xyz", self.position, strict=True)) | {"speed": speeds, "mass": self.mass}
+        held |= {} if self.radius is None else {"radius": self.radius}
         units = {"speed": "m/s", "mass": "kg"}
         rows = [(name, f"{row.min():.4g} to {row.max():.4g} {units.get(name, 'm')}") for name, row in held.items()]
         return notebook.table(f"{len(self)} particles", rows)

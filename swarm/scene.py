@@ -130,6 +130,7 @@ class Scene(Pieces):
         rows = [("" if text.startswith("<") else f"surfaces[{i}]", text) for i, text in enumerate(texts)]
         rows += [("gravity", "none" if self.gravity is None else f"{self.gravity} m/s^2")]
         rows += [] if self.period is None else [("period", f"{self.period} m")]
+        rows += [] if self.pairs is None else [("pairs", repr(self.pairs))]
         rows += [] if self.plane is None else [("plane", f"{self.plane} = 0")]
         return notebook.table("Scene", rows)
 

@@ -23,6 +23,7 @@ def numbers(trajectory: Path) -> dict[str, Any]:
         "frames": len(seen["time"]),
         "time": float(seen["time"][-1]),
         "impacts": int(seen["impacts"][-1]),
+        **({"collisions": int(seen["collisions"][-1])} if "collisions" in seen else {}),
         "energy_drift": drift(seen),
         "energy_error": float(seen["energy_error"].max()),
         "max_penetration": float(seen["max_penetration"].max()),

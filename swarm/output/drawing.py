@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ..plane import along, shown_as
 from ..state import Floats
 from . import colours, series
+from .balls import Balls, Discs
 from .colours import Colours
 
 # Okabe and Ito's, for a light background.
@@ -89,15 +90,17 @@ def frame(
     lines: tuple[Floats, Colours],
     faces: tuple[Floats, Colours],
     across: int | None = None,
+    radius: Floats | None = None,
 ) -> None:
     """A frame: `particles` of colours 0xRRGGBBAA, which bodies with faces do not show, and their `ties`.
 
-    `across` is the axis across the plane of a scene of two dimensions, whose axes are `view`s of it.
+    `across` is the axis across the plane of a scene of two dimensions, whose axes are `view`s of it; `radius` of balls
+    (n,) [m].
     """
     if across is not None:
-        flat(axes, across, points, red_green_blue(packed), wires)
+        flat(axes, across, points, red_green_blue(packed), wires, radius=radius)
         return
-    particles(axes, points, red_green_blue(packed), wires, 0.0 if len(faces[0]) else 1.0)
+    particles(axes, points, red_green_blue(packed), wires, 0.0 if len(faces[0]) else 1.0, radius=radius)
     ties(axes, lines, faces)
 
 
@@ -108,11 +111,13 @@ def particles(
     wires: list[tuple[bool, list[Floats]]],
     size: float = 1.0,
     box: tuple[Floats, Floats] | None = None,
+    radius: Floats | None = None,
 ) -> tuple[Any, list[Any]]:
     """Particles (N, 3) and the wire frames of the walls, of solids in their own colour, in 3-D axes of equal scale.
 
-    The dots of particles are smaller the more there are; `size` enlarges them, and 0 shows none. The axes end at the
-    corners of the box; None: around all that is drawn. Returns the artists of the dots, and of the wires of each wall.
+    The dots of particles are smaller the more there are; `size` enlarges them, and 0 shows none; balls have their
+    `radius` (N,) [m]. The axes end at the corners of the box; None: around all that is drawn. Returns the artists of
+    the dots, or the balls, and of the wires of each wall.
     """
     points = np.asarray(positions)
     axes.computed_zorder = False  # the particles would hide the solids among them
@@ -129,8 +134,12 @@ def particles(
         drawn.append(Line3DCollection(curves, clip_on=False, **style))
         axes.add_collection3d(drawn[-1], autolim=False)
     dot = size * float(np.clip(3e4 / len(points), 0.3, 1000.0)) ** 0.5
-    dots = axes.scatter(*points.T, c=colour, s=dot, linewidths=0.0, depthshade=False, zorder=2, clip_on=False)
-    low, high = _roomy(*(around(points, wires) if box is None else box))
+    dots: Any = None
+    if radius is None:
+        dots = axes.scatter(*points.T, c=colour, s=dot, linewidths=0.0, depthshade=False, zorder=2, clip_on=False)
+    else:
+        dots = Balls(axes, points, radius, colour)
+    low, high = _roomy(*(around(points, wires, radius) if box is None else box))
     for axis, a, b in zip((axes.xaxis, axes.yaxis, axes.zaxis), low, high, strict=True):
         axis.set_pane_color((0.0, 0.0, 0.0, 0.0))
         axis.line.set_color(LIGHT)
@@ -158,7 +167,7 @@ def view(figure: Any, across: int | None, *place: int) -> Any:
 
 def flat(
     axes: Any, across: int, positions: ArrayLike, colour: Any, wires: list[tuple[bool, list[Floats]]],
-    box: tuple[Floats, Floats] | None = None,
+    box: tuple[Floats, Floats] | None = None, radius: Floats | None = None,
 ) -> tuple[Any, list[Any]]:  # fmt: skip
     """`particles` of a scene of two dimensions, in axes of its plane, in which the picture fits the vessel."""
     points, drawn = np.asarray(positions), []
@@ -172,8 +181,12 @@ def flat(
         )  # fmt: skip
         axes.add_collection(drawn[-1], autolim=False)
     dot = float(np.clip(3e4 / len(points), 0.3, 300.0)) ** 0.5
-    dots = axes.scatter(*shown_as(across, points).T, c=colour, s=dot, linewidths=0.0, zorder=2, clip_on=False)
-    low, high = (shown_as(across, one) for one in _roomy(*(around(points, wires) if box is None else box)))
+    dots: Any = None
+    if radius is None:
+        dots = axes.scatter(*shown_as(across, points).T, c=colour, s=dot, linewidths=0.0, zorder=2, clip_on=False)
+    else:
+        dots = Discs(axes, shown_as(across, points), radius, colour)
+    low, high = (shown_as(across, one) for one in _roomy(*(around(points, wires, radius) if box is None else box)))
     room = _ROOM * (high - low).max()
     names = ["xyz"[k] for k in along(across)]
     axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room), aspect="equal")
@@ -187,9 +200,12 @@ def flat(
     return dots, drawn
 
 
-def around(points: Floats, wires: list[tuple[bool, list[Floats]]]) -> tuple[Floats, Floats]:
-    """The corners of the box around points (N, 3) and wires."""
-    corners = np.vstack([points, *(curve for _solid, curves in wires for curve in curves)])
+def around(
+    points: Floats, wires: list[tuple[bool, list[Floats]]], radius: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """The corners of the box around points (N, 3), or balls of a `radius`, and wires."""
+    ends = [points] if radius is None else [points - radius[:, None], points + radius[:, None]]
+    corners = np.vstack([*ends, *(curve for _solid, curves in wires for curve in curves)])
     corners = corners[~np.isnan(corners[:, 0])]
     if not len(corners):
         return np.zeros(3), np.zeros(3)

@@ -24,10 +24,14 @@ class Drawn:
     Attributes:
         noun: what is shown, "particles" or "bodies"; count: how many there are; shown: how many are shown.
         lines: (S, 2) and triangles: (T, 3), of the points that are shown.
+        radius: of those that are shown [m], where they are balls, else None.
     """
 
-    def __init__(self, points: int, body: Body | None, most: int) -> None:
-        """Of `points` particles or points of bodies, at most `most` points are shown, or one body."""
+    def __init__(self, points: int, body: Body | None, most: int, radius: Floats | None = None) -> None:
+        """Of `points` particles or points of bodies, at most `most` points are shown, or one body.
+
+        `radius` is that of all of them, of balls.
+        """
         self.noun = "particles" if body is None else "bodies"
         size = 1 if body is None else len(body)
         self.count = points // size
@@ -35,6 +39,7 @@ class Drawn:
         one = size if body is None or not self._faces else len(body.contacts)
         self._every = slice(None, None, math.ceil(self.count / max(1, most // one)))
         self.shown = len(range(self.count)[self._every])
+        self.radius = None if radius is None else radius[self._every]
         none = np.zeros((0, 3), np.int64)
         edges, faces = (none[:, :2], none) if body is None else (_lines(body), body.faces)
         self.lines, self.triangles = self._of_all(edges), self._of_all(faces)

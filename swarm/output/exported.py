@@ -22,7 +22,7 @@ class Moment(NamedTuple):
     position: NDArray[Any]  # (n, 3) [m]
     velocity: NDArray[Any]  # (n, 3) [m/s]
     # Further columns by their names, (n,) or (n, 3): "impacts"; where there are some, "image", "escape_time",
-    # "absorbed_time".
+    # "absorbed_time"; of balls "collisions" and "spin".
     more: dict[str, NDArray[Any]]
     ids: NDArray[np.int64]  # (n,) numbers of the particles
     mass: NDArray[np.float64]  # (n,) [kg]
@@ -34,7 +34,7 @@ class Exported:
     Attributes:
         trajectory: what is exported.
         numbers, times: of the frames, times in [s].
-        ids: (n,) numbers of the particles; mass: (n,) [kg].
+        ids: (n,) numbers of the particles; mass: (n,) [kg]; radius: (n,) of balls [m], else None.
         bonds: (B, 2) rows that are tied, of bodies.
         periods: the lengths of the cell that repeats, 0 where none does.
     """
@@ -56,6 +56,8 @@ class Exported:
         self._rows: Any = slice(None) if some.all() else np.flatnonzero(some)
         self.ids = ids[self._rows]
         self.mass = trajectory.frame(self.numbers[0]).mass[self._rows]
+        radius = trajectory.radius
+        self.radius = None if radius is None else radius[self._rows]
         self.bonds = _among(self.ids, trajectory.bonds)
         self.periods = np.array([length or 0.0 for length in trajectory.scene.period or (None,) * 3])
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from ..ball_numbers import balls_volume
 from ..notebook import shortened
 from ..observables import drift
 from ..surfaces.facets.mesh import Mesh
@@ -60,6 +61,7 @@ def of_scene(scene: Any) -> dict[str, str]:
         "surfaces": _call(", ".join(shortened(scene.surfaces))),
         **of_meshes(scene),
         "gravity": "none" if scene.gravity is None else f"{scene.gravity} m/s^2",
+        **({} if scene.pairs is None else {"pairs": _call(scene.pairs)}),
         **_period(scene),
     }
 
@@ -84,7 +86,8 @@ def of_meshes(scene: Any) -> dict[str, str]:
 
 def of_run(seen: dict[str, Any]) -> dict[str, str]:
     """The figures that show whether a run went well."""
-    rows = {"impacts": f"{int(seen['impacts'][-1]):,}".replace(",", " ")}
+    counts = [name for name in ("impacts", "collisions") if name in seen]
+    rows = {name: f"{int(seen[name][-1]):,}".replace(",", " ") for name in counts}
     if slid := seen.get("sliding_time", [0.0])[-1]:
         rows["sliding"] = f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"
     rows["energy drift"] = f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle"
@@ -137,7 +140,7 @@ def _what(trajectory: Any) -> dict[str, str]:
     """The row that says what was run: particles, or bodies and what they are made of."""
     body = trajectory.body
     if body is None:
-        return {"particles": f"{trajectory.count}"}
+        return {"particles": f"{trajectory.count}", **of_balls(trajectory)}
     parts = {
         "point": len(body),
         "link": len(body.links),
@@ -148,6 +151,25 @@ def _what(trajectory: Any) -> dict[str, str]:
     }
     told = [f"{count} {name}{'' if count == 1 else 's'}" for name, count in parts.items() if count]
     return {"bodies": f"{trajectory.copies} of {', '.join(told)}"}
+
+
+def of_balls(trajectory: Any) -> dict[str, str]:
+    """The radii of balls, and which part of their volume they fill; nothing of points."""
+    if not trajectory.has_particles() or trajectory.radius is None:
+        return {}
+    balls = trajectory.frame(0)
+    rows = {"radius": sizes_of(balls.radius)}
+    if balls.volume is not None and len(balls) == trajectory.count:
+        rows["packing"] = f"{balls_volume(trajectory.scene, balls.radius) / balls.volume:.4g} of {balls.volume:.4g} m^3"
+    if trajectory.scene.plane is not None and "packing" in rows:
+        rows["packing"] = rows["packing"].replace("m^3", "m^2")
+    return rows
+
+
+def sizes_of(radius: Any) -> str:
+    """One radius, or the smallest and the largest."""
+    least, most = radius.min(), radius.max()
+    return f"{least:.4g} m" if least == most else f"{least:.4g} m to {most:.4g} m"
 
 
 def _period(scene: Any) -> dict[str, str]:

@@ -19,6 +19,7 @@ from ..errors import FileError, SceneError
 from ..plane import shown_as
 from ..state import Floats
 from . import colours, drawing, paths
+from .balls import Balls
 from .drawn import Drawn
 from .shapes import Shape, shapes_of, since_start
 
@@ -133,7 +134,7 @@ class _Film:
     def __init__(self, trajectory: Any, numbers: list[int], pixels: tuple[int, int], most: int) -> None:
         self._trajectory, self._scene = trajectory, trajectory.scene
         self._seen, start = trajectory.observed(), trajectory.frame(numbers[0])
-        self._drawn = drawn = Drawn(len(start), trajectory.body, most)
+        self._drawn = drawn = Drawn(len(start), trajectory.body, most, start.radius)
         self._start, self._between = start.position, dict[tuple[int, float], Wires]()
         self._changes = self._scene.moves() or self._scene.has_doors()
         self._shapes = shapes_of(self._scene, start.position)
@@ -153,10 +154,14 @@ class _Film:
         at = drawn.points(start.position).T
         box = self._box(numbers)
         if across is not None:
-            self._dots, self._wires = drawing.flat(self._axes, across, at, drawing.LIGHT, self._walls, box)
+            self._dots, self._wires = drawing.flat(
+                self._axes, across, at, drawing.LIGHT, self._walls, box, drawn.radius
+            )
         else:
             size = 0.0 if len(drawn.triangles) else 1.0
-            self._dots, self._wires = drawing.particles(self._axes, at, drawing.LIGHT, self._walls, size, box)
+            self._dots, self._wires = drawing.particles(
+                self._axes, at, drawing.LIGHT, self._walls, size, box, drawn.radius
+            )
         # What lies in front of the dots, or changes, is drawn in every frame, and all else once.
         self._wires = [one for one in self._wires if self._changes or one.get_zorder() > self._dots.get_zorder()]
         for artist in (*self._wires, self._dots, self._title):
@@ -172,7 +177,7 @@ class _Film:
         boxes = []
         for k in numbers:
             points = self._drawn.points(self._trajectory.frame(k).position).T
-            boxes.append(drawing.around(points, self._walls_at(k)))
+            boxes.append(drawing.around(points, self._walls_at(k), self._drawn.radius))
         return np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
 
     def _walls_at(self, k: int) -> Wires:
@@ -196,15 +201,26 @@ class _Film:
             self._between[which] = _wires(shapes_of(self._scene, self._start, time))
         return self._between[which]
 
+    def _put(self, points: Floats, colour: Floats) -> None:
+        """Show the particles at points (n, 3) in colours (n, 3)."""
+        dots, across = self._dots, self._across
+        if isinstance(dots, Balls):
+            dots.place(points)
+        else:
+            dots.set_offsets(points[:, :2] if across is None else shown_as(across, points))
+        if self._drawn.radius is not None:
+            dots.paint(colour)
+            return
+        if across is None:
+            dots.set_3d_properties(points[:, 2], "z")
+        dots.set_facecolor(colour)
+
     def show(self, k: int) -> None:
         """Draw frame k on the canvas."""
         drawn = self._drawn
         position, packed, tints = drawn.coloured(self._trajectory.frame(k), self._scale, self._values)
         across = self._across
-        self._dots.set_offsets(position[:2].T if across is None else shown_as(across, position.T))
-        if across is None:
-            self._dots.set_3d_properties(position[2], "z")
-        self._dots.set_facecolor(drawing.red_green_blue(packed))
+        self._put(position.T, drawing.red_green_blue(packed))
         if self._changes:
             for artist, (_solid, curves) in zip(self._wires, self._walls_at(k), strict=True):
                 artist.set_segments(curves if across is None else [shown_as(across, curve) for curve in curves])

@@ -5,7 +5,8 @@ the center of the cell, which is log/center. In a direction in which it does not
 the particles need, and nothing is shifted but a scene that is far from the origin, whose center is log/center too: the
 schema has no box that does not repeat. Frames have the step number, and log/time [s], log/particles/id,
 log/particles/impacts, and log/particles/escape_time where there are openings, absorbed_time
-where walls absorb. Images are int32.
+where walls absorb; balls have diameters, log/particles/collisions, and log/particles/spin where they turn. Images are
+int32.
 """
 
 from pathlib import Path
@@ -49,6 +50,8 @@ def _frame(
     # Rounded to float32 what is at the edge of the cell may be beyond it.
     of.position, of.velocity = position.clip(-0.5 * edges, 0.5 * edges), moment.velocity.astype(np.float32)
     of.mass = moment.mass.astype(np.float32)
+    if chosen.radius is not None:
+        of.diameter = (2.0 * chosen.radius).astype(np.float32)
     if "image" in moment.more:
         of.image = _in_32_bits(moment.more["image"], moment.number)
     if len(bonds):

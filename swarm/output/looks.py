@@ -32,7 +32,8 @@ def path_of(shape: Shape) -> str:
 def log_static(stream: Any, drawn: Drawn, shapes: list[Shape], center: Floats) -> None:
     """Log the walls, and how particles and bodies look."""
     stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    stream.log(PARTICLES, rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.0)), static=True)
+    sizes = rr.Radius.ui_points(2.0) if drawn.radius is None else drawn.radius
+    stream.log(PARTICLES, rr.Points3D.from_fields(radii=sizes), static=True)
     width = rr.Radius.ui_points(1.0)
     if len(drawn.triangles):
         stream.log(MESH, rr.Mesh3D.from_fields(triangle_indices=drawn.triangles), static=True)

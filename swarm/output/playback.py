@@ -24,6 +24,7 @@ _NOUN, _CENTER, _PLANE = "noun", "center", "plane"
 # The entities of particles, and of bodies; recordings are written with them too.
 PARTICLES, LINES, MESH = "/scene/particles", "/scene/bodies/lines", "/scene/bodies/mesh"
 _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
+_RADII = "Points3D:radii"
 _STRIPS, _TINTS, _CORNERS = "LineStrips3D:strips", "LineStrips3D:colors", "Mesh3D:vertex_positions"
 _WAYS, _TURNS = "Transform3D:translation", "Transform3D:mat3x3"
 _TRIANGLES, _PAINT = "Mesh3D:triangle_indices", "Mesh3D:vertex_colors"
@@ -46,6 +47,7 @@ class Playback:
             frames; "noun": "particles" or "bodies".
         center: (3,) the origin of the positions in the file [m], which those given here are not less.
         wires: of each surface, whether it is a solid and its curves, at the start.
+        radius: of balls (n,) [m], None of points.
 
     Raises:
         SceneError: there is no such file, it is damaged or truncated, or not a recording of swarm.
@@ -119,6 +121,10 @@ class Playback:
         self.wires: list[tuple[bool, list[Floats]]] = [
             (entity.startswith(_SOLIDS), [np.array(strip) for strip in kept.as_py()]) for entity, kept in strips.items()
         ]
+        sizes = self._static.get((PARTICLES, _RADII))
+        wide = np.array([] if sizes is None else sizes.as_py(), np.float64)
+        # Those of dots are below 0: points of the screen.
+        self.radius = wide if wide.size and (wide > 0.0).all() else None
         triangles = self._static.get((MESH, _TRIANGLES))
         self._triangles = np.array([] if triangles is None else triangles.as_py(), np.int64).reshape(-1, 3)
 

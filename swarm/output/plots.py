@@ -103,7 +103,7 @@ def _series(figure: Any, content: Content, shapes: list[Shape], width: float) ->
     """The time series, and the speeds, in a figure of this width [inches]."""
     times, seen = content.seen["time"], content.seen
     drawn = {}
-    for line in series.lines_of(content.scene, content.method, shapes, content.body, "source_energy" in seen):
+    for line in series.lines_of(content.scene, content.method, shapes, content.body, seen):
         values = line.values(times, seen)
         known = ~np.isnan(values)
         drawn[line.path] = line.name, times[known], values[known]
@@ -121,7 +121,7 @@ def _series(figure: Any, content: Content, shapes: list[Shape], width: float) ->
 
 def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], most: int) -> None:
     """The particles, or the bodies, at the end."""
-    drawn = Drawn(len(end), content.body, most)
+    drawn = Drawn(len(end), content.body, most, end.radius)
     start = content.frames.get("start", end)
     # Of those that come during the run nobody may be there at the start.
     start = end if np.isnan(start.position[0]).any() else start
@@ -131,7 +131,7 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     axes = drawing.view(figure, across)
     figure.set_facecolor(drawing.BACKGROUND)
     wires = [(shape.solid, shape.wires) for shape in shapes]
-    drawing.frame(axes, position.T, packed, wires, *drawn.ties(position.T, packed, tints), across)
+    drawing.frame(axes, position.T, packed, wires, *drawn.ties(position.T, packed, tints), across, drawn.radius)
     drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high)
     count = content.count // (1 if content.body is None else len(content.body))
     title = f"{drawn.shown} of {count} {drawn.noun}, t = {content.seen['time'][-1]:.6g} s"

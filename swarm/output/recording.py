@@ -99,7 +99,9 @@ class RecordingWriter:
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
         self._last, self._body = frames - 1, body
         self._fed = start.births is not None or bool(np.isnan(start.position).any())
-        self._drawn = drawn = Drawn(len(start), body, settings.particles)
+        self._drawn = drawn = Drawn(len(start), body, settings.particles, start.radius)
+        some = {"collisions": start.radius is not None, "rotational_energy": start.spin is not None}
+        self._more = [name for name, there in {"source_energy": self._fed, **some}.items() if there]
         self._at_start, self._center = drawn.points(start.position), origin_of(scene, start)
         if body is not None and settings.color != "speed":
             raise SceneError(
@@ -127,7 +129,7 @@ class RecordingWriter:
 
     def __enter__(self) -> WriteFrames:
         self._shapes = shapes_of(self._scene, self._at_start)
-        self._series = series.lines_of(self._scene, self._method, self._shapes, self._body, self._fed)
+        self._series = series.lines_of(self._scene, self._method, self._shapes, self._body, self._more)
         fixed = sum(24 * len(s.vertices) + 12 * len(s.triangles) + 12 * sum(map(len, s.wires)) for s in self._shapes)
         lines, triangles = len(self._drawn.lines), len(self._drawn.triangles)
         points = self._at_start.shape[1] * (2 if triangles else 1)

@@ -1,7 +1,7 @@
 """The time series that recordings and plots show, from the observables of frames."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +33,7 @@ VIEWS = {
 }
 # Views that pictures leave out where all values are 0.
 _RARE = ("sliding",)
-_ENERGIES = ("total", "kinetic", "potential", "contact", "dissipated", "elastic", "work")
+_ENERGIES = ("total", "kinetic", "rotational", "potential", "contact", "dissipated", "elastic", "work")
 
 
 @dataclass(frozen=True)
@@ -76,11 +76,12 @@ def group_of(path: str) -> str:
 
 
 def lines_of(
-    scene: Scene, method: Method, shapes: list[Shape], body: Body | None = None, fed: bool = False
+    scene: Scene, method: Method, shapes: list[Shape], body: Body | None = None, more: Collection[str] = ()
 ) -> list[Line]:
     """The time series of a scene with particles or bodies, without those that are always zero in it.
 
-    `fed`: particles come from sources.
+    `more` has the observables that only some runs have: of sources "source_energy", of balls "collisions", and of those
+    that turn "rotational_energy".
     """
     named, one = scene.names_laws(), "particle" if body is None else "body"
     laws = None if named else scene.laws()
@@ -88,15 +89,19 @@ def lines_of(
     energies = {"total": True, "kinetic": True, "potential": scene.gravity is not None}
     energies |= {
         "contact": method.law() is not None,
-        "dissipated": named or (laws is not None and laws[:2] != (None, None)),
+        "dissipated": named or (laws is not None and laws[:2] != (None, None)) or _pairs_lose(scene),
+        "rotational": "rotational_energy" in more,
     }
     lines = [Line(f"/energy/{name}", name, f"{name}_energy") for name, there in energies.items() if there]
-    lines += [Line("/energy/sources", "brought by sources", "source_energy")] * fed
+    lines += [Line("/energy/sources", "brought by sources", "source_energy")] * ("source_energy" in more)
     lines += [
         Line("/energy_error", f"of a {one}", "energy_error", logarithm=True),
         Line("/penetration", f"of a {one}", "max_penetration", logarithm=True),
-        Line("/impacts", every, "impacts", per=1.0),
+        Line("/impacts", every if "collisions" not in more else "with walls", "impacts", per=1.0),
     ]
+    if "collisions" in more:
+        lines.append(Line("/impacts/collisions", "with one another", "collisions", per=1.0))
+        lines += [Line("/pressure/virial", "of the balls, by the virial", "pressure")] * (not scene.is_open())
     if body is not None and (len(body.springs) or body.strain is not None):
         lines.append(Line("/energy/elastic", "elastic", "contact_energy"))
     if body is not None and len(body.links):
@@ -112,6 +117,11 @@ def lines_of(
     if method.is_rigid():
         lines.append(Line("/sliding", every, "sliding"))
     return lines + _lines_of_walls(scene, shapes)
+
+
+def _pairs_lose(scene: Scene) -> bool:
+    """Whether particles lose energy where they meet."""
+    return scene.pairs is not None and (scene.pairs.restitution < 1.0 or scene.pairs.friction > 0.0)
 
 
 @dataclass(frozen=True)

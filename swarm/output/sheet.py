@@ -88,7 +88,8 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
         else:
             number = playback.numbers[k]
             ties = playback.lines(number), playback.faces(number)
-            drawing.frame(cells[-1], *playback.frame(number), playback.wires_at(number), *ties, across)
+            wires, radius = playback.wires_at(number), playback.radius
+            drawing.frame(cells[-1], *playback.frame(number), wires, *ties, across, radius)
     drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"])
     count = "1 frame" if len(playback.times) == 1 else f"{len(playback.times)} frames"
     title = f"{playback.path.name}: {about['shown']} of {about['particles']} {about['noun']}, {count}"

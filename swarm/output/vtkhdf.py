@@ -36,7 +36,8 @@ def write(chosen: Exported, path: Path) -> None:
                     if name != "position":
                         steps[f"PointDataOffsets/{name}"] = n * np.arange(frames)
                 values[name][done * n : (done + 1) * n] = column
-        for name, constant in (("id", chosen.ids), ("mass", chosen.mass)):
+        balls = {} if chosen.radius is None else {"radius": chosen.radius}
+        for name, constant in {"id": chosen.ids, "mass": chosen.mass, **balls}.items():
             root[f"PointData/{name}"], steps[f"PointDataOffsets/{name}"] = constant, np.zeros(frames, np.int64)
 
 

@@ -26,6 +26,7 @@ def write(chosen: Exported, path: Path) -> None:
         for moment in chosen.moments():
             columns = {"position": moment.position, "velocity": moment.velocity, "id": moment.ids, **moment.more}
             columns |= {} if alike else {"mass": moment.mass}
+            columns |= {} if chosen.radius is None else {"radius": chosen.radius}
             about = [cell, "Properties=species:S:1"]
             for name, column in columns.items():
                 about[1] += f":{_NAMES.get(name, name)}:{_KINDS[column.dtype.kind]}:{math.prod(column.shape[1:])}"

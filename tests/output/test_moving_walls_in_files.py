@@ -97,7 +97,7 @@ def test_pictures_show_the_walls_of_their_time(run, tmp_path, monkeypatch):
     monkeypatch.setattr(
         drawing,
         "particles",
-        lambda axes, *rest: drawn.append([wires for _solid, wires in rest[2]]) or draw(axes, *rest),
+        lambda axes, *rest, **more: drawn.append([wires for _solid, wires in rest[2]]) or draw(axes, *rest, **more),
     )
     held = playback.Playback(folder / "run.rrd")
     sheet.draw_sheet(held, tmp_path / "sheet.png", [0.0, 0.5, 1.0], False)
