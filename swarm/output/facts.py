@@ -87,7 +87,7 @@ def of_meshes(scene: Any) -> dict[str, str]:
 def of_run(seen: dict[str, Any]) -> dict[str, str]:
     """The figures that show whether a run went well."""
     counts = [name for name in ("impacts", "collisions") if name in seen]
-    rows = {name: f"{int(seen[name][-1]):,}".replace(",", " ") for name in counts}
+    rows: dict[str, str] = {name: f"{int(seen[name][-1]):,}".replace(",", " ") for name in counts}
     if slid := seen.get("sliding_time", [0.0])[-1]:
         rows["sliding"] = f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"
     rows["energy drift"] = f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle"
