@@ -40,6 +40,9 @@ class Rounded(Distance):
         e0, e1 = self.from_body(r0), self.from_body(r1)
         return dot(e1 - e0, e1 + e0)
 
+    def distance(self, r):
+        return self.gap_of(self.inner(r))
+
     def unit_normal(self, r):
         e = self.from_body(r)
         q = square(e)

@@ -1,0 +1,248 @@
+"""Walls that the centres of balls meet: as far as the radius from the wall, whatever it is."""
+
+import math
+
+import numpy as np
+import pytest
+from conftest import call
+
+import swarm
+from swarm.kernel.vector import Vec
+
+TURN = (0.8, 0.1, -0.5, 0.3)
+# One line a shape: what it is, and how far from the origin balls are looked at.
+SHAPES = {
+    "sphere": (swarm.Sphere(1.0, (0.1, 0.2, 0.3)), 1.0),
+    "ball": (swarm.Sphere(0.4, (0.1, 0.0, 0.0), "outside"), 1.0),
+    "plane": (swarm.Plane((1.0, 2.0, 3.0), 0.4), 1.0),
+    "slab": (swarm.Slab((1.0, 1.0, 0.0), 0.5), 1.0),
+    "plate": (swarm.Slab((0.0, 0.0, 1.0), 0.2, side="outside"), 1.0),
+    "box": (swarm.Box((0.5, 0.6, 0.7), rotation=TURN), 0.8),
+    "brick": (swarm.Box((0.5, 0.3, 0.4), (0.1, 0.0, 0.0), "outside", rotation=TURN), 1.0),
+    "upright brick": (swarm.Box((0.5, 0.3, 0.4), (0.1, 0.0, 0.2), "outside"), 1.0),
+    "tube": (swarm.Cylinder(0.6, (1.0, 1.0, 1.0)), 0.8),
+    "tube along x": (swarm.Cylinder(0.6, (1.0, 0.0, 0.0), center=(0.0, 0.1, 0.2)), 0.8),
+    "wire": (swarm.Cylinder(0.3, (1.0, 1.0, 1.0), center=(0.1, 0.0, 0.0), side="outside"), 1.0),
+    "can": (swarm.Cylinder(0.6, (1.0, 2.0, 0.0), length=1.4), 0.7),
+    "drum": (swarm.Cylinder(0.4, (1.0, 2.0, 0.5), length=0.6, side="outside"), 1.0),
+    "capsule": (swarm.Capsule(0.5, 0.8, (1.0, 2.0, 0.0)), 0.8),
+    "rod": (swarm.Capsule(0.3, 0.8, (1.0, 2.0, 0.0), side="outside"), 1.0),
+    "torus": (swarm.Torus(1.0, 0.4, rotation=TURN), 1.3),
+    "ring": (swarm.Torus(0.8, 0.2, side="outside", rotation=TURN), 1.3),
+    "cone": (swarm.Cone(0.7, (1.0, 0.0, 2.0), (0.0, 0.0, -0.5)), 1.0),
+    "cone along x": (swarm.Cone(0.7, (-1.0, 0.0, 0.0), (0.5, 0.0, 0.0)), 1.0),
+    "spike": (swarm.Cone(0.5, (1.0, 0.0, 2.0), side="outside"), 1.0),
+    "flat spike": (swarm.Cone(1.2, (0.0, 0.0, -1.0), side="outside"), 1.0),
+}
+every_shape = pytest.mark.parametrize("name", SHAPES)
+
+
+def walls_of(surface, radius):
+    """The walls that the centre of a ball meets, in the arithmetic of kernels."""
+    return [call(wall.grown, radius) for wall in map(_as_floats, surface.walls_of_balls(0.3))]
+
+
+def _as_floats(one):
+    if isinstance(one, tuple):
+        parts = map(_as_floats, one)
+        return tuple(parts) if type(one) is tuple else type(one)(*parts)
+    return np.float64(one) if isinstance(one, float) else one
+
+
+def gap_of(surface, points):
+    """The gap of a surface at points (3, N): above 0 where they are outside of it."""
+    return (-1.0 if surface.is_solid() else 1.0) * surface.phi(points)
+
+
+def outermost(walls, r):
+    """The wall that a ball is farthest outside of, and how far."""
+    depths = [call(wall.distance, r) for wall in walls]
+    k = int(np.argmax(depths))
+    return walls[k], depths[k]
+
+
+def places(name, number, least=0.02):
+    """Centres of balls that a shape admits, and radii that fit: from touching down to a tenth of that."""
+    surface, reach = SHAPES[name]
+    rng = np.random.default_rng(sum(map(ord, name)))
+    found = []
+    while len(found) < number:
+        r = rng.uniform(-reach, reach, 3)
+        room = -float(surface.reaching_outside(r[:, None], np.zeros(1))[0])
+        if gap_of(surface, r[:, None])[0] < 0.0 and room > least:
+            found.append((r, room, room * rng.choice([0.999, 0.9, 0.5, 0.1])))
+    return found
+
+
+@every_shape
+def test_a_ball_touches_where_the_nearest_point_of_the_wall_is(name):
+    """So far ahead along the normal is the wall, nowhere nearer, and none of that depends on the radius."""
+    surface, rng = SHAPES[name][0], np.random.default_rng(3)
+    around = rng.normal(size=(3, 3000))
+    around /= np.sqrt((around**2).sum(axis=0))
+    for r, room, radius in places(name, 40):
+        assert outermost(walls_of(surface, radius), r)[1] == pytest.approx(radius - room, abs=1e-14)
+        wall, depth = outermost(walls_of(surface, room), r)
+        assert abs(depth) <= 1e-14
+        normal = np.array(call(wall.unit_normal, r))
+        assert math.hypot(*normal) == pytest.approx(1.0, abs=1e-14)
+        foot = r + room * normal
+        steep = max(math.hypot(*surface.gradient(foot)), 1e-3)
+        assert abs(surface.phi(foot)) <= 1e-13 * (1.0 + steep)
+        close = normal[:, None] + rng.normal(size=(3, 300)) * rng.choice([1e-3, 0.03, 0.3], 300)
+        close /= np.sqrt((close**2).sum(axis=0))
+        for directions in (around, close):
+            assert gap_of(surface, r[:, None] + (1.0 - 1e-9) * room * directions).max() <= 1e-12
+
+
+@every_shape
+@pytest.mark.parametrize("heavy", [0.0, 2.0], ids=["straight", "falling"])
+def test_a_flight_ends_where_the_ball_touches_first(name, heavy):
+    """It ends on a wall, and never comes outside before; steps as long as the distance come to the same instant."""
+    surface, rng = SHAPES[name][0], np.random.default_rng(5)
+    hits = 0
+    for r, _room, radius in places(name, 25):
+        walls, v, pull = walls_of(surface, radius), rng.normal(size=3), heavy * rng.normal(size=3)
+        time, wall = first_hit(walls, r, v, pull, 20.0)
+        assert time >= by_distances(walls, r, v, pull, min(time, 20.0)) - 1e-5
+        if wall is None:
+            assert by_distances(walls, r, v, pull, 20.0) >= 20.0
+            continue
+        hits += 1
+        at, w = r + time * v + 0.5 * time * time * pull, v + time * pull
+        assert abs(outermost(walls, at)[1]) <= 1e-13 * (1.0 + abs(at).max())
+        assert np.array(call(wall.unit_normal, at)) @ w >= -1e-12
+        assert by_distances(walls, r, v, pull, time) >= time - 1e-5
+    assert hits > 2
+
+
+def first_hit(walls, r, v, pull, until):
+    """When a flight meets a wall, and which, or None."""
+    total = 0.0
+    for _ask in range(200):
+        asked = [
+            (*(call(w.falling_hit, r, v, pull) if pull.any() else call(w.first_hit, r, v)), k)
+            for k, w in enumerate(walls)
+        ]
+        time, found, k = min(asked, key=lambda one: one[0])
+        if not total + time < until:
+            return math.inf, None
+        r, v, total = r + time * v + 0.5 * time * time * pull, v + time * pull, total + time
+        if found:
+            return total, walls[k]
+    raise AssertionError("not found")
+
+
+def by_distances(walls, r, v, pull, until):
+    """The same by steps that are as long as the ball is away from all walls, to a small distance."""
+    t, weight = 0.0, math.hypot(*pull)
+    while t < until:
+        at, w = r + t * v + 0.5 * t * t * pull, v + t * pull
+        away = -outermost(walls, at)[1]
+        if away < 1e-7:
+            return t
+        speed = math.hypot(*w)
+        t += 2.0 * away / (speed + math.sqrt(speed * speed + 2.0 * weight * away))
+    return until
+
+
+@every_shape
+def test_a_step_has_a_discrete_gradient(name):
+    """D.(r1 - r0) = q1 - q0 of any two places near the wall, and its divided difference is that of the gap."""
+    surface, rng = SHAPES[name][0], np.random.default_rng(7)
+    for r, room, _radius in places(name, 20):
+        for wall in walls_of(surface, 0.9 * room):
+            near = r + room * 0.2 * rng.normal(size=3)
+            d = np.array(call(wall.discrete_gradient, r, near))
+            q0, q1 = call(wall.inner, r), call(wall.inner, near)
+            assert d @ (near - r) == pytest.approx(q1 - q0, abs=1e-14)
+            slope = call(wall.gap_slope, q0, q1)[0]
+            assert slope * (q1 - q0) == pytest.approx(call(wall.gap_of, q1) - call(wall.gap_of, q0), abs=1e-14)
+
+
+@every_shape
+def test_what_safe_times_and_distances_promise(name):
+    """Until the safe time no ball touches; `far` is no more than the distance."""
+    surface, rng = SHAPES[name][0], np.random.default_rng(9)
+    for r, _room, radius in places(name, 20):
+        walls, v, pull = walls_of(surface, radius), rng.normal(size=3), rng.normal(size=3)
+        for wall in walls:
+            away, safe = -call(wall.distance, r), min(call(wall.safe_time, r, v, pull), 5.0)
+            assert call(wall.far, r) <= max(away, 0.0) + 1e-12
+            for t in safe * rng.uniform(0.0, 1.0, 20):
+                assert call(wall.distance, r + t * v + 0.5 * t * t * pull) <= 1e-12
+
+
+def test_balls_of_any_radius_are_known_to_the_scene():
+    scene = swarm.Scene([swarm.Sphere(1.0), swarm.Box((0.2, 0.2, 0.2), side="outside")])
+    points, radius = np.array([[0.6, 0.6, 0.45], [0.0, 0.0, 0.45], [0.0, 0.0, 0.45]]), np.array([0.1, 0.5, 0.4])
+    reach = scene.distances_outside(points, 0.0, radius)
+    corner = math.sqrt(3.0 * 0.25**2)
+    assert reach == pytest.approx(np.array([[-0.3, 0.1, 0.45 * 3**0.5 - 0.6], [-0.3, 0.1, 0.4 - corner]]))
+    assert scene.admits(points, radius).tolist() == [True, False, False]
+    assert scene.outside(points, 0.2, radius).tolist() == []
+    assert scene.outside(points, 0.15, radius).tolist() == [2]
+    assert (scene.gaps(points, 0.0, radius) == reach).all()
+
+
+def test_a_ball_meets_a_solid_across_a_face_of_the_cell():
+    scene = swarm.Scene([swarm.Sphere(0.2, (0.25, 0.5, 0.5), "outside")], period=(1.0, 1.0, 1.0))
+    assert len(scene.pieces) == 1
+    assert len(scene.of_balls(np.array([0.04])).pieces) == 1
+    assert len(scene.of_balls(np.array([0.1])).pieces) == 2
+    assert scene.distances_outside([[0.98], [0.5], [0.5]], 0.0, np.array([0.1])) == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize("kind", ["spheres", "rods", "bricks", "drums"])
+def test_the_cells_of_a_field_hold_what_balls_touch(kind):
+    """As all members one by one say."""
+    rng = np.random.default_rng(11)
+    places, axes = rng.uniform(-1.0, 1.0, (60, 3)), rng.normal(size=(60, 3))
+    field = {
+        "spheres": swarm.Spheres(places, rng.uniform(0.02, 0.1, 60)),
+        "rods": swarm.Capsules(places, 0.05, 0.2, axes),
+        "bricks": swarm.Boxes(places, (0.05, 0.1, 0.02), rng.normal(size=(60, 4))),
+        "drums": swarm.Cylinders(places, 0.05, axes, 0.2),
+    }[kind]
+    radius = rng.uniform(0.01, 0.3, 400)
+    points = rng.uniform(-1.2, 1.2, (3, 400))
+    with np.errstate(all="ignore"):
+        found = field.reaching_outside(points, radius)
+        one_by_one = np.max([solid.reaching_outside(points, radius) for solid in field.solids()], axis=0)
+    touches = one_by_one > 0.0
+    assert 50 < touches.sum() < 350
+    assert found[touches] == pytest.approx(one_by_one[touches], abs=1e-14)
+    assert (found[~touches] <= 0.0).all()
+    members = field.walls_of_balls(0.3)[0]
+    for k in range(20):
+        v = rng.normal(size=3)
+        if touches[k]:
+            continue
+        grown = members.grown(np.float64(radius[k]))
+        start, total = Vec(*points[:, k]), 0.0
+        with np.errstate(all="ignore"):
+            for _cell in range(100):
+                hit = grown.field_hit(None, start, Vec(*v))
+                total += hit.time
+                if hit.wall >= 0.0 or not total < math.inf:
+                    break
+                start = start + Vec(*v) * hit.time
+            each = [
+                call(members.grown(np.float64(radius[k])).wall(float(m)).first_hit, points[:, k], v) for m in range(60)
+            ]
+        assert total == pytest.approx(min(time for time, _found in each), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("surfaces", "words"),
+    [
+        ([swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.5, (0.6, 0.0, 0.0))])], "Union, of 2 rooms"),
+        ([swarm.Formula("x**2 + y**2 + z**4 - 1")], "Formula"),
+    ],
+    ids=["union", "formula"],
+)
+def test_what_no_ball_may_meet_is_refused_in_a_sentence(surfaces, words):
+    scene = swarm.Scene(surfaces)
+    ball = swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), radius=0.1)
+    with pytest.raises(swarm.SceneError, match=words):
+        swarm.simulate(scene, ball, swarm.Impact(), until=1.0, every=1.0, progress=False)
