@@ -20,11 +20,13 @@ from ..shapes.common import Distance
 
 # The last step is shorter than this part of the radius, whose square is none, or than round-off of a place.
 _CLOSE, _ROUND_OFF = 1e-8, 4.0 * 2.220446049250313e-16
+# Part of a distance over which e is differenced: the cube root of the round-off.
+_SPACING = 6e-6
 _TINY = float(np.finfo(np.float64).tiny)
 
 
 class Rounded(Distance):
-    """A body grown by `radius`; it gives the fields of `Distance`, `from_body` and `hessian`."""
+    """A body grown by `radius`; it gives the fields of `Distance` and `from_body`."""
 
     def from_body(self, r):
         """The vector from the nearest point of the body; 0 in it."""
@@ -72,8 +74,27 @@ class Rounded(Distance):
     def passed(self, r, v):
         return dot(self.from_body(r), v) >= 0.0
 
+    def hessian(self, r):
+        # By differences of e
+        h = _SPACING * (norm(self.from_body(r)) + self.radius) + _TINY
+        half = 0.5 / h
+        x = half * (self.from_body(r + Vec(h, 0.0, 0.0)) - self.from_body(r - Vec(h, 0.0, 0.0)))
+        y = half * (self.from_body(r + Vec(0.0, h, 0.0)) - self.from_body(r - Vec(0.0, h, 0.0)))
+        z = half * (self.from_body(r + Vec(0.0, 0.0, h)) - self.from_body(r - Vec(0.0, 0.0, h)))
+        return Symmetric(x.x, y.y, z.z, x.y, y.z, z.x)
+
     def hessian_bounds(self, r):
         return (0.0, 1.0, self.radius)
+
+    def may_reach(self, low, high):
+        return norm(self.from_body(0.5 * (low + high))) <= self.radius + 0.500001 * norm(high - low)
+
+
+def part_within(d, way):
+    """The part of a way at which it is nearest to a place, from 0 to 1."""
+    length2 = square(way)
+    part = dot(d, way) / select(length2 > 0.0, length2, 1.0)
+    return select(part > 0.0, select(part < 1.0, part, 1.0), 0.0)
 
 
 class ToBody(Record):

@@ -6,9 +6,13 @@ import numpy as np
 
 from ... import checks
 from ...errors import SceneError
+from ...kernel.vector import Vec
+from ..balls.facet import RoundTriangle
 from ..data.mesh_files import Floats, Soup
 from ..data.triangles import Mesh as Closed
 from ..fields.grid import aligned
+from ..fields.many import field_of
+from ..fields.members import Members
 from .members import Facets
 from .nearest import nearest
 from .room import CLOSED, FREE, KIND, rooms_of, with_blocks
@@ -68,6 +72,16 @@ def table_of_facets(corners: Floats, room: float) -> Floats:
         inwards /= np.linalg.norm(inwards, axis=1)[:, None]
         columns += [inwards, ((inwards * p).sum(axis=1) - room)[:, None]]
     return aligned(np.concatenate(columns, axis=1))
+
+
+def triangles_of_balls(corners: Floats, largest: float) -> Members:
+    """The triangles with these corners (T, 3, 3) as balls meet them, with radii of at most the largest one [m]."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    radius = np.broadcast_to([0.0, 0.0, -1.0], (len(a), 3))
+    table = aligned(np.concatenate([a, b - a, c - a, radius], axis=1))
+    zero = Vec(0.0, 0.0, 0.0)
+    low, high = (np.ascontiguousarray(end(corners, axis=1).T) for end in (np.min, np.max))
+    return field_of(RoundTriangle(zero, zero, zero, 0.0, 0.0, -1.0), table, lambda: (low, high), None, largest)
 
 
 def _normals(a: Floats, b: Floats, c: Floats) -> Floats:

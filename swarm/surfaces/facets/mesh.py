@@ -16,10 +16,11 @@ from ...kernel.vector import Vec
 from .. import rotation as rotations
 from ..data.mesh_files import Floats, Indices, read_soup
 from ..data.triangles import closed
+from ..fields.members import Members
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .cells import cells_around
 from .facet import FacetNumbers, Shared
-from .made import given_arrays, sorted_by_place, table_of_facets, with_room
+from .made import given_arrays, sorted_by_place, table_of_facets, triangles_of_balls, with_room
 from .members import Facets
 from .nearest import boxes_of, nearest, within
 
@@ -175,6 +176,15 @@ class Mesh(Surface):
 
     def walls(self) -> tuple[Facets]:
         return (self.members,)
+
+    def walls_of_balls(self, largest: float) -> tuple[Members]:
+        made: dict[float, Members] = self.__dict__.setdefault("_of_balls", {})
+        if largest not in made:
+            made[largest] = triangles_of_balls(self.corners[self.triangles], largest)
+        return (made[largest],)
+
+    def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
+        return np.asarray(side_sign(self.side) * self.phi(points, time) + radius)
 
     def numbers(self) -> list[int]:
         """The number of every triangle."""

@@ -13,12 +13,13 @@ from ...errors import SceneError
 from ...kernel.vector import Vec, vec
 from .. import rotation as rotations
 from ..fields.grid import one_cell
-from ..fields.many import Many, grid_of
+from ..fields.many import Many, field_of, grid_of
 from ..fields.members import Members, table_of
 from ..rotation import Rotated
 from ..shapes.quadratic import QuadricNumbers
 from ..surface import UNBOUNDED, Box, HalfSpace, Surface, side_sign
 from .outline import Floats, Outline
+from .round_side import round_side
 from .sides import FewSides, Side, Sides
 
 # At so few sides each lane looks on a straight flight; under gravity so few are in one cell of a grid.
@@ -180,6 +181,17 @@ class Outlined(Many):
         like = self._side(0)
         grid = one_cell(len(self)) if len(self) <= _IN_ONE_CELL else grid_of(like, table, self._boxes())
         return (FewSides if len(self) <= _FEW else Sides)(like, table, grid)
+
+    def _members_of_balls(self, largest: float) -> Members:
+        sides = [round_side(self._side(k)) for k in range(len(self))]
+        table = table_of(sides)
+        return field_of(sides[0], table, self._boxes, None, largest)
+
+    def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
+        return np.asarray(side_sign(self.side) * self.phi(points, time) + radius)
+
+    def holds_balls(self) -> str | None:
+        return None
 
     def _boxes(self) -> tuple[Floats, Floats]:
         """The lowest and the highest corners (3, n) of boxes around all walls, infinite across an endless outline."""

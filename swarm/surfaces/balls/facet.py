@@ -1,0 +1,31 @@
+"""A triangle that balls meet, from both sides: with round edges and corners."""
+
+from ...kernel.jit import select
+from ...kernel.vector import Vec, cross, dot, either, square
+from .rounded import Rounded, part_within
+
+
+class RoundTriangle(Rounded):
+    """A triangle of a mesh; `side` is -1, for balls are outside of what is within the radius from it."""
+
+    corner: Vec
+    first: Vec  # from there to the other corners
+    second: Vec
+    radius: float
+    radius2: float
+    side: float
+
+    def from_body(self, r):
+        d, a, b = r - self.corner, self.first, self.second
+        n, third = cross(a, b), b - a
+        n2 = square(n)
+        # Between its edges, seen along the normal
+        u, v = dot(cross(d, b), n), dot(cross(a, d), n)
+        within = (n2 > 0.0) & (u >= 0.0) & (v >= 0.0) & (u + v <= n2)
+        across = (dot(d, n) / select(n2 > 0.0, n2, 1.0)) * n
+        far = d - a
+        one, two = d - part_within(d, a) * a, d - part_within(d, b) * b
+        other = far - part_within(far, third) * third
+        edge = either(square(one) <= square(two), one, two)
+        edge = either(square(edge) <= square(other), edge, other)
+        return either(within, across, edge)

@@ -1,0 +1,142 @@
+"""The sides of an outline as balls meet them: each parallel to its line or arc, and a circle around both its ends."""
+
+import math
+from typing import Any
+
+from ...kernel.gravity import as_vector
+from ...kernel.jit import outlined, select
+from ...kernel.vector import Vec, either, norm, square, times
+from .. import contract
+from ..balls.tube import Tube
+from ..course import ball_rise_time
+from ..rotation import Rotated
+from .sides import Side
+
+# What an arc bends away from within this part of its radius is a point.
+_LEAST = 1e-12
+
+
+class RoundSide(contract.Smooth):
+    """All that is within the radius of a ball from one side; phi is the distance outside of what is admissible."""
+
+    wall: Side
+    radius: float
+
+    side = 1.0
+    holds_balls = True
+
+    def grown(self, radius):
+        return self._replace(radius=radius)
+
+    # --- The distance ---
+
+    def phi(self, r):
+        return self.wall.distance(r) + self.radius
+
+    def distance(self, r):
+        return self.phi(r)
+
+    def gradient(self, r):
+        # Towards the nearest point of the side, or, behind it, away from that
+        wall = self.wall
+        signed, out = wall.signed(r)
+        d = wall.along_plane(r - wall.body.center)
+        last = d - wall.end
+        at_start = square(d) < square(last)
+        to_end = -1.0 * either(at_start, d, last)
+        within = wall.is_within(d - signed * out, wall.slack)
+        n = either(within, out, to_end)
+        length = norm(n)
+        return n * (1.0 / select(length > 0.0, length, 1.0))
+
+    unit_normal = gradient
+
+    def far(self, r):
+        return -self.phi(r)
+
+    def out_of(self, r):
+        return -self.phi(r)
+
+    def may_reach(self, low, high):
+        wall = self.wall
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        t, n = wall.ahead, wall.body.b
+        # Along the plane 1, across it 0, where boxes have no end
+        half = times(times(t, t) + times(n, n), half)
+        return wall.beside(middle)[1] <= self.radius + 1.000001 * norm(half)
+
+    # --- Flight ---
+
+    def parallel(self):
+        """Whether the ball is not too wide for the arc, and the line or arc so far in the admissible side."""
+        wall, radius = self.wall, self.radius
+        body = wall.body
+        # The curvature is 2 a, which is 0 across the plane.
+        k = 2.0 * (max(body.a.x, max(body.a.y, body.a.z)) + min(body.a.x, min(body.a.y, body.a.z)))
+        narrow = 1.0 - k * radius
+        fits = narrow > _LEAST
+        scale = 1.0 / select(fits, narrow, 1.0)
+        start = body.center - radius * body.b
+        # The normal at the end is n + k end.
+        end = narrow * wall.end
+        moved = body._replace(center=start, a=scale * body.a)
+        return fits, wall._replace(body=moved, end=end)
+
+    def has_ends(self):
+        """Whether the side has ends: a lid has none."""
+        return square(self.wall.end) > 0.0
+
+    def around(self, point):
+        """The circle around one of its ends."""
+        t, n = self.wall.ahead, self.wall.body.b
+        along = times(t, t) + times(n, n)
+        across = Vec(_whole(along.x), _whole(along.y), _whole(along.z))
+        return Tube(point, across, self.radius, self.radius * self.radius, -1.0)
+
+    def ends(self):
+        """Both circles."""
+        start = self.wall.body.center
+        return self.around(start), self.around(start + self.wall.end)
+
+    def first_hit(self, r, v):
+        fits, parallel = self.parallel()
+        time, _found = parallel.first_hit(r, v)
+        first = select(fits, time, math.inf)
+        for circle in self.ends():
+            d, u = circle.off(r), times(circle.across, v)
+            time = select(self.has_ends(), ball_rise_time(-1.0, circle.radius2, d, u), math.inf)
+            first = select(time < first, time, first)
+        return first, True
+
+    def falling_hit(self, r, v, pull):
+        return _first_fall(self, r, v, pull)
+
+    def entry(self, gravity, r, v):
+        return self.first_hit(r, v) if gravity is None else self.falling_hit(r, v, as_vector(gravity))
+
+    def safe_time(self, r, v, pull):
+        return self.falling_hit(r, v, pull)[0]
+
+
+def _whole(part):
+    return select(part > 0.25, 1.0, 0.0)
+
+
+@outlined
+def _first_fall(side, r, v, pull):
+    """When a fall hits a side: the parallel curve or a circle."""
+    fits, parallel = side.parallel()
+    first, found = math.inf, True
+    if fits:
+        first, found = parallel.falling_hit(r, v, pull)
+    if side.has_ends():
+        for circle in side.ends():
+            time, here = circle.falling_hit(r, v, pull)
+            if time < first:
+                first, found = time, here
+    return first, found
+
+
+def round_side(wall: Any) -> Any:
+    """A side of an outline, which may be turned, as balls meet it."""
+    return wall._replace(body=round_side(wall.body)) if isinstance(wall, Rotated) else RoundSide(wall, 0.0)
