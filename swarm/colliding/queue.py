@@ -7,7 +7,7 @@ are in one line of the cache; behind the last there are three that never come.
 
 import math
 
-from ..kernel.arrays import index
+from ..kernel.arrays import fetch, index
 from ..kernel.jit import outlined, select
 from .rows import FLOATS, MEETS, NOBODY, PARTNER, WHOLES
 
@@ -60,6 +60,11 @@ def _sink(flock, node, item, key):
     last = flock.number() + FIRST
     first = _CHILDREN * (node - 2)
     while first < last:
+        # The children of all of these: the next ones are among them.
+        below = _CHILDREN * (first - 2)
+        fetch(flock.key, below)
+        fetch(flock.key, below + 8)
+        fetch(flock.item, below)
         a, b = flock.key[index(first)], flock.key[index(first + 1)]
         c, d = flock.key[index(first + 2)], flock.key[index(first + 3)]
         one, other = select(b < a, b, a), select(d < c, d, c)
