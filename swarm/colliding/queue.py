@@ -2,7 +2,7 @@
 
 The order is that of the times; of equal ones that of the smaller ball of a collision, then of the other one (none at a
 wall), so that it does not depend on what was done to the heap before. Nodes are numbered from 3 on, so that children
-are in one line of the cache; behind the last there are three that never come.
+are in one line of the cache; behind the last there are some that never come.
 """
 
 import math
@@ -12,7 +12,7 @@ from ..kernel.jit import outlined, select
 from .rows import FLOATS, MEETS, NOBODY, PARTNER, WHOLES
 
 # The first node, of which the children are those from 4 (node - 2) to 4 (node - 2) + 3.
-FIRST, SPARE = 3, 6
+FIRST, SPARE = 3, 8
 _CHILDREN = 4
 
 
@@ -69,7 +69,7 @@ def _sink(flock, node, item, key):
         c, d = flock.key[index(first + 2)], flock.key[index(first + 3)]
         one, other = select(b < a, b, a), select(d < c, d, c)
         soonest = select(other < one, other, one)
-        if key < soonest or key == math.inf:
+        if key < soonest or soonest == math.inf:
             break
         least = first + select(other < one, select(d < c, 3, 2), select(b < a, 1, 0))
         again = (a == b) | (c == d) | (one == other)
