@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..kernel.arrays import index, unwritten
+from ..kernel.arrays import fetch, index, unwritten
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, square
@@ -208,7 +208,9 @@ def _around(box, flock, i, now, face, known):
                 row = grid.stride * (grid.z.offset[index(kz)] + line)
                 count = room[index(row)]
                 for k in range(_FEW):
-                    near[index(found + k)] = room[index(row + 1 + k)]
+                    j = room[index(row + 1 + k)]
+                    near[index(found + k)] = j
+                    fetch(flock.flight, FLOATS * j)
                 found += min(count, _FEW)
                 if count > _FEW:
                     known = _look_through(box, flock, i, now, rest, row, known)

@@ -11,7 +11,7 @@ import math
 from typing import Any, NamedTuple
 
 from ..contact.reflection import Energy, exact
-from ..kernel.arrays import index
+from ..kernel.arrays import fetch, index
 from ..kernel.gravity import potential
 from ..kernel.jit import Array, long_kernel, outlined, select
 from ..kernel.record import Record
@@ -211,6 +211,27 @@ def _begin_epoch(flock, clock, now):
     return shift
 
 
+def _fetch_next(box, flock):
+    """Ask for what the events of the nodes below the first need, and for the cells around the first of them."""
+    soonest, then = math.inf, 0
+    for child in range(4, 8):
+        key, item = flock.key[index(child)], flock.item[index(child)]
+        fetch(flock.event, FLOATS * item)
+        fetch(flock.flight, FLOATS * item)
+        sooner = key < soonest
+        soonest, then = select(sooner, key, soonest), select(sooner, item, then)
+    mate = max(flock.tag[index(WHOLES * then + PARTNER)], 0)
+    fetch(flock.event, FLOATS * mate)
+    fetch(flock.flight, FLOATS * mate)
+    x, y, z = flock.cell(then)
+    for kx in range(-1, 2):
+        plane = box.grid.x.offset[index(x + kx)]
+        for ky in range(-1, 2):
+            row = box.grid.stride * (box.grid.y.offset[index(y + ky)] + plane + z)
+            fetch(flock.room, row - box.grid.stride)
+            fetch(flock.room, row + box.grid.stride)
+
+
 @long_kernel
 def take(box, flock, books, clock, rule):
     """Take event after event until the end of the frame: (status, ball).
@@ -229,6 +250,7 @@ def take(box, flock, books, clock, rule):
             return Status.INTERRUPTED.value, 0
         taken += 1
         clock[EVENTS] += 1.0
+        _fetch_next(box, flock)
         if now >= clock[LENGTH]:
             shift = _begin_epoch(flock, clock, now)
             end -= shift

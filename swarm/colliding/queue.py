@@ -2,17 +2,17 @@
 
 The order is that of the times; of equal ones that of the smaller ball of a collision, then of the other one (none at a
 wall), so that it does not depend on what was done to the heap before. Nodes are numbered from 3 on, so that children
-are in one line of the cache; behind the last there are three that never come.
+are in one line of the cache; behind the last there are some that never come.
 """
 
 import math
 
-from ..kernel.arrays import index
+from ..kernel.arrays import fetch, index
 from ..kernel.jit import outlined, select
 from .rows import FLOATS, MEETS, NOBODY, PARTNER, WHOLES
 
 # The first node, of which the children are those from 4 (node - 2) to 4 (node - 2) + 3.
-FIRST, SPARE = 3, 6
+FIRST, SPARE = 3, 8
 _CHILDREN = 4
 
 
@@ -60,11 +60,16 @@ def _sink(flock, node, item, key):
     last = flock.number() + FIRST
     first = _CHILDREN * (node - 2)
     while first < last:
+        # The children of all of these: the next ones are among them.
+        below = _CHILDREN * (first - 2)
+        fetch(flock.key, below)
+        fetch(flock.key, below + 8)
+        fetch(flock.item, below)
         a, b = flock.key[index(first)], flock.key[index(first + 1)]
         c, d = flock.key[index(first + 2)], flock.key[index(first + 3)]
         one, other = select(b < a, b, a), select(d < c, d, c)
         soonest = select(other < one, other, one)
-        if key < soonest or key == math.inf:
+        if key < soonest or soonest == math.inf:
             break
         least = first + select(other < one, select(d < c, 3, 2), select(b < a, 1, 0))
         again = (a == b) | (c == d) | (one == other)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from llvmlite import ir
 from llvmlite.ir import Constant
 from llvmlite.ir.instructions import InsertValue
 from numba import types
@@ -141,6 +142,23 @@ def next_of(ticket: Any) -> int:
 def _emit_next(context, builder, signature, args):
     counter = context.make_array(signature.args[0])(context, builder, args[0]).data
     return builder.atomic_rmw("add", counter, context.get_constant(types.int64, 1), "monotonic")
+
+
+def fetch(row: Any, i: Any) -> None:
+    """Ask for the line of the cache that holds row[i], which is needed soon; the index may be of any place."""
+
+
+@operation(fetch, lambda row, i: types.none, types.Array, types.Any)
+def _emit_fetch(context, builder, signature, args):
+    data = context.make_array(signature.args[0])(context, builder, args[0]).data
+    place = builder.gep(data, [context.cast(builder, args[1], signature.args[1], types.intp)])
+    place = builder.bitcast(place, cgutils.voidptr_t)
+    number, pointer = ir.IntType(32), cgutils.voidptr_t
+    kind = ir.FunctionType(ir.VoidType(), [pointer, number, number, number])
+    ask = builder.module.declare_intrinsic("llvm.prefetch", [pointer], kind)
+    # To read, of use for long, data
+    builder.call(ask, [place, number(0), number(3), number(1)])
+    return context.get_dummy_value()
 
 
 def index(value: Any) -> Any:
