@@ -20,8 +20,9 @@ BEFORE, AFTER = 0, 3
 # inverse of the mass that moves; the damping; and where there is friction its impulse, and the place in the lists.
 START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, DRAG, LISTED = 0, 3, 4, 5, 6, 9, 12, 13, 14, 17
 COLUMNS, COLUMNS_OF_FRICTION = 16, 24
-# Of a clock: the steps of the frame that are done, and those since pairs were listed; the skin of the lists [m].
-DONE, SINCE, SKIN, CLOCK = 0, 1, 2, 3
+# Of a clock: the steps of the frame that are done, those since pairs were listed, and those since the run was halted
+# last; the skin of the lists [m].
+DONE, SINCE, TAKEN, SKIN, CLOCK = 0, 1, 2, 3, 4
 
 
 class Grains(NamedTuple):

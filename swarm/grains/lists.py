@@ -12,7 +12,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
 from ..surfaces.posed import Posed
-from .arrays import RADIUS, SKIN, X, vector_at
+from .arrays import RADIUS, X, vector_at
 from .cell import nearest
 
 # More cells than this along an axis, of which three numbers still make one.
@@ -88,12 +88,12 @@ def _list_between(period, grains, near, span, i, found):
 
 
 @long_kernel
-def list_pairs(period, grains, near, cells, clock):
+def list_pairs(period, grains, near, cells, skin):
     """List all pairs that are nearer than the sum of their radii and the skin; how many there are, listed or not."""
     key, strides, found = cells.key, cells.strides, 0
     for a in range(key.size):
         i = index(a)
-        near.first[i] = found
+        near.first[i], given = found, (cells, skin, a)
         z = key[i] // strides[2]
         y = (key[i] - z * strides[2]) // strides[1]
         x = key[i] - z * strides[2] - y * strides[1]
@@ -106,22 +106,17 @@ def list_pairs(period, grains, near, cells, clock):
                     for along in range(-1, 2):
                         if not _is_again(cells, 0, along):
                             found = _list_cells(
-                                period,
-                                grains,
-                                near,
-                                (cells, clock[SKIN], a, found),
-                                row + _beside(cells, 0, x, along),
-                                0,
-                            )
+                                    period, grains, near, given, row + _beside(cells, 0, x, along), 0, found
+                                )  # fmt: skip
                 elif row + x + 1 >= key[i]:
-                    found = _list_cells(period, grains, near, (cells, clock[SKIN], a, found), row + x, 1)
+                    found = _list_cells(period, grains, near, given, row + x, 1, found)
     near.first[index(key.size)] = found
     return found
 
 
-def _list_cells(period, grains, near, given, middle, around):
+def _list_cells(period, grains, near, given, middle, around, found):
     """List the pairs of a ball with those after it in some cells of a row; how many are listed then."""
-    cells, skin, a, found = given
+    cells, skin, a = given
     begin = max(_first_from(cells.key, middle - around), a + 1)
     end = _first_from(cells.key, middle + around + 1)
     return _list_between(period, grains, near, (begin, end, skin), index(a), found)
@@ -142,12 +137,12 @@ def _list_at_wall(wall, grains, near, skin, found):
 
 
 @long_kernel
-def list_walls(walls, grains, near, clock):
+def list_walls(walls, grains, near, skin):
     """List the balls near each wall; how many there are, listed or not."""
     found = 0
     for k, wall in enumerate(walls.at(0.0).each):
         near.wall_first[k] = found
-        found = _list_at_wall(wall, grains, near, clock[SKIN], found)
+        found = _list_at_wall(wall, grains, near, skin, found)
     near.wall_first[len(walls.each)] = found
     for k in range(grains.place.shape[0]):
         i = index(k)

@@ -12,7 +12,7 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
 from ..status import Status
-from .arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, X, set_vector, vector_at
+from .arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
 from .booking import book_pairs, book_wall
 from .contacts import gather_at_wall, gather_pairs, push_pairs, push_walls, sweep_pairs, sweep_wall, worse
 from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
@@ -215,15 +215,14 @@ def march(matter, walls, world, clock, rule):
     LEASE_ENDED where lists are to be made anew: then call this again. INTERRUPTED after so many steps as the rule says;
     it goes on with the same bits.
     """
-    taken = 0
     while clock[DONE] < rule.span:
-        if taken >= rule.halt[0]:
+        if clock[TAKEN] >= rule.halt[0]:
             return Status.INTERRUPTED.value
         left = (rule.span - clock[DONE]) * matter.h
         status = _step(matter, walls.during(left, left - matter.h), world, clock[SKIN])
         if status != Status.DONE.value:
             return status
-        taken += 1
         clock[DONE] += 1.0
+        clock[TAKEN] += 1.0
         clock[SINCE] += 1.0
     return Status.DONE.value

@@ -12,7 +12,7 @@ from .. import observables
 from ..ball_numbers import BallNumbers
 from ..errors import RunError
 from ..grains import arrays, energy, lists
-from ..grains.arrays import DONE, SINCE, SKIN, X
+from ..grains.arrays import DONE, LOST, SINCE, SKIN, TAKEN, X
 from ..grains.booking import Books
 from ..grains.described import matter_of
 from ..grains.drags import kept_drags, set_drags
@@ -55,6 +55,9 @@ class GrainsRun(BaseRun):
             particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
             np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None, balls=balls,
         )  # fmt: skip
+        if particles.image is not None:
+            self.state = self.state._replace(image=particles.image, period=scene.cell())
+        self._image = np.zeros((3, 0), np.int64) if particles.image is None else particles.image.copy()
         self._walls = scene.walls(0.0)
         pool, tier = ThreadPoolExecutor(1, "swarm"), Tier(compile, (self._matter, self._walls), n)
         super().__init__(scene, method, n, pool, tier)
@@ -82,18 +85,46 @@ class GrainsRun(BaseRun):
         """List anew what is near, where all are now."""
         matter, clock, grains, kernel = self._matter, self._clock, self._world.grains, self._tier.kernel
         kept = kept_drags(self._world)
-        reach = 2.0 * float(grains.place[:, arrays.RADIUS].max()) + clock[SKIN]
+        self._wrap()
+        skin = float(clock[SKIN])
+        reach = 2.0 * float(grains.place[:, arrays.RADIUS].max()) + skin
         cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, matter.period)
         for rows in (grains.number, grains.place, grains.speed, grains.spin):
             if rows is not None:
                 rows[:] = rows[order]
         near = self._world.near
-        while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, clock)) > near.mate.size:
+        while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:
             near = self._make_room(pairs, near.slot.size)
-        while (at := kernel(lists.list_walls)(self._walls, grains, near, clock)) > near.slot.size:
+        while (at := kernel(lists.list_walls)(self._walls, grains, near, skin)) > near.slot.size:
             near = self._make_room(near.mate.size, at)
         set_drags(self._world, kept)
         clock[SINCE] = 0.0
+
+    def _wrap(self) -> None:
+        """Bring all into the cell that repeats."""
+        grains, image = self._world.grains, self.state.image
+        for axis, length in enumerate(self._scene.period or ()):
+            if length is not None:
+                assert image is not None
+                x = grains.place[:, X + axis].copy()
+                cells = np.floor(x / length)
+                inside = x - cells * length
+                grains.place[:, X + axis] = inside
+                grains.place[:, LOST + axis] += (x - inside) - cells * length
+                self._image[axis, grains.number] += cells.astype(np.int64)
+
+    def _show(self) -> None:
+        """Copy where all are, and how fast, into the state."""
+        self._tier.kernel(energy.show)(self._world.grains, self.state)
+        image, position = self.state.image, self.state.position
+        for axis, length in enumerate(self._scene.period or ()):
+            if length is not None and image is not None:
+                cells = np.floor(position[axis] / length)
+                position[axis] -= cells * length
+                # Below 0 by so little that it is at the other face.
+                at_face = position[axis] >= length
+                position[axis, at_face] = 0.0
+                image[axis] = self._image[axis] + cells.astype(np.int64) + at_face
 
     def _make_room(self, pairs: int, touching: int) -> arrays.Near:
         """Make room for so many pairs, and balls at walls, and some more."""
@@ -131,6 +162,7 @@ class GrainsRun(BaseRun):
         self._walls = self._scene.walls(self._method.instant(moment))
         if not self._cut_short:
             self._clock[DONE] = 0.0
+        self._clock[TAKEN] = 0.0
         latest = self._limit(latest)
         status, rule = Status.LEASE_ENDED.value, Rule(span, self._watch.passes)
         began = time.perf_counter()
@@ -156,8 +188,8 @@ class GrainsRun(BaseRun):
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         world, matter = self._world, self._matter
         cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
-        yield lists.list_pairs, (matter.period, world.grains, world.near, cells, self._clock)
-        yield lists.list_walls, (self._walls, world.grains, world.near, self._clock)
+        yield lists.list_pairs, (matter.period, world.grains, world.near, cells, 0.0)
+        yield lists.list_walls, (self._walls, world.grains, world.near, 0.0)
         yield march, (matter, self._walls, world, self._clock, Rule(0.0, self._watch.passes))
         yield energy.stored, (matter, self._walls, world.grains, world.near)
         yield energy.show, (world.grains, self.state)
@@ -174,7 +206,7 @@ class GrainsRun(BaseRun):
 
     def _observe(self, moment: float) -> None:
         world, kernel = self._world, self._tier.kernel
-        kernel(energy.show)(world.grains, self.state)
+        self._show()
         self._stored = kernel(energy.stored)(self._matter, self._walls, world.grains, world.near)
         kernel(observables.observe)(*self._observing())
         self._numbers.frame(self.state, moment, self._summary()["kinetic_energy"])
@@ -208,14 +240,13 @@ class GrainsRun(BaseRun):
             for part, array in getattr(world, name)._asdict().items()
             if array is not None
         }
-        return {**kept, **self._numbers.arrays(), "clock": self._clock}
+        return {**kept, **self._numbers.arrays(), "clock": self._clock, "image": self._image}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
         self._make_room(arrays["near.mate"].size, arrays["near.slot"].size)
         super().restore(arrays, cut_short)
-        energies: Any = self._tier.kernel(energy.show)
-        energies(self._world.grains, self.state)
+        self._show()
 
 
 def _balance(seen: dict[str, Any]) -> float:

@@ -35,7 +35,7 @@ def _require_laws(scene: Scene) -> None:
             "surfaces must have no temperature and no laws of their own with Penalty, got a scene with them; use "
             "restitution and friction, or Impact"
         )
-    if scene.has_doors():
+    if scene.has_doors() or scene.openings() is not None:
         raise SceneError(
             "surfaces must have no openings and always be present with particles that have a radius and Penalty, got a "
             "scene with them; build the wall of parts that leave the opening, such as solid boxes"

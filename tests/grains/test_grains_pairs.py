@@ -81,11 +81,11 @@ def test_the_lists_are_those_of_all_pairs(period):
     centres = random.uniform(0.0, [one or 5.0 for one in period or (4.0, 3.0, 5.0)], (n, 3))
     radius = random.uniform(0.05, 0.2, n)
     grains = arrays.grains_of(centres.T, np.zeros((3, n)), radius, np.ones(n))
-    near, clock = arrays.near_of(n, 1, 40 * n, n), np.array([0.0, 0.0, skin])
+    near = arrays.near_of(n, 1, 40 * n, n)
     cells, order = lists.cells_of(grains.place[:, :3], 0.4 + skin, lengths)
     for rows in (grains.number, grains.place):
         rows[:] = rows[order]
-    found = lists.list_pairs(lengths, grains, near, cells, clock)
+    found = lists.list_pairs(lengths, grains, near, cells, skin)
     pairs = [
         frozenset((grains.number[i], grains.number[j]))
         for i in range(n)

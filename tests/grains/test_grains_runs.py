@@ -1,0 +1,129 @@
+"""Runs of soft balls: the same bits whatever stops them, cells that repeat, what is refused in a sentence."""
+
+import numpy as np
+import pytest
+from grains_runs import ROOM, cloud, ran
+
+import swarm
+from swarm.errors import RunError, SceneError
+from swarm.run.grains import GrainsRun
+from swarm.run.state import Seeding
+from swarm.run.tally import Watched
+
+METHOD = swarm.Penalty(0.002, 400.0, 1.5)
+LAWS = {"restitution": 0.6, "friction": 0.4}
+BOX = swarm.Box((3.2, 3.2, 3.2), (2.5, 2.5, 2.5), **LAWS)
+SCENE = swarm.Scene([BOX], gravity=(0.0, 0.0, -2.0), pairs=swarm.Pairs(**LAWS))
+
+
+def started(scene=SCENE, method=METHOD):
+    start = cloud()
+    start.spin = np.zeros((3, len(start)))
+    run = GrainsRun(scene, start, method, 1, None, "never", Seeding(), Watched())
+    run.observe()
+    return run
+
+
+def bits(run):
+    return {name: array.tobytes() for name, array in run.arrays().items()}
+
+
+def advanced(run, frames=4, span=50.0, halts=()):
+    for k in range(frames):
+        halts = list(halts)
+        if halts:
+            run.halt(halts.pop())
+        while not run.advance(span, (k + 1) * span * METHOD.dt):
+            assert 0.0 <= run.share_done(span) < 1.0
+            if halts:
+                run.halt(halts.pop())
+    return run
+
+
+def test_halts_do_not_change_a_bit():
+    with started() as whole, started() as halted:
+        assert bits(advanced(whole)) == bits(advanced(halted, halts=(3, 0, 1, 17, 5)))
+        assert whole.state.balls.collisions.sum() > 10
+
+
+def test_a_run_that_is_restored_goes_on_with_the_same_bits():
+    with started() as whole, started() as first, started() as second:
+        advanced(whole)
+        advanced(first, 2)
+        first.halt(7)
+        assert not first.advance(50.0, 150.0 * METHOD.dt)
+        second.restore({name: array.copy() for name, array in first.arrays().items()}, True)
+        for run in (first, second):
+            while not run.advance(50.0, 150.0 * METHOD.dt):
+                pass
+            run.advance(50.0, 200.0 * METHOD.dt)
+        assert bits(whole) == bits(first) == bits(second)
+        for name in ("position", "velocity", "dissipated", "impulse"):
+            assert (getattr(whole.state, name) == getattr(second.state, name)).all()
+        assert whole.seen()["pressure"] == second.seen()["pressure"] or not whole.seen()["pressure"] > 0.0
+
+
+def test_a_run_does_not_depend_on_its_frames():
+    one, other = (ran(SCENE, cloud(), METHOD, 0.2, every=every) for every in (0.2, 0.02))
+    assert (one.particles.position == other.particles.position).all()
+    assert (one.particles.spin == other.particles.spin).all()
+
+
+@pytest.mark.parametrize("period", [(4.0, 4.0, 4.0), (4.0, None, None)])
+def test_a_cell_that_repeats_keeps_energy_and_momentum(period):
+    walls = [swarm.Slab(n, 5.0, (0.0, 2.0, 2.0)) for n in ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+    walls = walls if None in period else []
+    start = cloud()
+    scene = swarm.Scene(walls, period=period)
+    result = ran(scene, start, swarm.Penalty(0.002, 400.0, 1.5), 0.6, every=0.2)
+    seen, end = result.observables, result.particles
+    assert seen["collisions"][-1] > 10
+    assert seen["energy_error"].max() < 1e-13
+    scale = (end.mass * np.sqrt((end.velocity**2).sum(axis=0))).sum()
+    assert abs(seen["momentum"] - seen["momentum"][0])[:, 0].max() < 1e-14 * scale
+    assert end.image.any()
+    for k, length in enumerate(period):
+        if length is not None:
+            assert ((end.position[k] >= 0.0) & (end.position[k] < length)).all()
+
+
+def test_a_cell_is_as_good_as_its_images():
+    """Two balls that meet through a face do as two that meet in the middle."""
+    method, scene = swarm.Penalty(0.001, 400.0, 1.5), swarm.Scene([], period=(4.0, 4.0, 4.0))
+    ends = []
+    for x in (1.7, 3.7):
+        start = swarm.Particles(
+            [[x, x + 0.55], [2.0, 2.1], [2.0, 2.0]], [[0.5, -0.5], [0.0, 0.0], [0.0, 0.0]], radius=0.25
+        )
+        result = ran(scene, start, method, 0.4)
+        assert result.observables["collisions"][-1] == 1
+        ends.append(result.particles.velocity)
+    assert ends[0] == pytest.approx(ends[1], abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (swarm.Scene([swarm.Sphere(9.0, restitution=0.0)]), "restitution must be 0.01 or more"),
+        (swarm.Scene(ROOM.surfaces, pairs=swarm.Pairs(restitution=0.001)), "pairs.restitution must be 0.01"),
+        (swarm.Scene([swarm.Sphere(9.0, temperature=1.0)]), "temperature"),
+        (swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 5.0, mass=1.0)]), "mass"),
+        (swarm.Scene([swarm.Sphere(9.0, openings=[swarm.Sphere(1.0, (0.0, 0.0, 9.0))])]), "openings"),
+    ],
+)
+def test_what_soft_balls_do_not_know_is_refused(scene, words):
+    with pytest.raises(SceneError, match=words):
+        ran(scene, cloud(), METHOD, 0.1)
+
+
+def test_a_step_that_is_long_for_a_contact_is_told(caplog):
+    start = swarm.Particles([[0.0, 3.0], [0.0, 0.0], [0.0, 0.0]], [[0.1, 0.0], [0.0, 0.0], [0.0, 0.0]], radius=0.5)
+    ran(ROOM, start, swarm.Penalty(0.1, 1000.0), 0.1)
+    assert "touch for 0.0702 s; use dt <= 0.0035 s" in caplog.text
+
+
+def test_a_velocity_that_is_no_number_ends_the_run():
+    with started() as run:
+        run._world.grains.speed[3, 0] = np.nan
+        with pytest.raises(RunError):
+            run.advance(10.0, 0.02)
