@@ -64,7 +64,7 @@ def _sink(flock, node, item, key):
         c, d = flock.key[index(first + 2)], flock.key[index(first + 3)]
         one, other = select(b < a, b, a), select(d < c, d, c)
         soonest = select(other < one, other, one)
-        if key < soonest or key == math.inf:
+        if key < soonest or soonest == math.inf:
             break
         least = first + select(other < one, select(d < c, 3, 2), select(b < a, 1, 0))
         again = (a == b) | (c == d) | (one == other)

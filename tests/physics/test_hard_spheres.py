@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conftest import rarely
 from scipy import stats
+from scipy.spatial import cKDTree
 
 import swarm
 from examples import hard_spheres
@@ -183,6 +184,8 @@ def test_velocities_become_maxwellian(name):
     scene, side = cell_of(0.2, 10), 10
     start = lattice(scene, side)
     start.velocity = STARTS[name](start.velocity)
+    # Off the lattice, on which beams meet head on for ever.
+    start.position += 0.1 * np.random.default_rng(3).uniform(size=start.position.shape)
     start.mass = np.tile([1.0, 4.0], len(start) // 2)
     total = (start.mass * start.velocity).sum(axis=1, keepdims=True)
     start.velocity = start.velocity - total / start.mass.sum()
@@ -209,15 +212,20 @@ def viscosity(packing):
     return 1.016 * 5.0 / (16.0 * math.sqrt(math.pi)) * (1.0 / g + 0.8 * b + 0.761 * b * b * g)
 
 
-def speedy(packing):
-    """Self-diffusion of hard spheres from simulations, of any number of balls (Speedy, Mol. Phys. 62, 509, 1987)."""
+def diffusion(packing):
+    """Self-diffusion of endlessly many hard spheres: Enskog's, times what simulations have.
+
+    The polynomial is that of Liu, Silva and Macedo (Chem. Eng. Sci. 53, 2403, 1998) through the points of Erpenbeck and
+    Wood (Phys. Rev. A 43, 4254, 1991).
+    """
     n = packing / (math.pi / 6.0)
-    return 3.0 / (8.0 * math.sqrt(math.pi) * n) * (1.0 - n / 1.09) * (1.0 + n * n * (0.4 - 0.83 * n * n))
+    more = 1.0 + 0.94605 * n**1.5 + 1.4022 * n**3 - 5.6898 * n**5 + 2.6626 * n**7
+    return 3.0 / (8.0 * math.sqrt(math.pi) * n * contact_value(packing)) * more
 
 
 @pytest.mark.parametrize("packing", [rarely(0.1), 0.3, rarely(0.4)])
 def test_self_diffusion(packing, tmp_path):
-    """Of N balls in a cell it is less by 2.837 k T/(6 pi viscosity L), the flow around images: published to 3 %."""
+    """Of N balls in a cell it is less by 2.837 k T/(6 pi viscosity L), the flow around images: published to 2 %."""
     scene, start = mixed(packing)
     one, windows, lags = collision_time(packing), 60, 5
     window = 12.0 * one
@@ -231,7 +239,7 @@ def test_self_diffusion(packing, tmp_path):
     error /= 6.0 * window * (lags - 2)
     less = 2.837297 / (6.0 * math.pi * viscosity(packing) * scene.period[0])
     assert error < 0.03 * found
-    assert found == pytest.approx(speedy(packing) - less, rel=0.03, abs=2.0 * error)
+    assert found == pytest.approx(diffusion(packing) - less, rel=0.02, abs=2.0 * error)
 
 
 # --- Losses ----------------------------------------------------------------------------------------------
@@ -262,20 +270,18 @@ def test_a_pile_that_comes_to_rest():
     position[0] += 0.01 * position[2]
     random = np.random.default_rng(5)
     start = swarm.Particles(position, 0.1 * random.normal(size=position.shape), radius=random.uniform(0.07, 0.1, 64))
-    result = run(scene, start, 8.0, 16)
+    result = run(scene, start, 4.0, 16)
     seen = result.observables
     assert seen["kinetic_energy"][-1] < 1e-4 * seen["kinetic_energy"].max()
     assert (np.diff(seen["collisions"])[-4:] < 3_000_000).all()
     assert seen["energy_error"].max() < 1e-11
     assert seen["max_penetration"].max() < 1e-14
-    assert overlap(result.particles) < 4e-16
+    assert overlap(result.particles.position, start.radius) < 4e-16
 
 
-def overlap(particles, period=None):
+def overlap(position, radius, period=None):
     """The deepest that two balls are in one another [m]."""
-    from scipy.spatial import cKDTree
-
-    r, radius = particles.position.T, particles.radius
+    r = position.T
     tree = cKDTree(r, boxsize=period)
     pairs = tree.query_pairs(2.001 * radius.max(), output_type="ndarray")
     d = r[pairs[:, 0]] - r[pairs[:, 1]]
@@ -291,12 +297,10 @@ def conserved(side, packing, collisions):
     """Energy and momentum of a cell, and no overlap at any frame."""
     scene, start = mixed(packing, side=side, collisions=10)
     n = len(start)
-    ends = []
     seen = run(
         scene, start, 2.0 * collisions / n * collision_time(packing), 20,
-        observables={"overlap": lambda frame: overlap(frame.particles, scene.period)},
+        observables={"overlap": lambda frame: overlap(frame.position, start.radius, scene.period)},
     ).observables  # fmt: skip
-    del ends
     assert seen["collisions"][-1] > 0.95 * collisions
     energy = seen["total_energy"]
     assert np.abs(energy / energy[0] - 1.0).max() <= 1e-13
@@ -410,5 +414,4 @@ def test_newtons_cradle(moving):
     assert result.particles.velocity[0] == pytest.approx([0.0] * (n - moving) + [1.0] * moving, abs=1e-15)
     assert result.observables["energy_error"].max() < 1e-15
     places = 2.0 * radius * np.arange(n)
-    places[:moving] -= 0.0
     assert result.particles.position[0, moving : n - moving] == pytest.approx(places[moving : n - moving], abs=1e-15)
