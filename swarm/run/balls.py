@@ -42,7 +42,7 @@ def require_balls(scene: Scene, particles: Particles | None, method: Method, opt
             "particles that meet"
         )
     _require_method(scene, particles, method)
-    require_shapes(scene)
+    require_shapes(scene, particles.radius)
     _require_options(options)
     require_size(scene, particles.radius)
     require_instants_of_balls(scene, particles, method, options)
@@ -138,13 +138,21 @@ def _require_within(scene: Scene, particles: Particles, radius: np.ndarray, clos
     )
 
 
-def require_shapes(scene: Scene) -> None:
-    """Raise a `SceneError` where balls may not meet a surface of the scene."""
+def require_shapes(scene: Scene, radius: np.ndarray) -> None:
+    """Raise a `SceneError` where balls with these radii may not meet a surface of the scene."""
     for i, surface in enumerate(scene.surfaces):
         why = surface.holds_balls()
         if why is not None:
             raise SceneError(
                 f"surfaces[{i}] must be one that particles with a radius may meet, got {type(surface).__name__}, "
-                f"{why}; they may meet Sphere, Plane, Slab, Box, Cylinder, Capsule, Torus and Cone, and fields of "
-                "these; make it of such surfaces, or leave the radius out"
+                f"{why}; they may meet Sphere, Plane, Slab, Box, Cylinder, Capsule, Torus, Cone, Ellipsoid, Polygon, "
+                "Stadium, Prism and Mesh, fields and intersections of these; make it of such surfaces, or leave the "
+                "radius out"
+            )
+        largest = int(radius.argmax())
+        if not radius[largest] < surface.largest_ball():
+            raise SceneError(
+                f"radius must be below {surface.largest_ball():.6g} m, the smallest radius of curvature of "
+                f"surfaces[{i}] ({type(surface).__name__}), so that no ball touches it at several points at once, got "
+                f"{radius[largest]:g} m of particle {largest}; use smaller balls, or a rounder surface"
             )

@@ -134,6 +134,10 @@ class Surface:
             return None
         return "whose parallel surface is not known"
 
+    def largest_ball(self) -> float:
+        """The radius below which balls touch the surface at one point only [m]: its smallest radius of curvature."""
+        return math.inf
+
     def open_volumes(self, between: bool = False) -> tuple["Surface", ...]:
         """The volumes of its openings, each present while that is open: those of walls between rooms, or others."""
         return tuple(volume_of(one) for one in self.openings if (isinstance(one, Opening) and one.between) == between)

@@ -42,6 +42,10 @@ FACES = [
     (1, 5, 7), (1, 7, 3),
 ]  # fmt: skip
 SHAPES |= {
+    "egg": (swarm.Ellipsoid((0.9, 0.7, 0.8), (0.1, 0.0, 0.0), rotation=TURN), 0.9),
+    "orbit": (swarm.Ellipsoid((0.7, 0.7, 0.8)), 0.8),
+    "stone": (swarm.Ellipsoid((0.6, 0.2, 0.4), side="outside", rotation=TURN), 1.0),
+    "pebble": (swarm.Ellipsoid((0.5, 0.5, 0.3), (0.1, 0.0, 0.0), "outside"), 1.0),
     "table": (swarm.Polygon(L_SHAPE), 0.8),
     "pillar": (swarm.Polygon(L_SHAPE, axis=(1.0, 2.0, 0.5), side="outside"), 1.5),
     "bent table": (swarm.Polygon(BENT), 1.0),
@@ -90,7 +94,8 @@ def places(name, number, least=0.02):
     while len(found) < number:
         r = rng.uniform(-reach, reach, 3)
         room = -float(surface.reaching_outside(r[:, None], np.zeros(1))[0])
-        if gap_of(surface, r[:, None])[0] < 0.0 and room > least:
+        # Where it is larger than that it touches at several points at once.
+        if gap_of(surface, r[:, None])[0] < 0.0 and least < room < surface.largest_ball():
             found.append((r, room, room * rng.choice([0.999, 0.9, 0.5, 0.1])))
     return found
 

@@ -12,8 +12,6 @@ from ...kernel.jit import Array, kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, put
 from .. import flights
-from ..balls.rounded import Rounded
-from ..balls.tube import Tube
 from ..facets.facet import Shared
 from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers
@@ -26,7 +24,7 @@ from .grid import Grid, aligned, cell_of, until_next
 # The rows of a rotation that turns nothing.
 _UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
 # What has fields of its own in a table, beside vectors and balls.
-_KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, Rotated, SolidNumbers, Rounded, Tube)
+_KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, Rotated, SolidNumbers)
 
 
 class GrownLike(Record):

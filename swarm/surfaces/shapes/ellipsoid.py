@@ -3,11 +3,18 @@
 It is the quadric of quadratic.py without a linear term; here is what that makes shorter.
 """
 
+import math
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...checks import Vector, length, vector
 from ...kernel.jit import select
 from ...kernel.vector import cross, norm, times, total, vec
+from .. import rotation as rotations
+from ..balls.egg import EggCavity, EggSolid, distances_from
 from ..course import level_and_window, rise_time_inside
 from ..surface import Box, Surface, box_around, farthest, rotated_box, side_sign
 from .quadratic import QuadricNumbers, form, turning, widths
@@ -44,6 +51,28 @@ class Ellipsoid(Surface):
         a = vec(1.0 / (axis * axis) for axis in self.semi_axes)
         kind = EllipsoidCavity if self.side == "inside" else EllipsoidNumbers
         return kind(vec(self.own_center()), a, None, 1.0, 1.0, side_sign(self.side))
+
+    def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
+        kind = EggCavity if self.side == "inside" else EggSolid
+        squares = vec(axis * axis for axis in self.semi_axes)
+        egg = kind(vec(self.own_center()), squares, 0.0, self._bend(), side_sign(self.side))
+        return (rotations.rotated(self.rotation, egg),)
+
+    def largest_ball(self) -> float:
+        return math.inf if self.is_solid() else self._bend()
+
+    def _bend(self) -> float:
+        """The smallest radius of curvature."""
+        return min(self.semi_axes) ** 2 / max(self.semi_axes)
+
+    def reaching_outside(
+        self, points: NDArray[np.float64], radius: NDArray[np.float64], time: float = 0.0
+    ) -> NDArray[np.float64]:
+        rows = self._own_rows(points, time)
+        wall = self.walls_of_balls(0.0)[0]
+        found = np.empty(points.shape[1])
+        distances_from(wall, np.ascontiguousarray(rows), found)
+        return found + radius
 
     def size(self) -> float:
         return min(self.semi_axes)

@@ -1,0 +1,168 @@
+"""Ellipsoids that balls meet: phi is the distance from the parallel surface, by the foot of the normal.
+
+With t for which x = a^2 y/(t + a^2) is on the ellipsoid, x is the foot of the normal through y, and t |y/(t + a^2)| the
+signed distance. t is found from below by Newton's method for 1/|x/a| = 1, which is concave: no step is too long.
+"""
+
+import math
+
+from ...kernel.gravity import as_vector
+from ...kernel.jit import kernel, outlined, select
+from ...kernel.vector import Vec, column, dot, norm, square, times
+from .. import contract
+from ..course import rise_time, rise_time_inside
+from .rounded import ToBody
+
+# Newton's steps to a foot and to a hit; near both each one doubles the digits.
+_SWEEPS, _STEPS = 60, 40
+_EPSILON = 2.220446049250313e-16
+# What is no denominator, as a part of the square semi-axis.
+_POLE = 1e-30
+# Of the room that is left to the smallest radius of curvature, where H has a bound: up to this part of it.
+_PART = 0.5
+
+
+class Egg(contract.Smooth):
+    """All that is within the radius of a ball from an ellipsoid, in its principal frame; q = phi."""
+
+    center: Vec
+    squares: Vec  # of the semi-axes
+    radius: float  # of the ball
+    bend: float  # the smallest radius of curvature
+    side: float
+
+    def grown(self, radius):
+        return self._replace(radius=radius)
+
+    def foot(self, r):
+        """The signed distance of a point outside of the ellipsoid, and the unit normal of that at its foot."""
+        return _foot(self, r)
+
+    def phi(self, r):
+        return self.foot(r)[0] + self.side * self.radius
+
+    def gradient(self, r):
+        return self.foot(r)[1]
+
+    def distance(self, r):
+        return self.side * self.phi(r)
+
+    def unit_normal(self, r):
+        return self.side * self.gradient(r)
+
+    def far(self, r):
+        return -self.distance(r)
+
+    def out_of(self, r):
+        return -self.distance(r)
+
+    def clearance(self, r):
+        return -self.distance(r)
+
+    def farthest_push(self):
+        return select(self.side > 0.0, math.inf, -1.0)
+
+
+class EggSolid(Egg):
+    """Around a solid, which is behind the plane at the foot: steps are those to planes."""
+
+    def before(self, gravity, r, v):
+        """When a flight comes to the plane that is as far as the radius from the one at the foot."""
+        away, n = self.foot(r)
+        half = -0.5 * dot(n, v)
+        bend = 0.0 * half if gravity is None else -0.5 * dot(n, as_vector(gravity))
+        return rise_time(self.radius - away, half, bend)
+
+    def steps(self, gravity, r, v):
+        return ToBody(self, gravity, r, v)
+
+    in_steps = True
+
+    def safe_time(self, r, v, pull):
+        time = self.before(pull, r, v)
+        return select(self.phi(r) < 0.0, 0.0, time)
+
+    def passed(self, r, v):
+        return dot(self.gradient(r), v) >= 0.0
+
+    def hessian_bounds(self, r):
+        # 1/(2 d) at most, where d is the distance from the solid
+        away = max(self.foot(r)[0], self.radius)
+        return 0.0, 1.0 / select(away > 0.0, away, 1.0), 0.5 * away
+
+
+class EggCavity(Egg):
+    """In a cavity, in which all places that are as far from the wall as the radius are convex: it is left once."""
+
+    leaves_once = True
+
+    def first_hit(self, r, v):
+        return _leaving(self, r, v), True
+
+    def hessian_bounds(self, r):
+        # 1/(2 (R - d)) at most, where d is how far inside of the ellipsoid, and R the radius of curvature
+        inside = max(-self.foot(r)[0], 0.0)
+        room = self.bend - inside
+        reach = select(room > 0.0, _PART * room, _EPSILON * self.bend)
+        left = select(room > 0.0, (1.0 - _PART) * room, _EPSILON * self.bend)
+        return 0.5 / left, 0.5 / left, reach
+
+
+@outlined
+def _foot(egg, r):
+    y, a2 = r - egg.center, egg.squares
+    least = min(a2.x, min(a2.y, a2.z))
+    size = times(a2, times(y, y))
+    # Each of the terms of |x/a|^2 is 1 at most.
+    t = max(math.sqrt(size.x) - a2.x, max(math.sqrt(size.y) - a2.y, math.sqrt(size.z) - a2.z))
+    whole = 0.0
+    for _sweep in range(_SWEEPS):
+        x, z = _part(t, a2.x), _part(t, a2.z)
+        w = _part(t, a2.y)
+        s = size.x * x * x + size.y * w * w + size.z * z * z
+        slope = size.x * x * x * x + size.y * w * w * w + size.z * z * z * z
+        whole = s
+        step = s * (math.sqrt(s) - 1.0) / select(slope > 0.0, slope, 1.0)
+        after = t + step
+        if not after > t:
+            break
+        t = after
+    u = Vec(y.x * _part(t, a2.x), y.y * _part(t, a2.y), y.z * _part(t, a2.z))
+    length = norm(u)
+    # On the middle of the shortest axis, deep inside, x is beside it on both sides.
+    deep = (t + least <= 4.0 * _EPSILON * least) & (whole < 1.0)
+    depth = -math.sqrt(t * t * square(u) + least * select(deep, 1.0 - whole, 0.0))
+    return select(deep, depth, t * length), u * (1.0 / select(length > 0.0, length, 1.0))
+
+
+def _part(t, a2):
+    """1/(t + a^2)"""
+    bottom = t + a2
+    return 1.0 / select(bottom > _POLE * a2, bottom, _POLE * a2)
+
+
+@outlined
+def _leaving(egg, r, v):
+    """When a straight flight leaves the cavity: from where it leaves the ellipsoid back to the planes at the feet."""
+    y, a2 = r - egg.center, egg.squares
+    inverse = Vec(1.0 / a2.x, 1.0 / a2.y, 1.0 / a2.z)
+    w, u = times(inverse, y), times(inverse, v)
+    t = rise_time_inside(dot(w, y) - 1.0, dot(u, y), dot(u, v))
+    if not t < math.inf:
+        return t
+    for _step in range(_STEPS):
+        away, n = egg.foot(r + t * v)
+        approach = dot(n, v)
+        late = (away + egg.radius) / select(approach > 0.0, approach, math.inf)
+        before = t - late
+        if not (before < t and late > _EPSILON * t):
+            break
+        t = before
+    return select(t > 0.0, t, 0.0)
+
+
+@kernel
+def distances_from(wall, points, found):
+    """How far points (3, N) are outside of a wall, into `found`."""
+    for i in range(points.shape[1]):
+        found[i] = wall.distance(column(points, 0, i))
