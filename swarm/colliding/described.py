@@ -28,7 +28,7 @@ _CELLS, _FEW = 2.0, 64
 # Of fewer cells along a period a ball may have two images of another one in its own cell and its neighbours.
 _IMAGES = 4
 # The least numbers in the row of a cell: how many balls, and these.
-_LEAST = 8
+_LEAST = 5
 # Balls fly this part of the scene in an epoch, about.
 _EPOCH = 0.125
 # t_c where none is given is this part of the time in which balls fly their diameter.
@@ -62,7 +62,7 @@ def with_room(flock: Flock, grid: Grid) -> tuple[Flock, Grid]:
     order = np.argsort(cells, kind="stable").astype(np.int32)
     numbers, first, counts = np.unique(np.asarray(cells)[order], return_index=True, return_counts=True)
     stride = max(_LEAST, 2 * grid.stride)
-    while stride < int(counts.max()) + 2:
+    while stride < int(counts.max()) + 1:
         stride *= 2
     room = np.zeros((grid.near.size, stride), np.int32)
     room[numbers, 0] = counts

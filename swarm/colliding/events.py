@@ -284,4 +284,3 @@ def show(box, flock, state, end, first, last):
             state.position[axis, i] = x
         put(state.velocity, 0, i, v)
         state.balls.collisions[i] = flock.tag[index(WHOLES * k + MET)]
-        state.energy[i] = 0.5 * square(v) + potential(box.pull, r)
