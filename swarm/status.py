@@ -18,6 +18,7 @@ class Status(IntEnum):
     LOG_FULL = 9
     TIMELESS = 10
     SENT_WRONG = 11
+    WAITS = 12
 
     @property
     def sentence(self) -> str:
@@ -38,6 +39,8 @@ _SENTENCES = {
     Status.LEASE_ENDED: "walls that react have moved so far that all particles are predicted again",
     Status.LOG_FULL: "the log of impacts needs an empty part",
     Status.SENT_WRONG: "one of the laws of a wall gave it no velocity, or one into the wall, or out of the plane",
+    Status.WAITS: "one of the laws of a wall lets it wait there, which particles with a radius and Impact do not; let "
+    "it leave at once",
     Status.TIMELESS: "it goes from step to step, or from wall to wall, and no time passes; start it elsewhere, or end "
     "the run before; if nothing is special about the place, it is an error of swarm: please report it with the scene",
 }

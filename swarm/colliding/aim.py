@@ -14,15 +14,13 @@ from ..kernel.arrays import fetch, index, unwritten
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, square
-from ..surfaces import flights
 from .rows import DUE, FACE, FLOATS, MEETS, NOBODY, PARTNER, RADIUS, SEEN, STAMP, WALL, WHOLES
+from .window import UNKNOWN, next_hit
 
 # So many balls of a cell are copied without a branch, and so many are looked at at once.
 _FEW, _MOST = 4, 128
 # Of the cells around a ball: those beyond no face alone.
 _ANY = 6
-# No wall is asked for in a cell that is far from all.
-UNKNOWN = -2.0
 
 
 class Known(NamedTuple):
@@ -267,6 +265,5 @@ def find_wall(box, flock, i, now):
     """Find when a ball meets a wall, if its cell is near one and that is not known."""
     row = FLOATS * i
     if box.grid.near[index(box.grid.number(i, flock))] and flock.event[index(row + WALL)] == UNKNOWN:
-        r, v = flock.at(box.pull, i, now)
-        hit = flights.first_hit(box.walls.grown(box.kinds.radius_of(i)), box.pull, r, v)
+        hit = next_hit(box, flock, i, now)
         flock.event[index(row + DUE)], flock.event[index(row + WALL)] = now + hit.time, hit.wall

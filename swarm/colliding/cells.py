@@ -15,6 +15,7 @@ from ..kernel.vector import Vec
 from ..surfaces.course import rise_time
 from ..surfaces.walls import Field
 from .rows import CELL, FACE, FLOATS, LEAVES, WHOLES
+from .window import middle_of, swept
 
 
 class Axis(Record):
@@ -89,7 +90,7 @@ def until_exit(grid, pull, flock, i, now):
     flock.tag[index(WHOLES * i + FACE)] = face
 
 
-def _take_out(grid, flock, i, cell):
+def take_out(grid, flock, i, cell):
     """Remove a ball from its cell; the last one takes its place."""
     row = grid.stride * cell
     last = flock.room[index(row)]
@@ -118,7 +119,7 @@ def cross(grid, flock, i):
     taken = flock.room[index(row)] + 1
     fits = taken < grid.stride
     if fits:
-        _take_out(grid, flock, i, old)
+        take_out(grid, flock, i, old)
         # Where an axis has one cell it is the same one.
         taken = flock.room[index(row)] + 1
         flock.room[index(row)], flock.room[index(row + taken)] = taken, i
@@ -132,9 +133,10 @@ def cross(grid, flock, i):
 # --- At the start ----------------------------------------------------------------------------------------
 
 
-def mark_near(grid, walls, radius, plane):
+def mark_near(box, radius, plane):
     """Mark the cells of a plane across x in which a ball of at most this radius may touch a wall."""
-    reach = radius
+    grid, reach = box.grid, radius
+    walls, half = middle_of(box)
     for axis in grid.axes():
         reach = 0.5 * axis.width + reach
     for ky in range(grid.y.count + 2):
@@ -146,14 +148,14 @@ def mark_near(grid, walls, radius, plane):
                 if axis.period is None:
                     is_outer = (k <= 1) | (k >= axis.count) | is_outer
             number = (plane * (grid.y.count + 2) + ky) * (grid.z.count + 2) + kz
-            grid.near[index(number)] = is_outer or not _clear(walls, r) > reach
+            grid.near[index(number)] = is_outer or not _clear(walls, r, half) > reach
 
 
-def _clear(walls, r):
-    """A lower bound of the distance of a place from all walls."""
+def _clear(walls, r, half):
+    """A lower bound of the distance of a place from all walls, within so long before and after where some move."""
     least = math.inf
     for wall in walls.each:
-        least = min(_clear_of(wall, r), least)
+        least = min(_clear_of(wall, r) - swept(wall, r, half), least)
     return least
 
 

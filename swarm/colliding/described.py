@@ -10,12 +10,14 @@ from ..contact.laws import NONE
 from ..pairs import Pairs
 from ..particles import Particles
 from ..scene import Scene
+from ..surfaces.drive import drive_of
 from .aim import Alike, Various
+from .box import Box
 from .cells import Axis, Grid
-from .events import Box
 from .meet import Loss
 from .queue import FIRST, SPARE
-from .rows import CELL, FLOATS, RADIUS, WHOLES, Flock
+from .rows import CELL, FLOATS, RADIUS, WALL, WHOLES, Flock
+from .window import OUT
 
 Floats = NDArray[np.float64]
 
@@ -31,8 +33,11 @@ _IMAGES = 4
 _LEAST = 5
 # Balls fly this part of the scene in an epoch, about.
 _EPOCH = 0.125
-# t_c where none is given is this part of the time in which balls fly their diameter.
-_DURATION = 1e-4
+# t_c where none is given is this part of the time in which balls fly their diameter; under gravity of that in which
+# they fall so far, by the second part.
+_DURATION, _FALL = 1e-4, 1e-3
+# A flight from a wall back to it takes at least this part of an epoch: on a shorter one round-off is all there is.
+_SHORTEST = 2.0**-20
 
 
 def flock_of(particles: Particles, grid: Grid, loses: bool) -> Flock:
@@ -54,19 +59,21 @@ def flock_of(particles: Particles, grid: Grid, loses: bool) -> Flock:
 
 
 def with_room(flock: Flock, grid: Grid) -> tuple[Flock, Grid]:
-    """The balls in cells that have room for all, and for some more."""
+    """The balls in cells that have room for all, and for some more; who is gone is in none."""
     n, cells = flock.number(), 0
+    there = np.flatnonzero(flock.event.reshape(n, FLOATS)[:, WALL] != OUT)
     whole = flock.tag.reshape(n, WHOLES)
     for k, axis in enumerate(grid.axes()):
-        cells = cells + axis.offset[whole[:, CELL + k]]
-    order = np.argsort(cells, kind="stable").astype(np.int32)
-    numbers, first, counts = np.unique(np.asarray(cells)[order], return_index=True, return_counts=True)
+        cells = cells + axis.offset[whole[there, CELL + k]]
+    sorts = np.argsort(cells, kind="stable")
+    order = there[sorts].astype(np.int32)
+    numbers, first, counts = np.unique(np.asarray(cells)[sorts], return_index=True, return_counts=True)
     stride = max(_LEAST, 2 * grid.stride)
-    while stride < int(counts.max()) + 1:
+    while stride < int(counts.max(initial=0)) + 1:
         stride *= 2
     room = np.zeros((grid.near.size, stride), np.int32)
     room[numbers, 0] = counts
-    place = np.arange(n) - np.repeat(first, counts)
+    place = np.arange(len(order)) - np.repeat(first, counts)
     room[np.repeat(numbers, counts), 1 + place] = order
     return flock._replace(room=aligned_copy(room.ravel())), grid._replace(stride=stride)
 
@@ -94,10 +101,11 @@ def described(scene: Scene, particles: Particles) -> tuple[Box, Flock]:
     pairs = scene.pairs or Pairs()
     loss = None
     if pairs.restitution < 1.0 or laws.restitution is not None:
-        loss = Loss(pairs.restitution, duration_of(pairs, particles))
+        loss = Loss(pairs.restitution, duration_of(scene, pairs, particles))
     grid = grid_of(scene, particles)
     flock, grid = with_room(flock_of(particles, grid, loss is not None), grid)
-    return Box(scene.walls(0.0), laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss), flock
+    shortest = max(_SHORTEST * epoch_of(scene, particles, grid), 0.0 if loss is None else loss.duration)
+    return Box(scene.walls(0.0), laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest), flock
 
 
 def kinds_of(particles: Particles, flight: Any) -> Any:
@@ -109,18 +117,32 @@ def kinds_of(particles: Particles, flight: Any) -> Any:
     return Various(flight, mass)
 
 
-def duration_of(pairs: Pairs, particles: Particles) -> float:
+def speed_of(scene: Scene, particles: Particles) -> float:
+    """The root mean square speed of balls at the start, or that of the fastest wall [m/s]."""
+    fastest = [math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))]
+    for surface in scene.surfaces:
+        if surface.motion is not None:
+            drive = drive_of(surface, 0.0)
+            reach = surface.extent() if math.isfinite(surface.extent()) else scene.finite_size()
+            fastest.append(drive.fastest + drive.angular_speed() * reach)
+    return max(fastest)
+
+
+def duration_of(scene: Scene, pairs: Pairs, particles: Particles) -> float:
     """t_c of a run [s]."""
     assert particles.radius is not None
     if pairs.contact_duration is not None:
         return pairs.contact_duration
-    speed = math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))
-    return _DURATION * 2.0 * float(particles.radius.min()) / speed if speed > 0.0 else 0.0
+    diameter = 2.0 * float(particles.radius.min())
+    speed = speed_of(scene, particles)
+    if scene.gravity is not None:
+        speed = max(speed, _DURATION / _FALL * math.sqrt(math.hypot(*scene.gravity) * diameter))
+    return _DURATION * diameter / speed if speed > 0.0 else 0.0
 
 
 def epoch_of(scene: Scene, particles: Particles, grid: Grid) -> float:
     """The length of an epoch [s], a power of two."""
-    speed = math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))
+    speed = speed_of(scene, particles)
     size = _EPOCH * max(axis.width * axis.count for axis in grid.axes())
     if scene.gravity is not None:
         speed = max(speed, math.sqrt(size * math.hypot(*scene.gravity)))

@@ -8,55 +8,24 @@ Frames look at the balls and change no flight, so that a run has the same bits w
 """
 
 import math
-from typing import Any, NamedTuple
 
-from ..contact.reflection import Energy, exact
 from ..kernel.arrays import fetch, index
 from ..kernel.gravity import potential
-from ..kernel.jit import Array, long_kernel, outlined, select
-from ..kernel.record import Record
-from ..kernel.vector import put, square
+from ..kernel.jit import long_kernel, outlined, select
+from ..kernel.vector import norm, put, square
 from ..status import Status
 from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
-from .cells import cross, mark_near, until_exit
-from .meet import met, squared
+from .bounce import FLIES, GONE, bounce
+from .cells import cross, mark_near, take_out, until_exit
+from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, SAME
+from .journal import has_room, note_pair
+from .meet import met
 from .queue import FIRST, build, requeue
-from .rows import DUE, FLOATS, LEAVES, MEETS, MET, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
+from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NOBODY, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
+from .window import END, OUT
 
-# Of a clock: how many epochs have ended, their length [s], events and collisions so far, those at one time.
-EPOCHS, LENGTH, EVENTS, COLLISIONS, SAME, CLOCK = 0, 1, 2, 3, 4, 5
 # So many events a ball between which no time passes: then time does not pass at all.
 _AT_ONCE = 1000
-
-
-class Box(Record):
-    """What the balls are in: walls and their laws, gravity, cells, kinds of balls, what is lost of their energy."""
-
-    walls: Any
-    laws: Any
-    pull: Any
-    grid: Any
-    kinds: Any
-    loss: Any  # None, or `Loss`
-    log: Any = None
-
-
-class Books(NamedTuple):
-    """What is booked: of each ball, and of all."""
-
-    impulse: Array  # (2 walls, 1)
-    dissipated: Array  # (N,), or none
-    impacts: Array  # (N,)
-    virial: Array  # (1,)
-    image: Any = None  # (3, N) where the scene repeats
-    counts: Any = None  # (walls,) impacts on each, where they are counted
-
-
-class Rule(NamedTuple):
-    """The end of the frame [s], and when to stop."""
-
-    end: float
-    halt: Array  # (1,) events
 
 
 # --- Of one ball -------------------------------------------------------------------------------------------
@@ -94,6 +63,9 @@ def _collide(box, flock, books, clock, i, now):
         flock.put(one, now, r, blow.one)
         flock.put(other, now, there, blow.other)
         _book(flock, books, clock, (one, other), blow, now)
+        if box.log is not None:
+            impulse = box.kinds.mass_of(one) * norm(blow.one - v)
+            note_pair(box, books, clock, (one, other, now), (r, v, blow.one), impulse)
         flock.event[index(FLOATS * other + MEETS)] = math.inf
         _aim(box, flock, one, now)
         _queue_both(flock, one)
@@ -113,37 +85,32 @@ def _book(flock, books, clock, pair, blow, now):
 
 
 @outlined
-def _bounce(box, flock, books, i, now):
-    """The impact of a ball on a wall."""
-    r, v = flock.at(box.pull, i, now)
-    wall, m = flock.event[index(FLOATS * i + WALL)], box.kinds.mass_of(i)
-    twice = square(v) + 2.0 * potential(box.pull, r)
-    energy = Energy(twice, select(twice > 0.0, 0.5 / select(twice > 0.0, twice, 1.0), 0.0))
-    walls = box.walls.grown(box.kinds.radius_of(i))
-    bounce = exact(box.laws, walls, box.pull, wall, r, v, energy)
-    if flock.last is not None:
-        if now - flock.last[index(i)] < box.loss.duration:
-            bounce = exact(box.laws._replace(restitution=None), walls, box.pull, wall, r, v, energy)
-        flock.last[index(i)] = now
-    flock.put(i, now, r, squared(bounce.v, bounce.twice_energy - 2.0 * potential(box.pull, r)))
-    books.impulse[index(int(walls.row(wall))), 0] += m * bounce.impulse
-    if books.dissipated.size > 0:
-        books.dissipated[index(i)] += 0.5 * m * (twice - bounce.twice_energy)
-    books.impacts[index(i)] += bounce.impulse > 0.0
-    if books.counts is not None:
-        books.counts[index(int(wall))] += bounce.impulse > 0.0
+def _vanish(box, flock, i):
+    """Take a ball out that is no more among the walls: it stays where it is, and meets nobody."""
+    take_out(box.grid, flock, i, box.grid.number(i, flock))
+    for k in (MEETS, LEAVES, DUE):
+        flock.event[index(FLOATS * i + k)] = math.inf
+    flock.event[index(FLOATS * i + WALL)] = OUT
+    flock.tag[index(WHOLES * i + PARTNER)] = NOBODY
+    requeue(flock, i)
 
 
-def _at_wall(box, flock, books, i, now):
-    """What comes when a ball may meet a wall: it is reflected, or looks farther."""
+def _at_wall(box, flock, books, clock, i, now):
+    """What comes when a ball may meet a wall: it is reflected, or gone, or looks farther; a status if it goes wrong."""
+    ended = FLIES
     if flock.event[index(FLOATS * i + WALL)] >= 0.0:
-        _bounce(box, flock, books, i, now)
-        _aim(box, flock, i, now)
-        _queue_both(flock, i)
+        ended = bounce(box, flock, books, clock, i, now)
+        if ended == GONE:
+            _vanish(box, flock, i)
+            ended = FLIES
+        elif ended == FLIES:
+            _aim(box, flock, i, now)
+            _queue_both(flock, i)
     else:
         forget_wall(box, flock, i)
         find_wall(box, flock, i, now)
         requeue(flock, i)
+    return ended
 
 
 @outlined
@@ -174,7 +141,22 @@ def _enter(box, flock, books, i, now):
 def mark(box, radius, first, last):
     """Mark which cells are near walls, in the planes of cells from `first` to before `last`."""
     for plane in range(first, last):
-        mark_near(box.grid, box.walls, radius, plane)
+        mark_near(box, radius, plane)
+
+
+@long_kernel
+def look_again(box, flock, now, first, last):
+    """Find the next wall of the balls from `first` to before `last` anew."""
+    for i in range(first, last):
+        if flock.event[index(FLOATS * i + WALL)] != OUT:
+            forget_wall(box, flock, i)
+            find_wall(box, flock, i, now)
+
+
+@long_kernel
+def next_epoch(flock, clock):
+    """Begin the epoch after this one, at its end."""
+    _begin_epoch(flock, clock, clock[LENGTH])
 
 
 @long_kernel
@@ -232,20 +214,32 @@ def _fetch_next(box, flock):
             fetch(flock.room, row + box.grid.stride)
 
 
+def _is_over(box, end, now):
+    """The status with which no event is taken at a time; -1 where one is."""
+    ended = select(now < end, -1, Status.DONE.value)
+    if box.log is not None:
+        ended = select((ended < 0) & (not has_room(box.log)), Status.LOG_FULL.value, ended)
+    if box.window is not None:
+        ended = select((box.window[END] < end) & (not now < box.window[END]), Status.LEASE_ENDED.value, ended)
+    return ended
+
+
 @long_kernel
 def take(box, flock, books, clock, rule):
     """Take event after event until the end of the frame: (status, ball).
 
-    LEASE_ENDED where a cell has no room for one ball more: give all cells more, and call it again. INTERRUPTED after so
-    many events as the rule says; it goes on with the same bits.
+    LEASE_ENDED where a cell has no room for one ball more: give all cells more, and call it again; with no ball where
+    the window of walls that move has ended. LOG_FULL where the log needs an empty part. INTERRUPTED after so many
+    events as the rule says; it goes on with the same bits.
     """
     end, taken = rule.end - clock[EPOCHS] * clock[LENGTH], 0
     most = float(_AT_ONCE * flock.number())
     before = -math.inf
     while True:
         i, now = flock.item[FIRST], flock.key[FIRST]
-        if not now < end:
-            return Status.DONE.value, 0
+        ended = _is_over(box, end, now)
+        if ended >= 0:
+            return ended, NOBODY
         if taken >= rule.halt[0]:
             return Status.INTERRUPTED.value, 0
         taken += 1
@@ -264,7 +258,9 @@ def take(box, flock, books, clock, rule):
             if flock.event[index(row + MEETS)] <= now:
                 _collide(box, flock, books, clock, i, now)
             elif flock.event[index(row + DUE)] <= now:
-                _at_wall(box, flock, books, i, now)
+                status = _at_wall(box, flock, books, clock, i, now)
+                if status != FLIES:
+                    return status, i
             elif not _enter(box, flock, books, i, now):
                 clock[EVENTS] -= 1.0
                 return Status.LEASE_ENDED.value, i
@@ -276,6 +272,8 @@ def show(box, flock, state, end, first, last):
     for k in range(first, last):
         i = index(k)
         r, v = flock.at(box.pull, k, end)
+        if box.gates is not None and flock.event[index(FLOATS * k + WALL)] == OUT:
+            r, v = flock.place(k), flock.velocity(k)
         for axis, cells in enumerate(box.grid.axes()):
             x = r[axis]
             if cells.period is not None:

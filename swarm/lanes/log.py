@@ -54,6 +54,7 @@ class Log(NamedTuple):
     impulse: Array  # (rows,) [N s], along the wall's normal
     slip: Any  # (rows, 3) [m/s] tangential velocity relative to the wall, before; None without friction
     image: Any  # (rows, 3) int32, how many cells away that is; None where the scene does not repeat
+    partner: Any  # (rows,) int32, the particle that it meets, -1 at a wall; None where particles do not meet
     filled: Array  # (2,) int64, and how many rows had no room
     going: Array  # (GOING,) int64
     order: Array  # int64, the lanes of a pass that have a row

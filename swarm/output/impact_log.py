@@ -72,7 +72,7 @@ class ImpactLog(Stored):
         self._columns: dict[str, Any] = {}
         for name in file["impacts"]:
             shape = (self._rows, 3) if name in (*_VECTORS, "slip", "image") else (self._rows,)
-            kinds = "iu" if name in ("particle", "wall", "image") else "f"
+            kinds = "iu" if name in ("particle", "wall", "image", "partner") else "f"
             self._columns[name] = layout.dataset(file, f"impacts/{name}", kinds, shape)
             layout.require_fits(self._columns[name], self._rows, self.path)
         for name in ("time", "particle", "wall", *_VECTORS, "impulse"):
@@ -106,7 +106,7 @@ class ImpactLog(Stored):
             return int(kept) if isinstance(kept, int) else sorted({whole("particle", i) for i in kept})
 
     def counts(self) -> NDArray[np.int64]:
-        """Number of impacts on each surface, with a last row of each particle that passed an opening."""
+        """Number of impacts on each surface, no collisions, with a last row of each particle that passed an opening."""
         return self._counted()[0]
 
     def crossings(self) -> NDArray[np.int64]:
@@ -119,7 +119,8 @@ class ImpactLog(Stored):
             with self._reading(f"its rows from {k} on"):
                 walls = self._columns["wall"][k : min(k + _AT_ONCE, self._rows)]
                 counts += np.bincount(self._surface[walls[walls >= 0]], minlength=len(counts))
-                crossings += np.bincount(-1 - walls[walls < 0], minlength=len(crossings))
+                if self._counters:
+                    crossings += np.bincount(-1 - walls[walls < 0], minlength=len(crossings))
         return counts, crossings.reshape(-1, 2)
 
     @property
@@ -147,6 +148,7 @@ class ImpactLog(Stored):
         fields: list[Any] = [("time", "f8"), ("particle", "i4"), ("surface", "i4"), ("member", "i4")]
         fields += [*((name, real, 3) for name in _VECTORS), ("impulse", real)]
         fields += [field for field in (("slip", real, 3), ("image", "i4", 3)) if field[0] in self._columns]
+        fields += [("partner", "i4")] * ("partner" in self._columns)
         fields += [("counter", "i4"), ("sense", "i4")] * (self._counters > 0)
         return np.dtype(fields)
 
@@ -177,6 +179,9 @@ class ImpactLog(Stored):
             scene repeats, the position is in the cell and `image` (3,) says how many cells away that is.
 
             Who passes an opening of a surface has a last row there, with an impulse of 0.
+
+            Of particles with a radius a collision of two is a row too, of the one with the smaller number: `partner` is
+            the other one, -1 at a wall, `impulse` what each gives the other, and both `surface` and `member` are -1.
 
             In a run with counters a crossing is a row too, with an impulse of 0 and the velocity at the crossing twice:
             `counter` is the place of the counter in `counters` and `sense` 0 out of its admissible side, 1 back, and
@@ -222,7 +227,7 @@ class ImpactLog(Stored):
         with self._reading(f"its rows from {rows.start} on"):
             time = finite(self._columns["time"][rows], "row")
             particle, wall = self._columns["particle"][rows], self._columns["wall"][rows]
-            lowest = -2 * self._counters
+            lowest = -1 if "partner" in self._columns else -2 * self._counters
             if len(wall) and not (wall.min() >= lowest and wall.max() < len(self._surface)):
                 raise ValueError(
                     f"expected walls from {lowest} to {len(self._surface) - 1}, got {wall.min()} to {wall.max()}"

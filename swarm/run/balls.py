@@ -43,7 +43,7 @@ def require_balls(scene: Scene, particles: Particles | None, method: Method, opt
         )
     _require_method(scene, particles, method)
     require_shapes(scene, particles.radius)
-    _require_options(options)
+    _require_options(method, options)
     require_size(scene, particles.radius)
     require_instants_of_balls(scene, particles, method, options)
     require_soft_balls(scene, particles, method)
@@ -85,11 +85,11 @@ def _require_method(scene: Scene, particles: Particles, method: Impact | Penalty
         )
 
 
-def _require_options(options: RunOptions) -> None:
+def _require_options(method: Method, options: RunOptions) -> None:
     """Raise a `SceneError` for options of particles that are independent of one another."""
     given = {
         "cluster": options.cluster is not None, "sources": bool(options.sources), "counters": bool(options.counters),
-        "member_impacts": options.member_impacts,
+        "member_impacts": options.member_impacts and not isinstance(method, Impact),
     }  # fmt: skip
     for name, is_given in given.items():
         if is_given:

@@ -12,9 +12,12 @@ import numpy as np
 from .. import observables
 from ..ball_numbers import BallNumbers
 from ..colliding import events
+from ..colliding.bounce import Gates, Source
+from ..colliding.box import Books, Rule
+from ..colliding.clock import CLOCK, EPOCHS, LENGTH
 from ..colliding.described import described, epoch_of, with_room
-from ..colliding.events import CLOCK, EPOCHS, LENGTH, Books, Rule
 from ..colliding.queue import FIRST
+from ..colliding.window import END
 from ..errors import RunError
 from ..methods.base import Method
 from ..particles import Particles
@@ -23,9 +26,13 @@ from ..state import Balls, State
 from ..status import Status
 from . import failures
 from .base import Arrays, BaseRun
+from .doors import comers
+from .impacts import Page
+from .observed import gone_of, poses_of
 from .state import Seeding
 from .tally import Watched
 from .tiers import Tier
+from .windows import windows_of
 
 # Fewer balls than this are written sooner than another thread is awake.
 _FEW = 4096
@@ -43,25 +50,42 @@ class CollidingRun(BaseRun):
         assert particles.radius is not None
         n, rows = len(particles), len(scene.owners())
         self._radius = float(particles.radius.max())
-        self._box, self._flock = described(scene, particles)
-        loses = self._box.laws.may_dissipate or self._box.laws.loses or self._box.loss is not None
+        box, self._flock = described(scene, particles)
+        self._clock = np.zeros(CLOCK)
+        self._clock[LENGTH] = epoch_of(scene, particles, box.grid)
+        self._windows = windows_of(scene, self._clock)
+        laws, openings = box.laws, scene.openings()
+        loses = laws.may_dissipate or laws.loses or box.loss is not None
         balls = Balls(particles.radius, np.zeros(n, np.int64), np.zeros(1))
         # The energy of each alone is not kept; of zeros that nobody writes there is one page.
         unused = np.zeros(n)
         # Times are those of the start of each flight: so what is written at frames is no part of the motion.
         self.state = State(
             particles.position, particles.velocity, particles.mass, *2 * (unused,),
-            np.zeros(n, np.int64), np.zeros((2 * rows, 1)), np.zeros(n if loses else 0), None, None,
+            np.zeros(n, np.int64), np.zeros((2 * rows if scene.moves() else rows, 1)), np.zeros(n if loses else 0),
+            None, None, np.zeros((rows, 1)) if laws.give_heat else None,
             image=particles.image, period=scene.cell(), balls=balls,
+            escape_time=None if openings is None else np.full(n, math.nan), openings=openings,
+            absorbed_time=np.full(n, math.nan) if laws.may_end else None,
+            absorbed_wall=np.full(n, -1, np.int32) if laws.may_end else None,
+        )  # fmt: skip
+        state, self._balls, gates = self.state, balls, None
+        if openings is not None or laws.may_end:
+            gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
+        seed = seeding.seed - 2**64 if seeding.seed >= 2**63 else seeding.seed
+        self._impacts, self._tally, _counters = watched
+        self._box = box._replace(
+            log=None if self._impacts is None else self._impacts.example,
+            window=None if self._windows is None else self._windows.numbers,
+            gates=gates, source=Source(seed, seeding.first) if laws.send_off else None,
         )  # fmt: skip
         pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, self._box, n)
         super().__init__(scene, method, n, pool, tier, seeding.first)
-        state, self._balls = self.state, balls
-        self._tally = watched.tally
-        counts = None if self._tally is None else self._tally.of_thread(0).impacts
-        self._books = Books(state.impulse, state.dissipated, state.impacts, balls.virial, state.image, counts)
-        self._clock = np.zeros(CLOCK)
-        self._clock[LENGTH] = epoch_of(scene, particles, self._box.grid)
+        counts = None if self._tally is None else self._tally.counts()
+        self._books = Books(
+            state.impulse, state.dissipated, state.impacts, balls.virial, state.image, counts, state.heat
+        )
+        self._surfaces_of_walls = scene.members()[0]
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._threads = threads if n >= _FEW else 1
         self._numbers = BallNumbers(scene, particles)
@@ -73,12 +97,20 @@ class CollidingRun(BaseRun):
         latest = self._limit(latest)
         began = time.perf_counter()
         self._ends[:] = moment, moment - span
+        page, rule = None if self._impacts is None else Page(self._impacts, moment), Rule(moment, self._watch.passes)
         status = ball = int(Status.LEASE_ENDED)
-        while status == Status.LEASE_ENDED:
-            taking: Any = self._box, self._flock, self._books, self._clock, Rule(moment, self._watch.passes)
+        while status in (Status.LEASE_ENDED, Status.LOG_FULL):
+            kept = self._box if page is None else self._box._replace(log=page.log)
+            taking: Any = kept, self._flock, self._books, self._clock, rule
             ((status, ball),) = self._called(events.take, [taking], latest)
-            if status == Status.LEASE_ENDED:
+            if page is not None and status == Status.LOG_FULL:
+                page.turn()
+            elif status == Status.LEASE_ENDED and ball >= 0:
                 self._make_room()
+            elif status == Status.LEASE_ENDED:
+                self._next_window()
+        if page is not None:
+            page.close()
         self._cut_short = status == Status.INTERRUPTED
         if not self._cut_short and status == Status.DONE:
             self._show(moment)
@@ -102,6 +134,57 @@ class CollidingRun(BaseRun):
     def _since(self, moment: float) -> float:
         """A moment in the time of the epoch [s]."""
         return float(moment - self._clock[EPOCHS] * self._clock[LENGTH])
+
+    def _next_window(self) -> None:
+        """Begin the next window of walls that move, come or go, in which all balls look for their walls anew."""
+        windows = self._windows
+        assert windows is not None
+        instant, now = windows.instant(), float(windows.numbers[END])
+        if windows.is_at_epoch():
+            ending: Any = self._flock, self._clock
+            self._called(events.next_epoch, [ending], math.inf)
+            now = 0.0
+        windows.begin(now)
+        self._set_window()
+        if instant is not None:
+            self._require_free(instant, now)
+        self._for_all(events.look_again, self._box, self._flock, now)
+        ordering: Any = (self._flock,)
+        self._called(events.order, [ordering], math.inf)
+
+    def _set_window(self) -> None:
+        """The walls of the window, and which cells are near them."""
+        if self._windows is not None:
+            gates = self._box.gates
+            if gates is not None:
+                gates = gates._replace(openings=self._windows.openings())
+                self.state = self.state._replace(openings=gates.openings)
+            self._box = self._box._replace(walls=self._windows.walls(), gates=gates)
+        self._in_parts(events.mark, self._box, self._radius, count=int(self._box.grid.x.count) + 2)
+
+    def _require_free(self, instant: float, now: float) -> None:
+        """Raise a RunError where a ball is inside a wall that comes at an instant [s], which is now in the epoch."""
+        came = comers(self._scene, instant)
+        if not came.any():
+            return
+        self._in_parts(events.show, self._box, self._flock, self.state, now, count=self.state.mass.size)
+        distances = self._scene.distances_outside(self.state.position, instant, self._balls.radius)
+        distances[~came] = -math.inf
+        distances[:, self.state.gone()] = -math.inf
+        inside = ~(distances <= self._deepest)
+        if inside.any():
+            ball = int(np.argmax(inside.any(axis=0)))
+            wall = int(np.argmax(inside[:, ball]))
+            depth = float(distances[wall, ball])
+            said = failures.sentence_of_coming(self._scene, self.state, (wall, ball), depth, instant, self._first)
+            raise RunError(said)
+
+    def _for_all(self, kernel: Any, *arguments: Any) -> None:
+        """Call a kernel for all balls, some at a time."""
+        n, size = self.state.mass.size, _AT_ONCE_PLAIN if self._tier.is_plain else _AT_ONCE
+        for first in range(0, n, size):
+            aiming: Any = *arguments, first, min(first + size, n)
+            self._called(kernel, [aiming], math.inf)
 
     def _in_parts(self, kernel: Any, *arguments: Any, count: int) -> None:
         """Call a kernel for so many balls, a part of them in each thread."""
@@ -127,11 +210,15 @@ class CollidingRun(BaseRun):
         yield events.order, (flock,)
         yield events.take, (box, flock, self._books, self._clock, Rule(0.0, self._watch.passes))
         yield events.show, (box, flock, self.state, 0.0, *part)
+        if self._windows is not None:
+            yield events.look_again, (box, flock, 0.0, *part)
+            yield events.next_epoch, (flock, self._clock)
         yield observables.observe, self._observing()
 
-    def _observing(self) -> tuple[Any, ...]:
+    def _observing(self, moment: float = 0.0) -> tuple[Any, ...]:
         drawn = np.arange(len(self._partial))
-        return None, self._box.walls, self._box.pull, self.state, drawn, observables.CHUNK, self._partial
+        walls = self._box.walls if self._windows is None else self._scene.walls(moment)
+        return None, walls, self._box.pull, self.state, drawn, observables.CHUNK, self._partial
 
     def observe(self) -> None:
         self._begin()
@@ -141,18 +228,18 @@ class CollidingRun(BaseRun):
 
     def _begin(self) -> None:
         """Find what is next for every ball."""
-        n, began = self.state.mass.size, time.perf_counter()
-        size = _AT_ONCE_PLAIN if self._tier.is_plain else _AT_ONCE
-        self._in_parts(events.mark, self._box, self._radius, count=int(self._box.grid.x.count) + 2)
-        for first in range(0, n, size):
-            aiming: Any = self._box, self._flock, first, min(first + size, n)
-            self._called(events.begin, [aiming], math.inf)
+        began = time.perf_counter()
+        if self._windows is not None:
+            self._windows.begin(0.0)
+        self._set_window()
+        self._for_all(events.begin, self._box, self._flock)
         ordering: Any = (self._flock,)
         self._called(events.order, [ordering], math.inf)
         self._tier.spend(time.perf_counter() - began)
 
     def _observe(self, moment: float) -> None:
-        self._tier.kernel(observables.observe)(*self._observing())
+        self._tier.kernel(observables.observe)(*self._observing(moment))
+        self._moment = moment
         self._numbers.frame(self.state, moment, self._summary()["kinetic_energy"])
 
     def _summary(self) -> dict[str, Any]:
@@ -162,8 +249,11 @@ class CollidingRun(BaseRun):
         seen = self._summary()
         scale = seen["kinetic_energy"] + seen["dissipated_energy"] + abs(seen["potential_energy"])
         seen["energy_error"] = abs(_balance(seen) - self._start[0]) / scale if scale > 0.0 else 0.0
-        escaped = int((np.sqrt((self.state.position**2).sum(axis=0)) > self._far).sum())
-        return self._numbers.added({**seen, "escaped": escaped}, self.state)
+        far = (np.sqrt((self.state.position**2).sum(axis=0)) > self._far) & ~self.state.gone()
+        seen |= gone_of(self.state, int(far.sum()), self._surfaces_of_walls, len(self._scene.surfaces))
+        if self._scene.moves():
+            seen |= poses_of(self._scene, self._moment)
+        return self._numbers.added(seen, self.state)
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
         failures.require_admissible(self._scene, self.state, seen, self._deepest, moment, self._first)
@@ -181,7 +271,11 @@ class CollidingRun(BaseRun):
             "start": self._start, "position": state.position, "velocity": state.velocity,
             **self._numbers.arrays(),
         }  # fmt: skip
-        some = {"last": flock.last, "image": state.image}
+        some = {
+            "last": flock.last, "image": state.image, "heat": state.heat, "escape_time": state.escape_time,
+            "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
+            "window": None if self._windows is None else self._windows.numbers,
+        }  # fmt: skip
         found |= {name: array for name, array in some.items() if array is not None}
         return found if self._tally is None else {**found, **self._tally.arrays()}
 
@@ -190,11 +284,14 @@ class CollidingRun(BaseRun):
         while self._flock.room.size < arrays["room"].size:
             self._make_room()
         super().restore(arrays, cut_short)
+        if self._windows is not None:
+            self._set_window()
         if self._tally is not None:
-            self._books.counts[:] = arrays["member_impacts"]
+            self._tally.restore(arrays)
+            self._books = self._books._replace(counts=self._tally.counts())
 
 
 def _balance(seen: dict[str, Any]) -> float:
     """The energy of all, with what was lost."""
-    kept: float = seen["total_energy"] + seen["dissipated_energy"]
-    return kept
+    kept: float = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum()
+    return kept - float(np.sum(seen.get("wall_work", 0.0)))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..contact.events import ARRIVED, CAREFUL, EDGE, FLYING, HELD
 from ..errors import RunError
+from ..scene import Scene
 from ..state import Contacts
 from .base import Arrays
 from .engine import Run
@@ -79,15 +80,11 @@ class DoorRun(Run):
 
     def _before(self, instant: float) -> float:
         """A time before an instant and after the one before it [s]."""
-        k = bisect.bisect_left(self._instants, instant)
-        return 0.5 * ((self._instants[k - 1] if k > 0 else 0.0) + instant)
+        return _before(self._scene, instant)
 
     def _require_free(self, instant: float) -> None:
         """Raise a RunError where a particle is inside a wall that comes at an instant [s]."""
-        last, owners = self._before(instant), self._scene.owners_of_pieces
-        came = np.zeros(len(self._scene.surfaces), np.bool_)
-        for i, piece in zip(owners, self._scene.pieces, strict=True):
-            came[i] |= piece.is_there(instant) and not piece.is_there(last)
+        came = comers(self._scene, instant)
         if not came.any():
             return
         distances = self._scene.distances_outside(self.state.position, instant)
@@ -117,6 +114,20 @@ class DoorRun(Run):
         contacts.walls[:, held] = -1.0
         contacts.step[held] = contacts.keep[held] = 0.0
         contacts.load[:, held] = 0.0
+
+
+def comers(scene: Scene, instant: float) -> NDArray[np.bool_]:
+    """Which surfaces have walls that come at an instant [s]."""
+    last, came = _before(scene, instant), np.zeros(len(scene.surfaces), np.bool_)
+    for i, piece in zip(scene.owners_of_pieces, scene.pieces, strict=True):
+        came[i] |= piece.is_there(instant) and not piece.is_there(last)
+    return came
+
+
+def _before(scene: Scene, instant: float) -> float:
+    """A time before an instant and after the one before it [s]."""
+    k = bisect.bisect_left(scene.instants, instant)
+    return 0.5 * ((scene.instants[k - 1] if k > 0 else 0.0) + instant)
 
 
 def _wake(contacts: Contacts, rests: NDArray[np.bool_]) -> None:

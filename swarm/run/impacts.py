@@ -38,6 +38,7 @@ class Impacts:
         precision: of positions, velocities and impulses; times are float64.
         threads: how many fill logs.
         counts: whether crossings of counters have rows too.
+        meet: whether particles meet one another.
 
     Attributes:
         kept: the particles and the precision, as TOML text.
@@ -49,13 +50,14 @@ class Impacts:
     """
 
     def __init__(
-        self, scene: Scene, n: int, particles: Any, precision: str, threads: int, counts: bool = False
-    ) -> None:
+        self, scene: Scene, n: int, particles: Any, precision: str, threads: int, counts: bool = False,
+        meet: bool = False,
+    ) -> None:  # fmt: skip
         laws, real = scene.laws(), np.dtype(precision)
         self.kept = tomli_w.dumps({"particles": particles, "precision": precision})
         self._chosen = chosen(particles, n)
         self._slips, self._repeats = laws is not None and laws.friction is not None, scene.period is not None
-        self._real = real
+        self._real, self._meet = real, meet
         # A flight may cross many counters.
         self._room = _ROWS // 2 if counts else LANES
         self._spare: queue.SimpleQueue[Log] = queue.SimpleQueue()
@@ -76,7 +78,8 @@ class Impacts:
             np.empty(rows), np.empty(rows, np.int32), np.empty(rows, np.int32), np.empty((rows, 3), real),
             np.empty((rows, 3), real), np.empty((rows, 3), real), np.empty(rows, real),
             np.empty((rows, 3), real) if self._slips else None,
-            np.empty((rows, 3), np.int32) if self._repeats else None, np.zeros(2, np.int64), np.zeros(GOING, np.int64),
+            np.empty((rows, 3), np.int32) if self._repeats else None, np.empty(rows, np.int32) if self._meet else None,
+            np.zeros(2, np.int64), np.zeros(GOING, np.int64),
             np.zeros(STRIDE, np.int64), self._chosen, 0.0, 0.0, self._room,
         )  # fmt: skip
 
@@ -138,8 +141,9 @@ def log_of(task: Task) -> Impacts | None:
         return None
     threads = options.thread_count()
     return Impacts(
-        task.scene, len(task.particles), options.impact_particles, options.precision, threads, bool(options.counters)
-    )
+        task.scene, len(task.particles), options.impact_particles, options.precision, threads, bool(options.counters),
+        task.particles.radius is not None,
+    )  # fmt: skip
 
 
 class Page:
@@ -165,6 +169,16 @@ class Page:
             self._impacts.hand_over(self._log)
             self._log = self._impacts.empty(self._end)
             self._log.going[:] = going
+
+    @property
+    def log(self) -> Log:
+        """The log that is filled now."""
+        return self._log
+
+    def turn(self) -> None:
+        """Hand over what there is, and go on with an empty log."""
+        self._impacts.hand_over(self._log)
+        self._log = self._impacts.empty(self._end)
 
     def close(self) -> None:
         """Hand over what there is."""

@@ -5,6 +5,7 @@ from ..methods import Impact
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
+from ..surfaces.laws.sticky import Sticky
 from .options import RunOptions
 
 
@@ -12,7 +13,7 @@ def require_instants_of_balls(scene: Scene, particles: Particles, method: Method
     """Raise a `SceneError` where balls that meet at instants do not go with the scene or the options."""
     if not isinstance(method, Impact):
         return
-    _require_plain(scene, options)
+    _require_plain(scene)
     if method.contact_step > 0.0:
         raise SceneError(
             f"contact_step must be 0 with particles that have a radius, got {method.contact_step:g}; leave it out"
@@ -31,28 +32,17 @@ def require_instants_of_balls(scene: Scene, particles: Particles, method: Method
             )
 
 
-def _require_plain(scene: Scene, options: RunOptions) -> None:
+def _require_plain(scene: Scene) -> None:
     """Raise a `SceneError` for what balls that meet at instants do not know."""
     for i, surface in enumerate(scene.surfaces):
-        if surface.motion is not None or surface.reacts():
+        if surface.reacts():
             raise SceneError(
-                f"surfaces[{i}] must be at rest with particles that have a radius, got {surface!r:.200}; leave out its "
-                "motion, its mass and its inertia, or the radius"
+                f"surfaces[{i}] must have no mass and no inertia with particles that have a radius, got "
+                f"{surface!r:.200}; leave these out, give it a motion, or leave out the radius"
             )
-    laws = scene.laws()
-    if laws is not None and laws.send_off:
-        raise SceneError(
-            "surfaces must have no temperature and no laws of their own with particles that have a radius and Impact, "
-            "got a scene with them; leave these or the radius out"
-        )
-    if scene.has_doors():
-        raise SceneError(
-            "surfaces must have no openings and always be present with particles that have a radius and Impact, got a "
-            "scene with them; leave these or the radius out"
-        )
-    for name in ("impacts", "counters", "sources"):
-        if getattr(options, name):
-            raise SceneError(
-                f"{name} must be left out with particles that have a radius and Impact, got {name}; leave these or the "
-                "radius out"
-            )
+        for k, law in enumerate(surface.laws):
+            if isinstance(law, Sticky):
+                raise SceneError(
+                    f"surfaces[{i}].laws[{k}] must let particles that have a radius leave at once with Impact, got "
+                    f"{law!r:.200}; leave it or the radius out"
+                )

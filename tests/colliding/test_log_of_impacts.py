@@ -1,0 +1,60 @@
+"""The log of impacts of balls: rows of walls and of collisions, whatever the log is filled by."""
+
+import numpy as np
+import pytest
+from colliding.test_colliding import gas
+from physics import ball_loop
+
+import swarm
+from swarm.run import impacts
+
+
+def logged(folder, scene, start, **options):
+    path = folder / "impacts.h5"
+    path.unlink(missing_ok=True)
+    options = {"until": 0.5, "compile": "never", **options}
+    run = swarm.simulate(scene, start, swarm.Impact(), impacts=path, **options)
+    with swarm.load_impacts(path) as log:
+        return run, log.table(), log.counts()
+
+
+def test_rows_are_the_events_of_a_plain_loop(tmp_path):
+    scene, start = gas(n=20)
+    run, table, counts = logged(tmp_path, scene, start)
+    expected = ball_loop.follow(scene, start, [0.5])
+    partner = [(i, j) for _t, i, j in expected.events]
+    assert list(zip(table["particle"].tolist(), table["partner"].tolist(), strict=True)) == partner
+    np.testing.assert_allclose(table["time"], [t for t, *_ in expected.events], atol=1e-9)
+    met = table["partner"] >= 0
+    assert met.sum() == run.observables["collisions"][-1]
+    assert (~met).sum() == run.observables["impacts"][-1] == counts.sum()
+    assert (table["surface"] == np.where(met, -1, 0)).all()
+    change = table["velocity_after"] - table["velocity_before"]
+    pushed = start.mass[table["particle"]] * np.sqrt((change**2).sum(axis=1))
+    np.testing.assert_allclose(table["impulse"], pushed, rtol=1e-12)
+    np.testing.assert_allclose(table["impulse"][~met].sum(), run.observables["impulse"][-1].sum(), rtol=1e-12)
+
+
+@pytest.mark.parametrize("options", [{}, {"period": (2.0, 2.0, 2.0)}])
+def test_a_log_that_is_full_goes_on_in_the_next_one(tmp_path, monkeypatch, options):
+    scene, start = gas(n=20, **options)
+    run, table, _counts = logged(tmp_path, scene, start, until=1.5)
+    monkeypatch.setattr(impacts, "_ROWS", 7)
+    again, same, _counts = logged(tmp_path, scene, start, until=1.5)
+    assert (again.particles.position == run.particles.position).all()
+    assert (same == table).all()
+    assert len(table) > 10
+
+
+def test_rows_of_some_balls_only(tmp_path):
+    scene, start = gas(n=20)
+    _run, table, _counts = logged(tmp_path, scene, start)
+    _run, some, _counts = logged(tmp_path, scene, start, impact_particles=[3, 7])
+    of_these = np.isin(table["particle"], [3, 7]) | np.isin(table["partner"], [3, 7])
+    assert (some == table[of_these]).all()
+
+
+def test_impacts_of_members_are_counted():
+    scene, start = gas(n=20)
+    seen = swarm.simulate(scene, start, swarm.Impact(), until=0.5, compile="never", member_impacts=True)
+    assert seen.observables["member_impacts"][-1].sum() == seen.observables["impacts"][-1] > 5
