@@ -10,9 +10,8 @@ Frames look at the balls and change no flight, so that a run has the same bits w
 import math
 
 from ..kernel.arrays import fetch, index
-from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined, select
-from ..kernel.vector import norm, put, square
+from ..kernel.vector import norm, put
 from ..status import Status
 from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .bounce import FLIES, GONE, bounce
