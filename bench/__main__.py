@@ -9,6 +9,7 @@ from . import (
     bars,
     bodies,
     cluster,
+    collisions,
     compare,
     compiling,
     contacts,
@@ -59,6 +60,7 @@ def main() -> None:
     )
     commands.add_parser("laws", help="laws of walls: what an impact costs under each, the books, first calls")
     commands.add_parser("unions", help="vessels of several parts: what an impact costs beside one of them, first calls")
+    commands.add_parser("collisions", help="balls that meet: what a collision costs, memory, first calls, how exact")
     commands.add_parser("meshes", help="meshes of triangles: the scene, its memory, an impact, the first call")
     first = commands.add_parser("compile", help="first calls: processor time, functions compiled, and the next process")
     first.add_argument(
@@ -102,6 +104,7 @@ def main() -> None:
         "compile": compiling,
         "sweep": sweeps,
         "cluster": cluster,
+        "collisions": collisions,
         "endurance": endurance,
     }
     if not arguments.quick:

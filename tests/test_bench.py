@@ -193,6 +193,13 @@ def test_laws_quick():
 
 
 @pytest.mark.long
+def test_collisions_quick():
+    told = printed("collisions")
+    for row in ("8788 balls, packing 0.4, box, a collision", "momentum along the cell", "overlap at 5 frames"):
+        assert row in told
+
+
+@pytest.mark.long
 def test_unions_quick():
     told = printed("unions")
     for row in ("two balls, an impact", "a box, a tube, a box under gravity, an impact"):

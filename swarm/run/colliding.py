@@ -14,7 +14,7 @@ from ..ball_numbers import BallNumbers
 from ..colliding import events
 from ..colliding.bounce import Gates, Source
 from ..colliding.box import Books, Rule
-from ..colliding.clock import CLOCK, EPOCHS, LENGTH
+from ..colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH
 from ..colliding.described import described, epoch_of, with_room
 from ..colliding.queue import FIRST
 from ..colliding.window import END
@@ -198,6 +198,10 @@ class CollidingRun(BaseRun):
             f"the frame after {before:g} s failed at particle {ball}: {status.sentence}; it is at "
             f"({', '.join(f'{x:.6g}' for x in r)}) m at {self._now():.9g} s"
         )
+
+    def collisions(self) -> float:
+        """How many there were since the start."""
+        return float(self._clock[COLLISIONS])
 
     def _now(self) -> float:
         """The time of the next event since the start [s]."""
