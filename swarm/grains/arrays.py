@@ -17,8 +17,22 @@ X, LOST, RADIUS, LIGHTNESS = 0, 3, 6, 7
 BEFORE, AFTER = 0, 3
 # Columns of `Touches.rows`: s0, from one centre to the other at the start of a step, or the centre; |s0|, or the inner
 # function of the wall; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
-# inverse of the mass that moves; the damping; and where there is friction its impulse, and the place in the lists.
-START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, DRAG, LISTED = 0, 3, 4, 5, 6, 9, 12, 13, 14, 17
+# inverse of the mass that moves; the damping; the gain of a Newton step; and where there is friction its
+# impulse, and the place in the lists.
+START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED = (
+    0,
+    3,
+    4,
+    5,
+    6,
+    9,
+    12,
+    13,
+    14,
+    15,
+    16,
+    19,
+)
 COLUMNS, COLUMNS_OF_FRICTION = 16, 24
 # Of a clock: the steps of the frame that are done, those since pairs were listed, and those since the run was halted
 # last; the skin of the lists [m].

@@ -21,10 +21,11 @@ class Books(NamedTuple):
     sweeps: Array  # (1,) int64
 
 
-def _lost(matter, push, gap, change):
-    """The energy that the damper of a contact takes [J]."""
+def _lost(matter, work, gap, change):
+    """The energy that the damper of a contact takes [J], by the work of its impulse times the step."""
+    # By what it did, not by what it was to do: so nothing is missing, however well the step is solved.
     force, _slope = matter.law.energy_slope(gap, gap + change)
-    return (push / matter.h - force) * change
+    return -work / matter.h - force * change
 
 
 @outlined
@@ -43,7 +44,7 @@ def book_pairs(matter, grains, touches, books):
         books.collisions[one] += begins
         books.collisions[other] += begins
         if matter.pairs.damping is not None:
-            lost = 0.5 * _lost(matter, rows[c, PUSH], rows[c, GAP], way.change)
+            lost = 0.5 * _lost(matter, dot(impulse, move), rows[c, GAP], way.change)
             books.dissipated[one] += lost
             books.dissipated[other] += lost
 
@@ -60,10 +61,13 @@ def book_wall(matter, law, wall, grains, touches, books, number):
         own = wall.grown(grains.place[i, RADIUS])
         way = rising(own, vector_at(rows, c, START), rows[c, SIZE], move)
         books.impacts[one] += (gap <= 0.0) & (gap + way.change > 0.0)
-        books.impulse[index(number), one] += norm(vector_at(rows, c, IMPULSE))
+        impulse = vector_at(rows, c, IMPULSE)
+        books.impulse[index(number), one] += norm(impulse)
+        work = dot(impulse, move)
         if isinstance(wall, Posed):
             # What it gives is what the ball gains and the contact stores or loses.
-            given = dot(vector_at(rows, c, IMPULSE), move) + push * way.change
+            given = work + push * way.change
             books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given / matter.h
+            work = work - given
         if law.damping is not None:
-            books.dissipated[one] += _lost(matter, push, gap, way.change)
+            books.dissipated[one] += _lost(matter, work, gap, way.change)

@@ -23,6 +23,7 @@ from .arrays import (
     DAMPING,
     DRAG,
     EASE,
+    GAIN,
     GAP,
     IMPULSE,
     LIGHTNESS,
@@ -39,6 +40,8 @@ from .arrays import (
 from .cell import nearest
 
 _TINY = 1e-300
+# Where a damper acts, a change of an impulse counts so much less: what it takes is booked by what it did.
+_DAMPED = 1e-6
 
 
 class Losses(Record):
@@ -84,6 +87,11 @@ def damper(own, rows, c):
     return None if own is None else rows[c, DAMPING]
 
 
+def weight_of(law):
+    """How much a change of an impulse counts."""
+    return 1.0 if law.damping is None else _DAMPED
+
+
 def lasting(gap):
     """1 where a contact of this gap has been one in the step before, else 0: then what is kept of it is old."""
     return select(gap > 0.0, 1.0, 0.0)
@@ -94,10 +102,35 @@ def worse(off, worst):
     return select((off <= worst) | (worst != worst), worst, off)
 
 
-def improved(push, wanted, slope, ease):
-    """A Newton step of the size of an impulse; `ease` is how much the gap falls for each of it."""
-    new = push + (wanted - push) / (1.0 + select(slope > 0.0, ease * slope, 0.0))
+def improved(rows, c, wanted):
+    """A Newton step of the size of an impulse."""
+    push = rows[c, PUSH]
+    new = push + (wanted - push) * rows[c, GAIN]
     return select(new > 0.0, new, 0.0)
+
+
+def begin_solve(rows, c, pressed_first, ease):
+    """The first size of an impulse, and the gain of all Newton steps."""
+    push, slope = pressed_first
+    rows[c, PUSH] = push
+    rows[c, GAIN] = 1.0 / (1.0 + select(slope > 0.0, ease * slope, 0.0))
+
+
+def relative(more, push, speeds, ease):
+    """A change of an impulse, relative to what moves there."""
+    return size_of(more) / (push + speeds / ease + _TINY)
+
+
+def change_of(rows, c, new):
+    """The change of an impulse, which becomes the new one."""
+    more = new - vector_at(rows, c, IMPULSE)
+    set_vector(rows, c, IMPULSE, new)
+    return more
+
+
+def size_of(a):
+    """The sum of the magnitudes of the components."""
+    return total(absolute(a))
 
 
 # --- Of pairs --------------------------------------------------------------------------------------------
@@ -130,7 +163,7 @@ def gather_pairs(matter, grains, near, touches):
     """Add the pairs that are in contact at an end of the step to its contacts; how many are new."""
     place, speed, half = grains.place, grains.speed, 0.5 * matter.h
     rows, count = touches.rows, touches.used[0]
-    first = count
+    known = count
     for a in range(place.shape[0]):
         i = index(a)
         here, radius = vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER), place[i, RADIUS]
@@ -153,34 +186,39 @@ def gather_pairs(matter, grains, near, touches):
                 if matter.pairs.damping is not None:
                     rows[c, DAMPING] = matter.pairs.damping / math.sqrt(ease)
                 way = closing(s0, size, move)
-                rows[c, PUSH], _slope = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
+                first = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
+                begin_solve(rows, c, first, half * ease)
                 set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
                 if matter.pairs.friction is not None:
                     rows[c, LISTED] = k
                     set_vector(rows, c, DRAG, vector_at(near.drag, index(k), 0) * lasting(rows[c, GAP]))
                 count += 1
     touches.used[0] = count
-    return count - first
+    return count - known
+
+
+def press_pair(matter, grains, touches, c, ends):
+    """Improve the impulse of a pair: its `Closing`, the velocities then, and the change, relative to what moves."""
+    rows, half, (i, j) = touches.rows, 0.5 * matter.h, ends
+    v, u = vector_at(grains.speed, i, AFTER), vector_at(grains.speed, j, AFTER)
+    way = closing(vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * (v - u))
+    wanted, _slope = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
+    rows[c, PUSH] = improved(rows, c, wanted)
+    more = change_of(rows, c, rows[c, PUSH] * way.along)
+    off = weight_of(matter.pairs) * relative(more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
+    return way, v + more * grains.place[i, LIGHTNESS], u - more * grains.place[j, LIGHTNESS], off
 
 
 @outlined
 def sweep_pairs(matter, grains, touches):
     """Improve the impulse of each pair in turn; the largest change of one, relative to what moves there."""
-    rows, speed, half, worst = touches.rows, grains.speed, 0.5 * matter.h, 0.0
+    speed, worst = grains.speed, 0.0
     for k in range(touches.used[0]):
         c = index(k)
         i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        v, u, ease = vector_at(speed, i, AFTER), vector_at(speed, j, AFTER), rows[c, EASE]
-        way = closing(vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * (v - u))
-        wanted, slope = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
-        push = improved(rows[c, PUSH], wanted, slope, half * ease)
-        new = push * way.along
-        more = new - vector_at(rows, c, IMPULSE)
-        rows[c, PUSH] = push
-        set_vector(rows, c, IMPULSE, new)
-        set_vector(speed, i, AFTER, v + more * grains.place[i, LIGHTNESS])
-        set_vector(speed, j, AFTER, u - more * grains.place[j, LIGHTNESS])
-        off = total(absolute(more)) / (push + (total(absolute(v)) + total(absolute(u))) / ease + _TINY)
+        _way, v, u, off = press_pair(matter, grains, touches, c, (i, j))
+        set_vector(speed, i, AFTER, v)
+        set_vector(speed, j, AFTER, u)
         worst = worse(off, worst)
     return worst
 
@@ -219,7 +257,7 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
     place, speed, half, rows = grains.place, grains.speed, 0.5 * matter.h, touches.wall_rows
     number, begin = given
     count = touches.wall_spans[1, number]
-    first, start = count, touches.wall_spans[0, number]
+    known, start = count, touches.wall_spans[0, number]
     for k in range(begin, near.wall_first[number + 1]):
         a = near.slot[index(k)]
         i = index(a)
@@ -242,34 +280,38 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             if law.damping is not None:
                 rows[c, DAMPING] = law.damping / math.sqrt(place[i, LIGHTNESS])
             way = rising(own, r0, q0, move)
-            rows[c, PUSH], _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
+            first = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
+            begin_solve(rows, c, first, half * place[i, LIGHTNESS] * square(way.along))
             set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
             if law.friction is not None:
                 rows[c, LISTED] = k
                 set_vector(rows, c, DRAG, vector_at(near.wall_drag, index(k), 0) * lasting(rows[c, GAP]))
             count += 1
     touches.wall_spans[1, number] = count
-    return count - first
+    return count - known
+
+
+def press_at_wall(matter, law, own, grains, rows, c, i):
+    """Improve the impulse of a ball at a wall: its `Closing`, the velocity then, and the change as for pairs."""
+    half, v = 0.5 * matter.h, vector_at(grains.speed, i, AFTER)
+    way = rising(own, vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * v)
+    wanted, _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
+    rows[c, PUSH] = improved(rows, c, wanted)
+    more = change_of(rows, c, rows[c, PUSH] * way.along)
+    off = weight_of(law) * relative(more, rows[c, PUSH], size_of(v), rows[c, EASE])
+    return way, v + more * rows[c, EASE], off
 
 
 @outlined
 def sweep_wall(matter, law, wall, grains, touches, number):
     """Improve the impulse of each ball at a wall; the largest change of one, relative to what moves there."""
-    rows, speed, half, worst = touches.wall_rows, grains.speed, 0.5 * matter.h, 0.0
-    begin = touches.wall_spans[0, number]
+    rows, worst, begin = touches.wall_rows, 0.0, touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        v, ease, own = vector_at(speed, i, AFTER), rows[c, EASE], wall.grown(grains.place[i, RADIUS])
-        way = rising(own, vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * v)
-        wanted, slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
-        push = improved(rows[c, PUSH], wanted, slope, half * ease * square(way.along))
-        new = push * way.along
-        more = new - vector_at(rows, c, IMPULSE)
-        rows[c, PUSH] = push
-        set_vector(rows, c, IMPULSE, new)
-        set_vector(speed, i, AFTER, v + more * ease)
-        off = total(absolute(more)) / (push + total(absolute(v)) / ease + _TINY)
+        own = wall.grown(grains.place[i, RADIUS])
+        _way, v, off = press_at_wall(matter, law, own, grains, rows, c, i)
+        set_vector(grains.speed, i, AFTER, v)
         worst = worse(off, worst)
     return worst
 

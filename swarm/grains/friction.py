@@ -15,7 +15,7 @@ import math
 
 from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
-from ..kernel.vector import ZERO, absolute, cross, dot, square, total
+from ..kernel.vector import ZERO, cross, dot, square
 from ..surfaces.posed import Posed
 from .arrays import (
     AFTER,
@@ -33,7 +33,7 @@ from .arrays import (
     set_vector,
     vector_at,
 )
-from .contacts import closing, rising, worse
+from .contacts import press_at_wall, press_pair, relative, rising, size_of, worse
 
 # 1/(2/5), of the moment of inertia of a ball.
 _ROUNDNESS = 2.5
@@ -69,19 +69,17 @@ def arm_of(way, size, change, reach):
 
 @outlined
 def rub_pairs(matter, grains, touches):
-    """Improve the friction of each pair in turn; the largest change of one, relative to what moves there."""
-    rows, place, speed, spin, half = touches.rows, grains.place, grains.speed, grains.spin, 0.5 * matter.h
-    worst = 0.0
+    """Improve the impulse and the friction of each pair in turn; the largest change, relative to what moves there."""
+    rows, place, speed, spin, worst = touches.rows, grains.place, grains.speed, grains.spin, 0.0
     for k in range(touches.used[0]):
         c = index(k)
         i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        v, u, ease, size = vector_at(speed, i, AFTER), vector_at(speed, j, AFTER), rows[c, EASE], rows[c, SIZE]
-        coast, radius, other = vector_at(rows, c, COAST), place[i, RADIUS], place[j, RADIUS]
-        way = closing(vector_at(rows, c, START), size, coast + half * (v - u))
-        arm = arm_of(way, size, way.change, radius + other)
+        way, v, u, off = press_pair(matter, grains, touches, c, (i, j))
+        radius, other = place[i, RADIUS], place[j, RADIUS]
+        arm = arm_of(way, rows[c, SIZE], way.change, radius + other)
         slip = across(v - u - cross(_turning(grains, i, j, AFTER), arm), way.along)
         before, limit = vector_at(rows, c, DRAG), matter.pairs.friction * rows[c, PUSH]
-        new = rubbed(across(before, way.along), slip, ease * (1.0 + _ROUNDNESS * square(arm)), limit)
+        new = rubbed(across(before, way.along), slip, rows[c, EASE] * (1.0 + _ROUNDNESS * square(arm)), limit)
         more = new - before
         set_vector(rows, c, DRAG, new)
         one, two = place[i, LIGHTNESS], place[j, LIGHTNESS]
@@ -90,8 +88,8 @@ def rub_pairs(matter, grains, touches):
         twist = cross(arm, more)
         set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (_ROUNDNESS * one / radius))
         set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (_ROUNDNESS * two / other))
-        off = total(absolute(more)) / (rows[c, PUSH] + (total(absolute(v)) + total(absolute(u))) / ease + _TINY)
-        worst = worse(off, worst)
+        rubbing = relative(more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
+        worst = worse(rubbing, worse(off, worst))
     return worst
 
 
@@ -126,31 +124,32 @@ def _carried(wall, r0, r1):
     return wall.velocity(r0) + last, last
 
 
-def _facing(wall, grains, rows, c, i, move):
+def _facing(own, way, radius, r0, move):
     """The unit normal of a contact with a wall, and `_carried` of the wall at the contact."""
-    radius, r0 = grains.place[i, RADIUS], vector_at(rows, c, START)
-    own = wall.grown(radius)
-    way = rising(own, r0, rows[c, SIZE], move)
     n = way.along * (1.0 / math.sqrt(square(way.along)))
     return n, _carried(own, r0 - radius * n, r0 + move - radius * n)
 
 
+def _faced(wall, grains, rows, c, i, move):
+    """`_facing` of a ball that moves so."""
+    radius, r0 = grains.place[i, RADIUS], vector_at(rows, c, START)
+    own = wall.grown(radius)
+    return _facing(own, rising(own, r0, rows[c, SIZE], move), radius, r0, move)
+
+
 @outlined
 def rub_wall(matter, law, wall, grains, touches, number):
-    """Improve the friction of each ball at a wall; the largest change of one, relative to what moves there."""
+    """Improve the impulse and the friction of each ball at a wall; the largest change, as for pairs."""
     rows, speed, spin, half, worst = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h, 0.0
     begin = touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        v, w, ease, radius = (
-            vector_at(speed, i, AFTER),
-            vector_at(spin, i, AFTER),
-            rows[c, EASE],
-            grains.place[i, RADIUS],
-        )
-        coast = vector_at(rows, c, COAST)
-        n, (_both, last) = _facing(wall, grains, rows, c, i, coast + half * v)
+        radius, ease, w = grains.place[i, RADIUS], rows[c, EASE], vector_at(spin, i, AFTER)
+        own = wall.grown(radius)
+        way, v, off = press_at_wall(matter, law, own, grains, rows, c, i)
+        move = vector_at(rows, c, COAST) + half * v
+        n, (_both, last) = _facing(own, way, radius, vector_at(rows, c, START), move)
         slip = across(v - last - radius * cross(w, n), n)
         before = vector_at(rows, c, DRAG)
         new = rubbed(across(before, n), slip, ease * (1.0 + _ROUNDNESS), law.friction * rows[c, PUSH])
@@ -158,7 +157,7 @@ def rub_wall(matter, law, wall, grains, touches, number):
         set_vector(rows, c, DRAG, new)
         set_vector(speed, i, AFTER, v + more * ease)
         set_vector(spin, i, AFTER, w - cross(n, more) * (_ROUNDNESS * ease / radius))
-        worst = worse(total(absolute(more)) / (rows[c, PUSH] + total(absolute(v)) / ease + _TINY), worst)
+        worst = worse(relative(more, rows[c, PUSH], size_of(v), ease), worse(off, worst))
     return worst
 
 
@@ -171,7 +170,7 @@ def twist_wall(matter, wall, grains, touches, number):
         c = index(k)
         i = index(touches.wall_ends[c])
         move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
-        n, _velocities = _facing(wall, grains, rows, c, i, move)
+        n, _velocities = _faced(wall, grains, rows, c, i, move)
         turned = cross(n, vector_at(rows, c, DRAG)) * (_ROUNDNESS * rows[c, EASE] / grains.place[i, RADIUS])
         set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - turned)
 
@@ -187,7 +186,7 @@ def book_rubbing(matter, wall, grains, near, touches, books, number):
         one, drag = index(grains.number[i]), vector_at(rows, c, DRAG)
         set_vector(near.wall_drag, index(int(rows[c, LISTED])), 0, drag)
         move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
-        n, (both, _last) = _facing(wall, grains, rows, c, i, move)
+        n, (both, _last) = _faced(wall, grains, rows, c, i, move)
         turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
         gained = dot(drag, move) / matter.h - 0.5 * grains.place[i, RADIUS] * dot(cross(n, drag), turned)
         given = 0.5 * dot(drag, both)

@@ -21,7 +21,7 @@ from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twi
 # one before, if that is round-off of what many large impulses leave of one another.
 _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 # Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them.
-_RUBBED = 1e-3
+_RUBBED = 1e-2
 _MOST_SWEEPS = 1000
 
 
@@ -101,13 +101,13 @@ def _sweep(matter, walls, world):
 
 
 def _rub(matter, walls, world):
-    """Improve the impulses of friction; the largest change."""
-    worst = 0.0
-    if matter.pairs.friction is not None:
-        worst = worse(rub_pairs(matter, world.grains, world.touches), worst)
+    """Improve all impulses with those of friction; the largest change."""
+    grains, touches = world.grains, world.touches
+    rub_or_sweep = sweep_pairs if matter.pairs.friction is None else rub_pairs
+    worst = rub_or_sweep(matter, grains, touches)
     for k, wall in enumerate(walls.each):
-        if matter.walls[k].friction is not None:
-            worst = worse(rub_wall(matter, matter.walls[k], wall, world.grains, world.touches, k), worst)
+        rub_or_sweep_wall = sweep_wall if matter.walls[k].friction is None else rub_wall
+        worst = worse(rub_or_sweep_wall(matter, matter.walls[k], wall, grains, touches, k), worst)
     return worst
 
 
@@ -119,8 +119,7 @@ def _solve(matter, walls, world):
         # Friction first, to fewer digits: then it is given, and what is to be exact depends on the others alone.
         worst = 1.0
         while sweeps < _MOST_SWEEPS and not worst <= _RUBBED:
-            worst = _sweep(matter, walls, world)
-            worst = worse(_rub(matter, walls, world), worst)
+            worst = _rub(matter, walls, world)
             sweeps += 1
         if not worst <= _RUBBED:
             return False

@@ -160,7 +160,7 @@ def test_a_heap_of_four_balls_stays_on_a_rough_floor_and_falls_apart_on_a_smooth
     for mu in (0.0, 0.5):
         laws = {"restitution": 0.3, "friction": mu}
         scene = swarm.Scene([swarm.Plane(FLOOR, 0.0, **laws)], gravity=(0.0, 0.0, -G), pairs=swarm.Pairs(**laws))
-        seen = ran(scene, start, METHOD, 2.5, every=0.5).observables
+        seen = ran(scene, start, METHOD, 3.0, every=1.0).observables
         speeds[mu] = seen["kinetic_energy"][-1]
         assert seen["energy_error"].max() < 1e-13
     assert speeds[0.0] > 1e-3
