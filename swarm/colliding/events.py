@@ -39,6 +39,7 @@ class Box(Record):
     kinds: Any
     loss: Any  # None, or `Loss`
     log: Any = None
+    growth: Any = None  # `Growth` of balls that are packed
 
 
 class Books(NamedTuple):
