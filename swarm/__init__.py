@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .motion import Guide, Oscillation, Path, Rotation, Translation
     from .output.impact_log import ImpactLog, load_impacts
     from .output.trajectory import Trajectory, load
+    from .packing import pack
     from .pairs import Pairs
     from .particles import Particles
     from .run.result import Result
@@ -80,6 +81,7 @@ _HOMES = {
     "motion": ("Guide", "Oscillation", "Path", "Rotation", "Translation"),
     "output.impact_log": ("ImpactLog", "load_impacts"),
     "output.trajectory": ("Trajectory", "load"),
+    "packing": ("pack",),
     "pairs": ("Pairs",),
     "particles": ("Particles",),
     "scene": ("Scene",),
@@ -107,7 +109,7 @@ __all__ = [
     "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab",
     "Source", "Sphere", "Spheres", "Stadium", "Sticky", "Strain", "SwarmError", "Torus", "Trajectory", "Translation",
     "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history",
-    "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "place", "rigid", "simulate", "sweep",
+    "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "pack", "place", "rigid", "simulate", "sweep",
     "tetrahedron",
 ]  # fmt: skip
 

@@ -65,15 +65,7 @@ def fill(
     n = checks.count("n", n)
     checks.particles_fit("n", n)
     seed = checks.count("seed", seed, least=0)
-    if (speed is None) == (temperature is None):
-        came = "neither" if speed is None else "both"
-        raise SceneError(f"fill needs one of speed and temperature, got {came}")
-    if speed is not None:
-        checks.magnitude("speed", speed)
-    if temperature is not None:
-        checks.magnitude("temperature", temperature)
-    if checks.flag("exact", exact) and temperature is None:
-        raise SceneError("exact must be False with speed, got True: it scales velocities to a temperature")
+    check_velocities("fill", speed, temperature, exact)
     random = np.random.default_rng(seed)
     # Checks the masses too; velocities follow, since a Maxwellian needs the masses.
     if radius is None:
@@ -83,6 +75,29 @@ def fill(
         particles, volume = _balls(scene, Particles(np.zeros((3, n)), np.zeros((3, n)), mass, None, radius), random)
     particles.volume = volume
     particles.image = None if scene.period is None else np.zeros((3, n), np.int64)
+    fill_velocities(scene, particles, speed, temperature, exact, random)
+    return particles
+
+
+def check_velocities(user: str, speed: float | None, temperature: float | None, exact: bool) -> None:
+    """Raise a `SceneError` unless they say how fast particles are."""
+    if (speed is None) == (temperature is None):
+        came = "neither" if speed is None else "both"
+        raise SceneError(f"{user} needs one of speed and temperature, got {came}")
+    if speed is not None:
+        checks.magnitude("speed", speed)
+    if temperature is not None:
+        checks.magnitude("temperature", temperature)
+    if checks.flag("exact", exact) and temperature is None:
+        raise SceneError("exact must be False with speed, got True: it scales velocities to a temperature")
+
+
+def fill_velocities(
+    scene: Scene, particles: Particles, speed: float | None, temperature: float | None, exact: bool,
+    random: np.random.Generator,
+) -> None:  # fmt: skip
+    """Give particles random velocities."""
+    n = len(particles)
     normal = np.zeros((3, n))
     normal[scene.axes()] = random.standard_normal((len(scene.axes()), n))
     if speed is not None:
@@ -92,23 +107,22 @@ def fill(
             # Of each component, sum(m v^2)/3n = T where the sum of the squares is 3 n; of two in a plane 2 n.
             normal *= np.sqrt(len(scene.axes()) * n / (normal**2).sum())
         particles.velocity = normal * np.sqrt(temperature / particles.mass)
-    return particles
 
 
 def _balls(scene: Scene, particles: Particles, random: np.random.Generator) -> tuple[Particles, float]:
     """Balls where they overlap nothing, and the volume."""
     assert particles.radius is not None
     require_size(scene, particles.radius)
-    room = room_of(scene, random)
+    room = room_of(scene, random, "fill")
     require_packing(scene, particles.radius, room)
     particles.position = place_balls(scene, particles.radius, room, random)
     return particles, room.volume
 
 
-def room_of(scene: Scene, random: np.random.Generator) -> Room:
-    """The volume of a scene, from random points."""
-    _points_of_it, volume = _points(scene, _POINTS, random)
-    return Room(*bounding_box(scene, "fill", _INSTEAD), volume)
+def room_of(scene: Scene, random: np.random.Generator, user: str) -> Room:
+    """The volume of a scene, from random points, for the `user` that a sentence names."""
+    _points_of_it, volume = _points(scene, _POINTS, random, user)
+    return Room(*bounding_box(scene, user, _INSTEAD), volume)
 
 
 def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]:
@@ -122,9 +136,9 @@ def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]
     return low, high
 
 
-def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, float]:
+def _points(scene: Scene, n: int, random: np.random.Generator, user: str = "fill") -> tuple[Floats, float]:
     """Admissible points, and the volume from their share of the random points of the bounding box."""
-    low, high = bounding_box(scene, "fill", _INSTEAD)
+    low, high = bounding_box(scene, user, _INSTEAD)
     points, found, tried, admissible = np.empty((3, n)), 0, 0, 0
     axes = scene.axes()
     box = float(np.prod((high - low)[axes]))
@@ -139,7 +153,7 @@ def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, 
         tried += _BATCH
         if tried >= _TRIES and found < 1e-6 * tried:
             raise SceneError(
-                f"fill found {found} admissible points in {tried} tries, a volume of about "
+                f"{user} found {found} admissible points in {tried} tries, a volume of about "
                 f"{box * found / tried:.2g} m^{len(axes)}: the admissible part of the box {low.ravel()} to "
                 f"{high.ravel()} is below 1e-6 of it; give the particles as arrays or a CSV file"
             )

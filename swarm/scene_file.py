@@ -43,11 +43,14 @@ class ParticlesTable:
     seed: int | None = None
     exact: bool | None = None
     radius: float | list[float] | None = None
+    fraction: float | None = None
     source: str | None = dataclasses.field(default=None, metadata={"key": "from"})
     frame: int | None = None
 
     def filled(self, scene: Scene) -> Particles:
         """The particles of a table without a file."""
+        if self.fraction is not None:
+            return self._packed(scene)
         assert self.count is not None
         particles_fit("count", self.count)
         return fill(
@@ -60,6 +63,16 @@ class ParticlesTable:
             exact=bool(self.exact),
             radius=self.radius,
         )
+
+    def _packed(self, scene: Scene) -> Particles:
+        from .packing import pack  # which imports the engine
+
+        if self.exact:
+            raise SceneError("exact must be left out with a fraction, got true: use temperature alone")
+        return pack(
+            scene, self.count, self.radius, self.fraction, self.seed or 0, speed=self.speed,
+            temperature=self.temperature, mass=1.0 if self.mass is None else self.mass,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -278,10 +291,12 @@ def _body(table: Any) -> "BodiesFile | Made":
 
 def _particles(given: Any) -> ParticlesTable:
     table = tables.convert(given, ParticlesTable, "particles")
-    filled = ("count", "speed", "temperature", "mass", "seed", "exact", "radius")
+    filled = ("count", "speed", "temperature", "mass", "seed", "exact", "radius", "fraction")
     if table.source is None:
         if table.frame is not None:
             raise SceneError('particles.frame: needs from = "FILE.h5"')
+        if table.count is None and table.fraction is not None:
+            return table
         if table.count is None:
             raise SceneError("particles.count: expected a whole number, got nothing; add count = ... or from = ...")
         count("particles.count", table.count)

@@ -77,10 +77,13 @@ def told(scene: Scene, radius: Floats, room: Room) -> str:
     )
 
 
-def place_balls(scene: Scene, radius: Floats, room: Room, random: np.random.Generator) -> Floats:
+def place_balls(
+    scene: Scene, radius: Floats, room: Room, random: np.random.Generator, wide: Floats | None = None
+) -> Floats:
     """Places (3, N) of balls of these radii, uniform among those where they overlap nothing, one after the other.
 
-    The largest come first: a place for them is rare among the small ones.
+    The largest come first: a place for them is rare among the small ones. `wide` are their radii for walls, if these
+    are others.
 
     Raises:
         SceneError: no place was found for some of them.
@@ -92,7 +95,7 @@ def place_balls(scene: Scene, radius: Floats, room: Room, random: np.random.Gene
         some = waiting[:_WINDOW]
         numbers = np.resize(some, max(_LEAST, min(_MOST, int(2.0 * some.size / share))))
         points = _points(scene, room, numbers.size, random)
-        within = _enter(scene, cells, points, numbers, done)
+        within = _enter(scene, cells, points, numbers, done, radius if wide is None else wide)
         left = waiting[~done[waiting]]
         placed = waiting.size - left.size
         tried, fitting, waiting = tried + numbers.size, fitting + within, left
@@ -108,12 +111,14 @@ def _points(scene: Scene, room: Room, n: int, random: np.random.Generator) -> Fl
     return points
 
 
-def _enter(scene: Scene, cells: Cells, points: Floats, numbers: NDArray[np.int64], done: NDArray[np.bool_]) -> int:
+def _enter(
+    scene: Scene, cells: Cells, points: Floats, numbers: NDArray[np.int64], done: NDArray[np.bool_], wide: Floats
+) -> int:
     """Let balls of these numbers enter where they overlap nothing: how many of the places are within the walls."""
     # Most places overlap a ball where many have entered, which is looked up faster than where the walls are.
     radius: Floats = cells.radius[numbers]  # type: ignore[assignment]
     free = np.flatnonzero(find_free(cells, points, radius))
-    free = free[admits(scene, points[:, free], radius[free])]
+    free = free[admits(scene, points[:, free], wide[numbers[free]])]
     enter_free(cells, points[:, free], numbers[free], done)
     return int(free.size)
 

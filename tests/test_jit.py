@@ -629,6 +629,7 @@ LAYERS = [
     ["commands"],
     ["ensemble"],
     ["scene_file", "summary"],
+    ["packing"],
     ["run"],
     ["output"],
     ["bodies"],

@@ -303,6 +303,21 @@ def test_balls(tmp_path):
     assert tables.scene_of(table["surface"], None, pairs=table["pairs"]).pairs == job.scene.pairs
 
 
+def test_packed_balls(tmp_path):
+    text = GOOD.replace("speed = 0.5", "fraction = 0.2")
+    packed = read(tmp_path, text).start()
+    assert len(packed) == 10
+    assert 10 * 4.0 / 3.0 * np.pi * packed.radius[0] ** 3 == pytest.approx(0.2 * packed.volume, rel=1e-9)
+    assert not packed.velocity.any()
+    many = read(tmp_path, text.replace("count = 10", "radius = 0.1\nspeed = 2.0")).start()
+    assert len(many) == int(0.2 * many.volume / (4.0 / 3.0 * np.pi * 0.1**3))
+    assert np.sqrt((many.velocity**2).sum(axis=0)) == pytest.approx(2.0)
+    with pytest.raises(
+        swarm.SceneError, match=r"\[particles\]: pack needs two of n, radius and fraction, got fraction = "
+    ):
+        read(tmp_path, text.replace("count = 10", "")).start()
+
+
 def test_balls_in_a_cell_without_walls(tmp_path):
     text = "period = [1.0, 1.0, 1.0]\n" + GOOD.replace("speed = 0.5", "speed = 0.5\nradius = 0.01")
     job = read(tmp_path, text.replace('[[surface]]\nkind = "sphere"\nradius = 0.5\n', ""))

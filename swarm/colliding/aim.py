@@ -108,10 +108,15 @@ def sight(b, u, touching2):
     return Sight(closing, gap, closing * closing - square(u) * gap)
 
 
+def _sight_in(box, b, u, touching2, now):
+    """The `Sight` of balls that may grow."""
+    return sight(b, u, touching2) if box.growth is None else box.growth.sight(b, u, touching2, now)
+
+
 @outlined
-def _meeting_of_any(grid, r, other, u, touching2):
+def _meeting_of_any(box, r, other, u, touching2, now):
     """When a ball meets any image of another one, where these are few and far from one another."""
-    soonest = math.inf
+    soonest, grid = math.inf, box.grid
     for kx in range(3):
         for ky in range(3):
             for kz in range(3):
@@ -120,7 +125,7 @@ def _meeting_of_any(grid, r, other, u, touching2):
                     for k, axis in zip((kx, ky, kz), grid.axes(), strict=True)
                 )
                 b = Vec(*(one - two + shift for one, two, shift in zip(other, r, shifts, strict=True)))
-                seen = sight(b, u, touching2)
+                seen = _sight_in(box, b, u, touching2, now)
                 if seen.meets():
                     soonest = min(meeting(*seen), soonest)
     return soonest
@@ -138,7 +143,7 @@ def _soonest(box, flock, i, now, near, count, known):
     for k in range(count):
         j = near[index(k)]
         other, w = flock.at(pull, j, now)
-        one = sight(between(grid, r, other), w - v, box.kinds.touching2(i, j))
+        one = _sight_in(box, between(grid, r, other), w - v, box.kinds.touching2(i, j), now)
         some[index(found)] = j
         for row, value in enumerate(one):
             seen[row, index(found)] = value
@@ -161,7 +166,7 @@ def _soonest_of_images(box, flock, i, now, near, count, known):
     for k in range(count):
         j = near[index(k)]
         other, w = flock.at(box.pull, j, now)
-        time = now + _meeting_of_any(box.grid, r, other, w - v, box.kinds.touching2(i, j))
+        time = now + _meeting_of_any(box, r, other, w - v, box.kinds.touching2(i, j), now)
         sooner = (time < first) | ((time == first) & (j < mate))
         if sooner and time < math.inf and time <= flock.event[index(FLOATS * j + MEETS)]:
             first, mate = time, j

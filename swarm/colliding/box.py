@@ -17,6 +17,7 @@ class Box(Record):
     loss: Any  # None, or `Loss`
     shortest: float  # the time that a flight from a wall back to it takes at least [s]
     log: Any = None
+    growth: Any = None  # `Growth` of balls that are packed
     window: Any = None  # of walls that move, come or go: see window.py
     gates: Any = None  # None, or `Gates` where balls may leave the walls
     source: Any = None  # None, or `Source` where walls send them off

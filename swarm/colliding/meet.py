@@ -58,6 +58,8 @@ def met(box, flock, one, two, now):
         recent = max(flock.last[index(i)], flock.last[index(j)])
         restitution = select(now - recent < box.loss.duration, 1.0, box.loss.restitution)
     after, lost = turned(u, b, closing, distance2, restitution)
+    if box.growth is not None:
+        after = box.growth.turned(u, b, closing, distance2, now)
     share = box.kinds.share(i, j)
     mass = box.kinds.mass_of(i) * share
     change = after - u
