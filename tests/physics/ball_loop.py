@@ -21,6 +21,8 @@ SHORTEST = 1e-5
 GRAZES = 1e-9
 # A gap that is smaller is none [m].
 ROUND_OFF = 1e-12
+# An impact in which so little of the velocity is along the normal is known to as few digits less.
+SLOW = 1e-3
 WALL = -1
 
 
@@ -92,18 +94,17 @@ class _Loop:
             if len(self.events) >= most:
                 return False
             self.now = hit
-            if pair[0] <= wall[0]:
-                if pair[1] is None:
-                    self.pairs[i, j] = self._next_of_pair(i, j, hit)
-                    continue
-                self._collide(i, j, pair)
-                changed = (i, j)
-            else:
+            if pair[0] > wall[0]:
                 i = self.at_walls.index(wall)
-                if not wall[2]:
-                    return False
-                self._strike(i, wall)
                 changed = (i,)
+                if not self._strike(i, wall):
+                    return False
+            elif pair[1] is not None:
+                changed = (i, j)
+                self._collide(i, j, pair)
+            else:
+                changed = ()
+                self.pairs[i, j] = self._next_of_pair(i, j, hit)
             for k in changed:
                 self.at_walls[k] = self._next_at_walls(k)
             for one in self.pairs:
@@ -289,12 +290,17 @@ class _Loop:
         return (a + b) / 2
 
     def _strike(self, i, hit):
+        """The impact of a ball; False where round-off decides of it, or is large in it."""
+        if not hit[2]:
+            return False
         time, wall, _clear = hit
         self._move(i, time)
         here, turn, u = self._as_given(wall, self.r[i], time)
         n, e = turn @ wall.normal(here), self._restitution(self.number(wall.e), i)
         self.met[i] = time
         b = (self.v[i] - u) @ n
+        if b < SLOW * self._length(self.v[i] - u):
+            return False
         before = self.v[i] @ self.v[i]
         self.v[i] = self.v[i] - (1 + e) * b * n
         self.lost += self.mass[i] * (1 - e * e) * b * b / 2
@@ -302,6 +308,7 @@ class _Loop:
         self.left[i] = wall
         self.impacts += 1
         self.events.append((time, i, WALL))
+        return True
 
     def _restitution(self, e, *balls):
         """That of an impact of balls; who met anything less than the contact duration before keeps its energy."""

@@ -128,7 +128,8 @@ class Walls:
 
     def _cylinder(self, one, side):
         k, c, radius = self._unit(one.axis), self._vector(one.center), self.number(one.radius)
-        across = self._round(lambda r: r - c - (k @ (r - c)) * k, radius, side)
+        near = self._near(one.center)
+        across = self._round(lambda r: near(r) - (k @ near(r)) * k, radius, side)
         if one.length is None:
             return across
         half = self.number(one.length) / 2
