@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..colliding.events import EVENTS, LENGTH
+from ..colliding.clock import EVENTS, LENGTH
 from ..colliding.growing import Growth
 from ..methods import Impact
 from ..particles import Particles
