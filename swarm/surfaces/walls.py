@@ -71,6 +71,10 @@ class Walls(Record):
         """The walls that the centre of a ball of this radius meets."""
         return self._replace(each=tuple(wall.grown(radius) for wall in self.each))
 
+    def foot(self, number, r, radius):
+        """Where a ball touches a wall that is grown by its radius: it escapes where that is in an opening."""
+        return r + radius * self.unit_normal(number, r)
+
     def at(self, remaining):
         """The walls when so much of the frame is left [s]: themselves, where none moves."""
         return self

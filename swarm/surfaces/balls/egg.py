@@ -6,12 +6,11 @@ signed distance. t is found from below by Newton's method for 1/|x/a| = 1, which
 
 import math
 
-from ...kernel.gravity import as_vector
 from ...kernel.jit import kernel, outlined, select
 from ...kernel.vector import Vec, column, dot, norm, square, times
 from .. import contract
-from ..course import rise_time, rise_time_inside
-from .rounded import ToBody
+from ..course import rise_time_inside
+from .rounded import Rounded
 
 # Newton's steps to a foot and to a hit; near both each one doubles the digits.
 _SWEEPS, _STEPS = 60, 40
@@ -22,14 +21,16 @@ _POLE = 1e-30
 _PART = 0.5
 
 
-class Egg(contract.Smooth):
-    """All that is within the radius of a ball from an ellipsoid, in its principal frame; q = phi."""
+class EggCavity(contract.Smooth):
+    """What is so far inside of an ellipsoid, in its principal frame: convex as that is, so that it is left once."""
 
     center: Vec
     squares: Vec  # of the semi-axes
     radius: float  # of the ball
     bend: float  # the smallest radius of curvature
-    side: float
+
+    side = 1.0
+    leaves_once = True
 
     def grown(self, radius):
         return self._replace(radius=radius)
@@ -39,16 +40,16 @@ class Egg(contract.Smooth):
         return _foot(self, r)
 
     def phi(self, r):
-        return self.foot(r)[0] + self.side * self.radius
+        return self.foot(r)[0] + self.radius
 
     def gradient(self, r):
         return self.foot(r)[1]
 
     def distance(self, r):
-        return self.side * self.phi(r)
+        return self.phi(r)
 
     def unit_normal(self, r):
-        return self.side * self.gradient(r)
+        return self.gradient(r)
 
     def far(self, r):
         return -self.distance(r)
@@ -60,41 +61,7 @@ class Egg(contract.Smooth):
         return -self.distance(r)
 
     def farthest_push(self):
-        return select(self.side > 0.0, math.inf, -1.0)
-
-
-class EggSolid(Egg):
-    """Around a solid, which is behind the plane at the foot: steps are those to planes."""
-
-    def before(self, gravity, r, v):
-        """When a flight comes to the plane that is as far as the radius from the one at the foot."""
-        away, n = self.foot(r)
-        half = -0.5 * dot(n, v)
-        bend = 0.0 * half if gravity is None else -0.5 * dot(n, as_vector(gravity))
-        return rise_time(self.radius - away, half, bend)
-
-    def steps(self, gravity, r, v):
-        return ToBody(self, gravity, r, v)
-
-    in_steps = True
-
-    def safe_time(self, r, v, pull):
-        time = self.before(pull, r, v)
-        return select(self.phi(r) < 0.0, 0.0, time)
-
-    def passed(self, r, v):
-        return dot(self.gradient(r), v) >= 0.0
-
-    def hessian_bounds(self, r):
-        # 1/(2 d) at most, where d is the distance from the solid
-        away = max(self.foot(r)[0], self.radius)
-        return 0.0, 1.0 / select(away > 0.0, away, 1.0), 0.5 * away
-
-
-class EggCavity(Egg):
-    """In a cavity, in which all places that are as far from the wall as the radius are convex: it is left once."""
-
-    leaves_once = True
+        return math.inf
 
     def first_hit(self, r, v):
         return _leaving(self, r, v), True
@@ -106,6 +73,17 @@ class EggCavity(Egg):
         reach = select(room > 0.0, _PART * room, _EPSILON * self.bend)
         left = select(room > 0.0, (1.0 - _PART) * room, _EPSILON * self.bend)
         return 0.5 / left, 0.5 / left, reach
+
+
+class EggSolid(Rounded):
+    """Around a solid ellipsoid, in its principal frame."""
+
+    center: Vec
+    squares: Vec
+    radius: float
+
+    def foot(self, r):
+        return _foot(self, r)
 
 
 @outlined

@@ -1,21 +1,21 @@
 """A triangle that balls meet, from both sides: with round edges and corners."""
 
+import math
+
 from ...kernel.jit import select
-from ...kernel.vector import Vec, cross, dot, either, square
+from ...kernel.vector import Vec, cross, dot, either, norm, square
 from .rounded import Rounded, part_within
 
 
 class RoundTriangle(Rounded):
-    """A triangle of a mesh; `side` is -1, for balls are outside of what is within the radius from it."""
+    """A triangle of a mesh: balls are outside of what is within the radius from it."""
 
     corner: Vec
     first: Vec  # from there to the other corners
     second: Vec
     radius: float
-    radius2: float
-    side: float
 
-    def from_body(self, r):
+    def foot(self, r):
         d, a, b = r - self.corner, self.first, self.second
         n, third = cross(a, b), b - a
         n2 = square(n)
@@ -28,4 +28,8 @@ class RoundTriangle(Rounded):
         other = far - part_within(far, third) * third
         edge = either(square(one) <= square(two), one, two)
         edge = either(square(edge) <= square(other), edge, other)
-        return either(within, across, edge)
+        e = either(within, across, edge)
+        away = norm(e)
+        # On the triangle itself either side is as near.
+        there = away > 0.0
+        return away, either(there, e, n) * (1.0 / select(there, away, select(n2 > 0.0, math.sqrt(n2), 1.0)))

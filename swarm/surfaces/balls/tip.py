@@ -4,10 +4,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...kernel.vector import Vec, dot, square
+from ...kernel.vector import Vec, dot, norm, square
+from ..contract import Smooth
 from ..frames import Framed
 from ..shapes.plane import PlaneNumbers
 from ..shapes.quadratic import QuadricNumbers
+
+_TINY = float(np.finfo(np.float64).tiny)
 
 
 class Unturned(Framed):
@@ -40,7 +43,7 @@ class TipPlane(Unturned):
 
 
 class Nappes(Unturned):
-    """Both nappes of the cone."""
+    """Both nappes of the cone: flights are those to the quadric `body`; phi, the inner function, is the distance."""
 
     body: QuadricNumbers
     axis: Vec
@@ -61,8 +64,28 @@ class Nappes(Unturned):
         across2 = square(d - along * self.axis)
         return np.sqrt(across2) * self.cosine - along * self.sine
 
-    def distance(self, r):
-        return self.phi(r)
+    def gradient(self, r):
+        d = r - self.body.center
+        across = d - dot(d, self.axis) * self.axis
+        return (self.cosine / np.maximum(np.sqrt(square(across)), _TINY)) * across - self.sine * self.axis
+
+    distance = inner = end_inner = phi
+    inner_gradient = gradient
+
+    def unit_normal(self, r):
+        n = self.gradient(r)
+        return n / norm(n)
+
+    def gap_of(self, q):
+        return q
+
+    level_of = gap_of
+
+    def gap_slope(self, q0, q1):
+        return 1.0, 0.0
+
+    discrete_gradient, step_normal = Smooth.discrete_gradient, Smooth.step_normal
+    difference, gap_scale, project = Smooth.difference, Smooth.gap_scale, Smooth.project
 
     def out_of(self, r):
         return -self.distance(r)

@@ -77,11 +77,10 @@ def table_of_facets(corners: Floats, room: float) -> Floats:
 def triangles_of_balls(corners: Floats, largest: float) -> Members:
     """The triangles with these corners (T, 3, 3) as balls meet them, with radii of at most the largest one [m]."""
     a, b, c = np.moveaxis(corners, 1, 0)
-    radius = np.broadcast_to([0.0, 0.0, -1.0], (len(a), 3))
-    table = aligned(np.concatenate([a, b - a, c - a, radius], axis=1))
+    table = aligned(np.concatenate([a, b - a, c - a, np.zeros((len(a), 1))], axis=1))
     zero = Vec(0.0, 0.0, 0.0)
     low, high = (np.ascontiguousarray(end(corners, axis=1).T) for end in (np.min, np.max))
-    return field_of(RoundTriangle(zero, zero, zero, 0.0, 0.0, -1.0), table, lambda: (low, high), None, largest)
+    return field_of(RoundTriangle(zero, zero, zero, 0.0), table, lambda: (low, high), None, largest)
 
 
 def _normals(a: Floats, b: Floats, c: Floats) -> Floats:

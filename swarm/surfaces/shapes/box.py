@@ -69,7 +69,7 @@ class Box(Surface):
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
         if not self.is_solid():
             return self.walls()
-        box = RoundBox(vec(self.own_center()), vec(self.half_widths), 0.0, 0.0, -1.0)
+        box = RoundBox(vec(self.own_center()), vec(self.half_widths), 0.0)
         return (rotations.rotated(self.rotation, box),)
 
     def open_faces(self) -> list[HalfSpace]:

@@ -76,7 +76,7 @@ class Cone(Revolved):
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
         sine, cosine = math.sin(self.half_angle), math.cos(self.half_angle)
         if self.is_solid():
-            round_ = RoundCone(vec(self.own_center()), sine, cosine, 0.0, 0.0, -1.0)
+            round_ = RoundCone(vec(self.own_center()), sine, cosine, 0.0)
             return (rotations.rotated(self.turn(), round_),)
         plane, _nappes = self.walls()
         nappes = Nappes(self.numbers(), Vec(0.0, 0.0, 1.0), sine, cosine)

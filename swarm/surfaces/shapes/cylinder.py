@@ -65,7 +65,7 @@ class Cylinder(Revolved):
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
         center, side = vec(self.own_center()), side_sign(self.side)
         if self.length is not None and self.is_solid():
-            can = RoundCan(center, self.radius, 0.5 * self.length, 0.0, 0.0, side)
+            can = RoundCan(center, self.radius, 0.5 * self.length, 0.0)
             return (rotations.rotated(self.turn(), can),)
         around = rotations.rotated(self.turn(), tube_of(center, self.radius, side))
         return (around,) if self.length is None else (around, self._caps(self.length))

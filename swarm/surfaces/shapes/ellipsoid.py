@@ -53,9 +53,8 @@ class Ellipsoid(Surface):
         return kind(vec(self.own_center()), a, None, 1.0, 1.0, side_sign(self.side))
 
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
-        kind = EggCavity if self.side == "inside" else EggSolid
-        squares = vec(axis * axis for axis in self.semi_axes)
-        egg = kind(vec(self.own_center()), squares, 0.0, self._bend(), side_sign(self.side))
+        center, squares = vec(self.own_center()), vec(axis * axis for axis in self.semi_axes)
+        egg: Any = EggSolid(center, squares, 0.0) if self.is_solid() else EggCavity(center, squares, 0.0, self._bend())
         return (rotations.rotated(self.rotation, egg),)
 
     def largest_ball(self) -> float:
