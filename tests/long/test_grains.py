@@ -1,0 +1,94 @@
+"""Soft balls for long: exact balances of ten thousand, a pile at rest, Beverloo's law of silos."""
+
+import numpy as np
+import pytest
+
+import swarm
+
+pytestmark = pytest.mark.long
+LAWS = {"restitution": 0.5, "friction": 0.5}
+G, DIAMETER = 9.81, 0.01
+MASS = 2500.0 * np.pi / 6.0 * DIAMETER**3
+
+
+def lattice(n, across, spacing, seed=0):
+    """Places of balls on a lattice, a little off it, layer by layer."""
+    k, wobble = np.arange(n), np.random.default_rng(seed).uniform(-0.015, 0.015, (3, n))
+    cells = np.array(
+        [k % across - 0.5 * (across - 1), k // across % across - 0.5 * (across - 1), k // across**2 + 0.55]
+    )
+    return spacing * (cells + wobble)
+
+
+def ran(scene, start, method, until, **options):
+    options = {"every": until, "progress": False, **options}
+    return swarm.simulate(scene, start, method, until=until, **options)
+
+
+def test_ten_thousand_balls_for_ten_thousand_steps():
+    """Energy 1e-10 with walls, and momentum 1e-13 where the cell repeats."""
+    n, dt = 10_000, 5e-4
+    places = lattice(n, 22, 2.0 / 22.0)
+    places[2] -= 1.0
+    velocity = np.random.default_rng(1).normal(size=(3, n))
+    for scene, shift in ((swarm.Scene([swarm.Box((1.0, 1.0, 1.0))]), 0.0), (swarm.Scene([], period=(2.0,) * 3), 1.0)):
+        start = swarm.Particles(0.98 * places + shift, velocity, 1.0, radius=0.03)
+        result = ran(scene, start, swarm.Penalty(dt, 1e6, 1.5), 10_000 * dt, every=1000 * dt)
+        seen, end = result.observables, result.particles
+        assert seen["collisions"][-1] > 10 * n
+        assert seen["energy_error"].max() < 1e-10
+        if not scene.surfaces:
+            scale = (end.mass * np.sqrt((end.velocity**2).sum(axis=0))).sum()
+            assert abs(seen["momentum"] - seen["momentum"][0]).max() < 1e-13 * scale
+
+
+def settled(n, across, height):
+    """Grains that have fallen into a box, and come to rest."""
+    half = 0.5 * across * 1.06 * DIAMETER
+    box = swarm.Box((half, half, 0.5 * height), (0.0, 0.0, 0.5 * height), **LAWS)
+    scene = swarm.Scene([box], gravity=(0.0, 0.0, -G), pairs=swarm.Pairs(**LAWS))
+    start = swarm.Particles(lattice(n, across, 1.04 * DIAMETER), np.zeros((3, n)), MASS, radius=0.5 * DIAMETER)
+    method = swarm.Penalty(1e-4, 6e4, 1.5)
+    return scene, ran(scene, start, method, 3.0).particles, method
+
+
+def test_a_pile_at_rest_stays_at_rest():
+    """A million steps after it has settled: less than 1e-20 J a grain."""
+    scene, start, method = settled(150, 5, 0.3)
+    before = start.position.copy()
+    result = ran(scene, start, method, 100.0, every=10.0)
+    seen = result.observables
+    moving = (seen["kinetic_energy"] + seen["rotational_energy"]) / len(start)
+    assert moving[1:].max() < 1e-20
+    assert seen["energy_error"].max() < 1e-13
+    assert abs(result.particles.position - before).max() < 1e-9
+
+
+def silo(width, is_shut=False):
+    """A vessel with a floor of four boxes, which leave a square orifice, and room below it."""
+    side, thick, far = 6.0 * DIAMETER, 0.5 * DIAMETER, 8.0 * DIAMETER
+    half = 0.5 * width
+    boxes = [((far, far, thick), (0.0, 0.0))]
+    if not is_shut:
+        boxes = [((0.5 * (far - half), far, thick), (sign * 0.5 * (far + half), 0.0)) for sign in (-1.0, 1.0)]
+        boxes += [((half, 0.5 * (far - half), thick), (0.0, sign * 0.5 * (far + half))) for sign in (-1.0, 1.0)]
+    floor = [swarm.Box(widths, (*place, -thick), side="outside", **LAWS) for widths, place in boxes]
+    vessel = swarm.Box((side, side, 0.45), (0.0, 0.0, 0.15), **LAWS)
+    return swarm.Scene([vessel, *floor], gravity=(0.0, 0.0, -G), pairs=swarm.Pairs(**LAWS))
+
+
+def test_a_silo_runs_out_as_beverloo_says():
+    """W = C rho sqrt(g) (D - k d)^(5/2), with k about 1.4."""
+    n, method = 2500, swarm.Penalty(1.5e-4, 6e4, 1.5)
+    start = swarm.Particles(lattice(n, 11, 1.04 * DIAMETER), np.zeros((3, n)), MASS, radius=0.5 * DIAMETER)
+    start = ran(silo(0.04, True), start, method, 0.45).particles
+    sizes, rates = np.array([4.0, 5.0, 6.0, 7.5]), []
+    for size in sizes:
+        until = 0.03 * round(0.55 * n / (0.67 * np.sqrt(G / DIAMETER) * (size - 1.4) ** 2.5) / 0.03)
+        below = {"below": lambda snapshot: float((snapshot.position[2] < -DIAMETER).sum())}
+        seen = ran(silo(size * DIAMETER), start, method, min(until, 1.2), every=0.03, observables=below).observables
+        flows = seen["time"] > 0.09
+        rates.append(np.polyfit(seen["time"][flows], seen["below"][flows], 1)[0])
+        assert seen["energy_error"].max() < 1e-12
+    exponent = np.polyfit(np.log(sizes - 1.4), np.log(rates), 1)[0]
+    assert exponent == pytest.approx(2.5, abs=0.15)
