@@ -304,13 +304,13 @@ def test_balls(tmp_path):
 
 
 def test_packed_balls(tmp_path):
-    text = GOOD.replace("speed = 0.5", "fraction = 0.2")
+    text = GOOD.replace("speed = 0.5", "fraction = 0.202")
     packed = read(tmp_path, text).start()
     assert len(packed) == 10
-    assert 10 * 4.0 / 3.0 * np.pi * packed.radius[0] ** 3 == pytest.approx(0.2 * packed.volume, rel=1e-9)
+    assert 10 * 4.0 / 3.0 * np.pi * packed.radius[0] ** 3 == pytest.approx(0.202 * packed.volume, rel=1e-9)
     assert not packed.velocity.any()
     many = read(tmp_path, text.replace("count = 10", "radius = 0.1\nspeed = 2.0")).start()
-    assert len(many) == int(0.2 * many.volume / (4.0 / 3.0 * np.pi * 0.1**3))
+    assert len(many) == int(0.202 * many.volume / (4.0 / 3.0 * np.pi * 0.1**3))
     assert np.sqrt((many.velocity**2).sum(axis=0)) == pytest.approx(2.0)
     with pytest.raises(
         swarm.SceneError, match=r"\[particles\]: pack needs two of n, radius and fraction, got fraction = "
