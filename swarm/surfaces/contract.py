@@ -13,7 +13,7 @@ q is then a discrete gradient of anything built on phi (the composite gradient),
 from ..kernel.gravity import Gravity, as_vector
 from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, absolute, dot, norm, square, times, total
-from . import march, newton
+from . import curvature, march, newton
 from .approach import Approach
 from .at_rest import AtRest
 from .course import Fall, close, first_rise, rise_near, rise_time, safe_rise_time
@@ -256,6 +256,8 @@ class Smooth(AtRest):
 
     def outward_acceleration(self, r, v, pull):
         """The acceleration of a free flight along the wall out of it [m/s^2]: above 0 the wall holds the particle."""
+        if not self.gives("hessian"):
+            return curvature.outward_acceleration(self, r, v, pull)
         # The second derivative of the distance, (2 v.H v + grad q.G)/|grad q|
         n, h = self.inner_gradient(r), self.hessian(r)
         bent = h.xx * v.x * v.x + h.yy * v.y * v.y + h.zz * v.z * v.z
