@@ -1,6 +1,7 @@
 """Walls that the centres of balls meet: as far as the radius from the wall, whatever it is."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -257,6 +258,62 @@ def test_the_cells_of_a_field_hold_what_balls_touch(kind):
                 call(members.grown(np.float64(radius[k])).wall(float(m)).first_hit, points[:, k], v) for m in range(60)
             ]
         assert total == pytest.approx(min(time for time, _found in each), rel=1e-12)
+
+
+def test_the_foot_of_a_contact_is_on_the_wall():
+    scene = swarm.Scene([swarm.Sphere(1.0), swarm.Box((0.2, 0.2, 0.2), side="outside")])
+    radius = np.float64(0.1)
+    walls = scene.of_balls(np.array([radius])).walls().grown(radius)
+    for number, wall in walls.numbered():
+        r = Vec(*(np.float64(x) for x in ((0.9, 0.0, 0.0) if wall.side > 0.0 else (0.0, -0.3, 0.1))))
+        foot = np.array(walls.foot(number, r, radius))
+        assert np.abs(scene.gaps(foot[:, None])).min() <= 1e-15
+
+
+@pytest.mark.parametrize("name", ["ball", "slab", "brick", "box", "ring", "table", "bent table", "stone", "egg"])
+def test_discs_stay_in_their_plane(name):
+    """Of walls that stand upright, whose normals are in the plane to the last bit."""
+    surface = SHAPES[name][0]
+    if surface.rotation is not None:
+        surface = replace(surface, rotation={"axis": (0.0, 0.0, 1.0), "angle": 0.7})
+    scene = swarm.Scene([surface], plane="z")
+    rng = np.random.default_rng(13)
+    for wall in scene.of_balls(np.array([0.1])).walls().each:
+        members = getattr(wall, "members", None)
+        each = [wall] if members is None else [members.wall(float(m)) for m in range(int(members.count()))]
+        for one in each:
+            for _place in range(10):
+                n = call(call(one.grown, 0.05).unit_normal, np.array([*rng.uniform(-1.0, 1.0, 2), 0.0]))
+                assert abs(n.z) in (0.0, 1.0)
+
+
+@pytest.mark.parametrize("name", ["sphere", "brick", "can", "drum", "rod", "torus", "cone", "spike", "egg", "stone"])
+def test_soft_balls_keep_their_energy(name):
+    surface = SHAPES[name][0]
+    vessel = [surface] if name in ("sphere", "can", "torus", "egg") else [surface, swarm.Sphere(1.4)]
+    scene = swarm.Scene(vessel, gravity=(0.3, 0.1, -1.0))
+    start = swarm.fill(scene, 4, speed=1.5, radius=np.array([0.1, 0.05, 0.12, 0.08]), seed=3)
+    method = swarm.Penalty(dt=4e-3, penalty=1e3, exponent=1.5)
+    result = swarm.simulate(scene, start, method, until=2.0, every=1.0, progress=False)
+    energy = result.observables["total_energy"]
+    assert result.observables["impacts"][-1] > 0
+    assert energy == pytest.approx(energy[0], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("surfaces", "plane", "words"),
+    [
+        ([swarm.Ellipsoid((1.0, 1.0, 0.3))], None, "radius must be below 0.09 m, the smallest radius of curvature"),
+        ([swarm.Box((1.0, 1.0, 0.05))], "z", "as far from the plane as the largest radius, 0.1 m of particle 0"),
+        ([swarm.Prism(L_SHAPE, 0.1, center=(0.4, 0.4, 0.0))], "z", "got 0.05 m; make it endless"),
+    ],
+    ids=["tip", "lid", "lid of a prism"],
+)
+def test_balls_that_are_too_large_for_a_shape(surfaces, plane, words):
+    scene = swarm.Scene(surfaces, plane=plane)
+    ball = swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), radius=0.1)
+    with pytest.raises(swarm.SceneError, match=words):
+        swarm.simulate(scene, ball, swarm.Impact(), until=1.0, every=1.0, progress=False)
 
 
 @pytest.mark.parametrize(
