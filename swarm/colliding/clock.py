@@ -1,9 +1,23 @@
 """The time of a run of balls, which is counted from the start of an epoch on."""
 
-# Of a clock: how many epochs have ended, their length [s], events and collisions so far, the last ones at one time.
-EPOCHS, LENGTH, EVENTS, COLLISIONS, SAME, CLOCK = 0, 1, 2, 3, 4, 5
+import math
+
+# Of a clock: how many epochs have ended, their length [s], events and collisions so far, the last ones at one time; how
+# far balls are to fly in an epoch, about [m].
+EPOCHS, LENGTH, EVENTS, COLLISIONS, SAME, REACH, CLOCK = 0, 1, 2, 3, 4, 5, 6
 
 
 def moment_of(clock, now):
     """A time of the epoch since the start of the run [s]."""
     return clock[EPOCHS] * clock[LENGTH] + now
+
+
+def fit(clock, speed2):
+    """Fit the length of epochs to the mean square of the speed: halve it, or double it, and ends stay as they are."""
+    way2 = speed2 * clock[LENGTH] * clock[LENGTH]
+    reach2 = clock[REACH] * clock[REACH]
+    is_even = 2.0 * math.floor(0.5 * clock[EPOCHS]) == clock[EPOCHS]
+    if way2 > 4.0 * reach2:
+        clock[LENGTH], clock[EPOCHS] = 0.5 * clock[LENGTH], 2.0 * clock[EPOCHS]
+    elif 16.0 * way2 < reach2 and is_even:
+        clock[LENGTH], clock[EPOCHS] = 2.0 * clock[LENGTH], 0.5 * clock[EPOCHS]

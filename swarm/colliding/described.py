@@ -140,10 +140,15 @@ def duration_of(scene: Scene, pairs: Pairs, particles: Particles) -> float:
     return _DURATION * diameter / speed if speed > 0.0 else 0.0
 
 
+def reach_of(grid: Grid) -> float:
+    """How far balls are to fly in an epoch [m], about."""
+    return float(_EPOCH * max(axis.width * axis.count for axis in grid.axes()))
+
+
 def epoch_of(scene: Scene, particles: Particles, grid: Grid) -> float:
     """The length of an epoch [s], a power of two."""
     speed = speed_of(scene, particles)
-    size = _EPOCH * max(axis.width * axis.count for axis in grid.axes())
+    size = reach_of(grid)
     if scene.gravity is not None:
         speed = max(speed, math.sqrt(size * math.hypot(*scene.gravity)))
     return float(2.0 ** math.floor(math.log2(size / speed))) if speed > 0.0 else 1.0

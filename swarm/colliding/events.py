@@ -9,14 +9,15 @@ Frames look at the balls and change no flight, so that a run has the same bits w
 
 import math
 
-from ..kernel.arrays import fetch, index
+from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined, select
-from ..kernel.vector import norm, put
+from ..kernel.vector import norm, put, square
 from ..status import Status
+from .ahead import fetch_next
 from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .bounce import FLIES, GONE, bounce
 from .cells import cross, mark_near, take_out, until_exit
-from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, SAME
+from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, REACH, SAME, fit
 from .journal import has_room, note_pair
 from .meet import met
 from .queue import FIRST, build, requeue
@@ -192,25 +193,22 @@ def _begin_epoch(flock, clock, now):
     return shift
 
 
-def _fetch_next(box, flock):
-    """Ask for what the events of the nodes below the first need, and for the cells around the first of them."""
-    soonest, then = math.inf, 0
-    for child in range(4, 8):
-        key, item = flock.key[index(child)], flock.item[index(child)]
-        fetch(flock.event, FLOATS * item)
-        fetch(flock.flight, FLOATS * item)
-        sooner = key < soonest
-        soonest, then = select(sooner, key, soonest), select(sooner, item, then)
-    mate = max(flock.tag[index(WHOLES * then + PARTNER)], 0)
-    fetch(flock.event, FLOATS * mate)
-    fetch(flock.flight, FLOATS * mate)
-    x, y, z = flock.cell(then)
-    for kx in range(-1, 2):
-        plane = box.grid.x.offset[index(x + kx)]
-        for ky in range(-1, 2):
-            row = box.grid.stride * (box.grid.y.offset[index(y + ky)] + plane + z)
-            fetch(flock.room, row - box.grid.stride)
-            fetch(flock.room, row + box.grid.stride)
+def _pass_epoch(box, flock, clock, now):
+    """`_begin_epoch`, and the length of this one, where no window ends with it."""
+    shift = _begin_epoch(flock, clock, now)
+    if box.window is None:
+        fit(clock, _speed2(box, flock, clock))
+    return shift
+
+
+@outlined
+def _speed2(box, flock, clock):
+    """The mean square of the speed, at least that of a fall as far as balls are to fly in an epoch."""
+    whole = 0.0
+    for i in range(flock.number()):
+        whole += square(flock.velocity(i))
+    fall = 0.0 if box.pull is None else norm(box.pull) * clock[REACH]
+    return max(whole / flock.number(), fall)
 
 
 def _is_over(box, end, now):
@@ -243,9 +241,9 @@ def take(box, flock, books, clock, rule):
             return Status.INTERRUPTED.value, 0
         taken += 1
         clock[EVENTS] += 1.0
-        _fetch_next(box, flock)
+        fetch_next(box, flock)
         if now >= clock[LENGTH]:
-            shift = _begin_epoch(flock, clock, now)
+            shift = _pass_epoch(box, flock, clock, now)
             end -= shift
             before -= shift
         else:

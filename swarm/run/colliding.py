@@ -14,8 +14,8 @@ from ..ball_numbers import BallNumbers
 from ..colliding import events
 from ..colliding.bounce import Gates, Source
 from ..colliding.box import Books, Rule
-from ..colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH
-from ..colliding.described import described, epoch_of, with_room
+from ..colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
+from ..colliding.described import described, epoch_of, reach_of, with_room
 from ..colliding.queue import FIRST
 from ..colliding.window import END
 from ..errors import RunError
@@ -52,7 +52,7 @@ class CollidingRun(BaseRun):
         self._radius = float(particles.radius.max())
         box, self._flock = described(scene, particles)
         self._clock = np.zeros(CLOCK)
-        self._clock[LENGTH] = epoch_of(scene, particles, box.grid)
+        self._clock[[LENGTH, REACH]] = epoch_of(scene, particles, box.grid), reach_of(box.grid)
         self._windows = windows_of(scene, self._clock)
         laws, openings = box.laws, scene.openings()
         loses = laws.may_dissipate or laws.loses or box.loss is not None

@@ -8,6 +8,8 @@ import pytest
 from colliding.gases import BOX, depth, frames, gas, run_of
 
 import swarm
+from swarm.colliding.clock import LENGTH, REACH
+from swarm.colliding.queue import FIRST
 
 
 @pytest.mark.parametrize("restitution", [1.0, 0.5, 0.0])
@@ -135,6 +137,24 @@ def test_epochs_keep_the_digits_of_time():
     run = run_of(swarm.Scene([BOX]), start)
     position, _velocity, _seen = frames(run, [2000.125])
     np.testing.assert_allclose(position[0, 0], 0.125, atol=1e-12)
+
+
+@pytest.mark.parametrize("restitution", [1.0, 0.1])
+def test_epochs_fit_the_speed(restitution):
+    """In a gas that has cooled, or is as hot as ever, balls fly as far in an epoch."""
+    scene, start = gas(restitution=restitution)
+    run = run_of(scene, start)
+    with run:
+        run.observe()
+        first = float(run._clock[LENGTH])
+        run.advance(30.0, 30.0)
+        length, reach = run._clock[[LENGTH, REACH]]
+        speed = math.sqrt((run.state.velocity**2).sum(axis=0).mean())
+        assert length == first if restitution == 1.0 else length > 3.0 * first
+        assert 0.1 * reach < speed * length < 2.1 * reach
+        now = float(run._since(30.0))
+        assert now <= float(run._flock.key[FIRST])
+        assert math.log2(length) % 1.0 == 0.0
 
 
 def test_two_dimensions_stay_exact():
