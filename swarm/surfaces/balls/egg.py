@@ -7,7 +7,7 @@ signed distance. t is found from below by Newton's method for 1/|x/a| = 1, which
 import math
 
 from ...kernel.jit import kernel, outlined, select
-from ...kernel.vector import Vec, column, dot, norm, square, times
+from ...kernel.vector import Symmetric, Vec, column, dot, norm, square, times
 from .. import contract
 from ..course import rise_time_inside
 from .rounded import Rounded
@@ -44,6 +44,27 @@ class EggCavity(contract.Smooth):
 
     def gradient(self, r):
         return self.foot(r)[1]
+
+    def hessian(self, r):
+        # With C = 1/(t + a^2), k = n.C n and m = C n - k n: twice it is |a n| times
+        # C - n C n^T - C n n^T + k n n^T + t m m^T/(1 - t k), which is 1/(R + d) across n on a sphere.
+        away, n = self.foot(r)
+        size = math.sqrt(dot(self.squares, times(n, n)))
+        t = away * size
+        c = Vec(_part(t, self.squares.x), _part(t, self.squares.y), _part(t, self.squares.z))
+        cn = times(c, n)
+        k = dot(n, cn)
+        m, half = cn - k * n, 0.5 * size
+        left = 1.0 - t * k
+        share = t / select(left > 0.0, left, 1.0)
+
+        def entry(i, j):
+            return half * (k * n[i] * n[j] - n[i] * cn[j] - cn[i] * n[j] + share * m[i] * m[j])
+
+        return Symmetric(
+            entry(0, 0) + half * c.x, entry(1, 1) + half * c.y, entry(2, 2) + half * c.z,
+            entry(0, 1), entry(1, 2), entry(2, 0),
+        )  # fmt: skip
 
     def distance(self, r):
         return self.phi(r)
