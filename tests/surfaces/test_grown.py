@@ -9,6 +9,7 @@ from conftest import call
 
 import swarm
 from swarm.kernel.vector import Vec
+from swarm.surfaces.facets.made import triangles_of_balls
 
 TURN = (0.8, 0.1, -0.5, 0.3)
 # One line a shape: what it is, and how far from the origin balls are looked at.
@@ -198,6 +199,22 @@ def test_what_safe_times_and_distances_promise(name):
         safe = min(5.0, *(call(wall.safe_time, r, v, pull) for wall in walls))
         for t in safe * rng.uniform(0.0, 1.0, 20):
             assert outermost(walls, r + t * v + 0.5 * t * t * pull)[1] <= 1e-12
+
+
+def test_the_distance_from_a_triangle():
+    """The foot is on it, and all its corners are behind the plane there."""
+    rng = np.random.default_rng(15)
+    for _triangle in range(20):
+        corners = rng.normal(size=(3, 3))
+        wall = triangles_of_balls(corners[None], 0.1).wall(0.0)
+        for _place in range(20):
+            r = rng.normal(size=3)
+            away, normal = -call(wall.distance, r), np.array(call(wall.unit_normal, r))
+            foot = r + away * normal
+            weights = np.linalg.lstsq(np.vstack([corners.T, np.ones(3)]), np.append(foot, 1.0), rcond=None)[0]
+            assert corners.T @ weights == pytest.approx(foot, abs=1e-12)
+            assert (weights >= -1e-12).all()
+            assert ((corners - foot) @ normal >= -1e-12).all()
 
 
 def test_balls_of_any_radius_are_known_to_the_scene():
