@@ -10,10 +10,8 @@ ROOM = swarm.Scene([swarm.Sphere(100.0)])
 
 
 def ran(scene, particles, method, until, **options):
-    every = options.pop("every", until)
-    return swarm.simulate(
-        scene, particles, method, until=until, every=every, compile="never", progress=False, **options
-    )
+    options = {"every": until, "compile": "never", "progress": False, **options}
+    return swarm.simulate(scene, particles, method, until=until, **options)
 
 
 def cloud(n=30, seed=3, speed=1.0):

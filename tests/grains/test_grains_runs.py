@@ -6,6 +6,7 @@ from grains_runs import ROOM, cloud, ran
 
 import swarm
 from swarm.errors import RunError, SceneError
+from swarm.output import checkpoint
 from swarm.run.grains import GrainsRun
 from swarm.run.state import Seeding
 from swarm.run.tally import Watched
@@ -46,13 +47,14 @@ def test_halts_do_not_change_a_bit():
         assert whole.state.balls.collisions.sum() > 10
 
 
-def test_a_run_that_is_restored_goes_on_with_the_same_bits():
+def test_a_run_that_is_restored_goes_on_with_the_same_bits(tmp_path):
     with started() as whole, started() as first, started() as second:
         advanced(whole)
         advanced(first, 2)
         first.halt(7)
         assert not first.advance(50.0, 150.0 * METHOD.dt)
-        second.restore({name: array.copy() for name, array in first.arrays().items()}, True)
+        checkpoint.save(tmp_path / "a", checkpoint.Job("", "", "", "", 30, ""), first.arrays())
+        second.restore(checkpoint.read(tmp_path / "a")[1], True)
         for run in (first, second):
             while not run.advance(50.0, 150.0 * METHOD.dt):
                 pass
