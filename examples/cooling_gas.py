@@ -68,7 +68,7 @@ def draw(found: dict[float, Cooled], file: Path) -> None:
             axes[1].plot(one.time, 100.0 * (one.energy / law - 1.0), color=colour)
         axes[0].set(xscale="log", yscale="log", xlabel="time, in tau", ylabel="temperature, over that of the start")
         axes[0].legend()
-        axes[1].set(xlabel="time, in tau", ylabel="off the law [%]", ylim=(-10.0, 10.0))
+        axes[1].set(xlabel="time, in tau", ylabel="off the law [%]", ylim=(-5.0, 5.0))
 
 
 def main() -> None:

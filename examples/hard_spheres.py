@@ -111,10 +111,12 @@ def main() -> None:
     print("packing  p V/(N k T)  error   Carnahan and Starling  off       Kolafa   off")
     for packing in PACKINGS:
         found[packing] = one = measure(packing, asked.collisions)
-        print(f"{packing:<8g} {one.compressibility:<12.4f} {one.error:.4f}  ", end="")
-        for law, width in ((carnahan_starling(packing), 22), (kolafa(packing), 8)):
-            print(f"{law:<{width}.4f} {100.0 * (one.compressibility / law - 1.0):+.2f} %   ", end="")
-        print(flush=True)
+        laws = carnahan_starling(packing), kolafa(packing)
+        off = [100.0 * (one.compressibility / law - 1.0) for law in laws]
+        print(
+            f"{packing:<8g} {one.compressibility:<12.4f} {one.error:.4f}  {laws[0]:<22.4f} {off[0]:+.2f} %   ", end=""
+        )
+        print(f"{laws[1]:<8.4f} {off[1]:+.2f} %", flush=True)
     print(f"{sum(one.collisions for one in found.values()):.1e} collisions")
     draw(found, asked.output)
     print(f"written {asked.output}")

@@ -291,12 +291,13 @@ class _Loop:
 
     def _strike(self, i, hit):
         """The impact of a ball; False where round-off decides of it, or is large in it."""
-        if not hit[2]:
+        # Who is back at a wall, or met another ball, within the contact duration is in a contact that may last.
+        if not hit[2] or hit[0] - self.met[i] < self.duration:
             return False
         time, wall, _clear = hit
         self._move(i, time)
         here, turn, u = self._as_given(wall, self.r[i], time)
-        n, e = turn @ wall.normal(here), self._restitution(self.number(wall.e), i)
+        n, e = turn @ wall.normal(here), self.number(wall.e)
         self.met[i] = time
         b = (self.v[i] - u) @ n
         if b < SLOW * self._length(self.v[i] - u):

@@ -1,0 +1,47 @@
+"""The examples of balls that meet: an equation of state, Haff's law, cradles, and a break shot."""
+
+import numpy as np
+import pytest
+
+from examples import break_shot, cooling_gas, newton_cradle
+
+pytestmark = pytest.mark.physics
+
+
+def test_a_gas_cools_by_haffs_law():
+    """8000 balls, e = 0.9: 2 % until the temperature is a 25th."""
+    found = cooling_gas.run(0.9, taus=4.0)
+    assert found.energy == pytest.approx((1.0 + found.time) ** -2.0, rel=0.02)
+    assert found.balance < 1e-13
+
+
+@pytest.mark.parametrize("name", newton_cradle.CRADLES)
+def test_a_cradle_keeps_energy_and_order(name):
+    how = newton_cradle.CRADLES[name]
+    found = newton_cradle.run(until=2.0, **how)
+    assert found.balance < 1e-14
+    assert (np.diff(found.place, axis=1) >= 2.0 * newton_cradle.RADIUS - 1e-15).all()
+    if "masses" not in how and "restitution" not in how:
+        # At 0.7 s as many leave as came, and nobody else moves.
+        k = int(np.searchsorted(found.time, 0.7))
+        leaves = np.arange(newton_cradle.COUNT) >= newton_cradle.COUNT - how["moving"]
+        assert found.velocity[k] == pytest.approx(leaves.astype(float), abs=1e-14)
+
+
+def test_a_break_shot():
+    """Nobody is in another ball or leaves but through a pocket, and the game is another one with other gaps."""
+    games = [break_shot.run(seed, until=2.0) for seed in (1, 2)]
+    for game in games:
+        assert game.collisions > 20
+        assert game.balance < 1e-13
+        for position, time in zip(game.position, game.time, strict=True):
+            there = position[:2, ~(game.escape_time <= time)]
+            apart = np.linalg.norm(there[:, :, None] - there[:, None], axis=0)
+            np.fill_diagonal(apart, 1.0)
+            assert apart.min() > 2.0 * break_shot.RADIUS - 1e-15
+            assert (
+                np.abs(there).max(axis=1) <= [break_shot.LONG, break_shot.SHORT] - np.array(break_shot.RADIUS)
+            ).all()
+        assert not game.position[:, 2].any()
+        assert game.pocketed[-1] == np.isfinite(game.escape_time).sum()
+    assert np.abs(games[0].position[-1] - games[1].position[-1]).max() > 0.1
