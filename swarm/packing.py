@@ -69,9 +69,9 @@ def pack(
 
     >>> import swarm
     >>> box = swarm.Scene(surfaces=[swarm.Box((0.5, 0.5, 0.5))])
-    >>> balls = swarm.pack(box, 5, fraction=0.22, seed=1)
+    >>> balls = swarm.pack(box, 5, fraction=0.21, seed=1)
     >>> round(float(balls.radius[0]), 4)
-    0.219
+    0.2156
     """
     checks.of_class("scene", scene, Scene)
     seed = checks.count("seed", seed, least=0)

@@ -10,6 +10,7 @@ from .cells import Cells, empty_cells, enter_free, find_free, order_of
 from .errors import SceneError
 from .scene import Scene
 from .state import Floats
+from .vacant import Vacant
 
 # The largest packings, in space and in a plane. Random sequential addition ends at 0.384 and 0.547, where a place for
 # the last takes longer and longer.
@@ -23,6 +24,8 @@ _CLOSE = 1e-12
 _MOST, _LEAST, _WINDOW = 1 << 18, 256, 1 << 16
 # The search ends after this many places for each of the balls: of 0.35 it takes 160, of 0.5 in a plane 90.
 _TRIES, _ALWAYS = 4000, 2_000_000
+# Where fewer tries than this find a place, it is looked where places are left. Balls are of one size up to this part.
+_RARE, _ALIKE = 0.05, 0.9
 
 
 class Room(NamedTuple):
@@ -90,19 +93,34 @@ def place_balls(
     """
     cells = empty_cells(room.low.ravel(), room.high.ravel(), scene.period, radius)
     waiting, done = order_of(radius), np.zeros(radius.size, np.bool_)
+    wide = radius if wide is None else wide
     tried, fitting, share = 0, 0, 1.0
+    vacant: Vacant | None = None
     while waiting.size:
-        some = waiting[:_WINDOW]
-        numbers = np.resize(some, max(_LEAST, min(_MOST, int(2.0 * some.size / share))))
-        points = _points(scene, room, numbers.size, random)
-        within = _enter(scene, cells, points, numbers, done, radius if wide is None else wide)
-        left = waiting[~done[waiting]]
-        placed = waiting.size - left.size
-        tried, fitting, waiting = tried + numbers.size, fitting + within, left
-        share = max(placed / numbers.size, 1e-6)
-        if tried > _ALWAYS + _TRIES * radius.size and waiting.size:
+        # Those of about one size come before smaller ones.
+        some = waiting[:_WINDOW][radius[waiting[:_WINDOW]] >= _ALIKE * radius[waiting[0]]]
+        least = some[-1]
+        if vacant is not None and radius[least] < vacant.radius:
+            vacant = None
+        if share < _RARE:
+            vacant = _searched(scene, cells, room, (float(radius[least]), float(wide[some].min())), vacant)
+        if (vacant is not None and not len(vacant)) or tried > _ALWAYS + _TRIES * radius.size:
             raise _full(scene, radius, room, done, tried, fitting)
+        numbers = np.resize(some, max(_LEAST, min(_MOST, int(2.0 * some.size / share))))
+        n = numbers.size
+        points = _points(scene, room, n, random) if vacant is None else vacant.points(n, random)
+        within = _enter(scene, cells, points, numbers, done, wide)
+        tried, fitting, waiting = tried + n, fitting + within, waiting[~done[waiting]]
+        share = max(within / n, 1e-6)
     return np.ascontiguousarray(cells.position)
+
+
+def _searched(scene: Scene, cells: Cells, room: Room, sizes: tuple[float, float], vacant: Vacant | None) -> Vacant:
+    """Where balls of this radius, for others and for walls, may still be."""
+    if vacant is None:
+        return Vacant(scene, cells, room.low, room.high, *sizes)
+    vacant.refine()
+    return vacant
 
 
 def _points(scene: Scene, room: Room, n: int, random: np.random.Generator) -> Floats:

@@ -637,7 +637,7 @@ LAYERS = [
     ["tables", "filling", "sources"],
     ["law_tables"],
     ["plugins"],
-    ["observables", "history", "sequential"],
+    ["observables", "history", "sequential", "vacant"],
     ["colliding", "grains"],
     ["lanes", "reacting"],
     ["ball_numbers", "methods"],
