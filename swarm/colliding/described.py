@@ -23,8 +23,8 @@ Floats = NDArray[np.float64]
 
 # Cells are longer than the largest diameter by this part: round-off of places.
 _MARGIN = 1e-9
-# And not shorter than this many mean distances of balls.
-_SPACING = 0.8
+# And not shorter than this many mean distances of balls: of many, which no cache holds, fewer cells are better.
+_SPACING, _OF_MANY, _MANY = 0.8, 1.05, 30_000
 # There are at most so many cells a ball, and a few.
 _CELLS, _FEW = 2.0, 64
 # Of fewer cells along a period a ball may have two images of another one in its own cell and its neighbours.
@@ -163,7 +163,7 @@ def grid_of(scene: Scene, particles: Particles) -> Grid:
     long = [k for k in range(3) if high[k] > low[k]]
     sizes = (high - low)[long]
     spacing = (float(np.prod(sizes)) / n) ** (1.0 / len(long)) if long else 0.0
-    width = max(diameter, _SPACING * spacing)
+    width = max(diameter, (_SPACING if n < _MANY else _OF_MANY) * spacing)
     counts = np.ones(3, np.int64)
     while True:
         counts[long] = np.maximum(1, np.floor(sizes / width)).astype(np.int64)
