@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.reflection import Energy, exact, from_relative, given, relative, wall_velocity
+from ..contact.reflection import Energy, exact, given, relative, wall_velocity
 from ..contact.sending import Arriving, send
 from ..kernel.arrays import index
 from ..kernel.gravity import accelerated, potential
@@ -25,6 +25,8 @@ from .window import walls_at
 FLIES, GONE = Status.DONE.value, -1
 # Of a radius, how far a closed wall may be from a ball that an open one lets out.
 _TOUCH = 1e-9
+# Of its speed, that with which a ball leaves a wall at least: four roundings.
+_PARTS = 2.0**-50
 
 
 class Gates(Record):
@@ -69,8 +71,6 @@ def bounce(box, flock, books, clock, i, now):
         wall = closed
     after = _turned(box, flock, books, walls, wall, (i, now, r, v))
     _book(box, books, walls, wall, i, after)
-    if flock.last is not None:
-        flock.last[index(i)] = now
     ended = FLIES if box.laws.own is None else _end(box, clock, wall, i, now, after)
     v1 = either(ended == FLIES, after.v, v)
     flock.put(i, now, r, v1)
@@ -126,21 +126,19 @@ def _shares(laws, heat, lost):
 def _lifted(box, walls, wall, r, turned):
     """The same, so fast away from the wall that what pulls the ball back takes the shortest flight to do so.
 
-    By its speed along the wall; a ball that has none gets it, as a loss below 0.
+    What it gets so is a loss below 0, which the next impact takes back; along the wall nothing changes.
     """
     n, u = walls.unit_normal(wall, r), wall_velocity(box.laws.moving, walls, wall, r)
     w = relative(u, turned.v)
     held = walls.outward_acceleration(wall, r, turned.v, accelerated(box.pull, ZERO, 1.0))
-    least, away = 0.5 * held * box.shortest, -dot(n, w)
-    if held > 0.0 and away < least:
+    # At least so fast that its own velocity has digits of it
+    least, away = max(0.5 * held * box.shortest, _PARTS * math.sqrt(square(turned.v))), -dot(n, w)
+    # Who is absorbed stays as it is.
+    if away < least and turned.wait == 0.0:
         lift = least - away
-        up, speed2 = w - lift * n, square(w)
-        if speed2 > 4.0 * least * least:
-            up = up * math.sqrt(speed2 / square(up))
-        return Turned(
-            from_relative(u, up), turned.impulse + lift, turned.lost + (speed2 - square(up)), turned.heat,
-            turned.work + given(u, up - w), turned.wait,
-        )  # fmt: skip
+        lost, work = turned.lost - lift * (least + away), turned.work + given(u, -lift * n)
+        v = turned.v - lift * n
+        return Turned(v, turned.impulse + lift, lost, turned.heat, work, turned.wait)
     return turned
 
 

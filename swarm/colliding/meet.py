@@ -1,5 +1,6 @@
 """The collision of two balls: equal and opposite impulses, and the energy of the pair as it is to be."""
 
+import math
 from typing import Any
 
 from ..kernel.arrays import index
@@ -10,13 +11,15 @@ from .aim import between
 
 # What the relative velocity is scaled by to restore its square is 1 within round-off, unless next to nothing is left.
 _NEAR = 1e-6
+# The square of the part of their speeds with which balls part at least: four roundings.
+_PARTS = 2.0**-100
 
 
 class Loss(Record):
     """The loss of energy in collisions."""
 
     restitution: float
-    duration: float  # t_c [s]: who lost or met less than this before keeps its energy
+    duration: float  # t_c [s]: who met another ball less than this before keeps its energy
 
 
 class Met(Record):
@@ -48,6 +51,16 @@ def turned(u, n, closing, distance2, restitution):
     return squared(w, square(u) - lost), lost
 
 
+def _parted(u, b, distance2, speed2):
+    """A relative velocity that parts two balls so fast that their own velocities, |v|^2 + |w|^2, have digits of it.
+
+    Else those that touch and fly on together would collide without end by what is round-off of their velocities.
+    """
+    away, least2 = dot(b, u), _PARTS * speed2 * distance2
+    slow = (away < 0.0) | (away * away < least2)
+    return u + select(slow, (math.sqrt(least2) - away) / distance2, 0.0) * b
+
+
 def met(box, flock, one, two, now):
     """The `Met` of two balls that touch now, each as its number, its position and its velocity."""
     (i, r, v), (j, other, w) = one, two
@@ -62,5 +75,5 @@ def met(box, flock, one, two, now):
         after = box.growth.turned(u, b, closing, distance2, now)
     share = box.kinds.share(i, j)
     mass = box.kinds.mass_of(i) * share
-    change = after - u
+    change = _parted(after, b, distance2, square(v) + square(w)) - u
     return Met(v - share * change, w + (1.0 - share) * change, mass * dot(b, change), 0.5 * mass * lost)

@@ -34,7 +34,7 @@ class Flock(NamedTuple):
     key: Array  # of the nodes of the queue: the time of what is next
     item: Array  # int32, the ball of each node
     room: Array  # int32 of each cell: how many balls are in it, and these
-    last: Any = None  # (N) when each lost energy or met somebody last [s since the epoch]; None where nothing loses any
+    last: Any = None  # (N) when each met another ball last [s since the epoch]; None where nothing loses any
 
     def number(self):
         """The number of balls."""
