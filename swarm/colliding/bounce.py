@@ -12,7 +12,7 @@ from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined, select
 from ..kernel.random import Stream
 from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, dot, either, square
+from ..kernel.vector import ZERO, Vec, dot, either, norm, square
 from ..status import Status
 from ..surfaces.openings import is_open
 from .clock import moment_of
@@ -27,6 +27,8 @@ FLIES, GONE = Status.DONE.value, -1
 _TOUCH = 1e-9
 # Of its speed, that with which a ball leaves a wall at least: four roundings.
 _PARTS = 2.0**-50
+# And at most, where a wall bends away under it.
+_ENOUGH = 0.25
 
 
 class Gates(Record):
@@ -126,18 +128,24 @@ def _shares(laws, heat, lost):
 def _lifted(box, walls, wall, r, turned):
     """The same, so fast away from the wall that what pulls the ball back takes the shortest flight to do so.
 
-    What it gets so is a loss below 0, which the next impact takes back; along the wall nothing changes.
+    What it gets so is a loss below 0, which the next impact takes back; along the wall nothing changes. Where nothing
+    is lost, it is turned, with the speed that it has.
     """
     n, u = walls.unit_normal(wall, r), wall_velocity(box.laws.moving, walls, wall, r)
     w = relative(u, turned.v)
-    held = walls.outward_acceleration(wall, r, turned.v, accelerated(box.pull, ZERO, 1.0))
+    pull = accelerated(box.pull, ZERO, 1.0)
+    held = walls.outward_acceleration(wall, r, turned.v, pull)
+    # Where the wall bends away within that flight, a part of its speed is enough.
+    most = max(_ENOUGH * norm(w), 0.5 * norm(pull) * box.shortest)
     # At least so fast that its own velocity has digits of it
-    least, away = max(0.5 * held * box.shortest, _PARTS * math.sqrt(square(turned.v))), -dot(n, w)
+    least, away = max(min(0.5 * held * box.shortest, most), _PARTS * norm(turned.v)), -dot(n, w)
     # Who is absorbed stays as it is.
     if away < least and turned.wait == 0.0:
         lift = least - away
         lost, work = turned.lost - lift * (least + away), turned.work + given(u, -lift * n)
-        v = turned.v - lift * n
+        v, speed2 = turned.v - lift * n, square(turned.v)
+        if not box.laws.change_energy and speed2 > 4.0 * least * least:
+            v = squared(v * math.sqrt(speed2 / square(v)), speed2)
         return Turned(v, turned.impulse + lift, lost, turned.heat, work, turned.wait)
     return turned
 
