@@ -33,8 +33,8 @@ _IMAGES = 4
 _LEAST = 5
 # Balls fly this part of the scene in an epoch, about.
 _EPOCH = 0.125
-# t_c where none is given is this part of the time in which balls fly their diameter; under gravity of that in which
-# they fall so far, by the second part.
+# t_c where none is given is this part of the time in which balls fly their diameter; under gravity, by which contacts
+# last, the second part of that in which they fly or fall so far.
 _DURATION, _FALL = 1e-4, 1e-3
 # A flight from a wall back to it takes at least this part of an epoch: on a shorter one round-off is all there is.
 _SHORTEST = 2.0**-20
@@ -133,10 +133,9 @@ def duration_of(scene: Scene, pairs: Pairs, particles: Particles) -> float:
     assert particles.radius is not None
     if pairs.contact_duration is not None:
         return pairs.contact_duration
-    diameter = 2.0 * float(particles.radius.min())
-    speed = speed_of(scene, particles)
+    diameter, speed = 2.0 * float(particles.radius.min()), speed_of(scene, particles)
     if scene.gravity is not None:
-        speed = max(speed, _DURATION / _FALL * math.sqrt(math.hypot(*scene.gravity) * diameter))
+        return _FALL * diameter / max(speed, math.sqrt(math.hypot(*scene.gravity) * diameter))
     return _DURATION * diameter / speed if speed > 0.0 else 0.0
 
 
