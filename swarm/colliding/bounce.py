@@ -56,6 +56,7 @@ class Turned(Record):
     heat: float
     work: float
     wait: float
+    twice: float  # its energy then
 
 
 @outlined
@@ -76,6 +77,7 @@ def bounce(box, flock, books, clock, i, now):
     ended = FLIES if box.laws.own is None else _end(box, clock, wall, i, now, after)
     v1 = either(ended == FLIES, after.v, v)
     flock.put(i, now, r, v1)
+    flock.kept.keep(i, flock.stamp(i), after.twice)
     note_wall(box, books, clock, (i, now, wall), (r, v, v1), box.kinds.mass_of(i) * after.impulse)
     return ended
 
@@ -97,19 +99,20 @@ def _turned(box, flock, books, walls, wall, ball):
     """`Turned`, by the laws of a wall, of a ball: its number, the time, its position and its velocity."""
     i, now, r, v = ball
     fall = 2.0 * potential(box.pull, r)
-    twice = square(v) + fall
+    twice = flock.kept.at(i, flock.stamp(i), square(v) + fall)
     energy = Energy(twice, select(twice > 0.0, 0.5 / select(twice > 0.0, twice, 1.0), 0.0))
     hit = exact(box.laws, walls, box.pull, wall, r, v, energy)
     if flock.last is not None and now - flock.last[index(i)] < box.loss.duration:
         hit = exact(box.laws._replace(restitution=None), walls, box.pull, wall, r, v, energy)
     v1 = squared(hit.v, hit.twice_energy - fall)
-    turned = Turned(v1, hit.impulse, twice - (hit.twice_energy - hit.work), 0.0, hit.work, 0.0)
+    turned = Turned(v1, hit.impulse, twice - (hit.twice_energy - hit.work), 0.0, hit.work, 0.0, hit.twice_energy)
     if box.laws.send_off:
         random = Stream(box.source.seed, box.source.first + i, books.impacts[index(i)], 0, box.laws.across)
         sent = send(box.laws, walls, wall, Arriving(r, v, square(v), 0.0, box.kinds.mass_of(i)), random)
         if sent.happens:
             heat = select(sent.keeps, 0.0, square(sent.v) + fall - sent.work - twice)
-            turned = Turned(sent.v, sent.impulse, *_shares(box.laws, heat, sent.lost), sent.work, sent.wait)
+            left = square(sent.v) + fall
+            turned = Turned(sent.v, sent.impulse, *_shares(box.laws, heat, sent.lost), sent.work, sent.wait, left)
     return _lifted(box, walls, wall, r, turned)
 
 
@@ -142,11 +145,13 @@ def _lifted(box, walls, wall, r, turned):
     # Who is absorbed stays as it is.
     if away < least and turned.wait == 0.0:
         lift = least - away
-        lost, work = turned.lost - lift * (least + away), turned.work + given(u, -lift * n)
-        v, speed2 = turned.v - lift * n, square(turned.v)
+        v, gained, work, speed2 = turned.v - lift * n, lift * (least + away), given(u, -lift * n), square(turned.v)
         if not box.laws.change_energy and speed2 > 4.0 * least * least:
-            v = squared(v * math.sqrt(speed2 / square(v)), speed2)
-        return Turned(v, turned.impulse + lift, lost, turned.heat, work, turned.wait)
+            v, gained = squared(v * math.sqrt(speed2 / square(v)), speed2), 0.0
+        return turned._replace(
+            v=v, impulse=turned.impulse + lift, lost=turned.lost - gained, work=turned.work + work,
+            twice=turned.twice + gained + work,
+        )  # fmt: skip
     return turned
 
 

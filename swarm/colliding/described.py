@@ -16,7 +16,7 @@ from .box import Box
 from .cells import Axis, Grid
 from .meet import Loss
 from .queue import FIRST, SPARE
-from .rows import CELL, FLOATS, RADIUS, WALL, WHOLES, Flock
+from .rows import CELL, FLOATS, NOBODY, RADIUS, WALL, WHOLES, Flock, Kept
 from .window import OUT
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ _DURATION, _FALL = 1e-4, 1e-3
 _SHORTEST = 2.0**-20
 
 
-def flock_of(particles: Particles, grid: Grid, loses: bool) -> Flock:
+def flock_of(particles: Particles, grid: Grid, loses: bool, walled: bool) -> Flock:
     """The balls at the start, in their cells."""
     n = len(particles)
     flight, event = aligned(FLOATS * n), aligned(FLOATS * n)
@@ -54,8 +54,9 @@ def flock_of(particles: Particles, grid: Grid, loses: bool) -> Flock:
     key, item = np.full(n + SPARE, math.inf), np.zeros(n + SPARE, np.int32)
     item[FIRST : FIRST + n] = np.arange(n)
     last = np.full(n, -math.inf) if loses else None
+    kept = Kept(np.zeros(n), np.full(n, NOBODY, np.int32)) if walled else None
     node = np.arange(FIRST, FIRST + n, dtype=np.int32)
-    return Flock(flight, event, tag, node, aligned_copy(key), item, np.empty(0, np.int32), last)
+    return Flock(flight, event, tag, node, aligned_copy(key), item, np.empty(0, np.int32), last, kept)
 
 
 def with_room(flock: Flock, grid: Grid) -> tuple[Flock, Grid]:
@@ -103,7 +104,7 @@ def described(scene: Scene, particles: Particles) -> tuple[Box, Flock]:
     if pairs.restitution < 1.0 or laws.restitution is not None:
         loss = Loss(pairs.restitution, duration_of(scene, pairs, particles))
     grid = grid_of(scene, particles)
-    flock, grid = with_room(flock_of(particles, grid, loss is not None), grid)
+    flock, grid = with_room(flock_of(particles, grid, loss is not None, bool(scene.surfaces)), grid)
     shortest = max(_SHORTEST * epoch_of(scene, particles, grid), 0.0 if loss is None else loss.duration)
     return Box(scene.walls(0.0), laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest), flock
 

@@ -123,6 +123,8 @@ def _enter(box, flock, books, i, now):
         if turns != 0:
             # There it meets other images of the walls.
             forget_wall(box, flock, i)
+            if flock.kept is not None:
+                flock.kept.keep(i, NOBODY, 0.0)
         found = look_ahead(box, flock, i, now)
         until_exit(box.grid, box.pull, flock, i, now)
         find_wall(box, flock, i, now)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from ..kernel.arrays import index
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.jit import Array
+from ..kernel.jit import Array, select
 from ..kernel.vector import Vec
 
 # Numbers of a row, and whole numbers in the same memory.
@@ -24,6 +24,21 @@ PARTNER, SEEN, STAMP, MET, CELL, FACE = 8, 9, 10, 11, 12, 15
 NOBODY = -1
 
 
+class Kept(NamedTuple):
+    """The energy with which balls left a wall, for the next one: squares of velocities alone have a bias."""
+
+    twice: Array  # (N) twice that per mass
+    stamp: Array  # (N) int32, of the flight that has it
+
+    def at(self, i, stamp, otherwise):
+        """That of a ball, if its flight is still that one."""
+        return select(self.stamp[index(i)] == stamp, self.twice[index(i)], otherwise)
+
+    def keep(self, i, stamp, twice):
+        """Store it."""
+        self.twice[index(i)], self.stamp[index(i)] = twice, stamp
+
+
 class Flock(NamedTuple):
     """The balls of a run."""
 
@@ -35,6 +50,7 @@ class Flock(NamedTuple):
     item: Array  # int32, the ball of each node
     room: Array  # int32 of each cell: how many balls are in it, and these
     last: Any = None  # (N) when each met another ball last [s since the epoch]; None where nothing loses any
+    kept: Any = None  # `Kept`, None where there are no walls
 
     def number(self):
         """The number of balls."""
@@ -43,6 +59,10 @@ class Flock(NamedTuple):
     def time(self, i):
         """The time of its last impact."""
         return self.flight[index(FLOATS * i + TIME)]
+
+    def stamp(self, i):
+        """How often its velocity has changed."""
+        return self.tag[index(WHOLES * i + STAMP)]
 
     def place(self, i):
         """Its position then."""

@@ -275,8 +275,10 @@ class CollidingRun(BaseRun):
             "start": self._start, "position": state.position, "velocity": state.velocity,
             **self._numbers.arrays(),
         }  # fmt: skip
+        kept = flock.kept
         some = {
             "last": flock.last, "image": state.image, "heat": state.heat, "escape_time": state.escape_time,
+            "kept": None if kept is None else kept.twice, "kept_stamp": None if kept is None else kept.stamp,
             "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
             "window": None if self._windows is None else self._windows.numbers,
         }  # fmt: skip

@@ -1,0 +1,14 @@
+"""Balls that graze a wall: millions of impacts on it, none of which changes the energy."""
+
+import pytest
+
+import swarm
+
+
+@pytest.mark.parametrize("across", [1e-3, 1e-9, 0.0])
+def test_a_ball_that_grazes_a_cavity_keeps_its_energy(across):
+    start = swarm.Particles((0.4, 0.0, 0.0), (across, 1.0, 0.0), radius=0.1)
+    result = swarm.simulate(swarm.Scene([swarm.Sphere(0.5)]), start, swarm.Impact(), until=0.02, every=0.01)
+    assert result.observables["impacts"][-1] > 20
+    assert result.observables["energy_error"].max() <= 4.5e-16
+    assert result.observables["max_penetration"].max() <= 1e-15
