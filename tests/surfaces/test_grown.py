@@ -321,10 +321,12 @@ def test_soft_balls_keep_their_energy(name):
     ("surfaces", "plane", "words"),
     [
         ([swarm.Ellipsoid((1.0, 1.0, 0.3))], None, "radius must be below 0.09 m, the smallest radius of curvature"),
+        ([swarm.Sphere(0.1)], None, "radius must be below 0.1 m, .* touches it at several points at once"),
+        ([swarm.Torus(1.0, 0.1, (-1.0, 0.0, 0.0))], None, "radius must be below 0.1 m"),
         ([swarm.Box((1.0, 1.0, 0.05))], "z", "as far from the plane as the largest radius, 0.1 m of particle 0"),
         ([swarm.Prism(L_SHAPE, 0.1, center=(0.4, 0.4, 0.0))], "z", "got 0.05 m; make it endless"),
     ],
-    ids=["tip", "lid", "lid of a prism"],
+    ids=["tip", "sphere", "torus", "lid", "lid of a prism"],
 )
 def test_balls_that_are_too_large_for_a_shape(surfaces, plane, words):
     scene = swarm.Scene(surfaces, plane=plane)

@@ -52,6 +52,9 @@ class Capsule(Revolved):
         radius, side = self.radius, side_sign(self.side)
         return CapsuleNumbers(vec(self.own_center()), radius, radius * radius, 0.5 * self.length, side)
 
+    def largest_ball(self) -> float:
+        return math.inf if self.is_solid() else self.radius
+
     def size(self) -> float:
         return self.radius
 

@@ -47,6 +47,9 @@ class Sphere(Surface):
     def walls(self) -> tuple["SphereNumbers"]:
         return (self.numbers(),)  # whatever its rotation
 
+    def largest_ball(self) -> float:
+        return math.inf if self.is_solid() else self.radius
+
     def size(self) -> float:
         return self.radius
 

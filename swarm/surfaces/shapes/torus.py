@@ -58,6 +58,9 @@ class Torus(Surface):
         minor, side = self.minor_radius, side_sign(self.side)
         return TorusNumbers(vec(self.own_center()), self.major_radius, minor, minor * minor, side)
 
+    def largest_ball(self) -> float:
+        return math.inf if self.is_solid() else self.minor_radius
+
     def size(self) -> float:
         return self.minor_radius
 
