@@ -7,7 +7,8 @@ from ..kernel.jit import Array, outlined
 from ..kernel.vector import dot, norm
 from ..surfaces.posed import Posed
 from .arrays import AFTER, COAST, GAP, IMPULSE, PUSH, RADIUS, SIZE, START, vector_at
-from .contacts import closing, rising
+from .at_walls import rising
+from .contacts import closing
 
 
 class Books(NamedTuple):

@@ -33,7 +33,8 @@ from .arrays import (
     set_vector,
     vector_at,
 )
-from .contacts import press_at_wall, press_pair, relative, rising, size_of, worse
+from .at_walls import press_at_wall, rising
+from .contacts import press_pair, relative, size_of, worse
 
 # 1/(2/5), of the moment of inertia of a ball.
 _ROUNDNESS = 2.5

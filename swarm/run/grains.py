@@ -23,6 +23,7 @@ from ..scene import Scene
 from ..state import Balls, State
 from ..status import Status
 from .base import Arrays, BaseRun
+from .observed import poses_of
 from .state import Seeding
 from .tally import Watched
 from .tiers import Tier
@@ -75,6 +76,7 @@ class GrainsRun(BaseRun):
         self._clock[SKIN] = _SKIN * radius.min()
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._start = self._scale = self._stored = math.nan
+        self._moment = 0.0
         self._numbers = BallNumbers(scene, particles)
         self._choose_tier()
         self._list()
@@ -159,7 +161,8 @@ class GrainsRun(BaseRun):
     # --- A frame -------------------------------------------------------------------------------------------
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
-        self._walls = self._scene.walls(self._method.instant(moment))
+        self._moment = self._method.instant(moment)
+        self._walls = self._scene.walls(self._moment)
         if not self._cut_short:
             self._clock[DONE] = 0.0
         self._clock[TAKEN] = 0.0
@@ -227,6 +230,8 @@ class GrainsRun(BaseRun):
         seen = self._summary()
         scale = max(self._scale, self._scale_of(seen))
         seen["energy_error"] = abs(_balance(seen) - self._start) / scale if scale > 0.0 else 0.0
+        if self._scene.moves():
+            seen |= poses_of(self._scene, self._moment)
         return {**seen, "escaped": int((np.sqrt((self.state.position**2).sum(axis=0)) > self._far).sum())}
 
     def share_done(self, span: float) -> float:

@@ -15,7 +15,7 @@ def run_of(name, count, until, measured):
     """A scene with fewer grains, and a mean of each of its frames."""
     job = read(SCENES / f"{name}.toml")
     mass, radius = (getattr(job.start(), key)[0] for key in ("mass", "radius"))
-    start = swarm.fill(job.scene, count, mass=mass, radius=radius, seed=1)
+    start = swarm.fill(job.scene, count, speed=0.0, mass=mass, radius=radius, seed=1)
     return swarm.simulate(
         job.scene, start, job.method, until=until, every=0.05, progress=False, observables={"measured": measured}
     ).observables
@@ -24,7 +24,7 @@ def run_of(name, count, until, measured):
 @pytest.mark.physics
 def test_a_drum_carries_grains_up_to_a_slope():
     """The centre of grains that fill half of a drum is as far from below the axis as their surface is from level."""
-    seen = run_of("drum_grains", 250, 0.4, lambda snapshot: snapshot.position.mean(axis=1))
+    seen = run_of("drum_grains", 200, 0.3, lambda snapshot: snapshot.position.mean(axis=1))
     x, _y, z = seen["measured"].T
     angle = np.degrees(np.arctan2(-x, -z))
     assert 20.0 < angle[-1] < 55.0
@@ -37,6 +37,6 @@ def test_a_silo_runs_out_through_its_orifice():
     seen = run_of("silo", 300, 0.4, lambda snapshot: float((snapshot.position[2] < -0.055).sum()))
     assert seen["measured"][-1] > seen["measured"][0] + 30.0
     assert (np.diff(seen["measured"]) >= 0.0).all()
-    assert seen["energy_error"].max() < 1e-13
+    assert seen["energy_error"].max() < 1e-12
     # The bottom holds up what is on it.
     assert seen["max_penetration"].max() < 2e-3

@@ -167,15 +167,16 @@ def test_a_heap_of_four_balls_stays_on_a_rough_floor_and_falls_apart_on_a_smooth
     assert speeds[0.5] < 1e-20
 
 
-def test_a_shaker_gives_its_work():
+def test_a_shaker_gives_its_work(tmp_path):
     motion = swarm.Oscillation((0.0, 0.0, 0.02), 5.0)
     floor = swarm.Plane(FLOOR, 0.0, restitution=0.6, friction=0.3, motion=motion)
     scene = swarm.Scene(
         [floor, swarm.Cylinder(0.35, friction=0.3)], gravity=(0.0, 0.0, -G), pairs=swarm.Pairs(0.7, 0.2)
     )
     start = swarm.Particles([[-0.15, 0.15, 0.0], [0.0, 0.0, 0.2], [0.11] * 3], np.zeros((3, 3)), MASS, radius=RADIUS)
-    seen = ran(scene, start, METHOD, 0.6, every=0.1).observables
+    seen = ran(scene, start, METHOD, 0.6, every=0.1, trajectory=tmp_path / "shaker.h5").observables
     assert seen["wall_work"][-1].sum() > 0.01
+    assert seen["wall_position"][:, 0, 2] == pytest.approx(0.02 * np.sin(10.0 * np.pi * seen["time"]), abs=1e-12)
     assert np.ptp(balance(seen)) < 1e-13
 
 

@@ -72,7 +72,8 @@ def test_a_pile_at_rest_stays_at_rest():
     moving = (seen["kinetic_energy"] + seen["rotational_energy"]) / len(start)
     assert moving.max() < 1e-20
     assert seen["energy_error"].max() < 1e-13
-    assert abs(result.particles.position - before).max() < 1e-12
+    # A run begins without the impulses of friction of the one before it.
+    assert abs(result.particles.position - before).max() < 1e-5 * DIAMETER
 
 
 def silo(width, is_shut=False):

@@ -1,0 +1,130 @@
+"""The contacts of balls with walls: a ball is a point at the wall that its centre meets."""
+
+import math
+
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
+from ..kernel.vector import dot, square
+from ..surfaces.posed import Posed
+from .arrays import (
+    AFTER,
+    BEFORE,
+    COAST,
+    DAMPING,
+    DRAG,
+    EASE,
+    GAP,
+    IMPULSE,
+    LIGHTNESS,
+    LISTED,
+    LOST,
+    PUSH,
+    RADIUS,
+    SIZE,
+    START,
+    X,
+    set_vector,
+    vector_at,
+)
+from .contacts import (
+    Closing,
+    begin_solve,
+    change_of,
+    damper,
+    improved,
+    lasting,
+    pressed,
+    relative,
+    size_of,
+    weight_of,
+    worse,
+)
+
+
+def rising(wall, r0, q0, move):
+    """The `Closing` of a ball at r0 and a wall over a step, where the centre moves so."""
+    r1 = r0 + move
+    gradient = wall.discrete_gradient(r0, r1)
+    if isinstance(wall, Posed) and wall.pose.turn is not None:
+        risen = wall.end_inner(r1) - q0
+    else:
+        risen = dot(gradient, move - wall.displacement())
+    slope, _bend = wall.gap_slope(q0, q0 + risen)
+    return Closing(-slope * gradient, slope * risen)
+
+
+@outlined
+def gather_at_wall(matter, law, wall, grains, near, touches, given):
+    """Add the balls that are in a wall at an end of the step to its contacts; how many are new."""
+    place, speed, half, rows = grains.place, grains.speed, 0.5 * matter.h, touches.wall_rows
+    number, begin = given
+    count = touches.wall_spans[1, number]
+    known, start = count, touches.wall_spans[0, number]
+    for k in range(begin, near.wall_first[number + 1]):
+        a = near.slot[index(k)]
+        i = index(a)
+        r0, own = vector_at(place, i, X), wall.grown(place[i, RADIUS])
+        coast = half * vector_at(speed, i, BEFORE)
+        move = coast + half * vector_at(speed, i, AFTER)
+        q0 = own.inner(r0)
+        is_in = (own.level_of(q0) > 0.0) | (own.level_of(own.end_inner(r0 + move)) > 0.0)
+        if is_in & (not near.wall_is_on[index(k)]):
+            near.wall_is_on[index(k)] = True
+            c = index(start + count)
+            touches.wall_ends[c] = a
+            set_vector(rows, c, START, r0)
+            # What round-off has taken of the place, along the normal.
+            steep, _bend = own.gap_slope(q0, q0)
+            lost = dot(own.discrete_gradient(r0, r0), vector_at(place, i, LOST))
+            rows[c, SIZE], rows[c, GAP] = q0, own.gap_of(q0) + steep * lost
+            set_vector(rows, c, COAST, coast)
+            rows[c, EASE] = place[i, LIGHTNESS]
+            if law.damping is not None:
+                rows[c, DAMPING] = law.damping / math.sqrt(place[i, LIGHTNESS])
+            way = rising(own, r0, q0, move)
+            first = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
+            begin_solve(rows, c, first, half * place[i, LIGHTNESS] * square(way.along))
+            set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
+            if law.friction is not None:
+                rows[c, LISTED] = k
+                set_vector(rows, c, DRAG, vector_at(near.wall_drag, index(k), 0) * lasting(rows[c, GAP]))
+            count += 1
+    touches.wall_spans[1, number] = count
+    return count - known
+
+
+def press_at_wall(matter, law, own, grains, rows, c, i):
+    """Improve the impulse of a ball at a wall: its `Closing`, the velocity then, and the change as for pairs."""
+    half, v = 0.5 * matter.h, vector_at(grains.speed, i, AFTER)
+    way = rising(own, vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * v)
+    wanted, _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
+    rows[c, PUSH] = improved(rows, c, wanted)
+    more = change_of(rows, c, rows[c, PUSH] * way.along)
+    off = weight_of(law) * relative(more, rows[c, PUSH], size_of(v), rows[c, EASE])
+    return way, v + more * rows[c, EASE], off
+
+
+@outlined
+def sweep_wall(matter, law, wall, grains, touches, number):
+    """Improve the impulse of each ball at a wall; the largest change of one, relative to what moves there."""
+    rows, worst, begin = touches.wall_rows, 0.0, touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        own = wall.grown(grains.place[i, RADIUS])
+        _way, v, off = press_at_wall(matter, law, own, grains, rows, c, i)
+        set_vector(grains.speed, i, AFTER, v)
+        worst = worse(off, worst)
+    return worst
+
+
+@outlined
+def push_walls(law, grains, touches, number):
+    """Add the impulses of a wall to the velocities at the end of the step."""
+    rows, speed, begin = touches.wall_rows, grains.speed, touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i, impulse = index(touches.wall_ends[c]), vector_at(rows, c, IMPULSE)
+        if law.friction is not None:
+            impulse = impulse + vector_at(rows, c, DRAG)
+        set_vector(speed, i, AFTER, vector_at(speed, i, AFTER) + impulse * rows[c, EASE])
