@@ -76,4 +76,4 @@ def met(box, flock, one, two, now):
     share = box.kinds.share(i, j)
     mass = box.kinds.mass_of(i) * share
     change = _parted(after, b, distance2, square(v) + square(w)) - u
-    return Met(v - share * change, w + (1.0 - share) * change, mass * dot(b, change), 0.5 * mass * lost)
+    return Met(v - share * change, w + box.kinds.share(j, i) * change, mass * dot(b, change), 0.5 * mass * lost)

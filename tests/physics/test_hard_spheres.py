@@ -318,6 +318,18 @@ def test_a_hundred_million_collisions_keep_energy_and_momentum():
     conserved(20, 0.4, 100_000_000)
 
 
+def test_masses_that_differ_much_keep_momentum():
+    """One to a million: each gets its own share of what they exchange."""
+    scene, start = mixed(0.3, side=4, collisions=2)
+    random = np.random.default_rng(11)
+    start.mass = 10.0 ** random.uniform(-3.0, 3.0, len(start))
+    seen = run(scene, start, 40.0, 4).observables
+    assert seen["collisions"][-1] > 3000
+    moves = (start.mass * np.abs(start.velocity)).sum()
+    assert np.abs(seen["momentum"] - seen["momentum"][0]).max() <= 1e-13 * moves
+    assert seen["energy_error"].max() < 1e-13
+
+
 def test_angular_momentum_in_a_smooth_ball():
     """Walls push through the middle, pairs along the line of their centres."""
     scene = swarm.Scene([swarm.Sphere(0.5)])
