@@ -100,13 +100,12 @@ def test_what_cannot_be_is_one_sentence(arguments, sentence):
 
 
 def test_balls_that_jam_say_how_far_they_came(monkeypatch):
-    """Eleven balls that are as wide as their tube are longer than it."""
+    """Five balls of 0.448 m are too many for a sphere of 1 m."""
     monkeypatch.setattr(growing, "_JAMMED", 30)
-    tube = swarm.Scene([swarm.Box((0.5, 0.051, 0.051))])
     with pytest.raises(
-        swarm.SceneError, match=r"pack reached a packing of 0.* before the balls jammed, got 11 balls of"
+        swarm.SceneError, match=r"pack reached a packing of 0.* before the balls jammed, got 5 balls of"
     ):
-        swarm.pack(tube, 11, 0.05, seed=1)
+        swarm.pack(SCENES["sphere"], 5, fraction=0.45, seed=1)
 
 
 # --- The way of two balls that grow ---
