@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checks
+from .ball_walls import require_shapes
 from .errors import SceneError
 from .particles import Particles
 from .scene import Scene
@@ -112,6 +113,7 @@ def fill_velocities(
 def _balls(scene: Scene, particles: Particles, random: np.random.Generator) -> tuple[Particles, float]:
     """Balls where they overlap nothing, and the volume."""
     assert particles.radius is not None
+    require_shapes(scene, particles.radius)
     require_size(scene, particles.radius)
     room = room_of(scene, random, "fill")
     require_packing(scene, particles.radius, room)

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from . import checks
 from .ball_numbers import balls_volume
+from .ball_walls import require_shapes
 from .errors import SceneError
 from .filling import check_velocities, fill_velocities, room_of
 from .motion import pose
@@ -82,6 +83,7 @@ def pack(
     room = room_of(still, random, "pack")
     radii = _radii(still, n, radius, fraction, room)
     made = Particles(np.zeros((3, radii.size)), np.zeros((3, radii.size)), mass, None, radii)
+    require_shapes(still, radii)
     require_size(still, radii)
     packing = balls_volume(still, radii) / room.volume
     _require_below("the packing", packing, len(still.axes()), f" of {told(still, radii, room)}")

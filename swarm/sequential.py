@@ -26,6 +26,8 @@ _MOST, _LEAST, _WINDOW = 1 << 18, 256, 1 << 16
 _TRIES, _ALWAYS = 4000, 2_000_000
 # Where fewer tries than this find a place, it is looked where places are left. Balls are of one size up to this part.
 _RARE, _ALIKE = 0.05, 0.9
+# Places in a search for each ball, or for each box that is left.
+_SEARCHED = 8
 
 
 class Room(NamedTuple):
@@ -102,7 +104,8 @@ def place_balls(
         least = some[-1]
         if vacant is not None and radius[least] < vacant.radius:
             vacant = None
-        if share < _RARE:
+        # Where as many places are to be tried as there is to search
+        if share < _RARE and some.size / share > _SEARCHED * (radius.size if vacant is None else len(vacant)):
             vacant = _searched(scene, cells, room, (float(radius[least]), float(wide[some].min())), vacant)
         if (vacant is not None and not len(vacant)) or tried > _ALWAYS + _TRIES * radius.size:
             raise _full(scene, radius, room, done, tried, fitting)

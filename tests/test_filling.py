@@ -161,9 +161,9 @@ def radius_of(scene, packing, n):
 
 
 @pytest.mark.parametrize("scene", BALLS.values(), ids=BALLS)
-@pytest.mark.parametrize("packing", [0.05, 0.25])
+@pytest.mark.parametrize("packing", [0.05, 0.2])
 def test_balls_overlap_neither_one_another_nor_walls(scene, packing):
-    n = 150
+    n = 40
     radius = radius_of(scene, packing, n) * np.linspace(0.6, 1.2, n)
     particles = swarm.fill(scene, n, speed=2.0, radius=radius, seed=5)
     assert particles.radius.tolist() == radius.tolist()
@@ -177,6 +177,13 @@ def test_balls_overlap_neither_one_another_nor_walls(scene, packing):
     if scene.plane:
         assert not particles.position[2].any()
         assert not particles.velocity[2].any()
+
+
+def test_balls_are_not_placed_in_what_they_may_not_meet():
+    for place in (swarm.fill, swarm.pack):
+        scene = swarm.Scene([swarm.Formula("x**2 + y**2 + z**2 - 1")])
+        with pytest.raises(swarm.SceneError, match=r"surfaces\[0\] must be one that particles with a radius may meet"):
+            place(scene, 5, speed=1.0, radius=0.05)
 
 
 def test_few_small_balls_are_uniform():

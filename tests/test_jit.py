@@ -637,7 +637,7 @@ LAYERS = [
     ["tables", "filling", "sources"],
     ["law_tables"],
     ["plugins"],
-    ["observables", "history", "sequential"],
+    ["ball_walls", "observables", "history", "sequential"],
     ["vacant"],
     ["colliding", "grains"],
     ["lanes", "reacting"],

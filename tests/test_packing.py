@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import swarm
+from swarm import packing
 from swarm.ball_numbers import balls_volume
 from swarm.cells import overlaps_of
 from swarm.colliding.growing import Growth
@@ -99,13 +100,20 @@ def test_what_cannot_be_is_one_sentence(arguments, sentence):
         swarm.pack(BOX, **arguments)
 
 
-def test_balls_that_jam_say_how_far_they_came(monkeypatch):
-    """Five balls of 0.448 m are too many for a sphere of 1 m."""
-    monkeypatch.setattr(growing, "_JAMMED", 30)
+def test_balls_that_jam_give_way_no_more(monkeypatch):
+    """Two balls, whose centres may be 0.8 m apart, reach 0.8 of a diameter of 1 m."""
+    monkeypatch.setattr(growing, "_JAMMED", 100)
+    places, radius = np.array([[-0.4, 0.4], [0.0, 0.0], [0.0, 0.0]]), np.array([0.5, 0.5])
+    _places, reached = growing.grow(swarm.Scene([swarm.Sphere(0.9)]), places, radius, 0.75, np.random.default_rng(1))
+    assert 0.75 <= reached < 0.8
+
+
+def test_a_jam_is_one_sentence(monkeypatch):
+    monkeypatch.setattr(packing, "grow", lambda _scene, places, *_rest: (places, 0.99))
     with pytest.raises(
-        swarm.SceneError, match=r"pack reached a packing of 0.* before the balls jammed, got 5 balls of"
+        swarm.SceneError, match=r"pack reached a packing of 0.2038 before the balls jammed, got 4 balls"
     ):
-        swarm.pack(SCENES["sphere"], 5, fraction=0.45, seed=1)
+        swarm.pack(SCENES["sphere"], 4, fraction=0.21, seed=3)
 
 
 # --- The way of two balls that grow ---
@@ -116,18 +124,20 @@ def test_two_balls_that_grow_touch_when_they_are_as_far_apart_as_they_are_wide()
     met = 0
     for _ in range(200):
         b, u = (Vec(*random.normal(size=3)) for _ in range(2))
-        b, reach = 2.0 * b, float(random.uniform(0.2, 1.0))
+        u, reach = 0.3 * u, float(random.uniform(0.5, 1.0))
         now = float(random.uniform(0.0, 0.5))
         if square(b) <= (reach * growth.at(now)) ** 2:
             continue
         seen = growth.sight(b, u, reach * reach, now)
         times = now + np.linspace(0.0, 60.0, 60_001)
         far = sum((b[k] + u[k] * (times - now)) ** 2 for k in range(3)) - (reach * growth.at(times)) ** 2
-        assert bool(seen.meets()) == bool((far < 0.0).any())
         if not seen.meets():
+            assert not (far < 0.0).any()
+            continue
+        time = now + seen.gap / (np.sqrt(seen.discriminant) - seen.closing)
+        if time > 59.0:
             continue
         met += 1
-        time = now + seen.gap / (np.sqrt(seen.discriminant) - seen.closing)
         assert times[(far < 0.0).argmax()] == pytest.approx(time, abs=2e-3)
         r = b + (time - now) * u
         assert square(r) == pytest.approx((reach * growth.at(time)) ** 2, rel=1e-9)

@@ -1,0 +1,54 @@
+"""Which walls balls may meet, for what places them and what runs them."""
+
+import math
+
+from .errors import SceneError
+from .kernel.vector import Vec
+from .scene import Scene
+from .state import Floats
+from .surfaces.fields.many import Many
+from .surfaces.outlines.outlined import Outlined
+from .surfaces.surface import Surface
+
+# The component along an axis of a unit vector that is along it.
+_PARALLEL = 0.5
+
+
+def _nearest_lid(scene: Scene, surface: Surface) -> float:
+    """How far walls of a surface that are parallel to the plane of a scene are from that, where there are any [m]."""
+    across = scene.across()
+    if across is None:
+        return math.inf
+    lids = [0.5 * surface.height] if isinstance(surface, Outlined) and surface.height is not None else []
+    for wall in () if isinstance(surface, Many) else surface.walls_of_balls(0.0):
+        normal = wall.flat_normal()
+        if normal is not None and abs(normal[across]) > _PARALLEL:
+            lids.append(-wall.distance(Vec(0.0, 0.0, 0.0)))
+    return min(lids, default=math.inf)
+
+
+def require_shapes(scene: Scene, radius: Floats) -> None:
+    """Raise a `SceneError` where balls with these radii may not meet a surface of the scene."""
+    for i, surface in enumerate(scene.surfaces):
+        why = surface.holds_balls()
+        if why is not None:
+            raise SceneError(
+                f"surfaces[{i}] must be one that particles with a radius may meet, got {type(surface).__name__}, "
+                f"{why}; they may meet Sphere, Plane, Slab, Box, Cylinder, Capsule, Torus, Cone, Ellipsoid, Polygon, "
+                "Stadium, Prism and Mesh, fields and intersections of these; make it of such surfaces, or leave the "
+                "radius out"
+            )
+        largest = int(radius.argmax())
+        lid = _nearest_lid(scene, surface)
+        if lid < radius[largest]:
+            raise SceneError(
+                f"surfaces[{i}] ({type(surface).__name__}) must be as far from the plane as the largest radius, "
+                f"{radius[largest]:g} m of particle {largest}, where it is across it, got {lid:g} m; make it endless, "
+                f"or longer along {scene.plane}"
+            )
+        if not radius[largest] < surface.largest_ball():
+            raise SceneError(
+                f"radius must be below {surface.largest_ball():.6g} m, the smallest radius of curvature of "
+                f"surfaces[{i}] ({type(surface).__name__}), so that no ball touches it at several points at once, got "
+                f"{radius[largest]:g} m of particle {largest}; use smaller balls, or a rounder surface"
+            )
