@@ -147,26 +147,25 @@ def mark(box, radius, first, last):
 
 
 @long_kernel
-def look_again(box, flock, now, first, last):
-    """Find the next wall of the balls from `first` to before `last` anew."""
-    for i in range(first, last):
-        if flock.event[index(FLOATS * i + WALL)] != OUT:
-            forget_wall(box, flock, i)
-            find_wall(box, flock, i, now)
-
-
-@long_kernel
 def next_epoch(flock, clock):
     """Begin the epoch after this one, at its end."""
     _begin_epoch(flock, clock, clock[LENGTH])
 
 
 @long_kernel
-def begin(box, flock, first, last):
-    """Find what is next for the balls from `first` to before `last`, at time 0; before the first one nobody knows."""
+def begin(box, flock, now, first, last):
+    """Find what is next for the balls from `first` to before `last`, at the start, which is before time 0.
+
+    Before the first one nobody knows. Later, where a window begins, only the next wall of each.
+    """
     for i in range(first, last):
-        _aim(box, flock, i, 0.0)
-        tell_partner(flock, i)
+        if box.window is not None and now >= 0.0:
+            if flock.event[index(FLOATS * i + WALL)] != OUT:
+                forget_wall(box, flock, i)
+                find_wall(box, flock, i, now)
+        else:
+            _aim(box, flock, i, 0.0)
+            tell_partner(flock, i)
 
 
 @long_kernel

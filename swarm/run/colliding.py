@@ -148,7 +148,7 @@ class CollidingRun(BaseRun):
         self._set_window()
         if instant is not None:
             self._require_free(instant, now)
-        self._for_all(events.look_again, self._box, self._flock, now)
+        self._for_all(events.begin, self._box, self._flock, now)
         ordering: Any = (self._flock,)
         self._called(events.order, [ordering], math.inf)
 
@@ -210,12 +210,11 @@ class CollidingRun(BaseRun):
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         part, box, flock = (0, 0), self._box, self._flock
         yield events.mark, (box, self._radius, *part)
-        yield events.begin, (box, flock, *part)
+        yield events.begin, (box, flock, -1.0, *part)
         yield events.order, (flock,)
         yield events.take, (box, flock, self._books, self._clock, Rule(0.0, self._watch.passes))
         yield events.show, (box, flock, self.state, 0.0, *part)
         if self._windows is not None:
-            yield events.look_again, (box, flock, 0.0, *part)
             yield events.next_epoch, (flock, self._clock)
         yield observables.observe, self._observing()
 
@@ -236,7 +235,7 @@ class CollidingRun(BaseRun):
         if self._windows is not None:
             self._windows.begin(0.0)
         self._set_window()
-        self._for_all(events.begin, self._box, self._flock)
+        self._for_all(events.begin, self._box, self._flock, -1.0)
         ordering: Any = (self._flock,)
         self._called(events.order, [ordering], math.inf)
         self._tier.spend(time.perf_counter() - began)
