@@ -23,8 +23,8 @@ Floats = NDArray[np.float64]
 
 # Cells are longer than the largest diameter by this part: round-off of places.
 _MARGIN = 1e-9
-# And not shorter than this many mean distances of balls: of many, which no cache holds, fewer cells are better.
-_SPACING, _OF_MANY, _MANY = 0.8, 1.05, 30_000
+# And not shorter than this many mean distances of balls.
+_SPACING = 0.8
 # There are at most so many cells a ball, and a few.
 _CELLS, _FEW = 2.0, 64
 # Of fewer cells along a period a ball may have two images of another one in its own cell and its neighbours.
@@ -69,9 +69,8 @@ def with_room(flock: Flock, grid: Grid) -> tuple[Flock, Grid]:
     sorts = np.argsort(cells, kind="stable")
     order = there[sorts].astype(np.int32)
     numbers, first, counts = np.unique(np.asarray(cells)[sorts], return_index=True, return_counts=True)
-    stride = max(_LEAST, 2 * grid.stride)
-    while stride < int(counts.max(initial=0)) + 1:
-        stride *= 2
+    # A cell is full by one ball, so that a little more will do; memory is dear.
+    stride = max(_LEAST, grid.stride + max(1, grid.stride // 4), int(counts.max(initial=0)) + 1)
     room = np.zeros((grid.near.size, stride), np.int32)
     room[numbers, 0] = counts
     place = np.arange(len(order)) - np.repeat(first, counts)
@@ -163,7 +162,7 @@ def grid_of(scene: Scene, particles: Particles) -> Grid:
     long = [k for k in range(3) if high[k] > low[k]]
     sizes = (high - low)[long]
     spacing = (float(np.prod(sizes)) / n) ** (1.0 / len(long)) if long else 0.0
-    width = max(diameter, (_SPACING if n < _MANY else _OF_MANY) * spacing)
+    width = max(diameter, _SPACING * spacing)
     counts = np.ones(3, np.int64)
     while True:
         counts[long] = np.maximum(1, np.floor(sizes / width)).astype(np.int64)
