@@ -1,5 +1,6 @@
 """`pack`: dense balls that overlap nothing, and what cannot be."""
 
+import numba
 import numpy as np
 import pytest
 
@@ -151,6 +152,13 @@ def test_two_balls_that_grow_touch_when_they_are_as_far_apart_as_they_are_wide()
 def test_a_ball_does_not_meet_itself():
     nothing = Vec(0.0, 0.0, 0.0)
     assert not Growth(0.5, 0.3).sight(nothing, nothing, 1.0, 0.1).meets()
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: nothing is compiled")
+def test_balls_without_walls_are_compiled():
+    packed = swarm.pack(CELL, 300, fraction=0.4, seed=1, temperature=1.0)
+    run = swarm.simulate(CELL, packed, swarm.Impact(), until=0.01, compile="always")
+    assert run.observables["collisions"][-1] > 0
 
 
 @pytest.mark.long

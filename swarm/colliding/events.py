@@ -98,6 +98,9 @@ def _vanish(box, flock, i):
 def _at_wall(box, flock, books, clock, i, now):
     """What comes when a ball may meet a wall: it is reflected, or gone, or looks farther; a status if it goes wrong."""
     ended = FLIES
+    # Without walls there is none to be compiled.
+    if len(box.walls.each) == 0:
+        return ended
     if flock.event[index(FLOATS * i + WALL)] >= 0.0:
         ended = bounce(box, flock, books, clock, i, now)
         if ended == GONE:
