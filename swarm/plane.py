@@ -15,6 +15,7 @@ from . import checks
 from .errors import SceneError
 from .kernel.vector import vec
 from .motion import Guide, Oscillation, Path, Rotation, Translation, parts_of
+from .surfaces.facets.mesh import Mesh
 from .surfaces.fields.bodies import Spheres
 from .surfaces.fields.many import Many
 from .surfaces.outlines.outlined import Outlined
@@ -107,6 +108,11 @@ def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> Non
     for i, surface in enumerate(surfaces):
         _require_motion(plane, f"surfaces[{i}].motion", surface)
         _require_laws(plane, f"surfaces[{i}].laws", surface)
+        if isinstance(surface, Mesh):
+            raise SceneError(
+                f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got a Mesh, of '
+                "whose triangles none is known to; use swarm.Polygon, with the corners of its section"
+            )
         if isinstance(surface, Outlined):
             _require_upright(plane, i, surface)
             continue

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 
 import swarm
 from swarm import scene_file, tables
@@ -203,6 +204,12 @@ def test_what_would_leave_it_is_refused_in_a_sentence(case):
     with pytest.raises(swarm.SceneError) as caught:
         make()
     assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+def test_a_mesh_is_refused_in_a_sentence(tmp_path):
+    trimesh.creation.box((1.0, 1.0, 1.0)).export(tmp_path / "box.stl")
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\] must stand upright .* got a Mesh.*swarm.Polygon"):
+        swarm.Scene([swarm.Mesh(tmp_path / "box.stl")], plane="z")
 
 
 def test_what_does_not_reach_the_plane_may_lean():
