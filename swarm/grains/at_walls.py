@@ -100,7 +100,7 @@ def press_at_wall(matter, law, own, grains, rows, c, i):
     wanted, _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
     rows[c, PUSH] = improved(rows, c, wanted)
     more = change_of(rows, c, rows[c, PUSH] * way.along)
-    off = weight_of(law) * relative(more, rows[c, PUSH], size_of(v), rows[c, EASE])
+    off = weight_of(law) * relative(matter, more, rows[c, PUSH], size_of(v), rows[c, EASE])
     return way, v + more * rows[c, EASE], off
 
 

@@ -115,9 +115,10 @@ def begin_solve(rows, c, pressed_first, ease):
     rows[c, GAIN] = 1.0 / (1.0 + select(slope > 0.0, ease * slope, 0.0))
 
 
-def relative(more, push, speeds, ease):
-    """A change of an impulse, relative to what moves there."""
-    return size_of(more) / (push + speeds / ease + _TINY)
+def relative(matter, more, push, speeds, ease):
+    """A change of an impulse, relative to what moves there, and to what weight does in a step."""
+    fall = 0.0 if matter.pull is None else matter.h * size_of(matter.pull)
+    return size_of(more) / (push + (speeds + fall) / ease + _TINY)
 
 
 def change_of(rows, c, new):
@@ -204,7 +205,7 @@ def press_pair(matter, grains, touches, c, ends):
     wanted, _slope = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
     rows[c, PUSH] = improved(rows, c, wanted)
     more = change_of(rows, c, rows[c, PUSH] * way.along)
-    off = weight_of(matter.pairs) * relative(more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
+    off = weight_of(matter.pairs) * relative(matter, more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
     return way, v + more * grains.place[i, LIGHTNESS], u - more * grains.place[j, LIGHTNESS], off
 
 

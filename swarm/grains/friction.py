@@ -89,7 +89,7 @@ def rub_pairs(matter, grains, touches):
         twist = cross(arm, more)
         set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (_ROUNDNESS * one / radius))
         set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (_ROUNDNESS * two / other))
-        rubbing = relative(more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
+        rubbing = relative(matter, more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
         worst = worse(rubbing, worse(off, worst))
     return worst
 
@@ -158,7 +158,7 @@ def rub_wall(matter, law, wall, grains, touches, number):
         set_vector(rows, c, DRAG, new)
         set_vector(speed, i, AFTER, v + more * ease)
         set_vector(spin, i, AFTER, w - cross(n, more) * (_ROUNDNESS * ease / radius))
-        worst = worse(relative(more, rows[c, PUSH], size_of(v), ease), worse(off, worst))
+        worst = worse(relative(matter, more, rows[c, PUSH], size_of(v), ease), worse(off, worst))
     return worst
 
 

@@ -2,12 +2,17 @@
 
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
 import swarm
 from swarm.scene_file import read
 
+pytestmark = [
+    pytest.mark.physics,
+    pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="hours in plain Python"),
+]
 SCENES = Path(__file__).parents[2] / "examples" / "scenes"
 
 
@@ -21,7 +26,6 @@ def run_of(name, count, until, measured):
     ).observables
 
 
-@pytest.mark.physics
 def test_a_drum_carries_grains_up_to_a_slope():
     """The centre of grains that fill half of a drum is as far from below the axis as their surface is from level."""
     seen = run_of("drum_grains", 200, 0.3, lambda snapshot: snapshot.position.mean(axis=1))
@@ -32,7 +36,6 @@ def test_a_drum_carries_grains_up_to_a_slope():
     assert seen["energy_error"].max() < 1e-13
 
 
-@pytest.mark.physics
 def test_a_silo_runs_out_through_its_orifice():
     seen = run_of("silo", 300, 0.4, lambda snapshot: float((snapshot.position[2] < -0.055).sum()))
     assert seen["measured"][-1] > seen["measured"][0] + 30.0
