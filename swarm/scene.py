@@ -176,6 +176,14 @@ class Scene(Pieces):
                 f"surfaces[{i}] must not be {type(self.surfaces[i]).__name__} with {what}, got {self.surfaces[i]}; use "
                 f"Impact with contact_step = 0, or list its bodies one by one, at most {MOST_WALLS} walls"
             )
+        return self.ungrouped(what)
+
+    def ungrouped(self, what: str) -> "Scene":
+        """The scene whose fields are those that it was given, for `what` knows no rooms.
+
+        Raises:
+            SceneError: it has rooms, or too many walls.
+        """
         self.require_no_rooms(what)
         if not self.order.groups:
             return self

@@ -34,6 +34,8 @@ START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED
     19,
 )
 COLUMNS, COLUMNS_OF_FRICTION = 16, 24
+# Columns of `Near.spans`: where those of a field begin in `listed` and end, and of which face they are.
+BEGIN, END, FACE = 0, 1, 2
 # Of a clock: the steps of the frame that are done, those since pairs were listed, and those since the run was halted
 # last; the skin of the lists [m].
 DONE, SINCE, TAKEN, SKIN, CLOCK = 0, 1, 2, 3, 4
@@ -60,6 +62,10 @@ class Near(NamedTuple):
     wall_is_on: Array
     drag: Any  # (room, 3) the impulse of friction of each pair in the last step, or None
     wall_drag: Any
+    # Of a scene with fields, else None
+    spans: Any = None  # (room of walls, 3) int32, what of a field is near
+    listed: Any = None  # (room of members,) int32, its members
+    used: Any = None  # (1,) how many of these there are, listed or not
 
 
 class Touches(NamedTuple):
@@ -71,6 +77,8 @@ class Touches(NamedTuple):
     wall_ends: Array  # (room of walls,) int32, the ball
     wall_spans: Array  # (2, walls) where those of each wall begin in `wall_rows`, and how many there are
     used: Array  # (1,) how many rows are of pairs
+    spans: Any = None  # (room of walls, 3) int32, of fields, as in `Near`; and the same members
+    listed: Any = None
 
 
 def vector_at(rows: Any, c: Any, k: Any) -> Vec:
@@ -95,19 +103,26 @@ def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = 
     return Grains(np.arange(n), place, speed, np.zeros((n, 4)), turning)
 
 
-def near_of(n: int, walls: int, pairs: int, touching: int, has_friction: bool = False) -> Near:
-    """Room for so many pairs, and for so many balls at walls."""
+def near_of(
+    n: int, walls: int, pairs: int, touching: int, has_friction: bool = False, members: int | None = None
+) -> Near:
+    """Room for so many pairs, for so many balls at walls, and so many members of fields, where there are any."""
     drags = (np.zeros((pairs, 3)), np.zeros((touching, 3))) if has_friction else (None, None)
-    return Near(
+    made = Near(
         np.zeros(n + 1, np.int64), np.zeros(pairs, np.int32), np.zeros(pairs, np.bool_),
         np.zeros(walls + 1, np.int64), np.zeros(touching, np.int32), np.zeros(touching, np.bool_), *drags,
     )  # fmt: skip
+    if members is None:
+        return made
+    spans, listed = np.zeros((touching, 3), np.int32), np.zeros(members, np.int32)
+    return made._replace(spans=spans, listed=listed, used=np.zeros(1, np.int64))
 
 
-def touches_of(walls: int, pairs: int, touching: int, has_friction: bool = False) -> Touches:
-    """Room for the contacts of so many pairs, and of so many balls at walls."""
+def touches_of(walls: int, pairs: int, touching: int, has_friction: bool = False, listed: Any = None) -> Touches:
+    """Room for the contacts of so many pairs, and of so many balls at walls; with the members of fields in `Near`."""
     columns = COLUMNS_OF_FRICTION if has_friction else COLUMNS
     return Touches(
         np.zeros((pairs, columns)), np.zeros((pairs, 2), np.int32), np.zeros((touching, columns)),
         np.zeros(touching, np.int32), np.zeros((2, walls), np.int64), np.zeros(1, np.int64),
+        None if listed is None else np.zeros((touching, 3), np.int32), listed,
     )  # fmt: skip

@@ -6,13 +6,16 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import dot, square
 from ..surfaces.posed import Posed
+from ..surfaces.walls import Field
 from .arrays import (
     AFTER,
     BEFORE,
+    BEGIN,
     COAST,
     DAMPING,
     DRAG,
     EASE,
+    END,
     GAP,
     IMPULSE,
     LIGHTNESS,
@@ -39,6 +42,7 @@ from .contacts import (
     weight_of,
     worse,
 )
+from .vessel import met
 
 
 def rising(wall, r0, q0, move):
@@ -63,7 +67,7 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
     for k in range(begin, near.wall_first[number + 1]):
         a = near.slot[index(k)]
         i = index(a)
-        r0, own = vector_at(place, i, X), wall.grown(place[i, RADIUS])
+        r0, own = vector_at(place, i, X), met(wall, near.listed, near.spans, index(k), place[i, RADIUS])
         coast = half * vector_at(speed, i, BEFORE)
         move = coast + half * vector_at(speed, i, AFTER)
         q0 = own.inner(r0)
@@ -72,6 +76,8 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             near.wall_is_on[index(k)] = True
             c = index(start + count)
             touches.wall_ends[c] = a
+            if isinstance(wall, Field):
+                touches.spans[c, BEGIN], touches.spans[c, END] = near.spans[index(k), BEGIN], near.spans[index(k), END]
             set_vector(rows, c, START, r0)
             # What round-off has taken of the place, along the normal.
             steep, _bend = own.gap_slope(q0, q0)
@@ -111,7 +117,7 @@ def sweep_wall(matter, law, wall, grains, touches, number):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        own = wall.grown(grains.place[i, RADIUS])
+        own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
         _way, v, off = press_at_wall(matter, law, own, grains, rows, c, i)
         set_vector(grains.speed, i, AFTER, v)
         worst = worse(off, worst)

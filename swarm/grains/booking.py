@@ -9,6 +9,7 @@ from ..surfaces.posed import Posed
 from .arrays import AFTER, COAST, GAP, IMPULSE, PUSH, RADIUS, SIZE, START, vector_at
 from .at_walls import rising
 from .contacts import closing
+from .vessel import met
 
 
 class Books(NamedTuple):
@@ -59,7 +60,7 @@ def book_wall(matter, law, wall, grains, touches, books, number):
         i = index(touches.wall_ends[c])
         one, gap, push = index(grains.number[i]), rows[c, GAP], rows[c, PUSH]
         move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
-        own = wall.grown(grains.place[i, RADIUS])
+        own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
         way = rising(own, vector_at(rows, c, START), rows[c, SIZE], move)
         books.impacts[one] += (gap <= 0.0) & (gap + way.change > 0.0)
         impulse = vector_at(rows, c, IMPULSE)

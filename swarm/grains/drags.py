@@ -5,6 +5,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import FACE
+
+# More than a field has.
+_FACES = 1 << 31
+
 
 class Drags(NamedTuple):
     """The impulses that are not 0, by their pairs of particles, in ascending order; and those at walls."""
@@ -30,6 +35,8 @@ def _at_walls(world: Any) -> NDArray[np.int64]:
     number, near = world.grains.number, world.near
     first, count = near.wall_first, int(near.wall_first[-1])
     wall = np.repeat(np.arange(len(first) - 1), np.diff(first))
+    if near.spans is not None:
+        wall = wall * _FACES + near.spans[: wall.size, FACE]
     return np.asarray(wall * len(number) + number[near.slot[:count]], np.int64)
 
 

@@ -5,6 +5,7 @@ from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import norm
 from .arrays import BEFORE, RADIUS, X, vector_at
 from .contacts import apart
+from .vessel import met
 
 
 @outlined
@@ -12,7 +13,7 @@ def _stored_at_wall(matter, wall, grains, near, number):
     place, stored = grains.place, 0.0
     for k in range(near.wall_first[number], near.wall_first[number + 1]):
         i = index(near.slot[index(k)])
-        own = wall.grown(place[i, RADIUS])
+        own = met(wall, near.listed, near.spans, index(k), place[i, RADIUS])
         stored += matter.law.stored_energy(own.gap_of(own.inner(vector_at(place, i, X))))
     return stored
 

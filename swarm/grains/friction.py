@@ -35,6 +35,7 @@ from .arrays import (
 )
 from .at_walls import press_at_wall, rising
 from .contacts import press_pair, relative, size_of, worse
+from .vessel import met
 
 # 1/(2/5), of the moment of inertia of a ball.
 _ROUNDNESS = 2.5
@@ -131,10 +132,11 @@ def _facing(own, way, radius, r0, move):
     return n, _carried(own, r0 - radius * n, r0 + move - radius * n)
 
 
-def _faced(wall, grains, rows, c, i, move):
+def _faced(wall, grains, touches, c, i, move):
     """`_facing` of a ball that moves so."""
+    rows = touches.wall_rows
     radius, r0 = grains.place[i, RADIUS], vector_at(rows, c, START)
-    own = wall.grown(radius)
+    own = met(wall, touches.listed, touches.spans, c, radius)
     return _facing(own, rising(own, r0, rows[c, SIZE], move), radius, r0, move)
 
 
@@ -147,7 +149,7 @@ def rub_wall(matter, law, wall, grains, touches, number):
         c = index(k)
         i = index(touches.wall_ends[c])
         radius, ease, w = grains.place[i, RADIUS], rows[c, EASE], vector_at(spin, i, AFTER)
-        own = wall.grown(radius)
+        own = met(wall, touches.listed, touches.spans, c, radius)
         way, v, off = press_at_wall(matter, law, own, grains, rows, c, i)
         move = vector_at(rows, c, COAST) + half * v
         n, (_both, last) = _facing(own, way, radius, vector_at(rows, c, START), move)
@@ -171,7 +173,7 @@ def twist_wall(matter, wall, grains, touches, number):
         c = index(k)
         i = index(touches.wall_ends[c])
         move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
-        n, _velocities = _faced(wall, grains, rows, c, i, move)
+        n, _velocities = _faced(wall, grains, touches, c, i, move)
         turned = cross(n, vector_at(rows, c, DRAG)) * (_ROUNDNESS * rows[c, EASE] / grains.place[i, RADIUS])
         set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - turned)
 
@@ -187,7 +189,7 @@ def book_rubbing(matter, wall, grains, near, touches, books, number):
         one, drag = index(grains.number[i]), vector_at(rows, c, DRAG)
         set_vector(near.wall_drag, index(int(rows[c, LISTED])), 0, drag)
         move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
-        n, (both, _last) = _faced(wall, grains, rows, c, i, move)
+        n, (both, _last) = _faced(wall, grains, touches, c, i, move)
         turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
         gained = dot(drag, move) / matter.h - 0.5 * grains.place[i, RADIUS] * dot(cross(n, drag), turned)
         given = 0.5 * dot(drag, both)

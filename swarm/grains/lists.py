@@ -12,8 +12,10 @@ from ..kernel.arrays import index
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
 from ..surfaces.posed import Posed
-from .arrays import RADIUS, X, vector_at
+from ..surfaces.walls import Field
+from .arrays import FACE, RADIUS, X, vector_at
 from .cell import nearest
+from .vessel import list_in_field
 
 # More cells than this along an axis, of which three numbers still make one.
 _MOST_CELLS = 1 << 20
@@ -132,17 +134,27 @@ def _list_at_wall(wall, grains, near, skin, found):
         if always or wall.grown(place[i, RADIUS]).distance(vector_at(place, i, X)) > -2.0 * skin:
             if found < near.slot.size:
                 near.slot[index(found)] = k
+                if near.spans is not None:
+                    near.spans[index(found), FACE] = 0
             found += 1
     return found
 
 
 @long_kernel
-def list_walls(walls, grains, near, skin):
-    """List the balls near each wall; how many there are, listed or not."""
+def list_walls(walls, faces, grains, near, skin):
+    """List the balls near each wall; how many there are, listed or not.
+
+    `faces` are, of each field, of each member the number of its face, or of the body that it is.
+    """
     found = 0
+    if near.used is not None:
+        near.used[0] = 0
     for k, wall in enumerate(walls.at(0.0).each):
         near.wall_first[k] = found
-        found = _list_at_wall(wall, grains, near, skin, found)
+        if isinstance(wall, Field):
+            found = list_in_field(wall, faces[k], grains, near, skin, found)
+        else:
+            found = _list_at_wall(wall, grains, near, skin, found)
     near.wall_first[len(walls.each)] = found
     for k in range(grains.place.shape[0]):
         i = index(k)

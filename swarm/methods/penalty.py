@@ -47,6 +47,10 @@ class Penalty(fixed_step.SoftWalls):
     way, and what is lost is in "dissipated_energy". A damper that never pulls gives the restitution asked for at any
     speed; friction sticks where it can, so that a pile comes to rest and stays so, and turns balls, whose moment of
     inertia is 2/5 m R^2, in a plane too. A contact should take 12 steps or more.
+    They meet fields, outlines and meshes too, where nothing moves: each body once, and each face once, which are the
+    triangles of a plane or of a convex body, or sides that join smoothly or at an edge towards the balls. In a corner
+    around them they touch both faces. Within a contact's width of where the faces of one surface join, as on the
+    facets of a round hopper, they feel both, and are lifted by less than they overlap.
     Source: García Orden & Ortega 2007, eqs. (2)-(5), with the composite discrete gradient of surfaces/contract.py.
 
     >>> Penalty(dt=1e-3, penalty=1e4, exponent=0.5)

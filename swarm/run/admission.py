@@ -52,10 +52,7 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
         scene.require_no_rooms("bodies")
         known = scene if isinstance(method, Impact) else scene.apart("bodies and soft walls")
         return _task_of_bodies(known, particles.copy(), method, options)
-    if not isinstance(method, Impact):
-        scene = scene.apart(type(method).__name__)
-    elif method.contact_step > 0.0:
-        scene = scene.apart("a contact_step")
+    scene = _with_walls_of(scene, particles, method)
     if isinstance(method, Impact) and method.dt is not None:
         raise SceneError(
             f"dt of Impact is the step of bodies, got {method.dt:g} for particles, which need none; leave it out"
@@ -91,6 +88,14 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
         _require_place(scene, start, method)
     workload.require_few_impacts(scene, particles, method, times.until, times.every)
     return Task(scene, particles, method, options)
+
+
+def _with_walls_of(scene: Scene, particles: Particles | None, method: Method) -> Scene:
+    """The scene with its walls as the method takes them."""
+    if not isinstance(method, Impact):
+        knows_fields = isinstance(method, Penalty) and particles is not None and particles.radius is not None
+        return scene.ungrouped("Penalty") if knows_fields else scene.apart(type(method).__name__)
+    return scene.apart("a contact_step") if method.contact_step > 0.0 else scene
 
 
 def _require_place(scene: Scene, start: Particles, method: Method) -> None:

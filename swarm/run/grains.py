@@ -23,6 +23,7 @@ from ..scene import Scene
 from ..state import Balls, State
 from ..status import Status
 from .base import Arrays, BaseRun
+from .faces import Fields
 from .observed import poses_of
 from .state import Seeding
 from .tally import Watched
@@ -59,7 +60,8 @@ class GrainsRun(BaseRun):
         if particles.image is not None:
             self.state = self.state._replace(image=particles.image, period=scene.cell())
         self._image = np.zeros((3, 0), np.int64) if particles.image is None else particles.image.copy()
-        self._walls = scene.walls(0.0)
+        self._fields = Fields(scene, radius)
+        self._walls = self._fields.walls(0.0, 0.0)
         pool, tier = ThreadPoolExecutor(1, "swarm"), Tier(compile, (self._matter, self._walls), n)
         super().__init__(scene, method, n, pool, tier)
         state = self.state
@@ -68,9 +70,7 @@ class GrainsRun(BaseRun):
         )
         self._world = World(
             arrays.grains_of(state.position, state.velocity, radius, state.mass, spin if rubs else None),
-            arrays.near_of(n, walls, _PAIRS * n, _AT_WALLS * n, rubs),
-            arrays.touches_of(walls, _PAIRS * n, _AT_WALLS * n, rubs),
-            books,
+            *self._room(_PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
         )  # fmt: skip
         self._clock = np.zeros(arrays.CLOCK)
         self._clock[SKIN] = _SKIN * radius.min()
@@ -97,10 +97,21 @@ class GrainsRun(BaseRun):
         near = self._world.near
         while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:
             near = self._make_room(pairs, near.slot.size)
-        while (at := kernel(lists.list_walls)(self._walls, grains, near, skin)) > near.slot.size:
-            near = self._make_room(near.mate.size, at)
+        self._list_walls(kernel, near, skin)
         set_drags(self._world, kept)
         clock[SINCE] = 0.0
+
+    def _list_walls(self, kernel: Any, near: arrays.Near, skin: float) -> None:
+        """List what of the walls is near."""
+        if self._fields.reaches(skin):
+            self._walls = self._fields.walls(0.0, skin)
+        faces, grains = self._fields.faces, self._world.grains
+        while True:
+            at = kernel(lists.list_walls)(self._walls, faces, grains, near, skin)
+            members = 0 if near.used is None else int(near.used[0])
+            if at <= near.slot.size and (near.listed is None or members <= near.listed.size):
+                return
+            near = self._make_room(near.mate.size, at, members)
 
     def _wrap(self) -> None:
         """Bring all into the cell that repeats."""
@@ -128,16 +139,23 @@ class GrainsRun(BaseRun):
                 position[axis, at_face] = 0.0
                 image[axis] = self._image[axis] + cells.astype(np.int64) + at_face
 
-    def _make_room(self, pairs: int, touching: int) -> arrays.Near:
-        """Make room for so many pairs, and balls at walls, and some more."""
-        near, n, walls, rubs = self._world.near, len(self.state.mass), len(self._owners), self._matter.rubs
-        wanted = (pairs, near.mate.size), (touching, near.slot.size)
-        pairs, touching = (have if need <= have else int(_MORE * need) for need, have in wanted)
-        made = arrays.near_of(n, walls, pairs, touching, rubs)
+    def _room(self, pairs: int, touching: int, members: int | None) -> tuple[arrays.Near, arrays.Touches]:
+        """Arrays for so many pairs, balls at walls, and members of fields near them, None where there are no fields."""
+        n, walls, rubs = len(self.state.mass), len(self._owners), self._matter.rubs
+        near = arrays.near_of(n, walls, pairs, touching, rubs, members)
+        return near, arrays.touches_of(walls, pairs, touching, rubs, near.listed)
+
+    def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Near:
+        """Make room for so many pairs, balls at walls, and members of fields, and some more."""
+        near = self._world.near
+        have = 0 if near.listed is None else near.listed.size
+        wanted = (pairs, near.mate.size), (touching, near.slot.size), (members, have)
+        pairs, touching, members = (have if need <= have else int(_MORE * need) for need, have in wanted)
+        made, touches = self._room(pairs, touching, None if near.listed is None else members)
         for old, new in zip(near, made, strict=True):
             if old is not None:
                 new[: len(old)] = old
-        self._world = self._world._replace(near=made, touches=arrays.touches_of(walls, pairs, touching, rubs))
+        self._world = self._world._replace(near=made, touches=touches)
         return made
 
     def _list_again(self) -> None:
@@ -162,7 +180,7 @@ class GrainsRun(BaseRun):
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         self._moment = self._method.instant(moment)
-        self._walls = self._scene.walls(self._moment)
+        self._walls = self._fields.walls(self._moment, float(self._clock[SKIN]))
         if not self._cut_short:
             self._clock[DONE] = 0.0
         self._clock[TAKEN] = 0.0
@@ -192,7 +210,7 @@ class GrainsRun(BaseRun):
         world, matter = self._world, self._matter
         cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
         yield lists.list_pairs, (matter.period, world.grains, world.near, cells, 0.0)
-        yield lists.list_walls, (self._walls, world.grains, world.near, 0.0)
+        yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0)
         yield march, (matter, self._walls, world, self._clock, Rule(0.0, self._watch.passes))
         yield energy.stored, (matter, self._walls, world.grains, world.near)
         yield energy.show, (world.grains, self.state)
@@ -249,7 +267,8 @@ class GrainsRun(BaseRun):
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
-        self._make_room(arrays["near.mate"].size, arrays["near.slot"].size)
+        members = arrays["near.listed"].size if "near.listed" in arrays else 0
+        self._make_room(arrays["near.mate"].size, arrays["near.slot"].size, members)
         super().restore(arrays, cut_short)
         self._show()
 

@@ -8,6 +8,7 @@ from ..methods import Penalty
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
+from ..surfaces.facets.mesh import Mesh
 
 _LOG = logging.getLogger("swarm")
 # Steps in the shortest contact: with fewer than the first there is a warning, which proposes the second.
@@ -40,6 +41,18 @@ def _require_laws(scene: Scene) -> None:
             "surfaces must have no openings and always be present with particles that have a radius and Penalty, got a "
             "scene with them; build the wall of parts that leave the opening, such as solid boxes"
         )
+    for i in scene.order.fields if scene.moves() else ():
+        raise SceneError(
+            f"surfaces must not move beside a field or a mesh with particles that have a radius and Penalty, got "
+            f"surfaces[{scene.owners_of_pieces[i]}] ({type(scene.pieces[i]).__name__}) in a scene with a motion; use "
+            "Impact, or build it of single surfaces"
+        )
+    for i, surface in enumerate(scene.surfaces):
+        if isinstance(surface, Mesh) and surface.groups is not None:
+            raise SceneError(
+                f"surfaces[{i}].groups must be None with particles that have a radius and Penalty, got laws of "
+                f"{', '.join(surface.groups)}; give all of the mesh one law, make two of it, or use Impact"
+            )
     named = [(f"surfaces[{i}]", surface.restitution) for i, surface in enumerate(scene.surfaces)]
     for name, value in (*named, *(() if scene.pairs is None else [("pairs", scene.pairs.restitution)])):
         if value < MOST_DAMPED:

@@ -19,6 +19,7 @@ from ..data.triangles import closed
 from ..fields.members import Members
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .cells import cells_around
+from .faces import faces_of
 from .facet import FacetNumbers, Shared
 from .made import given_arrays, sorted_by_place, table_of_facets, triangles_of_balls, with_room
 from .members import Facets
@@ -182,6 +183,11 @@ class Mesh(Surface):
         if largest not in made:
             made[largest] = triangles_of_balls(self.corners[self.triangles], largest)
         return (made[largest],)
+
+    def faces_of_balls(self, largest: float) -> tuple[Members, Indices]:
+        """As `Many.faces_of_balls`: triangles in one plane, and those of a convex body."""
+        corners, face = faces_of(self.corners, self.triangles, -side_sign(self.side))
+        return triangles_of_balls(corners, largest), face
 
     def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
         return np.asarray(side_sign(self.side) * self.phi(points, time) + radius)

@@ -147,6 +147,14 @@ class Many(Surface):
     def _members_of_balls(self, largest: float) -> Members:
         return members_of(self.solids(), self.repeated, largest)
 
+    def faces_of_balls(self, largest: float) -> tuple[Members, NDArray[np.int64]]:
+        """What soft balls with radii up to the largest one [m] meet, and of each member the number of its face.
+
+        A face is what a ball touches at one place only: a body, or what joins without a corner around the balls.
+        """
+        (members,) = self.walls_of_balls(largest)
+        return members, np.arange(len(members.table))
+
     def holds_balls(self) -> str | None:
         if self.is_foam():
             return "whose cavities have edges where they meet, at which balls would turn"

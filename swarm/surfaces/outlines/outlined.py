@@ -187,6 +187,18 @@ class Outlined(Many):
         table = table_of(sides)
         return field_of(sides[0], table, self._boxes, None, largest)
 
+    def faces_of_balls(self, largest: float) -> tuple[Members, NDArray[np.int64]]:
+        """As `Many.faces_of_balls`: runs of sides that join smoothly or at an edge towards the balls, and lids."""
+        n, sign = len(self.boundary), side_sign(self.side)
+        # A ball that is too wide for an arc touches what is next to it on both sides.
+        fits = 1.0 - sign * self.boundary.sides.curvature * largest > 0.0
+        splits = (self.boundary.wedges(sign) > 0.0) | ~fits | ~np.roll(fits, -1)
+        face = np.concatenate([[0], np.cumsum(splits[:-1])])
+        if not splits[-1]:
+            face[face == face[-1]] = 0
+        lids = n + np.arange(len(self) - n)
+        return self.walls_of_balls(largest)[0], np.concatenate([face, lids])
+
     def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
         return np.asarray(side_sign(self.side) * self.phi(points, time) + radius)
 

@@ -1,0 +1,129 @@
+"""What a ball meets of a field: bodies, each by itself, or the faces of a vessel, of each the place that is nearest.
+
+A face is of sides of an outline that join smoothly or at an edge towards the balls, or of triangles of a mesh that are
+in one plane or of a convex body. Its depth is that below the nearest of them: a ball that comes from one triangle to
+the next in their plane has one contact all the time, whose depth and normal do not change there, and one that goes over
+an edge turns about it. Where faces meet in a corner around the balls each has a contact of its own, so that a ball is
+held by both. So what contacts store depends on the place of the ball alone, and its discrete gradients keep the energy.
+"""
+
+import math
+from typing import Any
+
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
+from ..kernel.vector import Vec
+from ..surfaces.balls.facet import RoundTriangle
+from ..surfaces.contract import Smooth
+from ..surfaces.fields.grid import block_of, over_block
+from ..surfaces.fields.members import GrownLike, member
+from ..surfaces.outlines.round_side import RoundSide
+from ..surfaces.rotation import Rotated
+from ..surfaces.walls import Field
+from .arrays import BEGIN, END, FACE, RADIUS, X, vector_at
+
+
+class Nearest(Smooth):
+    """Some of the members of a field as one wall; phi, the gap, is the distance outside of the nearest one."""
+
+    members: Any  # grown
+    listed: Any  # their numbers, from the first to the one before the stop
+    first: Any
+    stop: Any
+
+    side = 1.0
+
+    def phi(self, r):
+        """The distance outside of the nearest member."""
+        return _deepest(self, r)
+
+    def gradient(self, r):
+        """The unit normal of that member."""
+        return _outward(self, r)
+
+
+@outlined
+def _deepest(some, r):
+    most = -math.inf
+    for k in range(some.first, some.stop):
+        most = max(most, member(some.members, index(some.listed[index(k)])).distance(r))
+    return most
+
+
+@outlined
+def _outward(some, r):
+    most, which = -math.inf, some.first
+    for k in range(some.first, some.stop):
+        depth = member(some.members, index(some.listed[index(k)])).distance(r)
+        if depth > most:
+            most, which = depth, k
+    return member(some.members, index(some.listed[index(which)])).unit_normal(r)
+
+
+def is_of_faces(like):
+    """Whether the members of a field are parts of faces: a constant for the compiler."""
+    if isinstance(like, (GrownLike, Rotated)):
+        return is_of_faces(like.body)
+    return isinstance(like, (RoundSide, RoundTriangle))
+
+
+def met(wall, listed, spans, k, radius):
+    """What the centre of a ball meets of a wall, of a field what the span in row k says."""
+    grown = wall.grown(radius)
+    if not isinstance(wall, Field):
+        return grown
+    if is_of_faces(wall.members.like):
+        return Nearest(grown.members, listed, spans[k, BEGIN], spans[k, END])
+    return member(grown.members, index(listed[index(spans[k, BEGIN])]))
+
+
+# --- Lists -----------------------------------------------------------------------------------------------
+
+
+def _enter(end, m, given):
+    """Enter a member that is near in the order of faces, if it is not there yet; the end of the list then."""
+    members, face, near, (r, skin, begin) = given
+    # A distance to first order, which may be off by half of itself.
+    if not member(members, index(m)).distance(r) > -2.0 * skin:
+        return end
+    k, listed = end, near.listed
+    if end >= listed.size:
+        return end + 1
+    own = face[index(m)]
+    while k > begin and (face[index(listed[index(k - 1)])] > own or
+                         (face[index(listed[index(k - 1)])] == own and listed[index(k - 1)] > m)):  # fmt: skip
+        k -= 1
+    if k > begin and listed[index(k - 1)] == m:
+        return end
+    last = end
+    while last > k:
+        listed[index(last)] = listed[index(last - 1)]
+        last -= 1
+    listed[index(k)] = m
+    return end + 1
+
+
+@outlined
+def list_in_field(wall, face, grains, near, skin, found):
+    """List the balls near each face, or each body, of a field; how many are listed then."""
+    place, grid = grains.place, wall.members.grid
+    for a in range(place.shape[0]):
+        i = index(a)
+        r, radius, begin = vector_at(place, i, X), place[i, RADIUS], near.used[0]
+        reach = radius + 2.0 * skin
+        corner = Vec(reach, reach, reach)
+        block, members = block_of(grid, r - corner, r + corner), wall.grown(radius).members
+        given = members, face, near, (r, skin, begin)
+        end = over_block(grid, block, begin, _enter, given)
+        near.used[0] = end
+        if end <= near.listed.size:
+            k = begin
+            while k < end:
+                own, first = face[index(near.listed[index(k)])], k
+                while k < end and face[index(near.listed[index(k)])] == own:
+                    k += 1
+                if found < near.slot.size:
+                    c = index(found)
+                    near.slot[c], near.spans[c, BEGIN], near.spans[c, END], near.spans[c, FACE] = a, first, k, own
+                found += 1
+    return found

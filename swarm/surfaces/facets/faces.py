@@ -1,0 +1,157 @@
+"""The faces of a mesh that soft balls touch at one place each: triangles in one plane, and those of a convex body.
+
+Where two triangles make a corner around the balls they are of two faces, and a ball in it touches both. The nearest
+place of what is convex goes on without a jump of the normal. Triangles in one plane, to the round-off of a file, are
+put into that plane: from one to the next neither the distance nor the normal changes.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# The sine of an angle between triangles that are in one plane, and how far from that corners may be, of the size.
+_FLAT, _OFF = 1e-5, 1e-6
+# So many planes a face has at the most: more take long to compare. By this part a hull is larger than what is convex.
+_MOST, _WIDER = 2000, 1e-5
+
+
+class _Groups:
+    """Sets of numbers that become one, as a forest."""
+
+    def __init__(self, count: int) -> None:
+        self.parent = list(range(count))
+
+    def root(self, i: int) -> int:
+        while self.parent[i] != i:
+            self.parent[i] = self.parent[self.parent[i]]
+            i = self.parent[i]
+        return i
+
+
+def faces_of(vertices: Floats, triangles: Indices, side: float) -> tuple[Floats, Indices]:
+    """The corners (T, 3, 3) of the triangles, those of one plane in it, and the number of the face of each (T,).
+
+    Args:
+        vertices: (V, 3) [m].
+        triangles: (T, 3), which turn to the left seen from outside.
+        side: 1 where balls are outside, -1 inside.
+    """
+    corners = vertices[triangles]
+    crossed = side * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = crossed / np.linalg.norm(crossed, axis=1)[:, None]
+    pairs, bends = _joints(corners, triangles, normals)
+    flat = np.abs(bends) <= _FLAT
+    groups = _Groups(len(triangles))
+    for one, other in pairs[flat].tolist():
+        groups.parent[groups.root(one)] = groups.root(other)
+    planes = np.array([groups.root(i) for i in range(len(triangles))])
+    corners = _in_planes(corners, crossed, planes)
+    groups = _Groups(len(triangles))
+    _join_flat(groups, planes, corners, normals, pairs[flat])
+    edges = pairs[bends < -_FLAT][np.argsort(-bends[bends < -_FLAT], kind="stable")]
+    _join_edges(groups, planes, corners, normals, edges)
+    faces = np.array([groups.root(i) for i in range(len(triangles))])
+    return corners, np.unique(faces, return_inverse=True)[1]
+
+
+def _join_flat(groups: _Groups, planes: Indices, corners: Floats, normals: Floats, edges: Indices) -> None:
+    """Join triangles of one plane where they are convex: all of them, or one after the other along these edges."""
+    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+
+    def is_convex(some: list[int]) -> bool:
+        return _hull(corners[some].reshape(-1, 3), normals[some[0]]) <= (1.0 + _WIDER) * float(areas[some].sum())
+
+    parts = {i: [i] for i in range(len(planes))}
+    whole = [part for part in _parts_of(planes) if len(part) > 1]
+    hollow = set()
+    for part in whole:
+        if is_convex(part.tolist()):
+            for i in part[1:].tolist():
+                groups.parent[i] = int(part[0])
+        else:
+            hollow.add(int(planes[part[0]]))
+    for one, other in edges.tolist():
+        a, b = groups.root(one), groups.root(other)
+        if a != b and int(planes[one]) in hollow and is_convex(parts[a] + parts[b]):
+            groups.parent[b], parts[a] = a, parts[a] + parts[b]
+
+
+def _parts_of(numbers: Indices) -> list[Indices]:
+    """Where each of the numbers is."""
+    order = np.argsort(numbers, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
+
+
+def _hull(points: Floats, normal: Floats) -> float:
+    """The area of the convex hull of points of a plane."""
+    from scipy.spatial import ConvexHull
+
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    first /= np.linalg.norm(first)
+    second = np.cross(normal, first)
+    return float(ConvexHull(np.stack([points @ first, points @ second], axis=1)).volume)
+
+
+def _joints(corners: Floats, triangles: Indices, normals: Floats) -> tuple[Indices, Floats]:
+    """The pairs of triangles that share an edge, and by which sine the other rises towards the balls there."""
+    count = len(triangles)
+    ends = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    ends = ends[order]
+    change = np.flatnonzero(np.concatenate([[True], (ends[1:] != ends[:-1]).any(axis=1), [True]]))
+    # An edge of four triangles joins none.
+    first = change[:-1][np.diff(change) == 2]
+    one, other = order[first], order[first + 1]
+    pairs = np.stack([one % count, other % count], axis=1)
+    tip = corners[pairs[:, 1], (other // count + 2) % 3]
+    start = corners[pairs[:, 0], one // count]
+    way = corners[pairs[:, 0], (one // count + 1) % 3] - start
+    up = tip - start
+    height = np.linalg.norm(np.cross(way, up), axis=1) / np.linalg.norm(way, axis=1)
+    return pairs, (normals[pairs[:, 0]] * up).sum(axis=1) / height
+
+
+def _join_edges(groups: _Groups, planes: Indices, corners: Floats, normals: Floats, edges: Indices) -> None:
+    """Join what meets at edges towards the balls, in this order, where all of it is behind all of its planes.
+
+    Two parts of one plane, which has a hole or a notch, stay apart.
+    """
+    near = _OFF * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    roots = np.array([groups.root(i) for i in range(len(planes))])
+    # Of each its planes as rows (normal, offset), of a flat one the first triangle's; its corners; and their numbers.
+    bodies: dict[int, tuple[Floats, Floats, set[int]]] = {}
+    for part in _parts_of(roots):
+        n = normals[part[:1]]
+        row = np.concatenate([n, (n @ corners[part[0]].T).mean(axis=1, keepdims=True)], axis=1)
+        points = np.unique(corners[part].reshape(-1, 3), axis=0)
+        bodies[int(roots[part[0]])] = row, points, {int(planes[part[0]])}
+    for one, other in edges.tolist():
+        a, b = groups.root(one), groups.root(other)
+        (own, mine, known), (others, theirs, more) = bodies[a], bodies[b]
+        if a == b or len(own) + len(others) > _MOST or known & more:
+            continue
+        if _is_behind(theirs, own, near) and _is_behind(mine, others, near):
+            groups.parent[b] = a
+            bodies[a] = np.concatenate([own, others]), np.concatenate([mine, theirs]), known | more
+
+
+def _is_behind(points: Floats, planes: Floats, near: float) -> bool:
+    return bool((planes[:, :3] @ points.T - planes[:, 3:] <= near).all())
+
+
+def _in_planes(corners: Floats, crossed: Floats, planes: Indices) -> Floats:
+    """The corners of triangles, each in the plane of those with its number if that is near."""
+    which, each = np.unique(planes, return_inverse=True)
+    sums = np.zeros((len(which), 3))
+    np.add.at(sums, each, crossed)
+    normal = (sums / np.linalg.norm(sums, axis=1)[:, None])[each]
+    heights = np.einsum("tk,tck->tc", normal, corners)
+    middle = np.bincount(each, heights.mean(axis=1))[each] / np.bincount(each)[each]
+    off = heights - middle[:, None]
+    worst = np.zeros(len(which))
+    np.maximum.at(worst, each, np.abs(off).max(axis=1))
+    size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    off[(worst > _OFF * size)[each] | (np.bincount(each) == 1)[each]] = 0.0
+    return np.asarray(corners - off[:, :, None] * normal[:, None, :])
