@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checks
-from .ball_walls import require_shapes
 from .errors import SceneError
 from .particles import Particles
+from .placing.sequential import Room, place_balls, require_packing, require_size
+from .placing.shapes import require_shapes
 from .scene import Scene
-from .sequential import Room, place_balls, require_packing, require_size
 from .state import Floats
 
 _BATCH = 1 << 18

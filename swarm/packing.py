@@ -8,14 +8,14 @@ from numpy.typing import ArrayLike
 
 from . import checks
 from .ball_numbers import balls_volume
-from .ball_walls import require_shapes
 from .errors import SceneError
 from .filling import check_velocities, fill_velocities, room_of
 from .motion import pose
 from .particles import Particles
+from .placing.sequential import Room, place_balls, require_size, told
+from .placing.shapes import require_shapes
 from .run.growing import grow
 from .scene import Scene
-from .sequential import Room, place_balls, require_size, told
 from .state import Floats
 from .surfaces.surface import Surface
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.cells import overlaps_of
+from swarm.placing.cells import overlaps_of
 
 # The statistics of N points are off by a few 1/sqrt(N).
 N = 40_000

@@ -7,9 +7,9 @@ import pytest
 import swarm
 from swarm import packing
 from swarm.ball_numbers import balls_volume
-from swarm.cells import overlaps_of
 from swarm.colliding.growing import Growth
 from swarm.kernel.vector import Vec, dot, square
+from swarm.placing.cells import overlaps_of
 from swarm.run import growing
 
 CELL = swarm.Scene([], period=(1.0, 1.0, 1.0))

@@ -39,7 +39,7 @@ SOURCES = (
     "grains",
     "reacting",
     "colliding",
-    "cells.py",
+    "placing",
     "observables.py",
     "state.py",
     "status.py",

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from ..ball_walls import require_shapes
-from ..cells import overlaps_of
 from ..errors import SceneError
 from ..methods import Impact, Penalty
 from ..methods.base import Method
 from ..particles import Particles
+from ..placing.cells import overlaps_of
+from ..placing.sequential import require_size
+from ..placing.shapes import require_shapes
 from ..scene import Scene
-from ..sequential import require_size
 from .instants import require_instants_of_balls
 from .options import RunOptions
 from .soft import require_soft_balls

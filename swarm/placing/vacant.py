@@ -8,9 +8,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..scene import Scene
+from ..state import Floats
 from .cells import Cells, find_free
-from .scene import Scene
-from .state import Floats
 
 # The width of the first boxes, as a part of the radius, unless there were more than so many for each ball, and some.
 _WIDTH, _MOST, _SOME = 0.7, 48, 1_000_000

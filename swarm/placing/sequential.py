@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .ball_numbers import balls_volume
+from ..ball_numbers import balls_volume
+from ..errors import SceneError
+from ..scene import Scene
+from ..state import Floats
 from .cells import Cells, empty_cells, enter_free, find_free, order_of
-from .errors import SceneError
-from .scene import Scene
-from .state import Floats
 from .vacant import Vacant
 
 # The largest packings, in space and in a plane. Random sequential addition ends at 0.384 and 0.547, where a place for

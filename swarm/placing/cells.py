@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .kernel import cache
-from .kernel.arrays import index
-from .kernel.jit import Array, kernel, outlined, select
-from .kernel.vector import Vec, column
-from .state import Floats
+from ..kernel import cache
+from ..kernel.arrays import index
+from ..kernel.jit import Array, kernel, outlined, select
+from ..kernel.vector import Vec, column
+from ..state import Floats
 
 # So few places are looked at in plain Python, before a compiler is done.
 _FEW = 300

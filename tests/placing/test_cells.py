@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm.cells import empty_cells, enter_free, find_free, order_of, overlaps_of
+from swarm.placing.cells import empty_cells, enter_free, find_free, order_of, overlaps_of
 
 CELLS = {"none": (None,) * 3, "all": (1.0, 1.0, 1.0), "some": (1.0, None, 0.4)}
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 import swarm
-from swarm.cells import empty_cells, enter_free, find_free, order_of
-from swarm.vacant import Vacant
+from swarm.placing.cells import empty_cells, enter_free, find_free, order_of
+from swarm.placing.vacant import Vacant
 
 SCENE = swarm.Scene([swarm.Sphere(1.0)])
 LOW, HIGH = np.full((3, 1), -1.0), np.full((3, 1), 1.0)

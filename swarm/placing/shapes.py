@@ -2,13 +2,13 @@
 
 import math
 
-from .errors import SceneError
-from .kernel.vector import Vec
-from .scene import Scene
-from .state import Floats
-from .surfaces.fields.many import Many
-from .surfaces.outlines.outlined import Outlined
-from .surfaces.surface import Surface
+from ..errors import SceneError
+from ..kernel.vector import Vec
+from ..scene import Scene
+from ..state import Floats
+from ..surfaces.fields.many import Many
+from ..surfaces.outlines.outlined import Outlined
+from ..surfaces.surface import Surface
 
 # The component along an axis of a unit vector that is along it.
 _PARALLEL = 0.5

@@ -1,0 +1,1 @@
+"""Places for balls among others and within walls."""
