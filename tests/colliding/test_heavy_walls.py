@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import signal
 
 import numpy as np
 import pytest
@@ -77,7 +78,7 @@ def test_a_free_sphere_is_one_ball_more():
         np.c_[balls.position, np.zeros(3)], np.c_[balls.velocity, np.zeros(3)], np.append(balls.mass, 0.7),
         radius=np.append(balls.radius, 0.08),
     )  # fmt: skip
-    result = swarm.simulate(swarm.Scene([box]), more, swarm.Impact(), until=1.2, frames=2, compile="never")
+    result = swarm.simulate(swarm.Scene([box]), more, swarm.Impact(), until=1.2, compile="never")
     assert result.particles.position[:, :-1] == pytest.approx(position, abs=1e-9)
     assert result.particles.velocity[:, :-1] == pytest.approx(velocity, abs=1e-9)
     assert result.particles.position[:, -1] == pytest.approx(seen["wall_position"][1], abs=1e-9)
@@ -189,7 +190,7 @@ def test_compiled_and_plain_agree_with_any_number_of_threads():
 
 def test_energy_in_all_frames():
     scene, balls = moving(plate(0.5))
-    options = {"frames": 4, "compile": "never", "progress": False}
+    options = {"every": 0.15, "compile": "never", "progress": False}
     whole = swarm.simulate(scene, balls.copy(), swarm.Impact(), until=0.6, **options)
     assert whole.observables["energy_error"].max() < 1e-13
     assert whole.observables["wall_velocity"][-1, 1, 0] != 0.0
@@ -199,7 +200,7 @@ def test_discs_and_a_heavy_disc_stay_in_their_plane():
     wall = swarm.Slab(ACROSS, 0.02, side="outside", mass=2.0, motion=swarm.Guide(ACROSS))
     scene = swarm.Scene([BOX, wall], plane="z")
     discs = swarm.fill(scene, 20, radius=0.05, speed=1.0, seed=1)
-    result = swarm.simulate(scene, discs, swarm.Impact(), until=1.0, frames=2, compile="never", progress=False)
+    result = swarm.simulate(scene, discs, swarm.Impact(), until=1.0, compile="never", progress=False)
     assert not result.particles.position[2].any()
     assert not result.particles.velocity[2].any()
     assert result.observables["energy_error"].max() < 1e-13
@@ -208,4 +209,25 @@ def test_discs_and_a_heavy_disc_stay_in_their_plane():
 def test_impacts_of_members_are_refused():
     scene, balls = moving(plate())
     with pytest.raises(swarm.SceneError, match="member_impacts must be False"):
-        swarm.simulate(scene, balls, swarm.Impact(), until=0.1, frames=1, member_impacts=True)
+        swarm.simulate(scene, balls, swarm.Impact(), until=0.1, member_impacts=True)
+
+
+def test_a_run_that_is_cut_off_goes_on_from_its_file(tmp_path):
+    scene, balls = moving(plate(0.5), gravity=DOWN)
+    path = tmp_path / "run.h5"
+
+    def run(**more):
+        options = {"until": 0.6, "every": 0.1, "compile": "never", "progress": False}
+        return swarm.simulate(scene, balls.copy(), swarm.Impact(), **{**options, **more})
+
+    def stop(frame):
+        if frame.number == 3:
+            signal.raise_signal(signal.SIGTERM)
+
+    whole = run()
+    with pytest.raises(KeyboardInterrupt):
+        run(trajectory=path, progress=stop, checkpoint=600.0)
+    rest = run(trajectory=path, resume=True)
+    assert np.array_equal(rest.particles.position, whole.particles.position)
+    for name in ("wall_position", "total_energy", "pressure"):
+        assert np.array_equal(rest.observables[name], whole.observables[name], equal_nan=True)
