@@ -15,7 +15,7 @@ from ..colliding import events
 from ..colliding.bounce import Gates, Source
 from ..colliding.box import Books, Rule
 from ..colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
-from ..colliding.described import described, epoch_of, reach_of, with_room
+from ..colliding.described import aligned_copy, described, epoch_of, reach_of, with_room
 from ..colliding.queue import FIRST
 from ..colliding.window import END
 from ..errors import RunError
@@ -296,8 +296,9 @@ class CollidingRun(BaseRun):
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
-        while self._flock.room.size < arrays["room"].size:
-            self._make_room()
+        grid, size = self._box.grid, arrays["room"].size
+        self._flock = self._flock._replace(room=aligned_copy(np.zeros(size, np.int32)))
+        self._box = self._box._replace(grid=grid._replace(stride=size // grid.near.size))
         super().restore(arrays, cut_short)
         if self._windows is not None:
             self._set_window()
