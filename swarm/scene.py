@@ -211,6 +211,16 @@ class Scene(Pieces):
             made._require_few_walls(f" with balls of a radius of {largest:g} m")
         return made
 
+    def of_some(self, surfaces: Sequence[Surface]) -> "Scene":
+        """The scene of some of its surfaces, for the same particles."""
+        if self._largest is None:
+            return Scene(surfaces, self.gravity)
+        return Scene(surfaces, self.gravity, plane=self.plane).of_balls(np.array([self._largest]))
+
+    def walls_of(self, surface: Surface) -> tuple[Any, ...]:
+        """The walls of one of its surfaces that its particles meet."""
+        return surface.walls() if self._largest is None else surface.walls_of_balls(self._largest)
+
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""
         return self._moves

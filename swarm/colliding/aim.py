@@ -14,6 +14,8 @@ from ..kernel.arrays import fetch, index, unwritten
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, square
+from ..surfaces.flights import Hit
+from .heavy import meet_heavy
 from .rows import DUE, FACE, FLOATS, MEETS, NOBODY, PARTNER, RADIUS, SEEN, STAMP, WALL, WHOLES
 from .window import UNKNOWN, next_hit
 
@@ -265,10 +267,21 @@ def forget_wall(box, flock, i):
     flock.event[index(FLOATS * i + DUE)], flock.event[index(FLOATS * i + WALL)] = math.inf, UNKNOWN
 
 
+def _given_hit(box, flock, i, now):
+    """The next `Hit` on a wall without a mass, if the cell is near one."""
+    time, wall = math.inf, UNKNOWN
+    # Without walls there is none to be compiled.
+    if len(box.walls.each) > 0 and box.grid.near[index(box.grid.number(i, flock))]:
+        time, wall = next_hit(box, flock, i, now)
+    return Hit(time, wall)
+
+
 @outlined
 def find_wall(box, flock, i, now):
     """Find when a ball meets a wall, if its cell is near one and that is not known."""
     row = FLOATS * i
-    if box.grid.near[index(box.grid.number(i, flock))] and flock.event[index(row + WALL)] == UNKNOWN:
+    if box.heavy is not None:
+        meet_heavy(box, flock, i, now, _given_hit(box, flock, i, now))
+    elif box.grid.near[index(box.grid.number(i, flock))] and flock.event[index(row + WALL)] == UNKNOWN:
         hit = next_hit(box, flock, i, now)
         flock.event[index(row + DUE)], flock.event[index(row + WALL)] = now + hit.time, hit.wall

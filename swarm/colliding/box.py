@@ -20,6 +20,7 @@ class Box(Record):
     growth: Any = None  # `Growth` of balls that are packed
     window: Any = None  # of walls that move, come or go: see window.py
     gates: Any = None  # None, or `Gates` where balls may leave the walls
+    heavy: Any = None  # None, or `Heavy` where walls have a mass
     source: Any = None  # None, or `Source` where walls send them off
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..contact.laws import NONE
 from ..pairs import Pairs
 from ..particles import Particles
+from ..reacting.described import scenery_of
 from ..scene import Scene
 from ..surfaces.drive import drive_of
 from .aim import Alike, Various
@@ -97,15 +98,18 @@ def aligned(size: int) -> Floats:
 def described(scene: Scene, particles: Particles) -> tuple[Box, Flock]:
     """What the balls are in, and these at the start."""
     assert particles.radius is not None
-    laws = scene.laws() or NONE
+    scenery = scenery_of(scene, 0.0) if scene.reacts() else None
+    laws = scene.laws() or NONE if scenery is None else scenery.laws
     pairs = scene.pairs or Pairs()
     loss = None
-    if pairs.restitution < 1.0 or laws.restitution is not None:
+    heavy_loses = any(surface.reacts() and surface.restitution < 1.0 for surface in scene.surfaces)
+    if pairs.restitution < 1.0 or laws.restitution is not None or heavy_loses:
         loss = Loss(pairs.restitution, duration_of(scene, pairs, particles))
     grid = grid_of(scene, particles)
     flock, grid = with_room(flock_of(particles, grid, loss is not None, bool(scene.surfaces)), grid)
     shortest = max(_SHORTEST * epoch_of(scene, particles, grid), 0.0 if loss is None else loss.duration)
-    return Box(scene.walls(0.0), laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest), flock
+    walls = scene.walls(0.0) if scenery is None else scenery.given
+    return Box(walls, laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest), flock
 
 
 def kinds_of(particles: Particles, flight: Any) -> Any:
@@ -121,7 +125,7 @@ def speed_of(scene: Scene, particles: Particles) -> float:
     """The root mean square speed of balls at the start, or that of the fastest wall [m/s]."""
     fastest = [math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))]
     for surface in scene.surfaces:
-        if surface.motion is not None:
+        if surface.motion is not None and not surface.reacts():
             drive = drive_of(surface, 0.0)
             reach = surface.extent() if math.isfinite(surface.extent()) else scene.finite_size()
             fastest.append(drive.fastest + drive.angular_speed() * reach)

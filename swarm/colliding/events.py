@@ -13,15 +13,18 @@ from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined, select
 from ..kernel.vector import norm, put, square
 from ..status import Status
+from .again import aim_again, queue_both
 from .ahead import fetch_next
 from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .bounce import FLIES, GONE, bounce
 from .cells import cross, mark_near, take_out, until_exit
 from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, REACH, SAME, fit
+from .heavy import first_number
 from .journal import has_room, note_pair
 from .meet import met
 from .queue import FIRST, build, requeue
 from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NOBODY, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
+from .striking import renew_ended, shift_leases, strike_heavy
 from .window import END, OUT
 
 # So many events a ball between which no time passes: then time does not pass at all.
@@ -31,29 +34,13 @@ _AT_ONCE = 1000
 # --- Of one ball -------------------------------------------------------------------------------------------
 
 
-def _aim(box, flock, i, now):
-    """Find all that is next for a ball whose velocity has changed."""
-    until_exit(box.grid, box.pull, flock, i, now)
-    forget_wall(box, flock, i)
-    find_wall(box, flock, i, now)
-    find_partner(box, flock, i, now)
-
-
-def _queue_both(flock, i):
-    """Bring a ball to its place in the queue, and its partner, if that is told."""
-    requeue(flock, i)
-    told = tell_partner(flock, i)
-    if told >= 0:
-        requeue(flock, told)
-
-
 @outlined
 def _collide(box, flock, books, clock, i, now):
     """The collision of a ball, if its partner still has the flight that it had; else it looks for another one."""
     j = flock.tag[index(WHOLES * i + PARTNER)]
     if flock.tag[index(WHOLES * j + STAMP)] != flock.tag[index(WHOLES * i + SEEN)]:
         find_partner(box, flock, i, now)
-        _queue_both(flock, i)
+        queue_both(flock, i)
     else:
         # The one with the smaller number first
         one, other = min(i, j), max(i, j)
@@ -67,10 +54,10 @@ def _collide(box, flock, books, clock, i, now):
             impulse = box.kinds.mass_of(one) * norm(blow.one - v)
             note_pair(box, books, clock, (one, other, now), (r, v, blow.one), impulse)
         flock.event[index(FLOATS * other + MEETS)] = math.inf
-        _aim(box, flock, one, now)
-        _queue_both(flock, one)
-        _aim(box, flock, other, now)
-        _queue_both(flock, other)
+        aim_again(box, flock, one, now)
+        queue_both(flock, one)
+        aim_again(box, flock, other, now)
+        queue_both(flock, other)
 
 
 def _book(flock, books, clock, pair, blow, now):
@@ -97,22 +84,37 @@ def _vanish(box, flock, i):
 
 def _at_wall(box, flock, books, clock, i, now):
     """What comes when a ball may meet a wall: it is reflected, or gone, or looks farther; a status if it goes wrong."""
-    ended = FLIES
+    if box.heavy is not None:
+        if flock.event[index(FLOATS * i + WALL)] >= first_number(box):
+            strike_heavy(box, flock, books, clock, i, now)
+            return FLIES
+        if len(box.walls.each) == 0:
+            _look_for_wall(box, flock, i, now)
+            return FLIES
     # Without walls there is none to be compiled.
     if len(box.walls.each) == 0:
-        return ended
+        return FLIES
+    return _at_given_wall(box, flock, books, clock, i, now)
+
+
+def _look_for_wall(box, flock, i, now):
+    forget_wall(box, flock, i)
+    find_wall(box, flock, i, now)
+    requeue(flock, i)
+
+
+def _at_given_wall(box, flock, books, clock, i, now):
+    ended = FLIES
     if flock.event[index(FLOATS * i + WALL)] >= 0.0:
         ended = bounce(box, flock, books, clock, i, now)
         if ended == GONE:
             _vanish(box, flock, i)
             ended = FLIES
         elif ended == FLIES:
-            _aim(box, flock, i, now)
-            _queue_both(flock, i)
+            aim_again(box, flock, i, now)
+            queue_both(flock, i)
     else:
-        forget_wall(box, flock, i)
-        find_wall(box, flock, i, now)
-        requeue(flock, i)
+        _look_for_wall(box, flock, i, now)
     return ended
 
 
@@ -167,7 +169,7 @@ def begin(box, flock, now, first, last):
                 forget_wall(box, flock, i)
                 find_wall(box, flock, i, now)
         else:
-            _aim(box, flock, i, 0.0)
+            aim_again(box, flock, i, 0.0)
             tell_partner(flock, i)
 
 
@@ -193,6 +195,8 @@ def _begin_epoch(flock, clock, now):
             flock.event[index(row + k)] -= shift
         if flock.last is not None:
             flock.last[index(i)] -= shift
+    if flock.freedoms is not None:
+        shift_leases(flock.freedoms, shift)
     build(flock)
     return shift
 
@@ -213,6 +217,13 @@ def _speed2(box, flock, clock):
         whole += square(flock.velocity(i))
     fall = 0.0 if box.pull is None else norm(box.pull) * clock[REACH]
     return max(whole / flock.number(), fall)
+
+
+def _first(box, flock, clock, end):
+    """The ball and the time of the first event, with new leases of walls where they end before it."""
+    if box.heavy is not None:
+        renew_ended(box, flock, clock, end)
+    return flock.item[FIRST], flock.key[FIRST]
 
 
 def _is_over(box, end, now):
@@ -237,7 +248,7 @@ def take(box, flock, books, clock, rule):
     most = float(_AT_ONCE * flock.number())
     before = -math.inf
     while True:
-        i, now = flock.item[FIRST], flock.key[FIRST]
+        i, now = _first(box, flock, clock, end)
         ended = _is_over(box, end, now)
         if ended >= 0:
             return ended, NOBODY

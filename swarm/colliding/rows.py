@@ -51,6 +51,7 @@ class Flock(NamedTuple):
     room: Array  # int32 of each cell: how many balls are in it, and these
     last: Any = None  # (N) when each met another ball last [s since the epoch]; None where nothing loses any
     kept: Any = None  # `Kept`, None where there are no walls
+    freedoms: Any = None  # of walls with a mass, or None
 
     def number(self):
         """The number of balls."""

@@ -24,7 +24,7 @@ def scenery_of(scene: Scene, moment: float) -> Scenery:
     """The walls of a scene in the frame that ends at a moment [s]."""
     owners = np.array(scene.owners())
     rest = [surface for surface in scene.surfaces if not surface.reacts()]
-    given = Scene(rest, scene.gravity).apart("walls that react") if rest else None
+    given = scene.of_some(rest).apart("walls that react") if rest else None
     reacts = np.array([surface.reacts() for surface in scene.surfaces])[owners]
     return Scenery(
         Walls(()) if given is None else given.walls(moment),
@@ -41,7 +41,7 @@ def _reacting(scene: Scene) -> tuple[Reacting, ...]:
     made, number = [], 0
     for i in dict.fromkeys(scene.owners()):
         surface = scene.surfaces[i]
-        walls = surface.walls()
+        walls = scene.walls_of(surface)
         if surface.reacts():
             freedom = _freedom(surface, rows.index(i), scene.gravity or (0.0, 0.0, 0.0))
             made += [Reacting(wall, freedom, number + k, surface.restitution) for k, wall in enumerate(walls)]

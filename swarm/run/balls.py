@@ -44,7 +44,7 @@ def require_balls(scene: Scene, particles: Particles | None, method: Method, opt
         )
     _require_method(scene, particles, method)
     require_shapes(scene, particles.radius)
-    _require_options(method, options)
+    _require_options(scene, method, options)
     require_size(scene, particles.radius)
     require_instants_of_balls(scene, particles, method, options)
     require_soft_balls(scene, particles, method)
@@ -86,8 +86,13 @@ def _require_method(scene: Scene, particles: Particles, method: Impact | Penalty
         )
 
 
-def _require_options(method: Method, options: RunOptions) -> None:
+def _require_options(scene: Scene, method: Method, options: RunOptions) -> None:
     """Raise a `SceneError` for options of particles that are independent of one another."""
+    if options.member_impacts and scene.reacts():
+        raise SceneError(
+            "member_impacts must be False where particles have a radius and impacts move a surface, got True; leave it "
+            "out, or give that surface a motion instead of a mass"
+        )
     given = {
         "cluster": options.cluster is not None, "sources": bool(options.sources), "counters": bool(options.counters),
         "member_impacts": options.member_impacts and not isinstance(method, Impact),

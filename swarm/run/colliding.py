@@ -15,7 +15,7 @@ from ..colliding import events
 from ..colliding.bounce import Gates, Source
 from ..colliding.box import Books, Rule
 from ..colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
-from ..colliding.described import described, epoch_of, reach_of, with_room
+from ..colliding.described import aligned_copy, described, epoch_of, reach_of, with_room
 from ..colliding.queue import FIRST
 from ..colliding.window import END
 from ..errors import RunError
@@ -48,7 +48,7 @@ class CollidingRun(BaseRun):
         seeding: Seeding, watched: Watched,
     ) -> None:  # fmt: skip
         assert particles.radius is not None
-        n, rows = len(particles), len(scene.owners())
+        self._of, n, rows = scene, len(particles), len(scene.owners())
         self._radius = float(particles.radius.max())
         box, self._flock = described(scene, particles)
         self._clock = np.zeros(CLOCK)
@@ -74,7 +74,7 @@ class CollidingRun(BaseRun):
             gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
         seed = seeding.seed - 2**64 if seeding.seed >= 2**63 else seeding.seed
         self._impacts, self._tally, _counters = watched
-        self._box = box._replace(
+        self._box = self._with_heavy(box)._replace(
             log=None if self._impacts is None else self._impacts.example,
             window=None if self._windows is None else self._windows.numbers,
             gates=gates, source=Source(seed, seeding.first) if laws.send_off else None,
@@ -83,7 +83,7 @@ class CollidingRun(BaseRun):
         super().__init__(scene, method, n, pool, tier, seeding.first)
         counts = None if self._tally is None else self._tally.counts()
         self._books = Books(
-            state.impulse, state.dissipated, state.impacts, balls.virial, state.image, counts, state.heat
+            self._impulse_of_books(), state.dissipated, state.impacts, balls.virial, state.image, counts, state.heat
         )
         self._surfaces_of_walls = scene.members()[0]
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
@@ -92,6 +92,14 @@ class CollidingRun(BaseRun):
         self._ends = np.zeros(2)  # of the frame, and of the one before [s]
         self._start = np.zeros(1)
         self._choose_tier()
+
+    def _with_heavy(self, box: Any) -> Any:
+        """What the balls are in, with walls that have a mass."""
+        return box
+
+    def _impulse_of_books(self) -> Any:
+        """Where impulses on walls are booked."""
+        return self.state.impulse
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         latest = self._limit(latest)
@@ -220,14 +228,16 @@ class CollidingRun(BaseRun):
 
     def _observing(self, moment: float = 0.0) -> tuple[Any, ...]:
         drawn = np.arange(len(self._partial))
-        walls = self._box.walls if self._windows is None else self._scene.walls(moment)
-        return None, walls, self._box.pull, self.state, drawn, observables.CHUNK, self._partial
+        return None, self._walls_seen(moment), self._box.pull, self.state, drawn, observables.CHUNK, self._partial
+
+    def _walls_seen(self, moment: float) -> Any:
+        return self._box.walls if self._windows is None else self._scene.walls(moment)
 
     def observe(self) -> None:
         self._begin()
         self._show(0.0)
         self._observe(0.0)
-        self._start[0] = _balance(self._summary())
+        self._start[0] = balance(self._summary())
 
     def _begin(self) -> None:
         """Find what is next for every ball."""
@@ -251,7 +261,7 @@ class CollidingRun(BaseRun):
     def seen(self) -> dict[str, Any]:
         seen = self._summary()
         scale = seen["kinetic_energy"] + seen["dissipated_energy"] + abs(seen["potential_energy"])
-        seen["energy_error"] = abs(_balance(seen) - self._start[0]) / scale if scale > 0.0 else 0.0
+        seen["energy_error"] = abs(balance(seen) - self._start[0]) / scale if scale > 0.0 else 0.0
         far = (np.sqrt((self.state.position**2).sum(axis=0)) > self._far) & ~self.state.gone()
         seen |= gone_of(self.state, int(far.sum()), self._surfaces_of_walls, len(self._scene.surfaces))
         if self._scene.moves():
@@ -286,8 +296,9 @@ class CollidingRun(BaseRun):
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
-        while self._flock.room.size < arrays["room"].size:
-            self._make_room()
+        grid, size = self._box.grid, arrays["room"].size
+        self._flock = self._flock._replace(room=aligned_copy(np.zeros(size, np.int32)))
+        self._box = self._box._replace(grid=grid._replace(stride=size // grid.near.size))
         super().restore(arrays, cut_short)
         if self._windows is not None:
             self._set_window()
@@ -296,7 +307,7 @@ class CollidingRun(BaseRun):
             self._books = self._books._replace(counts=self._tally.counts())
 
 
-def _balance(seen: dict[str, Any]) -> float:
+def balance(seen: dict[str, Any]) -> float:
     """The energy of all, with what was lost."""
     kept: float = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum()
     return kept - float(np.sum(seen.get("wall_work", 0.0)))

@@ -35,11 +35,6 @@ def require_instants_of_balls(scene: Scene, particles: Particles, method: Method
 def _require_plain(scene: Scene) -> None:
     """Raise a `SceneError` for what balls that meet at instants do not know."""
     for i, surface in enumerate(scene.surfaces):
-        if surface.reacts():
-            raise SceneError(
-                f"surfaces[{i}] must have no mass and no inertia with particles that have a radius, got "
-                f"{surface!r:.200}; leave these out, give it a motion, or leave out the radius"
-            )
         for k, law in enumerate(surface.laws):
             if isinstance(law, Sticky):
                 raise SceneError(

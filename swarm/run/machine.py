@@ -24,6 +24,7 @@ from .compiling import Compilations
 from .doors import DoorRun
 from .engine import Run
 from .grains import GrainsRun
+from .heavy import HeavyRun
 from .impacts import log_of
 from .measures import Measures
 from .options import Task
@@ -200,7 +201,7 @@ def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
         bodies.tally = watched.tally
         return bodies
     if task.particles.radius is not None:
-        kind = CollidingRun if task.method.is_rigid() else GrainsRun
+        kind = (HeavyRun if task.scene.reacts() else CollidingRun) if task.method.is_rigid() else GrainsRun
         return kind(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
     if task.scene.reacts():
         return ReactingRun(task.scene, task.particles, task.method, *how, watched.tally)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..reacting.described import Observed
 from ..scene import Scene
 from ..state import State
 
@@ -29,4 +30,18 @@ def poses_of(scene: Scene, moment: float) -> dict[str, Any]:
     return {
         "wall_position": np.array([pose.position() for pose in poses]),
         "wall_orientation": np.array([pose.quaternion for pose in poses]),
+    }
+
+
+def with_walls(seen: dict[str, Any], walls: Observed) -> dict[str, Any]:
+    """The observables with those of walls that react, whose energy is a part of the whole."""
+    energy = walls.kinetic + walls.potential
+    return {
+        **seen,
+        "total_energy": seen["total_energy"] + float(energy.sum()),
+        "wall_energy": energy,
+        "wall_velocity": walls.velocity,
+        "wall_spin": walls.spin,
+        "wall_position": walls.position,
+        "wall_orientation": walls.orientation,
     }

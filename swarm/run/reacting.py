@@ -24,6 +24,7 @@ from ..state import State
 from ..status import Status
 from . import failures
 from .base import Arrays, BaseRun
+from .observed import with_walls
 from .tally import Tally
 from .tiers import Tier
 
@@ -175,17 +176,7 @@ class ReactingRun(BaseRun):
 
     def _summary(self) -> dict[str, Any]:
         seen = observables.summary(self._partial, self.state, self._owners, lasts=False, parts=self._parts)
-        walls = self._walls
-        energy = walls.kinetic + walls.potential
-        return {
-            **seen,
-            "total_energy": seen["total_energy"] + float(energy.sum()),
-            "wall_energy": energy,
-            "wall_velocity": walls.velocity,
-            "wall_spin": walls.spin,
-            "wall_position": walls.position,
-            "wall_orientation": walls.orientation,
-        }
+        return with_walls(seen, self._walls)
 
     def seen(self) -> dict[str, Any]:
         seen = self._summary()

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..colliding.clock import EPOCHS, LENGTH
 from ..colliding.window import END, MOMENT, PASSED, WINDOW
+from ..reacting.described import scenery_of
 from ..scene import Scene
 from ..state import Floats
 
@@ -44,7 +45,8 @@ class Windows:
 
     def walls(self) -> Any:
         """The walls as kernels take them in this window."""
-        return self._scene.walls(float(self.numbers[MOMENT]))
+        moment = float(self.numbers[MOMENT])
+        return scenery_of(self._scene, moment).given if self._scene.reacts() else self._scene.walls(moment)
 
     def openings(self) -> Any:
         """The openings in it."""
@@ -53,4 +55,7 @@ class Windows:
 
 def windows_of(scene: Scene, clock: Floats) -> Windows | None:
     """The windows of a scene, None where its walls are always the same."""
-    return Windows(scene, clock) if scene.moves() or scene.has_doors() else None
+    moves = scene.moves()
+    if scene.reacts():
+        moves = any(surface.motion is not None for surface in scene.surfaces if not surface.reacts())
+    return Windows(scene, clock) if moves or scene.has_doors() else None
