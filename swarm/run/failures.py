@@ -51,7 +51,7 @@ def require_admissible(
     if seen["max_penetration"] <= deepest:
         return
     position, size = state.position[:, : len(state.mass)], scene.finite_size()
-    distances = scene.distances_outside(position, moment)
+    distances = scene.distances_outside(position, moment, None if state.balls is None else state.balls.radius)
     # Far out in an open scene the round-off of a position is that of its own size.
     outside = distances > deepest / size * np.maximum(np.abs(position).max(axis=0), size)
     outside &= ~state.gone()

@@ -231,3 +231,15 @@ def test_a_run_that_is_cut_off_goes_on_from_its_file(tmp_path):
     assert np.array_equal(rest.particles.position, whole.particles.position)
     for name in ("wall_position", "total_energy", "pressure"):
         assert np.array_equal(rest.observables[name], whole.observables[name], equal_nan=True)
+
+
+@pytest.mark.parametrize("place", [0.95, 0.05], ids=["wall", "plate"])
+def test_a_ball_that_reaches_into_a_wall_is_an_error(place):
+    scene, balls = moving(plate())
+    with run_of(scene, balls) as run:
+        run.observe()
+        run.require_admissible(run.seen(), 0.0)
+        run.state.position[0, 3] = place
+        run._observe(0.0)
+        with pytest.raises(swarm.RunError, match=r"3: it is .* m outside"):
+            run.require_admissible(run.seen(), 0.0)
