@@ -32,7 +32,7 @@ from .arrays import (
 from .contacts import (
     Closing,
     begin_solve,
-    change_of,
+    changed,
     damper,
     improved,
     lasting,
@@ -48,7 +48,7 @@ from .vessel import met
 def rising(wall, r0, q0, move):
     """The `Closing` of a ball at r0 and a wall over a step, where the centre moves so."""
     r1 = r0 + move
-    gradient = wall.discrete_gradient(r0, r1)
+    gradient = wall.resting_gradient(r0, r1)
     if isinstance(wall, Posed) and wall.pose.turn is not None:
         risen = wall.end_inner(r1) - q0
     else:
@@ -99,26 +99,27 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
     return count - known
 
 
-def press_at_wall(matter, law, own, grains, rows, c, i):
+def press_at_wall(matter, law, own, grains, rows, at, share):
     """Improve the impulse of a ball at a wall: its `Closing`, the velocity then, and the change as for pairs."""
+    c, i = at
     half, v = 0.5 * matter.h, vector_at(grains.speed, i, AFTER)
     way = rising(own, vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * v)
     wanted, _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
     rows[c, PUSH] = improved(rows, c, wanted)
-    more = change_of(rows, c, rows[c, PUSH] * way.along)
+    more, part = changed(rows, c, IMPULSE, rows[c, PUSH] * way.along, share)
     off = weight_of(law) * relative(matter, more, rows[c, PUSH], size_of(v), rows[c, EASE])
-    return way, v + more * rows[c, EASE], off
+    return way, v + part * rows[c, EASE], off
 
 
 @outlined
-def sweep_wall(matter, law, wall, grains, touches, number):
+def sweep_wall(matter, law, wall, grains, touches, number, share):
     """Improve the impulse of each ball at a wall; the largest change of one, relative to what moves there."""
     rows, worst, begin = touches.wall_rows, 0.0, touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
         own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
-        _way, v, off = press_at_wall(matter, law, own, grains, rows, c, i)
+        _way, v, off = press_at_wall(matter, law, own, grains, rows, (c, i), share)
         set_vector(grains.speed, i, AFTER, v)
         worst = worse(off, worst)
     return worst

@@ -21,6 +21,7 @@ class Books(NamedTuple):
     dissipated: Array  # (N,) [J]
     virial: Array  # (1,) [J s]
     sweeps: Array  # (1,) int64
+    lagging: Array  # (1,) int64, steps whose friction, or a damper, was not solved to its tolerance
 
 
 def _lost(matter, work, gap, change):

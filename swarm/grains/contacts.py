@@ -121,11 +121,13 @@ def relative(matter, more, push, speeds, ease):
     return size_of(more) / (push + (speeds + fall) / ease + _TINY)
 
 
-def change_of(rows, c, new):
-    """The change of an impulse, which becomes the new one."""
-    more = new - vector_at(rows, c, IMPULSE)
-    set_vector(rows, c, IMPULSE, new)
-    return more
+def changed(rows, c, k, new, share):
+    """The change from an impulse in three columns of a row to the new one, and that share of it, which is made."""
+    old = vector_at(rows, c, k)
+    more = new - old
+    part = share * more
+    set_vector(rows, c, k, old + part)
+    return more, part
 
 
 def size_of(a):
@@ -197,26 +199,29 @@ def gather_pairs(matter, grains, near, touches):
     return count - known
 
 
-def press_pair(matter, grains, touches, c, ends):
-    """Improve the impulse of a pair: its `Closing`, the velocities then, and the change, relative to what moves."""
+def press_pair(matter, grains, touches, c, ends, share):
+    """Improve the impulse of a pair: its `Closing`, the velocities then, and the change, relative to what moves.
+
+    Only a share of the change is made.
+    """
     rows, half, (i, j) = touches.rows, 0.5 * matter.h, ends
     v, u = vector_at(grains.speed, i, AFTER), vector_at(grains.speed, j, AFTER)
     way = closing(vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * (v - u))
     wanted, _slope = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
     rows[c, PUSH] = improved(rows, c, wanted)
-    more = change_of(rows, c, rows[c, PUSH] * way.along)
+    more, part = changed(rows, c, IMPULSE, rows[c, PUSH] * way.along, share)
     off = weight_of(matter.pairs) * relative(matter, more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
-    return way, v + more * grains.place[i, LIGHTNESS], u - more * grains.place[j, LIGHTNESS], off
+    return way, v + part * grains.place[i, LIGHTNESS], u - part * grains.place[j, LIGHTNESS], off
 
 
 @outlined
-def sweep_pairs(matter, grains, touches):
+def sweep_pairs(matter, grains, touches, share):
     """Improve the impulse of each pair in turn; the largest change of one, relative to what moves there."""
     speed, worst = grains.speed, 0.0
     for k in range(touches.used[0]):
         c = index(k)
         i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        _way, v, u, off = press_pair(matter, grains, touches, c, (i, j))
+        _way, v, u, off = press_pair(matter, grains, touches, c, (i, j), share)
         set_vector(speed, i, AFTER, v)
         set_vector(speed, j, AFTER, u)
         worst = worse(off, worst)

@@ -34,7 +34,7 @@ from .arrays import (
     vector_at,
 )
 from .at_walls import press_at_wall, rising
-from .contacts import press_pair, relative, size_of, worse
+from .contacts import changed, press_pair, relative, size_of, worse
 from .vessel import met
 
 # 1/(2/5), of the moment of inertia of a ball.
@@ -70,24 +70,23 @@ def arm_of(way, size, change, reach):
 
 
 @outlined
-def rub_pairs(matter, grains, touches):
+def rub_pairs(matter, grains, touches, share):
     """Improve the impulse and the friction of each pair in turn; the largest change, relative to what moves there."""
     rows, place, speed, spin, worst = touches.rows, grains.place, grains.speed, grains.spin, 0.0
     for k in range(touches.used[0]):
         c = index(k)
         i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        way, v, u, off = press_pair(matter, grains, touches, c, (i, j))
+        way, v, u, off = press_pair(matter, grains, touches, c, (i, j), share)
         radius, other = place[i, RADIUS], place[j, RADIUS]
         arm = arm_of(way, rows[c, SIZE], way.change, radius + other)
         slip = across(v - u - cross(_turning(grains, i, j, AFTER), arm), way.along)
         before, limit = vector_at(rows, c, DRAG), matter.pairs.friction * rows[c, PUSH]
         new = rubbed(across(before, way.along), slip, rows[c, EASE] * (1.0 + _ROUNDNESS * square(arm)), limit)
-        more = new - before
-        set_vector(rows, c, DRAG, new)
+        more, part = changed(rows, c, DRAG, new, share)
         one, two = place[i, LIGHTNESS], place[j, LIGHTNESS]
-        set_vector(speed, i, AFTER, v + more * one)
-        set_vector(speed, j, AFTER, u - more * two)
-        twist = cross(arm, more)
+        set_vector(speed, i, AFTER, v + part * one)
+        set_vector(speed, j, AFTER, u - part * two)
+        twist = cross(arm, part)
         set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (_ROUNDNESS * one / radius))
         set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (_ROUNDNESS * two / other))
         rubbing = relative(matter, more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
@@ -141,7 +140,7 @@ def _faced(wall, grains, touches, c, i, move):
 
 
 @outlined
-def rub_wall(matter, law, wall, grains, touches, number):
+def rub_wall(matter, law, wall, grains, touches, number, share):
     """Improve the impulse and the friction of each ball at a wall; the largest change, as for pairs."""
     rows, speed, spin, half, worst = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h, 0.0
     begin = touches.wall_spans[0, number]
@@ -150,16 +149,15 @@ def rub_wall(matter, law, wall, grains, touches, number):
         i = index(touches.wall_ends[c])
         radius, ease, w = grains.place[i, RADIUS], rows[c, EASE], vector_at(spin, i, AFTER)
         own = met(wall, touches.listed, touches.spans, c, radius)
-        way, v, off = press_at_wall(matter, law, own, grains, rows, c, i)
+        way, v, off = press_at_wall(matter, law, own, grains, rows, (c, i), share)
         move = vector_at(rows, c, COAST) + half * v
         n, (_both, last) = _facing(own, way, radius, vector_at(rows, c, START), move)
         slip = across(v - last - radius * cross(w, n), n)
-        before = vector_at(rows, c, DRAG)
-        new = rubbed(across(before, n), slip, ease * (1.0 + _ROUNDNESS), law.friction * rows[c, PUSH])
-        more = new - before
-        set_vector(rows, c, DRAG, new)
-        set_vector(speed, i, AFTER, v + more * ease)
-        set_vector(spin, i, AFTER, w - cross(n, more) * (_ROUNDNESS * ease / radius))
+        before = across(vector_at(rows, c, DRAG), n)
+        new = rubbed(before, slip, ease * (1.0 + _ROUNDNESS), law.friction * rows[c, PUSH])
+        more, part = changed(rows, c, DRAG, new, share)
+        set_vector(speed, i, AFTER, v + part * ease)
+        set_vector(spin, i, AFTER, w - cross(n, part) * (_ROUNDNESS * ease / radius))
         worst = worse(relative(matter, more, rows[c, PUSH], size_of(v), ease), worse(off, worst))
     return worst
 

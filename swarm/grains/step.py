@@ -5,6 +5,7 @@ them. Its end follows from its impulses, each of which is there twice with oppos
 how well they are solved.
 """
 
+import math
 from typing import Any, NamedTuple
 
 from ..kernel.arrays import index
@@ -24,6 +25,10 @@ _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 # Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them.
 _RUBBED = 1e-2
 _MOST_SWEEPS = 1000
+# So many sweeps for friction; then it is given as it is, and so are dampers whose changes are no larger than that.
+_MOST_RUBS, _LAGGING = 200, 3e-7
+# Where so many sweeps have not brought the changes down to that part, only half as large a share of them is made.
+_STALLED, _BETTER, _LEAST_SHARE = 20, 0.7, 1.0 / 64.0
 
 
 class Rule(NamedTuple):
@@ -93,46 +98,70 @@ def _push(matter, walls, world):
                 twist_wall(matter, wall, grains, touches, k)
 
 
-def _sweep(matter, walls, world):
-    """Improve all normal impulses; the largest change."""
-    worst = sweep_pairs(matter, world.grains, world.touches)
+def _sweep(matter, walls, world, share):
+    """Improve all normal impulses by a share of what they are to change; the largest change."""
+    grains, touches = world.grains, world.touches
+    worst = sweep_pairs(matter, grains, touches, share)
     for k, wall in enumerate(walls.each):
-        worst = worse(sweep_wall(matter, matter.walls[k], wall, world.grains, world.touches, k), worst)
+        worst = worse(sweep_wall(matter, matter.walls[k], wall, grains, touches, k, share), worst)
     return worst
 
 
-def _rub(matter, walls, world):
-    """Improve all impulses with those of friction; the largest change."""
+def _rub(matter, walls, world, share):
+    """Improve all impulses with those of friction, as `_sweep`."""
     grains, touches = world.grains, world.touches
     rub_or_sweep = sweep_pairs if matter.pairs.friction is None else rub_pairs
-    worst = rub_or_sweep(matter, grains, touches)
+    worst = rub_or_sweep(matter, grains, touches, share)
     for k, wall in enumerate(walls.each):
         rub_or_sweep_wall = sweep_wall if matter.walls[k].friction is None else rub_wall
-        worst = worse(rub_or_sweep_wall(matter, matter.walls[k], wall, grains, touches, k), worst)
+        worst = worse(rub_or_sweep_wall(matter, matter.walls[k], wall, grains, touches, k, share), worst)
     return worst
+
+
+def _stalled(pace, worst):
+    """The share of changes to make, the least change so far, and how many sweeps ago that was."""
+    share, best, since = pace
+    if worst <= _BETTER * best:
+        return share, worst, 0
+    if since + 1 < _STALLED:
+        return share, best, since + 1
+    return max(0.5 * share, _LEAST_SHARE), best, 0
+
+
+@outlined
+def _solve_friction(matter, walls, world):
+    """Sweep until friction changes little; whether it does."""
+    worst, sweeps, share, best, since = 1.0, 0, 1.0, math.inf, 0
+    while sweeps < _MOST_RUBS:
+        worst = _rub(matter, walls, world, share)
+        sweeps += 1
+        if worst <= _RUBBED:
+            break
+        share, best, since = _stalled((share, best, since), worst)
+    world.books.sweeps[0] += sweeps
+    return worst <= _RUBBED
 
 
 @outlined
 def _solve(matter, walls, world):
     """Sweep until the impulses solve the step; whether they do."""
-    sweeps = 0
-    if matter.rubs:
-        # Friction first, to fewer digits: then it is given, and what is to be exact depends on the others alone.
-        worst = 1.0
-        while sweeps < _MOST_SWEEPS and not worst <= _RUBBED:
-            worst = _rub(matter, walls, world)
-            sweeps += 1
-        if not worst <= _RUBBED:
-            return False
-    before, most = 1.0, sweeps + _MOST_SWEEPS
-    while sweeps < most:
-        worst = _sweep(matter, walls, world)
+    books, lags = world.books, 0
+    # Friction first, to fewer digits: then it is given, and what is to be exact depends on the others alone.
+    if matter.rubs and not _solve_friction(matter, walls, world):
+        lags = 1
+    before, worst, sweeps, share, best, since = 1.0, 1.0, 0, 1.0, math.inf, 0
+    while sweeps < _MOST_SWEEPS:
+        worst = _sweep(matter, walls, world, share)
         sweeps += 1
         if worst <= _SOLVED or (worst <= _NEARLY and worst >= _GAIN * before):
-            world.books.sweeps[0] += sweeps
-            return True
+            break
         before = worst
-    return False
+        share, best, since = _stalled((share, best, since), worst)
+    books.sweeps[0] += sweeps
+    if worst > _NEARLY:
+        lags = 1
+    books.lagging[0] += lags
+    return worst <= _LAGGING
 
 
 def _forget(walls, world):

@@ -66,7 +66,7 @@ class GrainsRun(BaseRun):
         super().__init__(scene, method, n, pool, tier)
         state = self.state
         books = Books(
-            balls.collisions, state.impacts, state.impulse, state.dissipated, balls.virial, np.zeros(1, np.int64)
+            balls.collisions, state.impacts, state.impulse, state.dissipated, balls.virial, *np.zeros((2, 1), np.int64)
         )
         self._world = World(
             arrays.grains_of(state.position, state.velocity, radius, state.mass, spin if rubs else None),
@@ -234,7 +234,7 @@ class GrainsRun(BaseRun):
 
     def _summary(self) -> dict[str, Any]:
         seen = observables.summary(self._partial, self.state, self._owners, lasts=False, parts=self._parts)
-        seen["contact_energy"] = self._stored
+        seen["contact_energy"], seen["unconverged"] = self._stored, int(self._world.books.lagging[0])
         seen["total_energy"] += self._stored
         return self._numbers.added(seen, self.state)
 

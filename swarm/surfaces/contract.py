@@ -20,6 +20,8 @@ from .course import Fall, close, first_rise, rise_near, rise_time, safe_rise_tim
 
 # Newton steps of the chord.
 _CHORD_SWEEPS = 50
+# Of the identity of a discrete gradient, relative to the terms of q: 8 units in the last place.
+_NOISE = 8.0 * 2.220446049250313e-16
 
 
 class Smooth(AtRest):
@@ -273,6 +275,21 @@ class Smooth(AtRest):
         d = r1 - r0
         d2 = square(d)
         rest = self.difference(r0, r1) - g.x * d.x - g.y * d.y - g.z * d.z
+        return g + (rest / select(d2 > 0.0, d2, 1.0)) * d
+
+    def resting_gradient(self, r0, r1):
+        """The discrete gradient, but grad q(m) where that meets the identity up to round-off.
+
+        Divided by |d| that round-off is noise, the larger the shorter a step is, which keeps balls from coming to rest.
+        """
+        if self.gives("discrete_gradient"):
+            return self.discrete_gradient(r0, r1)
+        g, d = self.inner_gradient(0.5 * (r0 + r1)), r1 - r0
+        d2, rest = square(d), self.difference(r0, r1) - dot(g, d)
+        noise = _NOISE * total(times(absolute(g), absolute(r0) + absolute(r1)))
+        # All of it from twice the noise on, without a jump.
+        over = select(rest > 0.0, 1.0, -1.0) * 2.0 * (abs(rest) - noise)
+        rest = select(abs(rest) < 2.0 * noise, select(abs(rest) > noise, over, 0.0), rest)
         return g + (rest / select(d2 > 0.0, d2, 1.0)) * d
 
     def step_normal(self, r0, r1):

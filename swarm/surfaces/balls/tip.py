@@ -84,7 +84,8 @@ class Nappes(Unturned):
     def gap_slope(self, q0, q1):
         return 1.0, 0.0
 
-    discrete_gradient, step_normal = Smooth.discrete_gradient, Smooth.step_normal
+    discrete_gradient, resting_gradient = Smooth.discrete_gradient, Smooth.resting_gradient
+    step_normal = Smooth.step_normal
     difference, gap_scale, project = Smooth.difference, Smooth.gap_scale, Smooth.project
 
     def out_of(self, r):
