@@ -26,7 +26,7 @@ _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 _RUBBED = 1e-2
 _MOST_SWEEPS = 1000
 # So many sweeps for friction; then it is given as it is, and so are dampers whose changes are no larger than that.
-_MOST_RUBS, _LAGGING = 200, 3e-7
+_MOST_RUBS, _LAGGING = 200, 2e-6
 # Where so many sweeps have not brought the changes down to that part, only half as large a share of them is made.
 _STALLED, _BETTER, _LEAST_SHARE = 20, 0.7, 1.0 / 64.0
 
@@ -154,6 +154,8 @@ def _solve(matter, walls, world):
         worst = _sweep(matter, walls, world, share)
         sweeps += 1
         if worst <= _SOLVED or (worst <= _NEARLY and worst >= _GAIN * before):
+            break
+        if worst <= _LAGGING and share <= _LEAST_SHARE:
             break
         before = worst
         share, best, since = _stalled((share, best, since), worst)

@@ -46,7 +46,9 @@ class Penalty(fixed_step.SoftWalls):
     at any dt. There `restitution` (0.01 or more) and `friction` of `Pairs` and of surfaces count, walls may move in any
     way, and what is lost is in "dissipated_energy". A damper that never pulls gives the restitution asked for at any
     speed; friction sticks where it can, so that a pile comes to rest and stays so, and turns balls, whose moment of
-    inertia is 2/5 m R^2, in a plane too. A contact should take 12 steps or more.
+    inertia is 2/5 m R^2, in a plane too. A contact should take 12 steps or more. Energy and momentum are those of the
+    impulses that were used; a step in which the limit of friction, or a damper, is met to fewer digits than others is
+    counted in "unconverged". Balls that roll or spin lose nothing by it: there is no friction of rolling.
     They meet fields, outlines and meshes too, where nothing moves: each body once, and each face once, which are the
     triangles of a plane or of a convex body, or sides that join smoothly or at an edge towards the balls. In a corner
     around them they touch both faces. Within a contact's width of where the faces of one surface join, as on the

@@ -5,6 +5,10 @@ import pytest
 from grains_runs import cloud, ran
 
 import swarm
+from swarm.kernel.vector import Vec, dot, norm
+from swarm.surfaces.balls.tip import Nappes
+
+QUADRIC = swarm.Cone(0.7).walls()[1]
 
 
 @pytest.mark.parametrize("surface", [swarm.Box((3.2, 3.2, 3.2), (2.5, 2.5, 2.5)), swarm.Sphere(5.0, (1.5, 1.5, 1.5))])
@@ -25,3 +29,24 @@ def test_one_ball_is_a_point_in_a_smaller_cavity():
     assert one.observables["impacts"][-1] == other.observables["impacts"][-1] > 2
     assert np.allclose(one.particles.position, other.particles.position, rtol=0.0, atol=1e-11)
     assert one.observables["impulse"][-1] == pytest.approx(other.observables["impulse"][-1], rel=1e-11)
+
+
+@pytest.mark.parametrize("length", [1e-12, 1e-9, 1e-6, 1e-2])
+def test_a_short_step_at_a_cone_has_its_gradient_without_noise(length):
+    sine, cosine = np.sin(0.7), np.cos(0.7)
+    nappes = Nappes(QUADRIC, Vec(0.0, 0.0, 1.0), sine, cosine)
+    r0, d = Vec(0.3, 0.2, 0.5), length * Vec(0.5, -0.7, 0.3)
+    given, middle = nappes.resting_gradient(r0, r0 + d), nappes.inner_gradient(r0 + 0.5 * d)
+    assert abs(dot(given, d) - (nappes.inner(r0 + d) - nappes.inner(r0))) < 2e-14
+    if length < 1e-4:
+        assert norm(given - middle) < 1e-10
+
+
+def test_balls_that_settle_at_the_tip_of_a_cone_run():
+    laws = {"restitution": 0.1, "friction": 0.5}
+    scene = swarm.Scene([swarm.Cone(0.7, **laws)], gravity=(0.0, 0.0, -9.81), pairs=swarm.Pairs(**laws))
+    place = [[0.0, 0.1, -0.1], [0.0, 0.1, 0.12], [0.3, 0.5, 0.52]]
+    start = swarm.Particles(place, np.zeros((3, 3)), 0.3, radius=0.1)
+    seen = ran(scene, start, swarm.Penalty(1e-3, 2e4, 1.5), 0.4, every=0.1).observables
+    assert seen["energy_error"].max() < 1e-12
+    assert seen["kinetic_energy"][-1] < 0.3 * seen["kinetic_energy"].max()
