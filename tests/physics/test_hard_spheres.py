@@ -268,11 +268,11 @@ def test_a_pile_that_comes_to_rest():
     scene = swarm.Scene(
         [swarm.Box((0.5, 0.5, 1.0), restitution=0.5)], gravity=(0.0, 0.0, -9.81), pairs=swarm.Pairs(restitution=0.5)
     )
-    line = np.linspace(-0.35, 0.35, 3)
+    line = np.linspace(-0.34, 0.34, 3)
     position = np.stack(np.meshgrid(line, line, line)).reshape(3, -1)
     position[0] += 0.01 * position[2]
     random = np.random.default_rng(5)
-    start = swarm.Particles(position, 0.1 * random.normal(size=position.shape), radius=random.uniform(0.1, 0.16, 27))
+    start = swarm.Particles(position, 0.1 * random.normal(size=position.shape), radius=random.uniform(0.1, 0.15, 27))
     result = run(scene, start, 3.0, 12)
     seen = result.observables
     assert seen["kinetic_energy"][-1] < 1e-4 * seen["kinetic_energy"].max()
