@@ -59,7 +59,7 @@ class Impact(base.Method):
     or so), and who has met another ball in the last t_c loses nothing. What such a bounce gives is a negative part of
     the dissipated energy, m (a t_c)^2/8 where a pulls back to the wall, and the next impact takes it. So each lasting
     contact costs an impact or some in t_c: for grains that rest on each other for long use `Penalty`. Walls may move,
-    come and go, be open, hot, or have laws of their own, but for those on which particles wait, and masses; a ball is
+    have a mass, come and go, be open, hot, or have laws of their own, but for those on which particles wait; a ball is
     gone where the point of it that touches is in an opening.
 
     Raises:

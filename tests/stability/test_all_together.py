@@ -2,10 +2,13 @@
 the bits are the same for any threads, blocks, halts, sessions and tiers.
 """
 
+import functools
+
 import numpy as np
 import pytest
 from bounded import bounded
 from conftest import rarely
+from stability.interrupted import require_same_bits
 from stability.test_against_an_event_loop import (
     BOOKS,
     FRAMES,
@@ -25,7 +28,6 @@ from stability.test_against_an_event_loop import (
 import swarm
 from swarm.kernel.vector import dot
 from swarm.run.engine import Run
-from swarm.run.session import Session
 from swarm.sources.births import with_births
 
 NUMBER = 6
@@ -218,29 +220,8 @@ def holds(seed, folder, certain=False):
 
 def has_same_bits(made, result, folder, monkeypatch):
     """Any threads and blocks, halts within frames, and sessions."""
-    require_same(result, run(made, threads=2, block_size=256))
-    advance, look, passes = Run.advance, Session.look, [5]
-
-    def halting(self, *given, **more):
-        self.halt(passes[0])
-        return advance(self, *given, **more)
-
-    def stops(self, *given):
-        self.stop()
-        return look(self, *given)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Run, "advance", halting)
-        require_same(result, run(made))
-        passes[0] = 40
-        patch.setattr(Session, "look", stops)
-        for _session in range(300):
-            try:
-                require_same(result, run(made, trajectory=folder / "parts.h5", resume=True, checkpoint=1e3))
-                return
-            except KeyboardInterrupt:
-                continue
-    raise AssertionError("the sessions have no end")
+    pieces = functools.partial(run, made)
+    require_same_bits(Run, pieces, functools.partial(require_same, result), folder, monkeypatch)
 
 
 def hold_many(seeds, folder, monkeypatch, certain=False):

@@ -3,6 +3,7 @@ ball is in another one or in a wall, every joule is booked, the bits are the sam
 and as long as rounding allows each ball is where a plain event loop has it.
 """
 
+import functools
 import math
 
 import mpmath
@@ -12,12 +13,12 @@ from conftest import rarely
 from physics import ball_loop
 from physics.ball_loop import follow
 from physics.ball_walls import Walls
+from stability.interrupted import require_same_bits
 from stability.test_against_an_event_loop import SOLIDS, VESSELS, a_motion
 
 import swarm
 from swarm.colliding import events
 from swarm.run.colliding import CollidingRun
-from swarm.run.session import Session
 
 UNTIL, FRAMES, NUMBER = 1.0, 8, 7
 REFUSED = []
@@ -217,29 +218,8 @@ def holds(seed, folder):
 
 def has_same_bits(made, result, folder, monkeypatch):
     """Any threads and blocks, halts within frames, and sessions."""
-    require_same(result, run(made, threads=2, block_size=256))
-    advance, look, passes = CollidingRun.advance, Session.look, [5]
-
-    def halting(self, *given, **more):
-        self.halt(passes[0])
-        return advance(self, *given, **more)
-
-    def stops(self, *given):
-        self.stop()
-        return look(self, *given)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(CollidingRun, "advance", halting)
-        require_same(result, run(made))
-        passes[0] = 40
-        patch.setattr(Session, "look", stops)
-        for _session in range(300):
-            try:
-                require_same(result, run(made, trajectory=folder / "parts.h5", resume=True, checkpoint=1e3))
-                return
-            except KeyboardInterrupt:
-                continue
-    raise AssertionError("the sessions have no end")
+    pieces = functools.partial(run, made)
+    require_same_bits(CollidingRun, pieces, functools.partial(require_same, result), folder, monkeypatch)
 
 
 @pytest.mark.physics
