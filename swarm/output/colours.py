@@ -1,4 +1,4 @@
-"""Colours of particles by speed or by energy error, on a dark background: bright means large."""
+"""Colours of particles by speed or by energy error: from dark blue, small, to orange, large."""
 
 import math
 from collections.abc import Callable
@@ -18,14 +18,14 @@ Colours = NDArray[np.uint32]
 Values = Callable[[Floats, Floats], Floats]
 
 BY = ("speed", "energy-error")
-BACKGROUND = (24, 24, 27)
+BACKGROUND = (255, 255, 255)
 
-# Viridis (https://bids.github.io/colormap) without its darkest third, which is invisible on a dark background. It
-# goes from dark to light with every kind of colour vision.
+# Plasma (https://bids.github.io/colormap) from 6 % to 80 %: all of it is seen on a light background and on a dark one.
+# It goes from dark to light with every kind of colour vision.
 _TABLE = np.array(
     [
-        (53, 95, 141), (44, 114, 142), (36, 134, 142), (31, 153, 138), (41, 175, 127),
-        (78, 195, 107), (122, 209, 81), (173, 220, 48), (220, 227, 25), (253, 231, 37),
+        (47, 5, 150), (83, 2, 163), (116, 1, 168), (146, 15, 163), (173, 39, 147),
+        (196, 62, 127), (215, 86, 108), (231, 111, 90), (244, 137, 72), (252, 166, 54),
     ],
     dtype=np.float64,
 )  # fmt: skip

@@ -1,33 +1,26 @@
-"""Drawing with matplotlib for contact sheets and plots: particles among their walls, and time series."""
+"""Drawing with matplotlib for contact sheets, plots and films: particles among their walls."""
 
-import io
 import math
 from typing import Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import ListedColormap, Normalize
-from matplotlib.figure import Figure
+from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import ArrayLike
 
 from ..plane import along, shown_as
 from ..state import Floats
-from . import colours, series
 from .balls import Balls, Discs
 from .colours import Colours
+from .style import CAVITY_LINE, MAP, SOLID_LINE
 
-# Okabe and Ito's, for a light background.
-LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-MAP = ListedColormap(colours.table(), name="swarm")
-BACKGROUND, LIGHT = "#{:02x}{:02x}{:02x}".format(*colours.BACKGROUND), "#c8c8d0"
-_WIRE, _SOLID_WIRE = "#7d93a8", "#e0a070"
+LIGHT = "#5a5a62"
 _FEW_WIRES = 300
 # A direction in which a picture extends by less than this part of its widest one is drawn as flat.
 _FLAT = 1e-9
-_DPI = 100
 # Around a vessel that is seen from above, as a part of its width.
 _ROOM = 0.02
 # Matplotlib leaves room around 3-D axes: with this zoom a cube fills its cell, seen from where it is by default.
@@ -39,23 +32,6 @@ _SEEN = np.abs(
         [math.sin(_ELEVATION) * math.cos(_AZIMUTH), math.sin(_ELEVATION) * math.sin(_AZIMUTH), math.cos(_ELEVATION)],
     ]
 )
-
-
-class Picture(Figure):
-    """A figure without pyplot, which would choose a backend, keep the figure, and show it twice in a notebook.
-
-    A notebook shows it where it is the last line of a cell, whether or not the cell has chosen a backend.
-    """
-
-    def _repr_png_(self) -> bytes:
-        buffer = io.BytesIO()
-        self.savefig(buffer, format="png")
-        return buffer.getvalue()
-
-
-def picture(width: float, height: float) -> Picture:
-    """An empty picture of this size [inches]."""
-    return Picture(figsize=(width, height), dpi=_DPI, layout="constrained")
 
 
 def red_green_blue(packed: Colours) -> Floats:
@@ -126,9 +102,9 @@ def particles(
         # Of thousands of solids no particle would be seen behind the wires.
         few = min(1.0, (_FEW_WIRES / max(1, len(curves))) ** 0.35)
         style = (
-            {"colors": _SOLID_WIRE, "linewidths": 0.9 * few, "alpha": 0.7 * few, "zorder": 3 if few == 1.0 else 1}
+            {"colors": SOLID_LINE, "linewidths": 0.9 * few, "alpha": 0.7 * few, "zorder": 3 if few == 1.0 else 1}
             if solid
-            else {"colors": _WIRE, "linewidths": 0.5, "alpha": 0.7}
+            else {"colors": CAVITY_LINE, "linewidths": 0.5, "alpha": 0.7}
         )
         # Corners of a box reach beyond the cell at this zoom.
         drawn.append(Line3DCollection(curves, clip_on=False, **style))
@@ -156,7 +132,6 @@ def particles(
     relative = (high - low) / np.sqrt(((high - low) ** 2).mean())
     axes.set_box_aspect(high - low, zoom=_ZOOM * (_SEEN.sum(axis=1) / (_SEEN @ relative)).min())
     axes.grid(False)
-    axes.set_facecolor(BACKGROUND)
     return dots, drawn
 
 
@@ -175,7 +150,7 @@ def flat(
         few = min(1.0, (_FEW_WIRES / max(1, len(curves))) ** 0.35)
         drawn.append(
             LineCollection(
-                [shown_as(across, curve) for curve in curves], colors=_SOLID_WIRE if solid else _WIRE,
+                [shown_as(across, curve) for curve in curves], colors=SOLID_LINE if solid else CAVITY_LINE,
                 linewidths=1.6 * few, zorder=3, capstyle="round", clip_on=False,
             )
         )  # fmt: skip
@@ -196,7 +171,6 @@ def flat(
         axis.set_label_text(f"{name} [m]", fontsize=9, color=LIGHT)
     for spine in axes.spines.values():
         spine.set_visible(False)
-    axes.set_facecolor(BACKGROUND)
     return dots, drawn
 
 
@@ -228,41 +202,3 @@ def colour_bar(figure: Any, axes: Any, quantity: str, low: float, high: float) -
     bar = figure.colorbar(meaning, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.02)
     bar.set_label(f"colour: {quantity}", color=LIGHT, fontsize=9)
     bar.ax.tick_params(colors=LIGHT, labelsize=8)
-
-
-def lines(axes: Any, view: str, logarithm: bool, drawn: dict[str, tuple[Floats, Floats]]) -> None:
-    """The time series of one plot, by their names: (times [s], values). Rates have no value at the first frame."""
-    axes.set_title(view, fontsize=10)
-    if not any(len(times) for times, _values in drawn.values()):
-        axes.text(0.5, 0.5, "needs two frames", ha="center", va="center", color="grey", transform=axes.transAxes)
-        axes.set_axis_off()
-        return
-    for colour, (name, (times, values)) in zip(LINES * (len(drawn) // len(LINES) + 1), drawn.items(), strict=False):
-        shown = 10.0**values if logarithm else values
-        axes.plot(times, shown, color=colour, linewidth=1.2, label=name, marker="." if len(times) < 30 else None)
-    if logarithm:
-        axes.set_yscale("log")
-        lowest = min(values.min() for _times, values in drawn.values())
-        highest = max(values.max() for _times, values in drawn.values())
-        # A decade around the values: a flat line would have no ticks.
-        axes.set_ylim(10.0 ** (np.floor(lowest) - 0.3), 10.0 ** (np.floor(highest) + 1.3))
-        if lowest == series.NOTHING:
-            axes.axhline(10.0**series.NOTHING, color="grey", linewidth=0.6, linestyle=":")
-            axes.annotate("none", (1.0, 10.0**series.NOTHING), xycoords=("axes fraction", "data"),
-                          xytext=(3, 0), textcoords="offset points", fontsize=8, color="grey", va="center")  # fmt: skip
-    else:
-        _steady(axes, drawn)
-    axes.set_xlabel("time [s]", fontsize=9)
-    axes.tick_params(labelsize=8)
-    axes.grid(alpha=0.3)
-    if len(drawn) > 1:
-        axes.legend(fontsize=8)
-
-
-def _steady(axes: Any, drawn: dict[str, tuple[Floats, Floats]]) -> None:
-    """Keep curves that are constant up to round-off flat, instead of scaling round-off to the height of the axes."""
-    values = np.concatenate([values for _times, values in drawn.values()])
-    middle, half = 0.5 * (values.max() + values.min()), 0.5 * (values.max() - values.min())
-    if half <= 1e-6 * abs(middle):
-        axes.set_ylim(middle - 0.1 * abs(middle or 1.0), middle + 0.1 * abs(middle or 1.0))
-    axes.ticklabel_format(axis="y", useOffset=False, scilimits=(-3, 6))

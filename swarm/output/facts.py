@@ -19,7 +19,7 @@ def of_trajectory(trajectory: Any) -> dict[str, str]:
         **_what(trajectory),
         **of_scene(trajectory.scene),
         **of_counters(trajectory.counters),
-        "method": _call(trajectory.method),
+        "method": call(trajectory.method),
         "observables": ", ".join(seen) or "none",
         "size": f"{trajectory.path.stat().st_size / 1e6:.1f} MB",
     }
@@ -37,11 +37,11 @@ def of_log(log: Any) -> dict[str, str]:
         "frames": f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""),
         "particles": f"{which} of {log.count}",
         "surfaces": "\n".join(
-            f"{_call(surface)}: {count}" for surface, count in zip(scene.surfaces, counts, strict=True)
+            f"{call(surface)}: {count}" for surface, count in zip(scene.surfaces, counts, strict=True)
         ),
         **of_counters(log.counters, log.crossings()),
         **_period(scene),
-        "method": _call(log.method),
+        "method": call(log.method),
         "columns": ", ".join(log.dtype.names or ()),
         "size": f"{log.path.stat().st_size / 1e6:.1f} MB",
     }
@@ -49,7 +49,7 @@ def of_log(log: Any) -> dict[str, str]:
 
 def of_counters(counters: Any, crossings: Any = None) -> dict[str, str]:
     """The counters of a run, and how many rows of a log each has; nothing where there are none."""
-    told = [_call(one.surface if one.inside is None else one) for one in counters]
+    told = [call(one.surface if one.inside is None else one) for one in counters]
     if crossings is not None:
         told = [f"{one}: {out} out, {back} back" for one, (out, back) in zip(told, crossings.tolist(), strict=True)]
     return {"counters": "\n".join(told)} if told else {}
@@ -58,10 +58,10 @@ def of_counters(counters: Any, crossings: Any = None) -> dict[str, str]:
 def of_scene(scene: Any) -> dict[str, str]:
     """The surfaces of a `Scene`, gravity, and its period."""
     return {
-        "surfaces": _call(", ".join(shortened(scene.surfaces))),
+        "surfaces": call(", ".join(shortened(scene.surfaces))),
         **of_meshes(scene),
         "gravity": "none" if scene.gravity is None else f"{scene.gravity} m/s^2",
-        **({} if scene.pairs is None else {"pairs": _call(scene.pairs)}),
+        **({} if scene.pairs is None else {"pairs": call(scene.pairs)}),
         **_period(scene),
     }
 
@@ -181,6 +181,6 @@ def _period(scene: Any) -> dict[str, str]:
     return {"period": f"({lengths}) m", **plane}
 
 
-def _call(described: Any) -> str:
+def call(described: Any) -> str:
     """A surface or method as Python code writes it."""
     return str(described).replace("swarm.", "")

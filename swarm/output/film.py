@@ -18,7 +18,7 @@ from .. import checks
 from ..errors import FileError, SceneError
 from ..plane import shown_as
 from ..state import Floats
-from . import colours, drawing, paths
+from . import colours, drawing, paths, style
 from .balls import Balls
 from .drawn import Drawn
 from .shapes import Shape, shapes_of, since_start
@@ -76,10 +76,11 @@ def animate(trajectory: Any, path: Any, frames: int, fps: float, size: Any, part
     trajectory.require_frames()
     last = len(trajectory) - 1
     numbers = np.unique(np.linspace(0, last, min(most, last + 1)).round().astype(int)).tolist()
-    film = _Film(trajectory, numbers, pixels, shown)
+    with style.applied():
+        film = _Film(trajectory, numbers, pixels, shown)
     part = paths.part_of(target)
     try:
-        with matplotlib.rc_context(ffmpeg), writer.saving(film.picture, str(part), film.picture.dpi):
+        with style.applied(), matplotlib.rc_context(ffmpeg), writer.saving(film.picture, str(part), film.picture.dpi):
             for k in numbers:
                 film.show(k)
                 writer.grab_frame()
@@ -144,10 +145,9 @@ class _Film:
         self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, shown)
         # With half a pixel round-off takes none away.
         dpi = _DPI * min(1.0, min(pixels) / _ROOM)
-        self.picture = drawing.picture((pixels[0] + 0.5) / dpi, (pixels[1] + 0.5) / dpi)
+        self.picture = style.picture((pixels[0] + 0.5) / dpi, (pixels[1] + 0.5) / dpi)
         self.picture.set_dpi(dpi)
         self._canvas: Any = FigureCanvasAgg(self.picture)
-        self.picture.set_facecolor(drawing.BACKGROUND)
         self._across = across = self._scene.across()
         self._axes = drawing.view(self.picture, across)
         self._title = self.picture.suptitle("t", fontsize=10, color=drawing.LIGHT)

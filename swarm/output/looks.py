@@ -75,7 +75,7 @@ def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floa
     every = f", every {stride}th frame" if stride > 1 else ""
     text = (
         f"**{drawn.shown}{of} {drawn.noun}{every}**. Colour: {scale.quantity}, from {scale.low:g} (blue) over "
-        f"{0.5 * (scale.low + scale.high):g} (green) to {scale.high:g} (yellow). On the "
+        f"{0.5 * (scale.low + scale.high):g} (red) to {scale.high:g} (orange). On the "
         f"plots {series.NOTHING:g} is the logarithm of 0."
     )
     if center.any():

@@ -13,7 +13,7 @@ from ..errors import SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
-from . import colours, drawing, series
+from . import colours, drawing, graphs, series, style
 from .drawn import Drawn
 from .replaced import named_when_whole
 from .shapes import Shape, shapes_of
@@ -53,7 +53,7 @@ def draw_plot(trajectory: Any, target: Path) -> None:
         FileError: the picture cannot be written.
     """
     figure = figure_of(content_of(trajectory), _FILE, SHOWN)
-    with named_when_whole(target) as part:
+    with named_when_whole(target) as part, style.applied():
         figure.savefig(part)
 
 
@@ -73,20 +73,25 @@ def content_of(trajectory: Any) -> Content:
     )
 
 
-def figure_of(content: Content, figsize: Any, particles: int) -> drawing.Picture:
+def figure_of(content: Content, figsize: Any, particles: int) -> style.Picture:
     """The picture, in which at most so many particles are drawn."""
     most = checks.count("particles", particles)
     try:
         wide, high = (checks.positive("figsize", side) for side in figsize)
     except (TypeError, ValueError):
         raise SceneError(f"figsize must be width and height in inches, got {figsize!r}") from None
-    scene, times = content.scene, content.seen["time"]
+    with style.applied():
+        return _figure_of(content, (wide, high), most)
+
+
+def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.Picture:
+    (wide, high), scene, times = size, content.scene, content.seen["time"]
     end = content.frames.get("end", content.frames.get("start"))
     still = scene
     if scene.reacts():
         still = scene.placed(content.seen["wall_position"][-1], content.seen["wall_orientation"][-1])
     shapes = shapes_of(still, np.zeros((3, 1)) if end is None else end.position, float(times[-1]))
-    picture = drawing.picture(wide, high)
+    picture = style.picture(wide, high)
     right: Any = picture
     if end is not None:
         left, right = picture.subfigures(1, 2, width_ratios=[1.0 - _SERIES, _SERIES], squeeze=False).ravel()
@@ -112,7 +117,7 @@ def _series(figure: Any, content: Content, shapes: list[Shape], width: float) ->
     columns = max(1, min(round(width / _CELL), -(-count // 2)))
     cells = figure.subplots(-(-count // columns), columns, squeeze=False).ravel()
     for cell, (group, curves) in zip(cells, plots.items(), strict=False):
-        drawing.lines(cell, *series.title_of(group, content.scene.plane), curves)
+        graphs.lines(cell, *series.title_of(group, content.scene.plane), curves)
     if content.frames:
         _speeds(cells[len(plots)], content)
     for cell in cells[count:]:
@@ -129,7 +134,6 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     position, packed, tints = drawn.coloured(end, scale, values)
     across = content.scene.across()
     axes = drawing.view(figure, across)
-    figure.set_facecolor(drawing.BACKGROUND)
     wires = [(shape.solid, shape.wires) for shape in shapes]
     drawing.frame(axes, position.T, packed, wires, *drawn.ties(position.T, packed, tints), across, drawn.radius)
     drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high)
@@ -145,9 +149,9 @@ def _speeds(axes: Any, content: Content) -> None:
         speeds = np.sqrt((frame.velocity**2).sum(axis=0))
         speeds = speeds[~np.isnan(speeds)]
         counts, edges = np.histogram(speeds, bins=_BINS, range=(0.0, top))
-        style: dict[str, Any] = {"fill": True, "alpha": 0.25} if name == "start" else {"linewidth": 1.4}
-        colour = drawing.LINES[name == "end"]
-        axes.stairs(100.0 * counts / max(1, len(speeds)), edges, color=colour, label=name, **style)
+        form: dict[str, Any] = {"fill": True, "alpha": 0.25} if name == "start" else {"linewidth": 1.4}
+        colour = style.CURVES[name == "end"]
+        axes.stairs(100.0 * counts / max(1, len(speeds)), edges, color=colour, label=name, **form)
     axes.set_yscale("log")  # at the start all may be in one bin
     whose = "speeds" if content.body is None else "speeds of points"
     axes.set_title(f"{whose}, % in each of {_BINS} bins", fontsize=10)

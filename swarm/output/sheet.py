@@ -9,7 +9,7 @@ from matplotlib.image import imread
 
 from ..errors import RunError, SceneError
 from ..plane import across_of
-from . import drawing, series, viewer
+from . import drawing, graphs, series, style, viewer
 from .playback import Playback
 from .replaced import named_when_whole
 
@@ -31,10 +31,10 @@ def draw_sheet(playback: Playback, target: Path, times: list[float] | None, with
         FileError: the picture cannot be written.
     """
     numbers = _chosen(playback, times)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, style.applied():
         found, by = _pictures(playback, numbers, Path(folder), with_viewer)
         picture = _sheet(playback, numbers, found, by)
-    with named_when_whole(target) as part:
+    with named_when_whole(target) as part, style.applied():
         picture.savefig(part)
     return by
 
@@ -71,9 +71,8 @@ def _pictures(
 def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: str) -> Any:
     plots = series.plots_of({path: (playback.names[path], *values) for path, values in playback.series.items()})
     above, below = -(-len(frames) // _COLUMNS), -(-len(plots) // _COLUMNS)
-    picture = drawing.picture(5.4 * _COLUMNS, 5.0 * above + 2.7 * below)
+    picture = style.picture(5.4 * _COLUMNS, 5.0 * above + 2.7 * below)
     top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()
-    top.set_facecolor(drawing.BACKGROUND)
     about = playback.about
     across, cells = across_of(about.get("plane") or None), []
     for place, k in enumerate(frames):
@@ -95,7 +94,7 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     title = f"{playback.path.name}: {about['shown']} of {about['particles']} {about['noun']}, {count}"
     top.suptitle(f"{title}; drawn by {by.split(',')[0]}", fontsize=11, color=drawing.LIGHT)
     for place, (group, curves) in enumerate(plots.items()):
-        drawing.lines(
+        graphs.lines(
             bottom.add_subplot(below, _COLUMNS, place + 1), *series.title_of(group, about.get("plane") or None), curves
         )
     return picture

@@ -6,7 +6,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import swarm
-from swarm.output import drawing, facts
+from swarm.output import drawing, facts, style
 from swarm.output.background import Background
 from swarm.output.balls import Balls, Discs
 from swarm.output.drawn import Drawn
@@ -209,7 +209,7 @@ def test_discs_and_balls_are_as_large_as_they_are(run):
 
 
 def test_a_near_ball_hides_a_far_one():
-    figure = drawing.picture(4.0, 4.0)
+    figure = style.picture(4.0, 4.0)
     axes = drawing.view(figure, None)
     eye = np.array([0.433, -0.75, 0.5])
     red, blue = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)

@@ -10,7 +10,7 @@ import rerun as rr
 from children import python
 
 import swarm
-from swarm.output import colours, drawing, playback, plots, recording, sheet, viewer
+from swarm.output import colours, graphs, playback, plots, recording, sheet, viewer
 
 SCENE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 METHOD = swarm.Impact()
@@ -46,9 +46,9 @@ def test_an_energy_has_one_colour_in_every_picture(tmp_path, monkeypatch):
     swarm.simulate(
         scene, start, METHOD, until=1.0, every=0.5, trajectory=tmp_path / "run.h5", recording=tmp_path / "run.rrd"
     )
-    drawn, draw = [], drawing.lines
+    drawn, draw = [], graphs.lines
     monkeypatch.setattr(
-        drawing, "lines", lambda axes, view, log, curves: drawn.append(list(curves)) or draw(axes, view, log, curves)
+        graphs, "lines", lambda axes, view, log, curves: drawn.append(list(curves)) or draw(axes, view, log, curves)
     )
     held = playback.Playback(tmp_path / "run.rrd")
     held.series = dict(sorted(held.series.items()))

@@ -1,0 +1,56 @@
+"""The look of every picture: one style of matplotlib, and one meaning for each colour.
+
+`look.mplstyle` has fonts and sizes; scripts take it by `pyplot.style.use("swarm.output.look")`.
+"""
+
+import contextlib
+import io
+from collections.abc import Iterator
+
+import matplotlib as mpl
+from matplotlib import style
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+
+from . import colours
+
+# Okabe and Ito's, told apart by every kind of eye; also in look.mplstyle.
+BLUE, RED, GREEN, PINK, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
+CURVES = (BLUE, RED, GREEN, PINK, ORANGE, SKY)
+# What only guides the eye: laws beside measurements, limits, bands.
+GREY = "#8A8A8A"
+# Walls of a cavity, and solids: their faces and their lines.
+CAVITY, CAVITY_LINE = "#C9D6E2", "#6F8296"
+SOLID, SOLID_LINE = "#E3C9A8", "#A5733C"
+# Particles by their speed, or another number: from slow to fast.
+MAP = ListedColormap(colours.table(), name="swarm")
+
+
+class Picture(Figure):
+    """A figure without pyplot, which would choose a backend, keep the figure, and show it twice in a notebook.
+
+    A notebook shows it where it is the last line of a cell, whether or not the cell has chosen a backend.
+    """
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+
+@contextlib.contextmanager
+def applied(dark: bool = False) -> Iterator[None]:
+    """What is drawn and saved in this context has the look, on a light or a dark background."""
+    names = ["swarm.output.look", *["swarm.output.dark"] * dark]
+    with style.context(["default", *names]):
+        yield
+
+
+def picture(width: float, height: float) -> Picture:
+    """An empty picture of this size [inches], to be drawn in `applied`."""
+    return Picture(figsize=(width, height), layout="constrained")
+
+
+def ink() -> str:
+    """The colour of text, and of what is the sum of all, on the background of now."""
+    return str(mpl.rcParams["text.color"])
