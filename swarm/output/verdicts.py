@@ -11,7 +11,7 @@ class Verdict(NamedTuple):
     text: str
 
 
-def of_run(content: Any) -> list[Verdict]:
+def judged(content: Any) -> list[Verdict]:
     """The verdicts on a run, of what plots show of it (`plots.Content`)."""
     worst = float(content.seen["energy_error"].max())
     return [Verdict("energy", worst < 1e-12, f"the worst particle's relative error is {worst:.1e}")]
