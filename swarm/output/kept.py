@@ -1,0 +1,111 @@
+"""What a trajectory keeps once, not of each frame: of its particles, and of the run."""
+
+import functools
+import tomllib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from . import layout
+from .presented import Presented
+from .stored import finite
+
+if TYPE_CHECKING:
+    from ..bodies.body import Body
+
+
+class Kept(Presented):
+    """The part of a `Trajectory` that is the same in all frames."""
+
+    @staticmethod
+    def _comes(file: Any) -> bool:
+        return f"particles/all/{layout.BIRTHS[0]}" in file
+
+    def has_births(self) -> bool:
+        """Whether particles come during the run."""
+        with self._reading("the births of its particles") as file:
+            return self._comes(file)
+
+    @property
+    def radius(self) -> NDArray[np.float64] | None:
+        """The radii of the particles that the file keeps [m], (N,); None of points."""
+        if not self._has(f"particles/all/{layout.RADII}"):
+            return None
+        with self._reading("the radii of its particles") as file:
+            return finite(file[f"particles/all/{layout.RADII}"][()], "particle")
+
+    @property
+    def birth_time(self) -> NDArray[np.float64]:
+        """When each of the particles that the file keeps comes [s], (N,); 0 of those of the start."""
+        with self._reading("the births of its particles") as file:
+            if not self._comes(file):
+                return np.zeros(len(file["particles/all/mass"]))
+            return finite(file[f"particles/all/{layout.BIRTHS[0]}"][()], "particle")
+
+    @property
+    def birth_source(self) -> NDArray[np.int64]:
+        """The number of the source of each of them, (N,); -1 of those of the start."""
+        with self._reading("the sources of its particles") as file:
+            if not self._comes(file):
+                return np.full(len(file["particles/all/mass"]), -1)
+            return np.asarray(file[f"particles/all/{layout.BIRTHS[1]}"][()].astype(np.int64))
+
+    @property
+    def ids(self) -> NDArray[np.int64]:
+        """The numbers of the particles that the file keeps, (N,)."""
+        self._require_particles()
+        with self._reading("the numbers of its particles") as file:
+            ids = file["particles/all/id"][()].astype(np.int64)
+            if (np.diff(ids) <= 0).any() or ids[0] < 0 or ids[-1] >= self.count:
+                raise ValueError(f"expected some of 0 to {self.count - 1}, each once and in order")
+        return np.asarray(ids)
+
+    @property
+    def bonds(self) -> NDArray[np.int64]:
+        """The pairs of points of bodies that are tied, (B, 2), as numbers of particles."""
+        with self._reading("its bonds") as file:
+            if "connectivity/bonds" not in file:
+                return np.zeros((0, 2), np.int64)
+            bonds = layout.dataset(file, "connectivity/bonds", "iu", (None, 2))[()].astype(np.int64)
+            if len(bonds) and not (bonds.min() >= 0 and bonds.max() < self.count):
+                raise ValueError(f"expected numbers from 0 to {self.count - 1}, got {bonds.min()} to {bonds.max()}")
+        return np.asarray(bonds)
+
+    def has_particles(self) -> bool:
+        """Whether the file keeps particles."""
+        return self._has("particles/all")
+
+    def _require_particles(self) -> None:
+        if not self.has_particles():
+            raise SceneError(f'{self.path} keeps no particles: it was run with frames = "none"')
+
+    @functools.cached_property
+    def body(self) -> "Body | None":
+        """The body whose copies were run; None for particles."""
+        if not self._has("parameters/body"):
+            return None
+        from ..bodies.table import body_of
+
+        with self._reading("its body"):
+            body = body_of(tomllib.loads(self._text("body")))
+            if len(body) * self.copies != self.count:
+                raise ValueError(f"{self.copies} of {len(body)} points are not {self.count}")
+        return body
+
+    @property
+    def copies(self) -> int:
+        """Number of bodies that were run; 0 for particles."""
+        with self._reading("its number of bodies") as file:
+            return int(file["parameters/copies"][()]) if "parameters/body" in file else 0
+
+    @property
+    def descriptions(self) -> dict[str, str]:
+        """The texts that identify a run: scene, method and storage."""
+        return {name: self._text(name) for name in ("scene", "method", "storage")}
+
+    @property
+    def scene_text(self) -> str | None:
+        """The scene file that was run."""
+        return self._text("scene_file") if self._has("parameters/scene_file") else None
