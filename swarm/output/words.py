@@ -1,9 +1,264 @@
-"""A run in words, for the titles of pictures and for reports."""
+"""A run and its scene in words, for the titles of pictures and for reports."""
 
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from ..bodies.body import Body
+from ..methods import Method
+from ..particles import Particles
 from ..scene import Scene
-from .facts import call
+from ..surfaces.surface import Surface
+from ..surfaces.union import part_at
+from . import nouns
+from .amounts import amount, amounts, counted_in_words, direction, listed, many, one, plain, plural_of
+
+# Most letters of a title.
+LONGEST = 90
+# The parts of a title that are left out where it is too long, the least telling first; 0 is all.
+_BREVITY = range(7)
+_FEW = 3
 
 
 def of_scene(scene: Scene) -> str:
-    """What a scene is, as "an ellipsoid with a sphere in it, under gravity"."""
-    return ", ".join(call(surface) for surface in scene.surfaces)
+    """What a scene is: the vessel, what is in it, gravity, and what its walls do.
+
+    >>> import swarm
+    >>> ball = swarm.Sphere(0.2, side="outside")
+    >>> of_scene(swarm.Scene([swarm.Ellipsoid((0.5, 0.5, 0.7)), ball], gravity=(0.0, 0.0, -9.81)))
+    'in an ellipsoid with a ball in it, under gravity'
+    """
+    return _brief(scene, 0)
+
+
+def _brief(scene: Scene, brief: int) -> str:
+    """The same, with less the larger `brief` is."""
+    solids = [one for one in scene.surfaces if noun_is_solid(one)]
+    around = [one for one in scene.surfaces if not noun_is_solid(one)]
+    flat = scene.plane is not None
+    told = _around(scene, around, brief)
+    if solids:
+        told += f" {'with' if around else 'among'} {_several(scene, solids, brief)}" + " in it" * bool(around)
+    if flat and brief < 5:
+        told = f"in a billiard of two dimensions: {told.removeprefix('in ')}"
+    if scene.period is not None:
+        told = "in a cell that repeats" + f" {told}" * bool(told) * (brief < 5)
+    leans = any(name in told for name in (" floor", " lid", " slope"))
+    if scene.gravity is not None and brief < 6 and not (brief == 3 and leans):
+        told += ", under gravity"
+    return (told + _laws(scene) if brief < 1 else told).strip()
+
+
+def noun_is_solid(surface: Surface) -> bool:
+    """Whether a surface is in the way of particles, rather than around them."""
+    return surface.is_solid() or (
+        hasattr(surface, "is_foam") and not surface.is_foam() and not hasattr(surface, "side")
+    )
+
+
+def _around(scene: Scene, around: list[Surface], brief: int) -> str:
+    """The vessel: a closed one, then its floor, its lid, and other planes."""
+    planes = [one for one in around if type(one).__name__ in ("Plane", "Slab")]
+    vessels = [one for one in around if one not in planes]
+    if vessels:
+        inside = f"in {_several(scene, vessels, brief)}"
+        if not planes:
+            return inside
+        names = _several(scene, planes, brief)
+        joined = "cut by" if scene.gravity is None and all(one.motion is None for one in planes) else "with"
+        return f"{inside} {joined} {names}"
+    if len(planes) == 1 and type(planes[0]).__name__ == "Plane":
+        named = _several(scene, planes, brief)
+        return f"{'above' if 'floor' in named or 'slope' in named else 'beside'} {named}"
+    return f"between {_several(scene, planes, brief)}" if planes else ""
+
+
+def _several(scene: Scene, surfaces: list[Surface], brief: int) -> str:
+    """Some surfaces, those of one name together: "two balls, 78 pegs and a drum that turns"."""
+    found: Counter[tuple[str, str]] = Counter()
+    for surface in surfaces:
+        moves = nouns.moves_how(surface) if brief < 4 else ""
+        found[nouns.noun_of(surface, scene), moves] += nouns.number_of(surface)
+    if brief >= 4 and len(found) > 1 and (brief >= 5 or len(found) > _FEW):
+        return counted_in_words(sum(found.values()), "solid" if noun_is_solid(surfaces[0]) else "wall")
+    told = []
+    for (noun, moves), count in found.items():
+        named = counted_in_words(count, noun)
+        if count == 1 and noun in ("vessel", "compound solid", "intersection") and not moves:
+            named = _compound(scene, surfaces, noun)
+        verb = moves[:-1] if count > 1 and moves.endswith("s") and not moves.startswith("i") else moves
+        told.append(f"{named} that {verb}" if moves else named)
+    return listed(told)
+
+
+def _compound(scene: Scene, surfaces: list[Surface], noun: str) -> str:
+    """A union or an intersection by the names of its parts."""
+    whole: Any = next(one for one in surfaces if nouns.noun_of(one, scene) == noun)
+    if any(hasattr(part, "parts") for part in whole.parts):
+        return f"{one(noun)} of {len(whole.parts)} parts"
+    parts = Counter(nouns.noun_of(part, scene) for part in whole.parts)
+    return f"{one(noun)} of {listed([counted_in_words(count, kind) for kind, count in parts.items()])}"
+
+
+def _laws(scene: Scene) -> str:
+    """What the walls do to the energy or the number of particles, as the end of a title."""
+    pieces = [*scene.surfaces, *(part_at(scene.surfaces[i], where) for i, where in scene.parts)]
+    kinds = {type(law).__name__ for piece in pieces for law in piece.laws}
+    told = ["warm"] * (any(piece.temperature is not None for piece in pieces) or "CercignaniLampis" in kinds)
+    told += ["diffuse"] * ("Lambert" in kinds) + ["absorbing"] * ("Absorb" in kinds) + ["sticky"] * ("Sticky" in kinds)
+    lossy = any(piece.restitution < 1.0 or piece.friction for piece in pieces)
+    told += ["lossy"] * lossy
+    doors = ", with doors" * any("door" in " ".join(nouns.changes_of(piece)) for piece in pieces)
+    return (f", {' and '.join(told)} walls" if told else "") + doors
+
+
+# --- What runs -------------------------------------------------------------------------------------------
+
+
+def of_particles(content: Any) -> str:
+    """What runs: so many particles, balls or bodies.
+
+    `content` is the `plots.Content` of a run.
+    """
+    count, body, radius = content.count, content.body, _radius(content)
+    if body is not None:
+        copies = count // len(body)
+        noun = noun_of_body(body)
+        return f"1 {noun}" if copies == 1 else f"{many(copies)} {plural_of(noun)}"
+    noun = "particle"
+    if radius is not None:
+        noun = "ball" if content.scene.plane is None else "disc"
+    told = f"1 {noun}" if count == 1 else f"{many(count)} {plural_of(noun)}"
+    if radius is not None and len(radius):
+        low, high = float(np.nanmin(radius)), float(np.nanmax(radius))
+        size = amount(low, "m") if low == high else amounts([low, high], "m").replace(" and ", " to ")
+        told += f" of {size} radius"
+    return told
+
+
+def noun_of_body(body: Body) -> str:
+    """What one body is called, by its points and ties.
+
+    >>> import swarm
+    >>> noun_of_body(swarm.dumbbell(0.1, 1.0))
+    'dumbbell'
+    """
+    points, links, corners = len(body), len(body.links), len(body.contacts)
+    if body.strain is not None:
+        return f"elastic body of {many(points)} points"
+    if (points, links) == (2, 1):
+        return "dumbbell"
+    if points == 4 and links == 6:
+        return "tetrahedron" if corners == 4 else f"rigid body of {many(corners)} corners"
+    if links == points - 1 > 1 and all(j == i + 1 for i, j in body.links):
+        return f"chain of {many(points)} points"
+    tied = "linkage" if len(body.anchors) or len(body.guides) else "body"
+    return f"{tied} of {counted_in_words(points, 'point')}" if points > 1 else "tied point"
+
+
+def _radius(content: Any) -> Any:
+    frame: Particles | None = content.frames.get("start", content.frames.get("end"))
+    return None if frame is None or content.body is not None else frame.radius
+
+
+def of_method(method: Method) -> str:
+    """A method as a title says it: its name and its step.
+
+    >>> import swarm
+    >>> of_method(swarm.Impact()), of_method(swarm.AugmentedLagrangian(dt=1e-3, penalty=1e4))
+    ('Impact', 'Augmented Lagrangian, steps of 1 ms')
+    """
+    kind = type(method).__name__
+    name = "".join(f" {c}" if c.isupper() and k else c for k, c in enumerate(kind))
+    step = getattr(method, "dt", None)
+    return name if step is None else f"{name}, steps of {amount(float(step), 's')}"
+
+
+def title(content: Any) -> str:
+    """A run in fewer than 90 letters: what runs where, by which method, for how long."""
+    what, end = of_particles(content), amount(float(content.seen["time"][-1]), "s")
+    came = " from sources" * ("born" in content.seen)
+    step, name = of_method(content.method), of_method(content.method).split(",")[0]
+    for brief in _BREVITY:
+        method = step if brief < 2 else name
+        told = f"{what}{came} {_brief(content.scene, brief)}: {method}, {end}"
+        if len(told) < LONGEST:
+            return told
+    return f"{what}: {name}, {end}"
+
+
+def details(content: Any) -> list[tuple[str, str]]:
+    """A run in full, for reports: what each fact is about, and the fact in words."""
+    scene, seen, end = content.scene, content.seen, amount(float(content.seen["time"][-1]), "s")
+    rows = [("what runs", _in_full(content))]
+    names = nouns.labels(scene)
+    for i, surface in enumerate(scene.surfaces):
+        rows.append((f"surface {i}, {names[i, ()]}", nouns.in_full(surface, scene)))
+    for i, where in scene.parts:
+        part = part_at(scene.surfaces[i], where)
+        if told := nouns.laws_of(part) + nouns.changes_of(part):
+            rows.append((f"part {'.'.join(map(str, where))} of surface {i}, {names[i, where]}", ", ".join(told)))
+    rows += facts_of_space(scene)
+    if "born" in seen:
+        born = [counted_in_words(int(count), "particle") for count in np.atleast_1d(seen["born"][-1])]
+        rows.append(("sources", f"{listed(born)} came" if len(born) < 7 else f"{len(born)} of them"))
+    if "crossings" in seen and seen["crossings"].shape[1]:
+        rows.append(("counters", counted_in_words(seen["crossings"].shape[1], "surface") + " that stop nobody"))
+    rows.append(("method", ", ".join([of_method(content.method), *_numbers(content.method)])))
+    frames = counted_in_words(len(seen["time"]), "frame")
+    return [*rows, ("time", f"{end}, {frames}")]
+
+
+def facts_of_space(scene: Scene) -> list[tuple[str, str]]:
+    """What holds for a whole scene: gravity, its period, its plane, what particles do to one another."""
+    told = []
+    if scene.gravity is None:
+        told.append(("gravity", "none"))
+    else:
+        size = float(np.linalg.norm(scene.gravity))
+        told.append(("gravity", f"{amount(size, 'm/s²')} along {direction(scene.gravity)}"))
+    if scene.period is not None:
+        along = [
+            f"{amount(length, 'm')} along {axis}" for axis, length in zip("xyz", scene.period, strict=True)
+            if length is not None
+        ]  # fmt: skip
+        told.append(("period", f"a cell that repeats after {listed(along)}"))
+    if scene.plane is not None:
+        told.append(("plane", f"two dimensions, {scene.plane} = 0"))
+    if scene.pairs is not None:
+        told.append(
+            ("impacts of two", f"restitution {plain(scene.pairs.restitution)}, friction {plain(scene.pairs.friction)}")
+        )
+    return told
+
+
+def _in_full(content: Any) -> str:
+    """What runs, with masses and speeds at the start as far as frames are kept."""
+    told, frame = of_particles(content), content.frames.get("start")
+    if frame is None:
+        return told
+    masses, speeds = (
+        frame.mass * (1 if content.body is None else len(content.body)),
+        np.sqrt((frame.velocity**2).sum(axis=0)),
+    )
+    speeds = speeds[~np.isnan(speeds)]
+    for what, values, unit in (
+        (" of" if content.body is None else ", each of", masses, "kg"),
+        (", at the start with", speeds, "m/s"),
+    ):
+        if not len(values):
+            continue
+        low, high = float(values.min()), float(values.max())
+        same = high - low <= 1e-9 * abs(high)
+        told += f"{what} {amount(low, unit) if same else amounts([low, high], unit).replace(' and ', ' to ')}"
+    return told.replace(" radius of ", " radius and ")
+
+
+def _numbers(method: Method) -> list[str]:
+    """The numbers of a method besides its step, by their names."""
+    shown = {"penalty", "exponent", "tolerance", "max_sweeps", "sliding_tolerance", "shortest_flight", "contact_step"}
+    return [
+        f"{name.replace('_', ' ')} {plain(value)}" for name, value in vars(method).items()
+        if name in shown and isinstance(value, (int, float)) and value
+    ]  # fmt: skip
