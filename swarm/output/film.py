@@ -65,7 +65,7 @@ def animate(trajectory: Any, path: Any, frames: int, fps: float, size: Any, part
     paths.check_target(target, overwrite, "film")
     paths.check_distinct({"film": target}, {"trajectory": trajectory.path})
     most, rate = checks.count("frames", frames), checks.positive("fps", fps)
-    pixels = _pixels(size)
+    pixels = pixels_of(size)
     shown = checks.count("particles", particles)
     is_gif = target.suffix.lower() == ".gif"
     if is_gif and rate > _FASTEST:
@@ -92,7 +92,7 @@ def animate(trajectory: Any, path: Any, frames: int, fps: float, size: Any, part
     return target
 
 
-def _pixels(size: Any) -> tuple[int, int]:
+def pixels_of(size: Any) -> tuple[int, int]:
     """The width and the height of a film, both even, as videos have them."""
     with contextlib.suppress(TypeError, ValueError):
         wide, high = size
@@ -115,6 +115,13 @@ def _ffmpeg() -> str:
             "an .mp4 needs the program ffmpeg, which is not installed: pip install imageio-ffmpeg, or write a .gif"
         )
     return str(found)
+
+
+def has_ffmpeg() -> bool:
+    """Whether videos can be written."""
+    with contextlib.suppress(SceneError):
+        return bool(_ffmpeg())
+    return False
 
 
 def _reason(error: Exception) -> str:

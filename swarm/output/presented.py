@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .exported import Progress
+    from .shown_film import Film
 
 
 class Presented(Stored):
@@ -105,7 +106,7 @@ class Presented(Stored):
         """Write a film of the particles or bodies among their walls, coloured by speed.
 
         200 frames of 10 000 particles take 17 s of one core. Walls are drawn as they bound the volume at the start, and
-        moved where they move.
+        moved where they move. The path that it returns shows nothing in a notebook: `film` does.
 
         Args:
             path: `.mp4`, by ffmpeg, or `.gif`, which is some ten times as large.
@@ -126,6 +127,37 @@ class Presented(Stored):
         with needed_by("a film", "animation"):
             from . import film
         return film.animate(self, path, frames, fps, size, particles, overwrite)
+
+    def film(
+        self: Any,
+        *,
+        frames: int = 100,
+        fps: float = 25.0,
+        size: tuple[int, int] = (640, 480),
+        particles: int = 5000,
+    ) -> "Film":
+        """A film of the particles or bodies among their walls, which a notebook shows.
+
+        It is drawn as by `animate`, smaller and of fewer frames: all of it is kept in the notebook, some 0.5 MB. It
+        needs no kernel and no network to play when the notebook is opened again. `film.save("run.mp4")` writes it.
+
+        Args:
+            frames: the most that are drawn, evenly chosen, with the first and the last.
+            fps: frames a second, above 0; where ffmpeg is missing at most 50.
+            size: width and height in pixels, 64 to 8192 each; an odd one is made even.
+            particles: the most that are drawn, evenly chosen, or points of bodies.
+
+        Returns:
+            A `Film`: a video, or a GIF where ffmpeg is not installed. One of more than 22 MB is not shown, since it
+            would make the notebook hang, and says so.
+
+        Raises:
+            SceneError: an argument is out of its range, the trajectory is damaged or keeps no particles, or matplotlib
+                or scikit-image is not installed.
+        """
+        with needed_by("a film", "animation"):
+            from . import shown_film
+        return shown_film.film_of(self, frames, fps, size, particles)
 
     def to_xarray(self: Any) -> "xarray.Dataset":
         """The trajectory as a Dataset of xarray, with the dimensions time, particle, axis and surface.

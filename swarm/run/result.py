@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..output.sequence import Frames
+    from ..output.shown_film import Film
 
 
 @dataclass(frozen=True, repr=False)
@@ -150,15 +151,34 @@ class Result:
         Raises:
             SceneError: the run has no trajectory, or it is gone or damaged.
         """
-        if self.trajectory is None:
-            raise SceneError(
-                "frames are those of the trajectory, and this run has written none; give trajectory=, or take what is "
-                "needed of each frame by progress= or observables="
-            )
+        path = self._written("frames are", ", or take what is needed of each frame by progress= or observables=")
         from ..output.sequence import Frames
         from ..output.trajectory import load
 
-        return Frames(load(self.trajectory))
+        return Frames(load(path))
+
+    def _written(self, what: str, otherwise: str = "") -> Path:
+        """The path of the trajectory, of which `what` are or is."""
+        if self.trajectory is None:
+            raise SceneError(
+                f"{what} those of the trajectory, and this run has written none; give trajectory={otherwise}"
+            )
+        return self.trajectory
+
+    def film(
+        self, *, frames: int = 100, fps: float = 25.0, size: tuple[int, int] = (640, 480), particles: int = 5000
+    ) -> "Film":
+        """A film of the trajectory, which a notebook shows; see `Trajectory.film`.
+
+        Raises:
+            SceneError: the run has no trajectory, or it is gone or damaged or keeps no particles, an argument is out of
+                its range, or matplotlib or scikit-image is not installed.
+        """
+        path = self._written("the frames of a film are")
+        from ..output.trajectory import load
+
+        with load(path) as written:
+            return written.film(frames=frames, fps=fps, size=size, particles=particles)
 
     def plot(self, *, particles: int = 5000, figsize: tuple[float, float] = (12.0, 6.0)) -> "Figure":
         """Draw the run in one picture; see `Trajectory.plot`.
