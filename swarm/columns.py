@@ -92,17 +92,7 @@ def read_columns(
         SceneError: the file cannot be read, a column is missing or unknown, or a cell is not a number; names file, row
             and column.
     """
-    try:
-        text = Path(path).read_bytes()
-        table = list(csv.reader(io.StringIO(text.decode("utf-8-sig"), newline=""), skipinitialspace=True))
-    except UnicodeDecodeError as error:
-        row = text[: error.start].count(b"\n") + 1
-        raise SceneError(
-            f"cannot read {path}, row {row}: expected text in UTF-8, got the byte 0x{text[error.start]:02x}"
-        ) from error
-    except (OSError, csv.Error) as error:
-        raise SceneError(f"cannot read {path}: {error}") from error
-    rows = [(number, cells) for number, cells in enumerate(table, start=1) if any(cells) or len(cells) > 1]
+    rows = _rows_of(path)
     header = [name.strip() for name in rows[0][1]] if rows else []
     missing = [name for name in needed if name not in header]
     unknown = [name for name in header if name not in (*needed, *optional)]
@@ -115,6 +105,26 @@ def read_columns(
         raise SceneError(f"{path}: expected at least one {what} below the header, got none")
     values = np.array([_row(path, number, header, cells) for number, cells in rows[1:]])
     return dict(zip(header, values.T, strict=True))
+
+
+def row_of(path: str | Path, number: int) -> int:
+    """The row of a CSV file that holds the particle, or body, of this number."""
+    return _rows_of(path)[1 + number][0]
+
+
+def _rows_of(path: str | Path) -> list[tuple[int, list[str]]]:
+    """The rows of a CSV file that are not empty, with their numbers, from 1 on."""
+    try:
+        text = Path(path).read_bytes()
+        table = list(csv.reader(io.StringIO(text.decode("utf-8-sig"), newline=""), skipinitialspace=True))
+    except UnicodeDecodeError as error:
+        row = text[: error.start].count(b"\n") + 1
+        raise SceneError(
+            f"cannot read {path}, row {row}: expected text in UTF-8, got the byte 0x{text[error.start]:02x}"
+        ) from error
+    except (OSError, csv.Error) as error:
+        raise SceneError(f"cannot read {path}: {error}") from error
+    return [(number, cells) for number, cells in enumerate(table, start=1) if any(cells) or len(cells) > 1]
 
 
 def _hint(header: list[str]) -> str:

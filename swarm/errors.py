@@ -6,7 +6,13 @@ class SwarmError(Exception):
 
 
 class SceneError(SwarmError, ValueError):
-    """Bad input: an argument, a TOML key, a row of a file. Found before anything runs or is written."""
+    """Bad input: an argument, a TOML key, a row of a file. Found before anything runs or is written.
+
+    Attributes:
+        particle: the number of the particle that it is about, the first one; None where it is about none.
+    """
+
+    particle: int | None = None
 
 
 class CompleteError(SceneError):

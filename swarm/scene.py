@@ -114,9 +114,10 @@ class Scene(Pieces):
         self._require_alone()
         required.require_known(surfaces, self._bounds_of_lasting)
         if not self._has_volume():
+            why = required.apart_of(surfaces) or "check their `side`, and that solids are smaller than their cavity"
             raise SceneError(
                 f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces whose admissible sides "
-                "have no point in common; check their `side`, and that solids are smaller than their cavity"
+                f"have no point in common; {why}"
             )
 
     def __repr__(self) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import plugins, run_tables, tables
 from .checks import closest, count, listed, particles_fit
-from .columns import read_columns
+from .columns import read_columns, row_of
 from .errors import SceneError
 from .filling import fill
 from .methods import Method
@@ -98,6 +98,13 @@ class Job:
         """The file that holds the particles or bodies, or None."""
         name = getattr(self.source, "source", None)
         return None if name is None else self.path.parent / name
+
+    def located(self, error: SceneError) -> SceneError:
+        """An error, with the row of the file that holds the particle that it is about."""
+        file = self.start_file()
+        if error.particle is None or file is None or file.suffix.lower() != ".csv":
+            return error
+        return SceneError(f"{file}, row {row_of(file, error.particle)}: {error}")
 
     def start(self) -> "Particles | Bodies | None":
         """The particles or bodies at the start, made or read; None where all come from sources.

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import interrupt
-from ..errors import CompleteError, SwarmError, WallTimeError
+from ..errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
 
 
@@ -95,7 +95,10 @@ def run(  # noqa: PLR0913  one argument an option
                     paths.check_target(file, replaced, name)
             before, start = paths.identity(target), job.start()
             resumes = resume and paths.checkpoint_of(target).exists()
-        result = carry_out(job.scene, start, job.method, options)
+        try:
+            result = carry_out(job.scene, start, job.method, options)
+        except SceneError as error:
+            raise job.located(error) from None
     except (KeyboardInterrupt, WallTimeError) as stop:
         status = "walltime" if isinstance(stop, WallTimeError) else "interrupted"
         # The files are closed: a second signal may end the process here.

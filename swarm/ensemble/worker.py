@@ -124,6 +124,7 @@ def _carried_out(order: dict[str, Any], line: _Line) -> dict[str, Any]:
 
 
 def _simulated(job: "Job", order: dict[str, Any], line: _Line, **how: Any) -> dict[str, Any]:
+    from ..errors import SceneError
     from ..run.simulation import carry_out
     from .results import final
 
@@ -136,7 +137,10 @@ def _simulated(job: "Job", order: dict[str, Any], line: _Line, **how: Any) -> di
         progress=_display(line),
         **how,
     )
-    result = carry_out(job.scene, job.start(), job.method, options)
+    try:
+        result = carry_out(job.scene, job.start(), job.method, options)
+    except SceneError as error:
+        raise job.located(error) from None
     return {"state": "done", "observables": final(result.observables), "wall_time": result.wall_time}
 
 

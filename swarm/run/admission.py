@@ -21,10 +21,9 @@ from . import passing, workload
 from .balls import require_apart, require_balls
 from .counting import require_counters, require_no_counters
 from .options import RunOptions, Task
+from .starts import require_inside
 from .with_bodies import require_method_of_bodies, require_walls_of_bodies
 
-# A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
-_ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
 # Of the size of a scene, a place ahead that tells on which side of a wall a flight begins, and of that way, how far
 # outside it is where it begins in a tip.
 _NEAR, _TIP = 1e-6, 1e-2
@@ -103,7 +102,7 @@ def _require_place(scene: Scene, start: Particles, method: Method) -> None:
     if start.radius is not None:
         require_apart(scene, start, method)
         return
-    _require_inside(scene, start)
+    require_inside(scene, start)
     _require_normals(scene, start)
 
 
@@ -139,7 +138,7 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
         require_compiled(scene.surfaces)
     if len(bodies.body.contacts):
         touching = bodies.contact_points().reshape(3, -1)
-        _require_inside(scene, Particles(touching, touching))
+        require_inside(scene, Particles(touching, touching))
     points = bodies.particles()
     _require_precision(scene, points, options)
     return Task(scene, points, method, options, bodies)
@@ -244,24 +243,6 @@ def _require_instants(scene: Scene, particles: Particles, method: Method, option
 def _require_no_log(instead: str, options: RunOptions) -> None:
     if options.impacts is not None:
         raise SceneError(f"impacts must be None here, a log of impacts is {instead}; got {options.impacts}")
-
-
-def _require_inside(scene: Scene, particles: Particles) -> None:
-    # Their magnitude sets the round-off of a position on a wall.
-    magnitude = max(float(particles.position.max()), -float(particles.position.min()), scene.finite_size())
-    outside = scene.outside(particles.position, _ON_THE_WALL * magnitude)
-    if outside.size:
-        first = int(outside[0])
-        point = particles.position[:, first : first + 1]
-        distances = scene.distances_outside(point)[:, 0]
-        wall = int(np.argmax(np.where(np.isnan(distances), np.inf, distances)))
-        phi = float(scene.surfaces[wall].phi(point)[0])
-        when = "" if scene.surfaces[wall].motion is None else ", as it is at 0 s"
-        raise SceneError(
-            f"particles must start inside their walls, got {outside.size} of {len(particles)} outside; the first "
-            f"is particle {first} at {tuple(point[:, 0].tolist())}, where phi = {phi:.6g} of surfaces[{wall}] "
-            f"({type(scene.surfaces[wall]).__name__}){when}"
-        )
 
 
 def _require_normals(scene: Scene, particles: Particles) -> None:

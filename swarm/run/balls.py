@@ -13,6 +13,7 @@ from ..scene import Scene
 from .instants import require_instants_of_balls
 from .options import RunOptions
 from .soft import require_soft_balls
+from .starts import error_of
 
 # Balls overlap by round-off of their places at the start: this many times that of the largest coordinate.
 _ROUND_OFF = 64.0 * np.finfo(np.float64).eps
@@ -134,11 +135,4 @@ def _require_within(scene: Scene, particles: Particles, radius: np.ndarray, clos
     outside = np.flatnonzero(wrong.any(axis=0))
     if not outside.size:
         return
-    first = int(outside[0])
-    wall = int(np.argmax(np.where(np.isnan(distances[:, first]), np.inf, distances[:, first])))
-    when = "" if scene.surfaces[wall].motion is None else ", as it is at 0 s"
-    raise SceneError(
-        f"particles must start inside their walls, got {outside.size} of {len(particles)} outside; the first is "
-        f"particle {first} at {tuple(particles.position[:, first].tolist())}, whose radius of {radius[first]:g} m "
-        f"reaches {distances[wall, first]:.6g} m beyond surfaces[{wall}] ({type(scene.surfaces[wall]).__name__}){when}"
-    )
+    raise error_of(scene, particles, outside, distances[:, outside])

@@ -1,5 +1,6 @@
 """Checks that a surface has the methods, and the box in which it is known, that its use needs, before compilation."""
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from .contract import Smooth
 from .fields.members import Members
+from .instant import box_of
 from .rotation import Rotated
 from .shapes.solid import SolidNumbers
 from .surface import Surface, shown
@@ -134,3 +136,16 @@ def require_known(
                 f"from {shown(low)} to {shown(high)}; sample it in a larger box, check that phi is below 0 inside, "
                 "or add surfaces that keep particles in the grid"
             )
+
+
+def apart_of(surfaces: Sequence[Surface]) -> str | None:
+    """Which two surfaces that hold their particles have no point in common, in words; None: no such two."""
+    boxes = [(i, one, np.array(box_of(one, 0.0))) for i, one in enumerate(surfaces) if one.is_there(0.0)]
+    for (i, one, box), (j, other, its) in itertools.combinations(boxes, 2):
+        if (np.maximum(box[0], its[0]) > np.minimum(box[1], its[1])).any():
+            return (
+                f"surfaces[{i}] ({type(one).__name__}) and surfaces[{j}] ({type(other).__name__}) are apart: particles "
+                "live in what all surfaces have in common; a vessel of several rooms is one surface, "
+                'swarm.Union([...]), in a scene file kind = "union"'
+            )
+    return None
