@@ -112,3 +112,7 @@ def test_errors_name_the_argument(build, parts):
     with pytest.raises(swarm.SceneError) as caught:
         build()
     assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+def test_a_rotation_without_a_center_is_about_the_origin():
+    assert swarm.Rotation((0.0, 0.0, 1.0), 2.0) == swarm.Rotation((0.0, 0.0, 1.0), 2.0, (0.0, 0.0, 0.0))

@@ -136,7 +136,7 @@ class Rotation(Given):
     Args:
         axis: three numbers, not all 0; its length does not matter. The rotation is right-handed about it.
         rate: from -1e100 to 1e100 [rad/s].
-        center: a point of the axis [m].
+        center: a point of the axis [m]; the origin where none is given.
 
     Raises:
         SceneError: an argument is out of its range.
@@ -149,7 +149,7 @@ class Rotation(Given):
 
     axis: Vector
     rate: float
-    center: Vector
+    center: Vector = (0.0, 0.0, 0.0)
     most: ClassVar[float] = 1
     instead: ClassVar[str] = "about one axis their rates add up to that of a single one"
 
