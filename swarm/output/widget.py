@@ -23,7 +23,7 @@ def load() -> None:
     environment says otherwise.
     """
     if _ASSET in os.environ or _is_reached():
-        import rerun_notebook  # noqa: F401  Rerun imports it late, and says what to install in its own words
+        import rerun_notebook
 
         return
     os.environ[_ASSET] = "serve-local"
