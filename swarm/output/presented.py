@@ -179,6 +179,11 @@ class Presented(Stored):
     def show(self: Any, *, particles: int = 5000, color: str = "speed", megabytes: float = 100.0) -> None:
         """Show the trajectory in a Rerun viewer: in a notebook below the cell, else in a window on this machine.
 
+        The viewer of a notebook needs WebGL in the browser. The browser gets it (67 MB) from Rerun's server, or, where
+        the kernel does not reach that, from the machine of the kernel, which must be that of the browser then. The
+        environment variable RERUN_NOTEBOOK_ASSET, "serve-local" or a URL, says otherwise; "inline" does not work with
+        Rerun 0.41. It lives as long as the kernel: a notebook that is opened again shows nothing there, but a `film`.
+
         Args:
             particles: the most particles that are shown, evenly chosen, or points of bodies.
             color: what their colour shows, "speed" or "energy-error".
@@ -191,7 +196,9 @@ class Presented(Stored):
         in_notebook = notebook.is_running()
         with needed_by("a viewer", "notebook" if in_notebook else "record"):
             if in_notebook:
-                import rerun_notebook  # noqa: F401  Rerun imports it late, and says what to install in its own words
+                from . import widget
+
+                widget.load()
             from . import recording
         recording.show(self, recording.Settings(particles, color, megabytes, live=not in_notebook))
 

@@ -274,9 +274,9 @@ def show(trajectory: Any, settings: Settings) -> None:
     """Show a trajectory in the viewer that is `live`, or else in the notebook that is running."""
     stream = record(trajectory, None, settings)
     if not settings.live:
-        from rerun.notebook import Viewer  # which imports half of Jupyter
+        from . import widget
 
-        Viewer(width="auto", height="auto", recording=stream).display()
+        widget.show(stream)
 
 
 def record(trajectory: Any, path: Path | None, settings: Settings, overwrite: bool = False) -> Any:

@@ -1,5 +1,6 @@
 """What becomes of results in Python: tables, figures, films, labelled arrays, and how objects show in notebooks."""
 
+import os
 import sys
 import types
 
@@ -11,7 +12,7 @@ from PIL import Image
 import swarm
 from swarm import columns, notebook
 from swarm.errors import FileError, SceneError
-from swarm.output import film, labelled, playback, recording
+from swarm.output import film, labelled, playback, recording, widget
 
 RATE, FRAMES = 1.5, 5
 SCENE = swarm.Scene(
@@ -285,7 +286,10 @@ def test_a_closed_or_damaged_file_shows(run, tmp_path):
 def test_a_notebook_shows_the_recording(run, tmp_path, monkeypatch):
     import rerun.notebook
 
-    shown = []
+    shown, asked, hidden = [], [], []
+    monkeypatch.delenv("RERUN_NOTEBOOK_ASSET", raising=False)
+    monkeypatch.setattr(widget, "_is_reached", lambda: asked.append("server"))
+    monkeypatch.setattr(widget, "_shown", [])
     monkeypatch.setattr(notebook, "is_running", lambda: True)
     monkeypatch.setitem(sys.modules, "rerun_notebook", None)
     with pytest.raises(SceneError, match=r"pip install 'rerun-sdk\[notebook\]"):
@@ -294,9 +298,15 @@ def test_a_notebook_shows_the_recording(run, tmp_path, monkeypatch):
     monkeypatch.setattr(
         rerun.notebook,
         "Viewer",
-        lambda recording, **_size: types.SimpleNamespace(display=lambda: shown.append(recording)),
+        lambda recording, **_size: types.SimpleNamespace(
+            display=lambda: shown.append(recording), update_panels=lambda **panels: hidden.append(panels)
+        ),
     )
     run[1].show(particles=10)
+    assert "RERUN_NOTEBOOK_ASSET" not in os.environ
+    monkeypatch.setenv("RERUN_NOTEBOOK_ASSET", "serve-local")
+    widget.load()
+    assert (asked, hidden, len(widget._shown)) == (["server", "server"], [{"top": "hidden"}], 1)
     shown[0].save(tmp_path / "run.rrd")
     shown[0].flush()
     shown[0].disconnect()

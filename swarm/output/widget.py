@@ -1,0 +1,52 @@
+"""Rerun's viewer as a widget of a notebook."""
+
+import contextlib
+import io
+import os
+import socket
+from typing import Any
+
+# Where the browser gets the viewer from: by default from this server.
+_ASSET, _SERVER = "RERUN_NOTEBOOK_ASSET", ("app.rerun.io", 443)
+_PATIENCE = 3.0  # [s]
+# Pixels; the width is that of the cell.
+_HEIGHT = 600
+
+# What is shown, as long as the kernel lives: a viewer that nobody refers to is closed before its browser has begun.
+_shown: list[Any] = []
+
+
+def load() -> None:
+    """Import the widget, whose module decides when it is imported where browsers get the viewer from.
+
+    By default that is Rerun's server. Where this machine does not reach it, browsers get it from here, unless the
+    environment says otherwise.
+    """
+    if _ASSET in os.environ or _is_reached():
+        import rerun_notebook
+
+        return
+    os.environ[_ASSET] = "serve-local"
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):  # it says so
+            import rerun_notebook  # noqa: F401
+    finally:
+        del os.environ[_ASSET]
+
+
+def _is_reached() -> bool:
+    try:
+        socket.create_connection(_SERVER, _PATIENCE).close()
+    except OSError:
+        return False
+    return True
+
+
+def show(stream: Any) -> None:
+    """Show the recording of a stream below the cell that runs."""
+    from rerun.notebook import Viewer  # which imports half of Jupyter
+
+    viewer = Viewer(width="auto", height=_HEIGHT, recording=stream, theme="light")
+    viewer.update_panels(top="hidden")
+    viewer.display()
+    _shown.append((viewer, stream))
