@@ -35,7 +35,7 @@ LOSSY = swarm.Scene([swarm.Cylinder(0.3, friction=0.1)], gravity=DOWN, period=(N
 LEVEL = swarm.Scene([swarm.Cylinder(0.3)], gravity=(1.0, 0.0, 0.0), period=(None, None, 1.0))
 MANY = {"until": 1e12, "every": 1e9}
 COMES = {
-    "a late end": ([BOX], swarm.Impact(), MANY, "time between impacts is about T = 1.1 s", "until = 1e+12 s is kept to"),
+    "a late end": ([BOX], swarm.Impact(), MANY, "between impacts is about T = 1.1 s", "until = 1e+12 s is kept to"),
     "a long step": ([BALL], swarm.Penalty(dt=0.25, penalty=1e4), {}, "T = 0.", "s; dt = 0.25 s is 0."),
     "a long contact step": ([BALL], swarm.Impact(contact_step=0.25), {}, "T = 0.", "contact_step = 0.25 s is"),
     "steps that are cut": (
