@@ -191,10 +191,10 @@ def test_particles_outside_are_counted_and_the_first_is_named():
     with pytest.raises(swarm.SceneError) as caught:
         swarm.simulate(NESTED, swarm.Particles(position, np.ones((3, 5))), swarm.Impact(), until=1.0)
     message = str(caught.value)
-    for words in ("2 of 5 outside", "particle 1 at (0.75, 0.0, 0.0)", "phi = 0.25 of surfaces[0] (Sphere)"):
+    for words in ("2 of 5 outside", "particle 1 at (0.75, 0.0, 0.0)", "0.25 m outside surfaces[0] (Sphere)"):
         assert words in message
     position[0, 1] = 0.3
-    with pytest.raises(swarm.SceneError, match=r"1 of 5 .* particle 3 at \(0\.1, .* phi = -0\.1 of surfaces\[1\]"):
+    with pytest.raises(swarm.SceneError, match=r"1 of 5 .* particle 3 at \(0\.1, .* 0\.1 m inside surfaces\[1\]"):
         swarm.simulate(NESTED, swarm.Particles(position, np.ones((3, 5))), swarm.Impact(), until=1.0)
 
 
@@ -282,7 +282,7 @@ def test_a_flight_out_of_a_tip_is_refused(method):
 def test_a_phi_that_is_no_number_is_outside():
     wall = swarm.Formula("x**2 + y**2 + z**2 - 0.25 + log(z + 0.4)/1e3", bounds=((-0.6, -0.6, -0.39), (0.6, 0.6, 0.6)))
     start = swarm.Particles([[0.0], [0.0], [-0.41]], np.ones((3, 1)))
-    with pytest.raises(swarm.SceneError, match=r"1 of 1 outside; .* where phi = nan of surfaces\[0\]"):
+    with pytest.raises(swarm.SceneError, match=r"outside surfaces\[0\] .* its phi is not a number there"):
         swarm.simulate(swarm.Scene([wall]), start, swarm.Impact(), until=1.0)
 
 

@@ -17,6 +17,7 @@ from ..kernel.cache import kernels_compiled
 from ..particles import Particles
 from ..snapshot import NOTHING, Read, Snapshot
 from ..state import Absorbed, Multipliers
+from . import hints
 from .base import BaseRun
 from .bodies import BodyRun
 from .colliding import CollidingRun
@@ -29,7 +30,6 @@ from .impacts import log_of
 from .measures import Measures
 from .options import Task
 from .outputs import recorder_of, writer_of
-from .overlaps import warn_of_overlap
 from .progress import Display, display
 from .reacting import ReactingRun
 from .session import Session
@@ -92,7 +92,7 @@ def carry_out_task(task: Task, session: Session) -> End:
     if task.scene.is_open() and not task.is_shard:
         warn_open()
     if not task.is_shard:
-        warn_of_overlap(task.scene)
+        hints.give(task)
     until, span_of, kept = task.options.until, task.method.span, Columns()
     with _begun(task, session) as (run, writer, show, (log, tally, _counters), measures):
         with run, writer or contextlib.nullcontext(lambda *frame: None) as write:

@@ -63,6 +63,12 @@ def require_few_impacts(scene: Scene, particles: Particles, method: Method, unti
         )  # fmt: skip
 
 
+def time_between(scene: Scene, particles: Particles) -> float:
+    """The typical time of a flight from impact to impact at the start [s]."""
+    with np.errstate(all="ignore"):
+        return _of_particles(scene, particles, 0.0).between
+
+
 def check_turns(bodies: Bodies, dt: float) -> None:
     """Warn where a tie of a body turns so far in a step that the step is cut, or says little."""
     ends, r, v = bodies.body.links, bodies.position, bodies.velocity

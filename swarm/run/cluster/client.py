@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from ... import interrupt
 from ...errors import RunError, SceneError, WallTimeError
 from ...frames import Frame
+from .. import hints
 from ..machine import End, start_of, warn_open
 from ..measures import Measures
 from ..options import Task
-from ..overlaps import warn_of_overlap
 from ..progress import Display, display
 from . import connection, joined, shards, worker
 from .sharded import Sharded
@@ -80,7 +80,7 @@ def carry_out(task: Task, session: Sharded) -> End:
     _require_shards(task)
     if task.scene.is_open():
         warn_open()
-    warn_of_overlap(task.scene)
+    hints.give(task)
     target = Path(task.options.trajectory).absolute()
     saved = task.options.checkpoint or _SAVED
     task = dataclasses.replace(task, options=dataclasses.replace(task.options, trajectory=target, checkpoint=saved))

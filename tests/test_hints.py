@@ -1,0 +1,104 @@
+"""What is said before a run of what may not be meant: it comes where it should, and for no scene of the examples."""
+
+import logging
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import METHODS, SURFACES
+
+import swarm
+from swarm import scene_file
+from swarm.run import hints
+from swarm.run.admission import task_of
+from swarm.run.options import RunOptions
+
+BOX = swarm.Box((0.5, 0.5, 0.5))
+BALL = swarm.Sphere(0.5)
+DOWN = (0.0, 0.0, -9.81)
+
+
+def said(scene, method=None, until=1.0, caplog=None, particles=None, **options):
+    """The hints on a run; checks of its arguments come before them."""
+    particles = swarm.fill(scene, 20, speed=1.0, seed=1) if particles is None else particles
+    task = task_of(scene, particles, method or swarm.Impact(), RunOptions(until=until, **options))
+    caplog.clear()
+    with caplog.at_level(logging.WARNING, "swarm"):
+        hints.give(task)
+    return [record.getMessage() for record in caplog.records]
+
+
+AT_REST = swarm.Particles(np.zeros(3), np.zeros(3))
+CELL = swarm.Scene([swarm.Cylinder(0.3)], gravity=DOWN, period=(None, None, 1.0))
+LOSSY = swarm.Scene([swarm.Cylinder(0.3, friction=0.1)], gravity=DOWN, period=(None, None, 1.0))
+LEVEL = swarm.Scene([swarm.Cylinder(0.3)], gravity=(1.0, 0.0, 0.0), period=(None, None, 1.0))
+MANY = {"until": 1e12, "every": 1e9}
+COMES = {
+    "a late end": ([BOX], swarm.Impact(), MANY, "between impacts is about T = 1.1 s", "until = 1e+12 s is kept to"),
+    "a long step": ([BALL], swarm.Penalty(dt=0.25, penalty=1e4), {}, "T = 0.", "s; dt = 0.25 s is 0."),
+    "a long contact step": ([BALL], swarm.Impact(contact_step=0.25), {}, "T = 0.", "contact_step = 0.25 s is"),
+    "steps that are cut": (
+        [BALL], swarm.AugmentedLagrangian(dt=0.25, penalty=1e4, adaptive=True), {}, "T = 0.", "dt = 0.25 s is"
+    ),
+    "soft walls": ([BALL], swarm.Penalty(dt=1e-2, penalty=10.0), {}, "a contact lasts 0.99 s,", "m into its wall"),
+    "Verlet": ([BALL], swarm.Verlet(dt=1e-2, penalty=1e5), {}, "of a contact, which lasts 0.0099 s", "unstable"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", COMES)
+def test_it_is_said(name, caplog):
+    surfaces, method, options, *parts = COMES[name]
+    told = said(swarm.Scene(surfaces), method, caplog=caplog, **options)
+    assert len(told) == 1
+    for part in parts:
+        assert part in told[0]
+
+
+def test_what_rests_and_what_falls(caplog):
+    (told,) = said(swarm.Scene([BOX]), particles=AT_REST, caplog=caplog)
+    assert "all 1 particles are at rest" in told
+    assert said(swarm.Scene([BOX], DOWN), particles=AT_REST, caplog=caplog) == []
+    (told,) = said(CELL, caplog=caplog)
+    assert "gravity[2] = -9.81 m/s^2 pulls along period[2] = 1 m" in told
+    assert said(LOSSY, caplog=caplog) == said(LEVEL, caplog=caplog) == []
+
+
+@pytest.mark.parametrize("until", [1.0, 1e3, 1e7])
+def test_a_run_of_a_usual_length_is_not_late(until, caplog):
+    assert said(swarm.Scene([BOX]), until=until, caplog=caplog) == []
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("name", SURFACES)
+def test_no_surface_of_the_tables_is_told_of(name, method, caplog):
+    scene = swarm.Scene([SURFACES[name](), swarm.Sphere(3.0)])
+    assert said(scene, method, caplog=caplog) == []
+
+
+@pytest.mark.parametrize("path", sorted(Path("examples/scenes").glob("*.toml")), ids=lambda path: path.stem)
+def test_no_scene_of_the_examples_is_told_of(path, caplog):
+    job = scene_file.read(path)
+    task = task_of(job.scene, job.start(), job.method, job.run)
+    with caplog.at_level(logging.WARNING, "swarm"):
+        hints.give(task)
+    assert [record.getMessage() for record in caplog.records] == []
+
+
+def test_the_depth_that_is_said_is_the_one_that_comes(caplog):
+    """A particle that flies along the radius of a soft ball."""
+    start = swarm.Particles(np.array([0.1, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+    method, scene = swarm.Penalty(dt=1e-3, penalty=20.0), swarm.Scene([BALL])
+    (told,) = said(scene, method, until=1.5, caplog=caplog, particles=start)
+    run = swarm.simulate(scene, start, method, until=1.5, every=0.01, compile="never")
+    depth = float(told.split("sinks ")[1].split(" m")[0])
+    assert depth == pytest.approx(run.observables["max_penetration"].max(), rel=0.05)
+
+
+def test_it_takes_little(caplog):
+    """Beside the checks of 10^5 particles."""
+    scene = swarm.Scene([swarm.Ellipsoid((0.3, 0.3, 0.6))])
+    task = task_of(scene, swarm.fill(scene, 100_000, speed=0.7, seed=1), swarm.Impact(), RunOptions(until=100.0))
+    began = time.perf_counter()
+    hints.give(task)
+    assert time.perf_counter() - began < 0.05
