@@ -114,7 +114,7 @@ def run(  # noqa: PLR0913  one argument an option
     except SwarmError as error:
         report("failed", error=str(error))
         raise
-    report("complete", target, wall_time=result.wall_time)
+    report("complete", target, wall_time=result.wall_time, compile_time=result.compile_time)
     if not (quiet or as_json):
         table(of_result(result, getattr(start, "volume", None)))
 

@@ -8,6 +8,7 @@ import logging
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
@@ -217,12 +218,25 @@ def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
     return _is_found(kernel, tuple(map(numba.typeof, arguments)))
 
 
+class Spent:
+    """The time that went into kernels.
+
+    Attributes:
+        seconds: of wall time.
+    """
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+
 @contextlib.contextmanager
-def kernels_compiled(tell: Callable[[str], None], sentence: Callable[[Any], str] | None = None) -> Iterator[None]:
+def kernels_compiled(tell: Callable[[str], None], sentence: Callable[[Any], str] | None = None) -> Iterator[Spent]:
     """Report every kernel that is compiled in this context to the logger and to `tell`, in its `sentence`."""
+    spent, begun = Spent(), []
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, compiled: Any) -> None:
+            begun.append(time.monotonic())
             kernel = compiled.data["dispatcher"]
             if kernel in _kernels:
                 said = _COMPILING.format(kernel.__name__) if sentence is None else sentence(kernel)
@@ -230,7 +244,9 @@ def kernels_compiled(tell: Callable[[str], None], sentence: Callable[[Any], str]
                 tell(said)
 
         def on_end(self, compiled: Any) -> None:
-            pass
+            first = begun.pop()
+            # One that is compiled within another is counted there.
+            spent.seconds += 0.0 if begun else time.monotonic() - first
 
     with event.install_listener("numba:compile", Listener()):
-        yield
+        yield spent

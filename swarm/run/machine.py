@@ -60,6 +60,7 @@ class End(NamedTuple):
     absorbed: Absorbed | None
     birth_time: NDArray[np.float64]
     collisions: NDArray[np.int64] | None = None
+    compile_time: float = 0.0
 
 
 class Columns:
@@ -149,7 +150,10 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
             one.halt()
 
     shown, compilations = display(task.options.progress), Compilations()
-    with session, interrupt.taken_by(stop), shown as show, kernels_compiled(show.compiling, compilations.sentence):
+    with (
+        session, interrupt.taken_by(stop), shown as show,
+        kernels_compiled(show.compiling, compilations.sentence) as session.compiled,
+    ):  # fmt: skip
         session.prepare(task, watched.log)
         measures = _measures_of(task, session)
         _require_room(task, session, measures.size() + (watched.tally.size() if watched.tally else 0))
@@ -222,6 +226,7 @@ def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> End:
         state.absorbed,
         birth_times(task.particles),
         state.collisions,
+        session.compiled.seconds,
     )
 
 

@@ -66,6 +66,7 @@ class Result:
         scene, method: as they were run.
         birth_time: (N,) when each came [s], 0 of those of the start.
         collisions_per_particle: (N,) how often each has met another one; None of points, which do not meet.
+        compile_time: seconds of the wall time in which the last session compiled kernels; 0 on a cluster.
     """
 
     particles: Particles
@@ -81,6 +82,7 @@ class Result:
     method: Method | None = None
     birth_time: NDArray[np.float64] | None = None
     collisions_per_particle: NDArray[np.int64] | None = None
+    compile_time: float = 0.0
 
     def __repr__(self) -> str:
         seen, frames = self.observables, len(self.observables["time"])

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 from .. import run_tables
 from ..errors import CompleteError, SceneError, WallTimeError
 from ..frames import FrameTimes
+from ..kernel.cache import Spent
 from ..output import checkpoint, paths
 from ..output.lock import only_writer
 from ..version import VERSION
@@ -46,6 +47,8 @@ class Session:
         self._arrays: checkpoint.Arrays | None = None
         self._held = contextlib.ExitStack()
         self._log: Impacts | None = None
+        # What the session has compiled.
+        self.compiled = Spent()
 
     def __enter__(self) -> Self:
         return self

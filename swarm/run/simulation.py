@@ -154,5 +154,5 @@ def carry_out(scene: Scene, particles: Particles | Bodies | None, method: Method
     return Result(
         end.particles, end.observables, end.wall_time, options.trajectory, end.multipliers, end.impacts,
         end.escape_time, absorbed_time, bodies, scene, method, end.birth_time,
-        end.collisions,
+        end.collisions, end.compile_time,
     )  # fmt: skip
