@@ -29,6 +29,16 @@ _TABLE = np.array(
     ],
     dtype=np.float64,
 )  # fmt: skip
+# Okabe and Ito's, told apart by every kind of eye; also in look.mplstyle.
+BLUE, RED, GREEN, PINK, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
+CURVES = (BLUE, RED, GREEN, PINK, ORANGE, SKY)
+# The sum of all where the background is not known: it is seen on a light one and on a dark one.
+SUM, _PURPLE, _BROWN = "#8A8A8A", "#5E3C99", "#8C510A"
+# The colour of an energy in every picture, by how the name of its curve begins. The total is of the colour of text.
+ENERGIES = {
+    "kinetic": BLUE, "rotational": SKY, "potential": GREEN, "contact": PINK, "elastic": PINK, "dissipated": RED,
+    "brought by": ORANGE, "work of": _PURPLE, "energy of": _BROWN,
+}  # fmt: skip
 _STEPS = 256
 # The scale ends at this many times the speed of the mean energy at the start.
 _FASTER = 1.5
@@ -52,6 +62,22 @@ class Scale:
             steps = np.where(nobody, 0.0, steps)
         places: NDArray[np.intp] = np.clip(steps, 0.0, _STEPS - 1.0).astype(np.intp)
         return np.where(nobody, np.uint32(0), _PACKED[places])
+
+
+def curve_colour(name: str, k: int, total: str = SUM) -> str:
+    """The colour of curve k of a plot, by its name where that is an energy.
+
+    >>> curve_colour("kinetic", 3), curve_colour("ball", 1), curve_colour("total", 0, "black")
+    ('#0072B2', '#D55E00', 'black')
+    """
+    if name.startswith("total"):
+        return total
+    return next((colour for begin, colour in ENERGIES.items() if name.startswith(begin)), CURVES[k % len(CURVES)])
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue from 0 to 255 of "#RRGGBB"."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
 def table() -> Floats:

@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 from ..plane import across_of, along
 from ..state import Floats
 from . import series
-from .colours import BACKGROUND, Scale
+from .colours import BACKGROUND, Scale, curve_colour, rgb
 from .drawn import Drawn
 from .playback import LINES, MESH, PARTICLES
 from .shapes import Shape
@@ -20,8 +20,6 @@ _EYE = 1.3
 # Between the faces of bodies, which have no shading.
 _EDGE = (10, 10, 12, 255)
 _CAVITY_WIRE, _SOLID_WIRE = (150, 175, 200, 160), (235, 180, 130, 255)
-# Okabe and Ito's, without those that are invisible on a dark background.
-_CURVES = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (240, 228, 66), (204, 121, 167), (213, 94, 0))
 
 
 def path_of(shape: Shape) -> str:
@@ -62,10 +60,10 @@ def log_walls(stream: Any, shapes: list[Shape], center: Floats, static: bool = T
 
 
 def log_series(stream: Any, lines: list[series.Line]) -> None:
-    """Log the names and the colours of time series; every view starts with the first colour."""
+    """Log the names and the colours of time series."""
     for together in series.views_of(lines).values():
         for k, line in enumerate(together):
-            colour = _CURVES[k % len(_CURVES)]
+            colour = rgb(curve_colour(line.name, k))
             stream.log(line.path, rr.SeriesLines(colors=[colour], names=[line.name], widths=[1.5]), static=True)
 
 

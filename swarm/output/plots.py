@@ -1,5 +1,6 @@
 """A run in one picture: time series that show whether it went well, speeds, and the particles."""
 
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,16 +14,18 @@ from ..errors import SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
-from . import colours, drawing, graphs, series, style
+from . import colours, drawing, graphs, series, speeds, style, verdicts, words
+from .amounts import amount, many
 from .drawn import Drawn
 from .replaced import named_when_whole
 from .shapes import Shape, shapes_of
 
 # Most particles drawn, or points of bodies.
 SHOWN = 5000
-_BINS = 60
-# [inches]: of a file, and the width of one time series; which part of the picture these have beside the particles.
-_FILE, _CELL, _SERIES = (17.0, 7.6), 2.5, 0.64
+# [inches]: of a picture, of one time series, of a line of a sentence; and letters of one in an inch.
+_WIDE, _CELL, _HIGH, _LINE, _LETTERS = 12.5, 2.5, 2.35, 0.17, 14.0
+# Which part of a picture the time series have beside the particles; and its least height [inches].
+_SERIES, _LEAST = 0.66, 6.4
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ def draw_plot(trajectory: Any, target: Path) -> None:
         SceneError: the trajectory is damaged, or holds no frame.
         FileError: the picture cannot be written.
     """
-    figure = figure_of(content_of(trajectory), _FILE, SHOWN)
+    figure = figure_of(content_of(trajectory), None, SHOWN)
     with named_when_whole(target) as part, style.applied():
         figure.savefig(part)
 
@@ -74,10 +77,10 @@ def content_of(trajectory: Any) -> Content:
 
 
 def figure_of(content: Content, figsize: Any, particles: int) -> style.Picture:
-    """The picture, in which at most so many particles are drawn."""
+    """The picture, in which at most so many particles are drawn; as high as its plots need where no size is given."""
     most = checks.count("particles", particles)
     try:
-        wide, high = (checks.positive("figsize", side) for side in figsize)
+        wide, high = (_WIDE, 0.0) if figsize is None else (checks.positive("figsize", side) for side in figsize)
     except (TypeError, ValueError):
         raise SceneError(f"figsize must be width and height in inches, got {figsize!r}") from None
     with style.applied():
@@ -91,37 +94,92 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
     if scene.reacts():
         still = scene.placed(content.seen["wall_position"][-1], content.seen["wall_orientation"][-1])
     shapes = shapes_of(still, np.zeros((3, 1)) if end is None else end.position, float(times[-1]))
+    plots, spread = _shown(content, shapes), speeds.of_frames(content)
+    count, width = len(plots) + bool(spread), wide * (1.0 if end is None else _SERIES)
+    told = _sentences(content, width)
+    text = _LINE * (1.0 + sum(sentence.count("\n") + 1 for sentence, _holds in told))
+    rows = _rows(count, width)
+    high = high or max(_LEAST, _HIGH * len(rows) + text + 0.4)
     picture = style.picture(wide, high)
     right: Any = picture
     if end is not None:
         left, right = picture.subfigures(1, 2, width_ratios=[1.0 - _SERIES, _SERIES], squeeze=False).ravel()
-        wide *= _SERIES
         _places(left, content, end, shapes, most)
-    _series(right, content, shapes, wide)
-    frames = "1 frame" if len(times) == 1 else f"{len(times)} frames"
-    title = f"{content.name}{': ' * bool(content.name)}{frames}, {content.method!r}".replace("swarm.", "")
-    picture.suptitle(title, fontsize=11)
+    above, below = right.subfigures(2, 1, height_ratios=[max(high - text, 0.1), text], squeeze=False).ravel()
+    cells = []
+    for part, number in zip(above.subfigures(len(rows), 1, squeeze=False).ravel(), rows, strict=True):
+        cells += list(part.subplots(1, number, squeeze=False).ravel()) if number else []
+    _series(cells[: len(plots)], content, plots, rows[-1] - bool(spread))
+    if spread:
+        speeds.draw(cells[-1], content, spread)
+    _write(below, told, text)
+    picture.suptitle(words.title(content), fontsize=12)
     return picture
 
 
-def _series(figure: Any, content: Content, shapes: list[Shape], width: float) -> None:
-    """The time series, and the speeds, in a figure of this width [inches]."""
-    times, seen = content.seen["time"], content.seen
+def _shown(content: Content, shapes: list[Shape]) -> dict[str, graphs.Curves]:
+    """The curves of each plot that says something."""
+    times, seen = content.seen["time"], _with_inside(content)
     drawn = {}
     for line in series.lines_of(content.scene, content.method, shapes, content.body, seen):
         values = line.values(times, seen)
         known = ~np.isnan(values)
         drawn[line.path] = line.name, times[known], values[known]
-    plots = series.plots_of(drawn)
-    count = len(plots) + bool(content.frames)  # one more is for the speeds
+    return {group: curves for group, curves in series.plots_of(drawn).items() if not _says_nothing(group, curves)}
+
+
+def _series(cells: list[Any], content: Content, plots: dict[str, graphs.Curves], last: int) -> None:
+    """The time series; the `last` of them say what the axes of times are."""
+    limits = {"penetration": None if content.method.law() is not None else verdicts.penetration_limit(content)}
+    errors = verdicts.energy_limit(content)
+    for k, (group, curves) in enumerate(plots.items()):
+        view = series.title_of(group, content.scene.plane)
+        graphs.lines(cells[k], *view, curves, limit=limits.get(group, errors))
+        if k < len(plots) - last:
+            cells[k].set_xlabel("")
+
+
+def _with_inside(content: Content) -> dict[str, NDArray[Any]]:
+    """The observables, with how many are inside where any come or go."""
+    seen = dict(content.seen)
+    gone = np.asarray(seen["escaped"]) + np.sum(seen.get("absorbed", np.zeros((len(seen["time"]), 1))), axis=1)
+    if content.body is None and (np.any(gone) or "born" in seen):
+        born = np.sum(seen["born"], axis=1) if "born" in seen else 0
+        seen["inside"] = verdicts.at_start(content) + born - gone
+    return seen
+
+
+def _says_nothing(group: str, curves: dict[str, tuple[Any, Any]]) -> bool:
+    """Whether a sentence says it all: rates of one frame, and errors that are none."""
+    values = [values for _times, values in curves.values()]
+    if not any(len(column) for column in values):
+        return True
+    return series.VIEWS[group][1] and all((column <= series.NOTHING).all() for column in values)
+
+
+def _rows(count: int, width: float) -> list[int]:
+    """How many plots are in each row, as even as may be, the longer rows last: they fill the width."""
     columns = max(1, min(round(width / _CELL), -(-count // 2)))
-    cells = figure.subplots(-(-count // columns), columns, squeeze=False).ravel()
-    for cell, (group, curves) in zip(cells, plots.items(), strict=False):
-        graphs.lines(cell, *series.title_of(group, content.scene.plane), curves)
-    if content.frames:
-        _speeds(cells[len(plots)], content)
-    for cell in cells[count:]:
-        cell.set_axis_off()
+    rows = max(1, -(-count // columns))
+    return [count // rows + (k >= rows - count % rows) for k in range(rows)]
+
+
+def _sentences(content: Content, width: float) -> list[tuple[str, bool | None]]:
+    """What should hold of the run, in lines of this width [inches], and whether it does."""
+    marks = {True: "✓", False: "✗", None: "·"}
+    found = [one for one in verdicts.judged(content) if one.about != "numbers" or not one.holds]
+    letters = max(30, round(width * _LETTERS))
+    told = [(f"{marks[one.holds]} {one.about}: {one.text}", one.holds) for one in found]
+    return [(textwrap.fill(text, letters, subsequent_indent="    "), holds) for text, holds in told]
+
+
+def _write(figure: Any, told: list[tuple[str, bool | None]], high: float) -> None:
+    """Sentences, one below the other, in a figure of this height [inches]; what does not hold is red."""
+    line = 0.3
+    for text, holds in told:
+        figure.text(0.02, 1.0 - line * _LINE / high, text, va="top", fontsize=8.5,
+                    color=style.RED if holds is False else style.ink())  # fmt: skip
+        line += text.count("\n") + 1
 
 
 def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], most: int) -> None:
@@ -138,24 +196,10 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     drawing.frame(axes, position.T, packed, wires, *drawn.ties(position.T, packed, tints), across, drawn.radius)
     drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high)
     count = content.count // (1 if content.body is None else len(content.body))
-    title = f"{drawn.shown} of {count} {drawn.noun}, t = {content.seen['time'][-1]:.6g} s"
-    figure.suptitle(title, fontsize=10, color=drawing.LIGHT)
-
-
-def _speeds(axes: Any, content: Content) -> None:
-    """Histograms of the speeds, at the start and at the end."""
-    top = 1.05 * max(frame.fastest() for frame in content.frames.values()) or 1.0
-    for name, frame in content.frames.items():
-        speeds = np.sqrt((frame.velocity**2).sum(axis=0))
-        speeds = speeds[~np.isnan(speeds)]
-        counts, edges = np.histogram(speeds, bins=_BINS, range=(0.0, top))
-        form: dict[str, Any] = {"fill": True, "alpha": 0.25} if name == "start" else {"linewidth": 1.4}
-        colour = style.CURVES[name == "end"]
-        axes.stairs(100.0 * counts / max(1, len(speeds)), edges, color=colour, label=name, **form)
-    axes.set_yscale("log")  # at the start all may be in one bin
-    whose = "speeds" if content.body is None else "speeds of points"
-    axes.set_title(f"{whose}, % in each of {_BINS} bins", fontsize=10)
-    axes.set_xlabel("speed [m/s]", fontsize=9)
-    axes.tick_params(labelsize=8)
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
+    shown = many(count) if drawn.shown == count else f"{many(drawn.shown)} of {many(count)}"
+    noun = drawn.noun if end.radius is None else "balls" if content.scene.plane is None else "discs"
+    noun = noun if count > 1 else {"bodies": "body"}.get(noun, noun.removesuffix("s"))
+    title = f"{shown} {noun}, t = {amount(float(content.seen['time'][-1]), 's')}"
+    if (alike := speeds.of_all(content)) is not None:
+        title += f",\neach with {amount(alike, 'm/s')}" if alike else ", all at rest"
+    figure.suptitle(title, fontsize=10)

@@ -73,12 +73,12 @@ class Presented(Stored):
         """
         return frame_of(self.observables)
 
-    def plot(self, *, particles: int = 5000, figsize: tuple[float, float] = (12.0, 6.0)) -> "Figure":
+    def plot(self, *, particles: int = 5000, figsize: tuple[float, float] | None = None) -> "Figure":
         """Draw energies, errors, penetration, impacts, pressure, speeds and the particles or bodies at the end.
 
         Args:
             particles: the most particles that are drawn, evenly chosen, or points of bodies.
-            figsize: width and height [inches], at 100 pixels an inch.
+            figsize: width and height [inches], at 100 pixels an inch; None: as large as the plots need.
 
         Returns:
             A figure of matplotlib, which a notebook shows where it is the last line of a cell, and which can be

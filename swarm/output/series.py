@@ -14,25 +14,30 @@ from ..state import Floats
 from ..surfaces.surface import Surface
 from ..surfaces.union import part_at
 from .named import name_of
+from .nouns import labels
 from .shapes import Shape
 
 # Stands for the logarithm of zero.
 NOTHING = -18.0
 
-# Of each plot, by the first part of the entities on it: its title, and whether the values are a log10.
+# Of each plot, by the first part of the entities on it: what its axis says, and whether the values are a log10.
 VIEWS = {
     "energy": ("energy [J]", False),
     "energy_error": ("worst relative energy error", True),
     "link_error": ("worst relative error of a link's length", True),
     "penetration": ("largest penetration [m]", True),
-    "impacts": ("impacts per second [1/s]", False),
-    "pressure": ("pressure on each surface [Pa]", False),
-    "force": ("force on each surface [N]", False),
-    "sliding": ("how many slide or rest", False),
-    "heat": ("heat from each surface [W]", False),
+    "number": ("particles", False),
+    "impacts": ("impacts [1/s]", False),
+    "pressure": ("pressure [Pa]", False),
+    "force": ("force [N]", False),
+    "crossings": ("crossings [1/s]", False),
+    "flow": ("net flow [1/s]", False),
+    "sliding": ("particles that slide or rest", False),
+    "heat": ("heat from walls [W]", False),
+    "position": ("displacement [m]", False),
 }
 # Views that pictures leave out where all values are 0.
-_RARE = ("sliding",)
+_RARE = ("sliding", "heat", "position", "crossings", "flow")
 _ENERGIES = ("total", "kinetic", "rotational", "potential", "contact", "dissipated", "elastic", "work")
 
 
@@ -40,8 +45,8 @@ _ENERGIES = ("total", "kinetic", "rotational", "potential", "contact", "dissipat
 class Line:
     """A time series: its entity, its name in the legend, and the observable that it shows.
 
-    That is the number of one surface if it has one for each, its logarithm, or its growth since the frame before in a
-    second, divided by `per`.
+    That is the number of one surface if it has one for each, of a row of numbers the sum, or what is `along` a vector,
+    its logarithm, or its growth since the frame before in a second, divided by `per`.
     """
 
     path: str
@@ -50,6 +55,7 @@ class Line:
     surface: int | None = None
     logarithm: bool = False
     per: float | None = None
+    along: tuple[float, ...] | None = None
 
     def values(self, times: Floats, seen: dict[str, Any]) -> Floats:
         """The values at frames, whose times [s] and observables these are; NaN at the first where they are rates."""
@@ -57,6 +63,8 @@ class Line:
         column = np.asarray(seen.get(self.observable, np.zeros(len(times))), np.float64)
         if self.surface is not None:
             column = column[:, self.surface]
+        if column.ndim > 1:
+            column = column @ np.array(self.along or (1.0,) * column.shape[1])
         if self.logarithm:
             return np.asarray(np.log10(np.maximum(column, 10.0**NOTHING)))
         if self.per is None:
@@ -97,11 +105,12 @@ def lines_of(
     lines += [
         Line("/energy_error", f"of a {one}", "energy_error", logarithm=True),
         Line("/penetration", f"of a {one}", "max_penetration", logarithm=True),
-        Line("/impacts", every if "collisions" not in more else "with walls", "impacts", per=1.0),
     ]
+    if scene.surfaces:
+        lines.append(Line("/impacts", every if "collisions" not in more else "walls", "impacts", per=1.0))
     if "collisions" in more:
-        lines.append(Line("/impacts/collisions", "with one another", "collisions", per=1.0))
-        lines += [Line("/pressure/virial", "of the balls, by the virial", "pressure")] * (not scene.is_open())
+        lines.append(Line("/impacts/collisions", "other balls", "collisions", per=1.0))
+        lines += [Line("/pressure/virial", "virial", "pressure")] * (not scene.is_open())
     if body is not None and (len(body.springs) or body.strain is not None):
         lines.append(Line("/energy/elastic", "elastic", "contact_energy"))
     if body is not None and len(body.links):
@@ -113,10 +122,42 @@ def lines_of(
     for wall in _walls(scene, shapes):
         if scene.is_open() or wall.area > 0.0:
             per = 1.0 if scene.is_open() else wall.area
-            lines.append(Line(f"/{group}/{wall.name}", wall.name, wall.observed("impulse"), wall.number, per=per))
+            lines.append(Line(f"/{group}/{wall.name}", wall.label, wall.observed("impulse"), wall.number, per=per))
     if method.is_rigid():
         lines.append(Line("/sliding", every, "sliding"))
+    if isinstance(more, Mapping):
+        lines += _lines_of_numbers(more) + _lines_of_moved(scene)
     return lines + _lines_of_walls(scene, shapes)
+
+
+def _lines_of_numbers(seen: Mapping[str, Any]) -> list[Line]:
+    """How many are inside, have come or have gone, and what crosses counters, of a run whose observables are known."""
+    lines = []
+    if "inside" in seen:
+        told = {"inside": "inside", "born": "came", "escaped": "escaped", "absorbed": "absorbed"}
+        lines = [Line(f"/number/{k}", name, k) for k, name in told.items() if np.any(seen.get(k, 0))]
+    counters = np.shape(seen.get("crossings", [[]]))[1]
+    for k in range(counters):
+        which = "" if counters == 1 else f"counter {k}"
+        for name, along in (("out", (1.0, 0.0)), ("back", (0.0, 1.0))):
+            lines.append(
+                Line(f"/crossings/{k}_{name}", f"{which} {name}".strip(), "crossings", k, per=1.0, along=along)
+            )
+        lines.append(Line(f"/flow/{k}", which or "out less back", "crossings", k, per=1.0, along=(1.0, -1.0)))
+    return lines
+
+
+def _lines_of_moved(scene: Scene) -> list[Line]:
+    """Where impacts have moved surfaces to: along their guides, or along each axis."""
+    lines, names = [], labels(scene)
+    for i, surface in enumerate(scene.surfaces):
+        if surface.reacts() and surface.mass is not None:
+            guide = getattr(surface.motion, "axis", None) if surface.inertia is None else None
+            ways = {"": guide} if guide is not None else dict(zip(("x", "y", "z"), np.eye(3).tolist(), strict=True))
+            for axis, along in ways.items():
+                name = f"{names[i, ()]} {axis}".strip()
+                lines.append(Line(f"/position/{i}_{axis}", name, "wall_position", i, along=tuple(along)))
+    return lines
 
 
 def _pairs_lose(scene: Scene) -> bool:
@@ -129,6 +170,7 @@ class _Wall:
     """A surface, or a part of one, and its number among those of the observables of either."""
 
     name: str
+    label: str
     surface: Surface
     number: int
     area: float
@@ -141,28 +183,28 @@ class _Wall:
 
 def _walls(scene: Scene, shapes: list[Shape]) -> list[_Wall]:
     """What is drawn, by its surfaces, and by the parts of those that have parts."""
-    found = []
+    found, names = [], labels(scene)
     for shape in shapes:
         i, part = shape.surface, (shape.surface, shape.place)
         number = scene.parts.index(part) if shape.place else i
         surface = part_at(scene.surfaces[i], shape.place)
-        found.append(_Wall(shape.name, surface, number, shape.area(), bool(shape.place)))
+        found.append(_Wall(shape.name, names[part], surface, number, shape.area(), bool(shape.place)))
     return found
 
 
 def _lines_of_walls(scene: Scene, shapes: list[Shape]) -> list[Line]:
     """Of surfaces that give heat, do work, or are moved."""
-    lines = []
+    lines, names = [], labels(scene)
     for wall in _walls(scene, shapes):
-        surface, name = wall.surface, wall.name
+        surface = wall.surface
         if surface.temperature is not None or surface.laws:
-            lines.append(Line(f"/heat/{name}", name, wall.observed("heat"), wall.number, per=1.0))
+            lines.append(Line(f"/heat/{wall.name}", wall.label, wall.observed("heat"), wall.number, per=1.0))
     for i, surface in enumerate(scene.surfaces):
         name = name_of(scene, i)
         if surface.reacts():
-            lines.append(Line(f"/energy/{name}", f"energy of {name}", "wall_energy", i))
+            lines.append(Line(f"/energy/{name}", f"energy of {names[i, ()]}", "wall_energy", i))
         elif any(shape.surface == i and part_at(surface, shape.place).motion is not None for shape in shapes):
-            lines.append(Line(f"/energy/work_{name}", f"work of {name}", "wall_work", i))
+            lines.append(Line(f"/energy/work_{name}", f"work of {names[i, ()]}", "wall_work", i))
     return lines
 
 

@@ -13,10 +13,12 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from . import colours
+from .colours import BLUE, CURVES, ENERGIES, GREEN, ORANGE, PINK, RED, SKY
 
-# Okabe and Ito's, told apart by every kind of eye; also in look.mplstyle.
-BLUE, RED, GREEN, PINK, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
-CURVES = (BLUE, RED, GREEN, PINK, ORANGE, SKY)
+__all__ = [
+    "BLUE", "CAVITY", "CAVITY_LINE", "CURVES", "ENERGIES", "GREEN", "GREY", "MAP", "ORANGE", "PINK", "RED", "SKY",
+    "SOLID", "SOLID_LINE", "Picture", "applied", "ink", "picture",
+]  # fmt: skip
 # What only guides the eye: laws beside measurements, limits, bands.
 GREY = "#8A8A8A"
 # Walls of a cavity, and solids: their faces and their lines.

@@ -182,7 +182,7 @@ class Result:
         with load(path) as written:
             return written.film(frames=frames, fps=fps, size=size, particles=particles)
 
-    def plot(self, *, particles: int = 5000, figsize: tuple[float, float] = (12.0, 6.0)) -> "Figure":
+    def plot(self, *, particles: int = 5000, figsize: tuple[float, float] | None = None) -> "Figure":
         """Draw the run in one picture; see `Trajectory.plot`.
 
         Without a trajectory, or where that keeps no particles, the speeds at the start are left out, and colours are
@@ -194,8 +194,8 @@ class Result:
         >>> import swarm
         >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
         >>> result = swarm.simulate(cavity, swarm.fill(cavity, 10, speed=1.0), swarm.Impact(), until=2.0, every=0.5)
-        >>> result.plot().get_suptitle()[:16]
-        '5 frames, Impact'
+        >>> result.plot().get_suptitle()
+        '10 particles in a sphere: Impact, 2 s'
         """
         with needed_by("a plot", "plot"):
             from ..output import plots

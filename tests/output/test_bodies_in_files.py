@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 import swarm
 from swarm import observables, scene_file, summary
 from swarm.bodies.elastic import block
-from swarm.output import checkpoint, colours, drawing, playback, plots, recording, series, sheet, writer
+from swarm.output import checkpoint, colours, drawing, graphs, playback, plots, recording, series, sheet, writer
 from swarm.output.drawn import Drawn
 from swarm.output.storage import Storage
 from swarm.state import State
@@ -323,7 +323,7 @@ def test_pictures_show_bodies_and_the_error_of_links(run, tmp_path, monkeypatch)
     path, frames = run
     body, drawn = frames[0].body, {}
     monkeypatch.setattr(series, "VIEWS", {name: (name, log) for name, (_title, log) in series.VIEWS.items()})
-    monkeypatch.setattr(drawing, "lines", lambda axes, view, logarithm, curves: drawn.update({view: curves}))
+    monkeypatch.setattr(graphs, "lines", lambda axes, view, logarithm, curves, limit=0: drawn.update({view: curves}))
     cells = []
     monkeypatch.setattr(drawing, "colour_bar", lambda picture, axes, *meaning: cells.append(axes))
     with swarm.load(path) as trajectory:

@@ -1,0 +1,108 @@
+"""How speeds are spread at the start and at the end of a run, beside the law of Maxwell."""
+
+from typing import Any
+
+import numpy as np
+
+from ..state import Floats
+from . import style
+from .amounts import amount, prefixed
+
+_BINS = 50
+# Speeds that differ by less than this part of themselves are one: an impact rounds them.
+_ALIKE = 1e-9
+# Up to this largest difference of the cumulated distributions the law of Maxwell says something.
+_NEAR = 0.2
+# A histogram with more than this part in one bin says nothing.
+_ALL = 0.8
+Spread = dict[str, Floats]
+
+
+def of_frames(content: Any) -> Spread:
+    """The speeds at the start and at the end, as far as they are known; none where all are one number in each."""
+    found = {}
+    for name, frame in content.frames.items():
+        values = np.sqrt((frame.velocity**2).sum(axis=0))
+        values = values[~np.isnan(values)]
+        if len(values):
+            found[name] = values
+    if not found:
+        return {}
+    top = _top(found)
+    told = [values for values in found.values() if not _is_single(values)]
+    return (
+        found if any(np.histogram(values, _BINS, (0.0, top))[0].max() < _ALL * len(values) for values in told) else {}
+    )
+
+
+def _top(spread: Spread) -> float:
+    """The end of the axis of speeds: beyond a few that are far faster than all others."""
+    return 1.05 * max(min(float(values.max()), 4.0 * float(np.quantile(values, 0.99))) for values in spread.values())
+
+
+def of_all(content: Any) -> float | None:
+    """The speed that all have at the end, if that is one [m/s]; None of one particle, and where they differ."""
+    frame = content.frames.get("end", content.frames.get("start"))
+    if frame is None or content.body is not None:
+        return None
+    values = np.sqrt((frame.velocity**2).sum(axis=0))
+    values = values[~np.isnan(values)]
+    return float(values.mean()) if len(values) > 1 and _is_single(values) else None
+
+
+def maxwell(speeds: Floats, mean_square: float, dimensions: int) -> Floats:
+    """The density of Maxwell's law at speeds, of particles of one mass with this mean square of theirs.
+
+    >>> at = np.linspace(0.0, 10.0, 2001)
+    >>> np.round([maxwell(at, 2.0, d).sum() * at[1] for d in (2, 3)], 6).tolist()
+    [1.0, 1.0]
+    """
+    variance = mean_square / dimensions
+    if dimensions == 2:
+        return np.asarray(speeds / variance * np.exp(-(speeds**2) / (2.0 * variance)))
+    return np.asarray(np.sqrt(2.0 / np.pi) * speeds**2 / variance**1.5 * np.exp(-(speeds**2) / (2.0 * variance)))
+
+
+def draw(axes: Any, content: Any, spread: Spread) -> None:
+    """Histograms of the speeds, and the law of Maxwell of the same mean energy where they are near it."""
+    top = _top(spread)
+    factor, unit = prefixed(top, "m/s")
+    for name, values in spread.items():
+        colour = style.GREY if name == "start" and len(spread) > 1 else style.BLUE
+        when = "at the start" if name == "start" else "at the end"
+        if _is_single(values):
+            place = float(values.mean()) * factor
+            axes.axvline(place, color=colour, linewidth=1.4, linestyle="--",
+                         label=f"{when} all {amount(float(values.mean()), 'm/s', 3)}")  # fmt: skip
+            continue
+        counts, edges = np.histogram(values, bins=_BINS, range=(0.0, top))
+        look: dict[str, Any] = {"fill": True, "alpha": 0.35} if colour == style.GREY else {"linewidth": 1.6}
+        axes.stairs(100.0 * counts / len(values), edges * factor, color=colour, label=when, **look)
+    _law(axes, content, spread, top, factor)
+    axes.set_xlim(0.0, top * factor)
+    axes.set_ylim(0.0, 1.35 * axes.get_ylim()[1])
+    axes.set_title("Speeds" if content.body is None else "Speeds of points")
+    axes.set_ylabel(f"% in each of {_BINS} bins")
+    axes.set_xlabel(f"speed [{unit}]")
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _law(axes: Any, content: Any, spread: Spread, top: float, factor: float) -> None:
+    """The law of Maxwell of the last speeds, where these are near it."""
+    values, frame = list(spread.values())[-1], list(content.frames.values())[-1]
+    masses = frame.mass
+    if content.body is not None or np.ptp(masses) > 1e-9 * masses.max() or _is_single(values) or len(values) < _BINS:
+        return
+    dimensions = 3 if content.scene.plane is None else 2
+    at = np.linspace(0.0, top, 400)
+    density = maxwell(at, float((values**2).mean()), dimensions)
+    law = np.cumsum(density) * at[1]
+    measured = np.searchsorted(np.sort(values), at) / len(values)
+    if np.abs(law - measured).max() < _NEAR:
+        axes.plot(at * factor, 100.0 * density * top / _BINS, color=style.RED, linewidth=1.2, linestyle=":",
+                  label="Maxwell, same energy")  # fmt: skip
+
+
+def _is_single(values: Floats) -> bool:
+    """Whether all speeds are the same up to round-off."""
+    return bool(np.ptp(values) <= _ALIKE * values.max())
