@@ -24,4 +24,6 @@ def test_the_tour_shows_what_the_file_has(tmp_path):
     stored, book = nbformat.read(TOUR, 4), nbformat.read(TOUR, 4)
     NotebookClient(book, timeout=600, resources={"metadata": {"path": str(tmp_path)}}).execute()
     assert shown(book) == shown(stored)
-    assert sum("image/png" in kinds for cell in shown(book) for _text, kinds in cell) == 6
+    assert sum("image/png" in kinds for cell in shown(book) for _text, kinds in cell) == 5
+    films = [output for cell in book.cells for output in cell.get("outputs", []) if "<video" in str(output)]
+    assert len(films) == 2

@@ -22,16 +22,15 @@ def load() -> None:
     By default that is Rerun's server. Where this machine does not reach it, browsers get it from here, unless the
     environment says otherwise.
     """
-    if _ASSET in os.environ or _is_reached():
-        import rerun_notebook
-
-        return
-    os.environ[_ASSET] = "serve-local"
+    chosen = _ASSET in os.environ or _is_reached()
+    if not chosen:
+        os.environ[_ASSET] = "serve-local"
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # it says so
-            import rerun_notebook  # noqa: F401
+        with contextlib.redirect_stdout(io.StringIO()):  # it says what it does
+            import rerun_notebook  # noqa: F401  Rerun imports it late, and says what to install in its own words
     finally:
-        del os.environ[_ASSET]
+        if not chosen:
+            del os.environ[_ASSET]
 
 
 def _is_reached() -> bool:
