@@ -84,9 +84,11 @@ def frame_of(observables: Mapping[str, Any]) -> "pandas.DataFrame":
 
 
 def read_columns(
-    path: str | Path, needed: Sequence[str], optional: Sequence[str], what: str
+    path: str | Path, needed: Sequence[str], optional: Sequence[str], what: str, ignored: Sequence[str] = ()
 ) -> dict[str, NDArray[np.float64]]:
     """The columns of a CSV file with a header, in any order, one row for each `what`.
+
+    Those that are `ignored` may be there and hold anything.
 
     Raises:
         SceneError: the file cannot be read, a column is missing or unknown, or a cell is not a number; names file, row
@@ -95,7 +97,7 @@ def read_columns(
     rows = _rows_of(path)
     header = [name.strip() for name in rows[0][1]] if rows else []
     missing = [name for name in needed if name not in header]
-    unknown = [name for name in header if name not in (*needed, *optional)]
+    unknown = [name for name in header if name not in (*needed, *optional, *ignored)]
     if missing or unknown or len(set(header)) < len(header):
         problem = f"column {missing[0]!r} is missing" if missing else f"columns are {', '.join(header)}"
         more = f" and optionally {', '.join(optional)}" if optional else ""
@@ -103,8 +105,8 @@ def read_columns(
         raise SceneError(f"{path}: expected the columns {', '.join(needed)}{more}; {problem}{hint}")
     if len(rows) < 2:
         raise SceneError(f"{path}: expected at least one {what} below the header, got none")
-    values = np.array([_row(path, number, header, cells) for number, cells in rows[1:]])
-    return dict(zip(header, values.T, strict=True))
+    values = np.array([_row(path, number, header, cells, ignored) for number, cells in rows[1:]])
+    return {name: column for name, column in zip(header, values.T, strict=True) if name not in ignored}
 
 
 def row_of(path: str | Path, number: int) -> int:
@@ -139,11 +141,14 @@ def _hint(header: list[str]) -> str:
     return f"{got}; write the names as they are here, without units, and nothing above them"
 
 
-def _row(path: str | Path, number: int, header: list[str], cells: list[str]) -> list[float]:
+def _row(path: str | Path, number: int, header: list[str], cells: list[str], ignored: Sequence[str]) -> list[float]:
     if len(cells) != len(header):
         raise SceneError(f"{path}, row {number}: expected {len(header)} cells, got {len(cells)}")
     values = []
     for name, cell in zip(header, cells, strict=True):
+        if name in ignored:
+            values.append(0.0)
+            continue
         # float() also takes what other programs do not write: 1_0, and the digits of all scripts.
         value = float(cell) if _NUMBER.fullmatch(cell) else np.nan
         if not np.isfinite(value):

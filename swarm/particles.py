@@ -13,6 +13,10 @@ from .state import Floats
 
 _COLUMNS = ("x", "y", "z", "vx", "vy", "vz")
 _SPINS = ("wx", "wy", "wz")
+# What a frame of a trajectory that was exported as .csv has too; a start does not.
+_OF_FRAMES = (
+    "time", "id", "impacts", "collisions", "image_x", "image_y", "image_z", "escape_time", "absorbed_time",
+)  # fmt: skip
 
 
 class Particles:
@@ -107,13 +111,16 @@ class Particles:
     def from_csv(cls, path: str | Path) -> "Particles":
         """Particles from a CSV file with columns x, y, z, vx, vy, vz and optionally mass, in any order.
 
-        Of balls it has a column radius, and may have wx, wy, wz of their spins.
+        Of balls it has a column radius, and may have wx, wy, wz of their spins. One frame that was exported as .csv is
+        such a file; its other columns are not read.
 
         Raises:
             SceneError: the file cannot be read, a column is missing or unknown, or a cell is not a number; names
                 file, row and column.
         """
-        columns = read_columns(path, _COLUMNS, ("mass", "radius", *_SPINS), "particle")
+        columns = read_columns(path, _COLUMNS, ("mass", "radius", *_SPINS, "frame"), "particle", _OF_FRAMES)
+        if len(frames := set(columns.get("frame", ()))) > 1:
+            raise SceneError(f"{path}: expected particles at one time, got {len(frames)} frames; export one of them")
         spins = [columns[name] for name in _SPINS if name in columns]
         if spins and (len(spins) < len(_SPINS) or "radius" not in columns):
             raise SceneError(

@@ -9,15 +9,21 @@ import typer
 from ..errors import SceneError
 from .shown import TrajectoryFile, written
 
+# More files than these are a sequence.
+_FEW = 2
+
 
 def export(
     file: TrajectoryFile,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="OUT", help="OUT.vtkhdf for ParaView, OUT.xyz or OUT.gsd.")
+        Path,
+        typer.Option("-o", "--output", metavar="OUT", help="OUT.vtkhdf, .xyz, .gsd, .ply, .csv, or .obj of the walls."),
     ],
     frames: Annotated[
         str | None,
-        typer.Option(metavar="A:B:K", help="Frames A to before B, every K-th, or one, as -1 [default: all]."),
+        typer.Option(
+            metavar="A:B:K", help="Frames A to before B, every K-th, or one, as -1 [default: all; of .obj the first]."
+        ),
     ] = None,
     particles: Annotated[int, typer.Option(metavar="K", help="Every K-th particle or body.")] = 1,
     surfaces: Annotated[
@@ -25,7 +31,8 @@ def export(
     ] = True,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
 ) -> None:
-    """Write a trajectory for ParaView (.vtkhdf), OVITO and ASE (.xyz), or HOOMD-blue and freud (.gsd)."""
+    """Write a trajectory for ParaView (.vtkhdf), OVITO and ASE (.xyz), HOOMD-blue and freud (.gsd), as files of frames
+    for Blender, games and MeshLab (.ply), for spreadsheets (.csv), or its walls for them and CAD (.obj)."""  # noqa: D205, D209
     from rich.console import Console
     from rich.progress import Progress
 
@@ -39,6 +46,10 @@ def export(
             output, chosen, particles, surfaces, overwrite,
             lambda done, total: bar.update(task, completed=done, total=total),
         )  # fmt: skip
+    if len(files) > _FEW:
+        size = sum(path.stat().st_size for path in files) / 1e6
+        print(f"written to {files[0]} to {files[-1]} ({len(files)} files, {size:.1f} MB)")
+        return
     for path in files:
         written(path)
 

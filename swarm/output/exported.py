@@ -47,7 +47,7 @@ class Exported:
         """
         self.trajectory, self._progress = trajectory, progress
         trajectory.require_frames()
-        self.numbers = _numbers(frames, len(trajectory))
+        self.numbers = numbers_of(frames, len(trajectory))
         self.times = trajectory.times[list(self.numbers)]
         checks.count("particles", particles)
         ids, size = trajectory.ids, trajectory.copies
@@ -82,7 +82,7 @@ class Exported:
                 self._progress(done + 1, len(self.numbers))
 
 
-def _numbers(frames: slice | int | None, n: int) -> range:
+def numbers_of(frames: slice | int | None, n: int) -> range:
     """The numbers of the chosen ones of n frames."""
     if frames is None:
         return range(n)

@@ -211,23 +211,27 @@ class Presented(Stored):
         overwrite: bool = False,
         progress: "Progress | None" = None,
     ) -> list[Path]:
-        """Write the trajectory to a file of another format; units are as they are, and so are the digits of .xyz.
+        """Write the trajectory to files of another format; units are as they are, and so are digits of .xyz and .csv.
 
         Args:
             path: its suffix says the format: `.vtkhdf` for ParaView, `.xyz` (extended XYZ) for OVITO and ASE, `.gsd`
-                for HOOMD-blue and freud, in which numbers are float32.
-            frames: a slice of the frames, such as slice(0, None, 10), or the number of one; None: all.
+                for HOOMD-blue and freud, in which numbers are float32, `.ply` for Blender, MeshLab, Open3D and games,
+                float32 too, a file a frame: NAME_0000.ply and so on, `.csv` for spreadsheets and pandas, and `.obj`
+                for the walls at a frame, an object a surface, in Blender, games and CAD.
+            frames: a slice of the frames, such as slice(0, None, 10), or the number of one; None: all, of `.obj` the
+                first.
             particles: k is every k-th particle, or body, beginning with the first.
             surfaces: of `.vtkhdf`, write also the walls, as triangles, to `NAME.surfaces.vtkhdf`. Those of surfaces of
                 more than 20 000 bodies are left out.
-            overwrite: replace existing files.
+            overwrite: replace existing files; of a longer sequence of `.ply` all of them.
             progress: is called with how many frames are written, and how many there are to write.
 
         Returns:
             The files. They have their names when they are whole; one frame at a time is in memory.
 
         Raises:
-            SceneError: another suffix, an argument out of its range, a library that is missing, or a file that exists.
+            SceneError: another suffix, an argument out of its range or that is not one of the format, a library that
+                is missing, or a file that exists.
             FileError: the file cannot be written.
         """
         from .export import export

@@ -2,7 +2,8 @@
 
 import contextlib
 import os
-from collections.abc import Iterator
+import shutil
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -36,20 +37,65 @@ def replaced(path: Path, what: str) -> Iterator[IO[bytes]]:
 
 
 @contextlib.contextmanager
-def named_when_whole(target: Path) -> Iterator[Path]:
-    """The name under which others write a file, which gets its own when it is whole, and is removed if it never is.
+def together(target: Path, files: Sequence[Path], stale: Sequence[Path] = ()) -> Iterator[list[Path]]:
+    """The names under which others write files, which get their own when all are whole, and are removed else.
+
+    They are in a hidden folder beside `target`, which what is killed leaves, and the next one removes. Then the files
+    of these names, and those that are `stale`, are replaced.
 
     Raises:
-        FileError: it cannot be written.
+        FileError: they cannot be written; the old ones are there.
     """
-    part = paths.part_of(target)
+    folder = paths.part_of(target)
     try:
-        yield part
-        os.replace(part, target)
+        _remove(folder)
+        folder.mkdir()
+        parts = [folder / one.name for one in files]
+        yield parts
+        if len(files) == 1 and not stale:
+            os.replace(parts[0], files[0])
+        else:
+            _exchange(parts, files, [one for one in (*files, *stale) if one.exists()], folder)
     except SwarmError:
         raise
     except (OSError, RuntimeError) as error:
         raise FileError(f"cannot write {target}: {error}") from error
     finally:
         with contextlib.suppress(OSError):
-            part.unlink()
+            _remove(folder)
+
+
+@contextlib.contextmanager
+def named_when_whole(target: Path) -> Iterator[Path]:
+    """The name under which others write one file; as `together`."""
+    with together(target, [target]) as (part,):
+        yield part
+
+
+def _remove(folder: Path) -> None:
+    if folder.is_dir():
+        shutil.rmtree(folder)
+    else:
+        folder.unlink(missing_ok=True)
+
+
+def _exchange(parts: Sequence[Path], files: Sequence[Path], old: Sequence[Path], folder: Path) -> None:
+    """Give files their names, after the old ones are set aside; all of them, or on an error none.
+
+    Who is killed in this instant leaves no file without those that follow: a sequence has no beginning then.
+    """
+    aside = folder / "old"
+    aside.mkdir()
+    try:
+        for one in old:
+            os.replace(one, aside / one.name)
+        for part, one in reversed(list(zip(parts, files, strict=True))):
+            os.replace(part, one)
+    except BaseException:
+        for part, one in zip(parts, files, strict=True):
+            if not part.exists() and one.exists():
+                one.unlink()
+        for one in old:
+            if (aside / one.name).exists():
+                os.replace(aside / one.name, one)
+        raise

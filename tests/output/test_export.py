@@ -201,7 +201,10 @@ def test_some_frames_and_particles(stored, tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"path": "out.pdb"}, r"expected a file name that ends in \.vtkhdf, \.xyz, \.gsd, got .*out\.pdb"),
+        (
+            {"path": "out.pdb"},
+            r"expected a file name that ends in \.vtkhdf, \.xyz, \.gsd, \.ply, \.csv, \.obj, got .*out\.pdb",
+        ),
         ({"frames": 6}, r"frames must lie between -6 and 5, got 6"),
         ({"frames": 1.5}, r"frames must be a whole number, got 1\.5"),
         ({"frames": slice(7, 9)}, r"frames must hold one of the frames 0 to 5"),
@@ -285,7 +288,7 @@ def test_the_command(stored, tmp_path):
     ] == 3 * [[0, 3]]
     for words, message in (
         (("-o", "out.vtkhdf"), "out.vtkhdf exists"),
-        (("-o", "out.csv"), "ends in .vtkhdf, .xyz, .gsd"),
+        (("-o", "out.pdb"), "ends in .vtkhdf, .xyz, .gsd, .ply, .csv, .obj"),
         (("-o", "out.xyz", "--frames", "a:b"), "--frames must be a number, or A:B or A:B:K"),
     ):
         done = command("export", str(stored["cell"]), *words, cwd=tmp_path)

@@ -1,0 +1,46 @@
+"""CSV: a line a particle and frame, for spreadsheets, pandas and R, with the digits that give the same bits again.
+
+The first line has the names, plain ones, of the columns, so that every program reads the file unaided: frame, time [s],
+id, x, y, z [m], vx, vy, vz [m/s], mass [kg], of balls radius [m], where they turn wx, wy, wz [rad/s], then impacts and
+what else there is; of points of bodies also body, its number. A cell is empty where there is no number: the time of an
+escape of who is inside. Of one frame the file is a start: `from = "start.csv"`, `Particles.from_csv`.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from .exported import Exported
+
+# Columns of vectors, by their names; of others the names of the components are NAME_x, NAME_y, NAME_z.
+_VECTORS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "spin": ("wx", "wy", "wz")}
+
+
+def write(chosen: Exported, path: Path) -> None:
+    """Write the particles."""
+    encode, begun = msgspec.json.Encoder().encode, False
+    copies = chosen.trajectory.copies
+    with open(path, "wb") as file:
+        for moment in chosen.moments():
+            columns: dict[str, Any] = {"id": moment.ids, "position": moment.position, "velocity": moment.velocity}
+            columns["mass"] = moment.mass
+            columns |= {} if chosen.radius is None else {"radius": chosen.radius}
+            columns |= {"spin": moment.more["spin"]} if "spin" in moment.more else {}
+            columns |= {"body": moment.ids % copies} if copies else {}
+            columns |= moment.more
+            if not begun:
+                names = [part for name, column in columns.items() for part in _names(name, column.ndim)]
+                file.write(f"frame,time,{','.join(names)}\n".encode())
+                begun = True
+            if not len(moment.ids):
+                continue
+            numbers = [part for column in columns.values() for part in np.atleast_2d(column.T).tolist()]
+            # A writer of JSON is three times as fast as formatting by Python, with the same digits: [[1.5,2],[...]].
+            rows, begin = encode(list(zip(*numbers, strict=True)))[2:-2], f"{moment.number},{moment.time!r},".encode()
+            file.write(begin + rows.replace(b"],[", b"\n" + begin).replace(b"null", b"") + b"\n")
+
+
+def _names(name: str, dimensions: int) -> tuple[str, ...]:
+    return _VECTORS.get(name, tuple(f"{name}_{axis}" for axis in "xyz")) if dimensions > 1 else (name,)
