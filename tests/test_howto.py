@@ -92,7 +92,7 @@ FACTS = {
         "0000.npz", "0050.npz", "0100.npz"
     ],
     "Trajectories in float32": lambda a: os.path.getsize("float32.h5") < 0.7 * os.path.getsize("float64.h5"),
-    "A film, a picture, ParaView and Blender": lambda a: Path("run.gif").stat().st_size > 10_000,
+    "A film, a picture, ParaView and Blender": lambda a: Path("run.mp4").stat().st_size > 10_000,
 }  # fmt: skip
 
 
