@@ -6,9 +6,7 @@ import math
 import numpy as np
 
 from ..methods import Impact
-from ..methods.base import Method
 from ..methods.verlet import Verlet
-from ..particles import Particles
 from ..scene import Scene
 from . import workload
 from .options import Task
@@ -21,7 +19,7 @@ _STEP, _CONTACT, _ROUND_OFF = 0.25, 0.5, 1e-4
 _SURELY = 1e-2
 # Explicit steps of a spring are stable up to this many over its angular frequency.
 _STABLE = 2.0
-# Particles at which the slope of phi is looked at.
+# Particles that are looked at.
 _LOOKED_AT = 1000
 
 
@@ -30,10 +28,20 @@ def give(task: Task) -> None:
     warn_of_overlap(task.scene)
     _warn_of_fall(task.scene)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
-        _warn_of_rest(task)
+        # About the fastest: of some.
+        some = task.particles.velocity[:, _some(len(task.particles))]
+        fastest = float(np.sqrt((some**2).sum(axis=0).max()))
+        speed = _speed(task.scene, fastest)
+        if fastest == 0.0:
+            _warn_of_rest(task)
         with np.errstate(all="ignore"):
-            _warn_of_times(task)
-            _warn_of_steps(task.scene, task.particles, task.method)
+            _warn_of_times(task, speed)
+            _warn_of_steps(task, speed)
+
+
+def _some(count: int) -> slice:
+    """Some of so many particles."""
+    return slice(0, None, max(1, count // _LOOKED_AT))
 
 
 def _takes_energy(scene: Scene) -> bool:
@@ -60,7 +68,7 @@ def _warn_of_rest(task: Task) -> None:
     """Warn where nothing will move."""
     scene = task.scene
     is_moved = scene.gravity is not None or scene.moves() or scene.has_doors() or bool(task.options.sources)
-    if task.particles.fastest() == 0.0 and not is_moved:
+    if not is_moved and task.particles.fastest() == 0.0:
         _LOG.warning(
             "all %d particles are at rest, and nothing pulls or pushes them: nothing will move; give them a speed or a "
             "temperature, or the scene gravity",
@@ -68,20 +76,23 @@ def _warn_of_rest(task: Task) -> None:
         )  # fmt: skip
 
 
-def _crossing(scene: Scene, particles: Particles) -> float:
-    """The time in which the fastest particle crosses the scene [s]."""
-    fastest, pull, size = particles.fastest(), math.hypot(*(scene.gravity or (0.0,))), scene.finite_size()
-    speed = math.hypot(fastest, math.sqrt(2.0 * pull * size))
-    return size / speed if speed > 0.0 else math.inf
+def _speed(scene: Scene, fastest: float) -> float:
+    """The speed of the fastest particle after a fall through the scene [m/s]."""
+    return math.hypot(fastest, math.sqrt(2.0 * math.hypot(*(scene.gravity or (0.0,))) * scene.finite_size()))
 
 
-def _warn_of_times(task: Task) -> None:
+def _crossing(scene: Scene, speed: float) -> float:
+    """The time of a crossing of the scene at a speed [s]."""
+    return scene.finite_size() / speed if speed > 0.0 else math.inf
+
+
+def _warn_of_times(task: Task, speed: float) -> None:
     """Warn where the last times of a run are so late that float64 does not tell those of impacts apart."""
     scene, until = task.scene, task.options.until
     every = task.options.times.every
     assert every is not None
     kept = float(np.spacing(until))
-    if scene.moves() or kept < _SURELY * _ROUND_OFF * _crossing(scene, task.particles):
+    if scene.moves() or kept < _SURELY * _ROUND_OFF * _crossing(scene, speed):
         return
     between = workload.time_between(scene, task.particles)
     if kept > _ROUND_OFF * between:
@@ -96,14 +107,15 @@ def _warn_of_times(task: Task) -> None:
         )  # fmt: skip
 
 
-def _warn_of_steps(scene: Scene, particles: Particles, method: Method) -> None:
+def _warn_of_steps(task: Task, speed: float) -> None:
     """Warn where a step, or a contact with a soft wall, is a large part of the time between impacts."""
+    scene, particles, method = task.scene, task.particles, task.method
     name = "contact_step" if isinstance(method, Impact) else "dt"
     step, law = getattr(method, name, None), method.law()
     if not step or scene.moves():
         return
-    contact, depth = (0.0, 0.0) if law is None or method.is_rigid() else _contact(scene, particles, method)
-    if max(step / _STEP, contact / _CONTACT) < _SURELY * _crossing(scene, particles):
+    contact, depth = (0.0, 0.0) if law is None or method.is_rigid() else _contact(task, speed)
+    if max(step / _STEP, contact / _CONTACT) < _SURELY * _crossing(scene, speed):
         return
     between = workload.time_between(scene, particles)
     said = f"the time between impacts is about T = {between:.2g} s; "
@@ -127,18 +139,17 @@ def _warn_of_steps(scene: Scene, particles: Particles, method: Method) -> None:
         )  # fmt: skip
 
 
-def _contact(scene: Scene, particles: Particles, method: Method) -> tuple[float, float]:
+def _contact(task: Task, speed: float) -> tuple[float, float]:
     """How long the shortest contact with a soft wall lasts [s], and how deep the fastest sinks in [m].
 
     Of m g'' = -alpha s^2 g^a, s the slope of phi: see `contact_time` of grains.
     """
+    scene, particles, method = task.scene, task.particles, task.method
     a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
-    mass, p = float(particles.mass.min()), 1.0 / (a + 1.0)
-    size = scene.finite_size()
-    speed = math.hypot(particles.fastest(), math.sqrt(2.0 * math.hypot(*(scene.gravity or (0.0,))) * size))
+    mass, p = float(particles.mass[_some(len(particles))].min()), 1.0 / (a + 1.0)
     if speed == 0.0:
         return 0.0, 0.0
-    some = particles.position[:, :: max(1, len(particles) // _LOOKED_AT)]
+    some = particles.position[:, _some(len(particles))]
     slopes = [np.sqrt((one.gradient(some) ** 2).sum(axis=0)) for one in scene.surfaces]
     nearest = np.argmax(scene.gaps(some), axis=0)
     slope = float(np.median(np.array(slopes)[nearest, np.arange(some.shape[1])]))
