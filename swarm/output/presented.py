@@ -139,7 +139,8 @@ class Presented(Stored):
         """A film of the particles or bodies among their walls, which a notebook shows.
 
         It is drawn as by `animate`, smaller and of fewer frames: all of it is kept in the notebook, some 0.5 MB. It
-        needs no kernel and no network to play when the notebook is opened again. `film.save("run.mp4")` writes it.
+        needs no kernel and no network to play when the notebook is opened again; in one that is not trusted it waits
+        for its play button. `film.save("run.mp4")` writes it.
 
         Args:
             frames: the most that are drawn, evenly chosen, with the first and the last.
