@@ -20,6 +20,7 @@ _EYE = 1.3
 # Between the faces of bodies, which have no shading.
 _EDGE = (10, 10, 12, 255)
 _CAVITY_WIRE, _SOLID_WIRE = (150, 175, 200, 160), (235, 180, 130, 255)
+SOLID_LOOKS = _SOLID, _SOLID_WIRE
 
 
 def path_of(shape: Shape) -> str:

@@ -222,8 +222,8 @@ class Presented(Stored):
             frames: a slice of the frames, such as slice(0, None, 10), or the number of one; None: all, of `.obj` the
                 first.
             particles: k is every k-th particle, or body, beginning with the first.
-            surfaces: of `.vtkhdf`, write also the walls, as triangles, to `NAME.surfaces.vtkhdf`. Those of surfaces of
-                more than 20 000 bodies are left out.
+            surfaces: of `.vtkhdf`, write also the walls, as triangles, to `NAME.surfaces.vtkhdf`. Fields of
+                more than 2000 solids are points of `NAME.solids.vtkhdf`, a few numbers for each.
             overwrite: replace existing files; of a longer sequence of `.ply` all of them.
             progress: is called with how many frames are written, and how many there are to write.
 

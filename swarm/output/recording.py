@@ -5,6 +5,7 @@
 /scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise; of one that moves
                               also Transform3D, a frame's, from where it is at the start; where there are doors not
                               static, but from each frame on in which others are there
+                              fields of more than 2000 solids have bodies: Points3D with radii, Boxes3D, ... for mesh
 /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
 /time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
 /about                        meaning of the colours, as text and as values, and the origin; static
@@ -31,7 +32,7 @@ from ..errors import FileError, SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
-from . import colours, looks, paths, series, viewer
+from . import colours, instanced, looks, paths, series, solids, viewer
 from .drawn import Drawn
 from .origin import origin_of
 from .playback import LINES, MESH, PARTICLES
@@ -128,9 +129,11 @@ class RecordingWriter:
         self._scale, self._values = colours.colouring(color, scene, method, shown)
 
     def __enter__(self) -> WriteFrames:
-        self._shapes = shapes_of(self._scene, self._at_start)
+        self._shapes = shapes_of(self._scene, self._at_start, most=solids.MANY)
         self._series = series.lines_of(self._scene, self._method, self._shapes, self._body, self._more)
         fixed = sum(24 * len(s.vertices) + 12 * len(s.triangles) + 12 * sum(map(len, s.wires)) for s in self._shapes)
+        many = solids.solids_of(self._scene, 0.0)
+        fixed += sum(map(instanced.size_of, many))
         lines, triangles = len(self._drawn.lines), len(self._drawn.triangles)
         points = self._at_start.shape[1] * (2 if triangles else 1)
         frame = _PARTICLE_BYTES * points + _LINE_BYTES * lines + _NUMBER_BYTES * (4 + len(self._series))
@@ -152,6 +155,8 @@ class RecordingWriter:
             raise FileError(f"cannot write the recording {self._path}: {error}") from error
         self.stream.set_log_time_enabled(False)
         looks.log_static(self.stream, self._drawn, [] if self._has_doors else self._shapes, self._center)
+        if not self._has_doors:
+            self._log_solids(many, static=True)
         looks.log_series(self.stream, self._series)
         looks.log_about(self.stream, self._drawn, self._scale, self._stride, self._center, self._scene.plane)
         return self._write
@@ -223,9 +228,16 @@ class RecordingWriter:
                 self._instant = instant
                 self.stream.set_time("frame", sequence=number)
                 self.stream.set_time("sim_time", duration=min(moment, _LATEST))
-                shapes = shapes_of(self._scene, self._at_start, moment)
+                shapes = shapes_of(self._scene, self._at_start, moment, most=solids.MANY)
                 looks.log_walls(self.stream, shapes, self._center, static=False)
+                self._log_solids(solids.solids_of(self._scene, moment), static=False)
                 self.stream.reset_time()
+
+    def _log_solids(self, many: list[solids.Solids], static: bool) -> None:
+        """Log the fields of many solids, or those that are there from the time of the stream on."""
+        for shape in self._shapes:
+            for one in (one for one in many if one.surface == shape.surface):
+                instanced.log(self.stream, looks.path_of(shape), one, self._center, looks.SOLID_LOOKS, static)
 
     def _send_walls(self, numbers: Any, times: Any, walls: list[tuple[Any, Any]]) -> None:
         """Send where the surfaces that move are, (position, orientation) a frame, from where they were drawn."""

@@ -21,6 +21,7 @@ from .gridded import NOTHING, Corners, Grids, balls, each_body, foam, given_box,
 from .named import name_of
 from .parts import parts_of
 from .planar import PlaneWalls
+from .solids import is_of_solids
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def those_there(positions: Floats) -> Floats:
 def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = math.inf) -> list[Shape]:
     """A shape for every surface at a time [s]; where the volume is open, as far as surfaces and particles (3, N) go.
 
-    That of a surface of more than `most` bodies is empty.
+    That of a field of more than `most` solids is empty: see solids.py.
     """
     positions = those_there(positions)
     if scene.plane is not None:
@@ -83,13 +84,13 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
         if not bodies and sharp_ones:
             shapes += sharp_ones[i]
             continue
-        if not surface.is_there(time):
+        if not surface.is_there(time) or (bodies > most and is_of_solids(surface)):
             pass
-        elif bodies <= most and isinstance(surface, Spheres):
+        elif isinstance(surface, Spheres):
             mesh, wires = placed(at, *(foam(surface) if surface.is_foam() else balls(surface)))
-        elif bodies and bodies <= most:
+        elif bodies:
             mesh, wires = placed(at, *each_body(surface, given_box(walls.box, at)))
-        elif not bodies:
+        else:
             mesh, wires = walls.drawn(i, at)
         name = name_of(scene, i)
         solid = surface.is_solid() or i in grouped
@@ -134,7 +135,8 @@ def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) 
                 name, motion = name_of(scene, i, part.place), part.surface.motion if part.place else None
                 shapes.append(Shape(name, part.solid, *drawn, i, part.place, motion))
             continue
-        wires = walls.curves(i, at, bodies) if bodies <= most and surface.is_there(time) else []
+        left_out = not surface.is_there(time) or (bodies > most and is_of_solids(surface))
+        wires = [] if left_out else walls.curves(i, at, bodies)
         shapes.append(Shape(name, solid, *walls.strip(wires), wires, walls.height, i))
     return shapes
 

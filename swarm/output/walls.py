@@ -1,10 +1,18 @@
-"""The walls of a trajectory as a VTKHDF file of triangles: at rest, or where they are in every frame.
+"""The walls of a trajectory as VTKHDF: triangles, and the solids of large fields, at rest or where they are in a frame.
 
-Cells have the data "surface", the place in `scene.surfaces`, and "solid", 1 where particles are kept out of it; where
-there are unions also "part", the number of the part among those of all of them, or -1.
+Cells of triangles have the data "surface", the place in `scene.surfaces`, and "solid", 1 where particles are kept out
+of it; where there are unions also "part", the number of the part among those of all of them, or -1.
+
+The solids of fields of more than 2000 are points of a file of their own: with "surface", "kind" (0 spheres, 1 boxes,
+2 cylinders, 3 capsules, 4 ellipsoids), "radius" [m] of what has one, "halves", half of the extent along their axes
+[m], and "orientation", a quaternion (w, x, y, z). ParaView draws spheres as Point Gaussian, or by Glyph of a Sphere of
+radius 1 that is scaled by "radius", others by Glyph of a Box, Cylinder or Sphere of half widths 1 that is scaled by
+"halves" and turned by "orientation", in mode Quaternion. A million take 120 MB.
 """
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -12,15 +20,15 @@ import numpy as np
 from . import vtkhdf
 from .exported import Exported
 from .shapes import Shape, shapes_of, since_start
+from .solids import MANY, Solids, solids_of
 
-# Bodies of one surface that are drawn: each has some 200 vertices.
-_MOST = 20_000
+KINDS = ("spheres", "boxes", "cylinders", "capsules", "ellipsoids")
 
 
 def shapes(chosen: Exported) -> list[Shape]:
     """The walls at the start, as far as there were particles in the first frame that is exported."""
     positions = chosen.trajectory.frame(chosen.numbers[0]).position
-    return shapes_of(chosen.trajectory.scene, positions, most=_MOST)
+    return shapes_of(chosen.trajectory.scene, positions, most=MANY)
 
 
 def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
@@ -48,3 +56,39 @@ def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
             for shape, first in zip(drawn, done * firsts[-1] + firsts[:-1], strict=True):
                 turn, way = since_start(chosen.trajectory.scene, shape, seen["time"][number], places)
                 points[first : first + len(shape.vertices)] = shape.vertices @ turn.T + way
+
+
+def write_solids(chosen: Exported, path: Path) -> None:
+    """Write the solids of large fields as points."""
+    scene, times = chosen.trajectory.scene, chosen.times.tolist()
+    first = solids_of(scene, times[0], absent=True)
+    count = sum(len(one.centers) for one in first)
+    with h5py.File(path, "w") as file:
+        root = vtkhdf.begin(file, {"Vertices": np.arange(count)[:, None]}, count)
+        names = {
+            "surface": _of_all(first, lambda one: np.full(len(one.centers), one.surface)),
+            "kind": _of_all(first, lambda one: np.full(len(one.centers), KINDS.index(one.kind))),
+            "radius": _of_all(
+                first, lambda one: np.where(one.kind in ("boxes", "ellipsoids"), np.nan, one.halves[:, 0])
+            ),
+            "halves": _of_all(first, lambda one: one.halves),
+        }
+        for name, values in names.items():
+            root[f"PointData/{name}"] = values
+        frames = len(times) if scene.moves() else 1
+        root.create_dataset("Points", (frames * count, 3), np.float64)
+        root.create_dataset("PointData/orientation", (frames * count, 4), np.float64)
+        for k in range(frames):
+            there = solids_of(scene, times[k], absent=True)
+            rows = slice(k * count, (k + 1) * count)
+            root["Points"][rows] = _of_all(there, lambda one: one.centers)
+            root["PointData/orientation"][rows] = _of_all(there, lambda one: one.turns)
+        if scene.moves():
+            steps = vtkhdf.timed(root, chosen, count)
+            for name in (*names, "orientation"):
+                moved = count * np.arange(frames) if name == "orientation" else np.zeros(frames, np.int64)
+                steps[f"PointDataOffsets/{name}"] = moved
+
+
+def _of_all(each: list[Solids], values: Callable[[Solids], Any]) -> Any:
+    return np.concatenate([values(one) for one in each])

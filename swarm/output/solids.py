@@ -1,0 +1,114 @@
+"""Fields of many solids as what each of them is, a few numbers, without triangles: places, sizes and directions.
+
+For viewers that draw a million of them from one mesh: Rerun (instanced.py) and ParaView (walls.py).
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..motion import Pose
+from ..scene import Scene
+from ..state import Floats
+from ..surfaces import Boxes, Capsules, Cylinders, Ellipsoids, Spheres
+from ..surfaces.rotation import after, onto
+from ..surfaces.surface import Surface
+
+# A field of more solids is shown so.
+MANY = 2_000
+_CIRCLE = 25
+_CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
+
+
+class Solids(NamedTuple):
+    """The solids of a field.
+
+    Attributes:
+        surface: its number in the scene.
+        kind: "spheres", "boxes", "cylinders", "capsules" or "ellipsoids".
+        centers: (n, 3) [m].
+        halves: (n, 3) half of the extent along the axes of each, for capsules with their caps [m].
+        turns: (n, 4) quaternions (w, x, y, z) of these axes.
+    """
+
+    surface: int
+    kind: str
+    centers: Floats
+    halves: Floats
+    turns: Floats
+
+
+def solids_of(scene: Scene, time: float, absent: bool = False) -> list[Solids]:
+    """The fields of many solids of a scene, where they are at a time [s]; with `absent` also those that are not."""
+    each = enumerate(zip(scene.surfaces, scene.poses(time), strict=True))
+    return [
+        _placed(i, surface, at) for i, (surface, at) in each if is_many(surface) and (absent or surface.is_there(time))
+    ]
+
+
+def is_of_solids(surface: Surface) -> bool:
+    """Whether each of the bodies of a surface is shown as it is: those of a foam are not, nor what has no end."""
+    if not isinstance(surface, Spheres | Boxes | Capsules | Cylinders | Ellipsoids):
+        return False
+    return not surface.is_foam() and not (isinstance(surface, Cylinders) and surface.lengths is None)
+
+
+def is_many(surface: Surface) -> bool:
+    """Whether a surface is a field of so many solids that it is shown as what each is."""
+    return is_of_solids(surface) and len(surface) > MANY  # type: ignore[arg-type]
+
+
+def _placed(i: int, surface: Any, at: Pose) -> Solids:
+    """The solids of surface i, in its pose."""
+    n, still = len(surface), np.array([1.0, 0.0, 0.0, 0.0])
+    turns: Any = np.broadcast_to(still, (n, 4))
+    if isinstance(surface, Spheres):
+        halves = np.repeat(surface.radii[:, None], 3, axis=1)
+    elif isinstance(surface, Boxes | Ellipsoids):
+        halves = surface.half_widths if isinstance(surface, Boxes) else surface.semi_axes
+        if surface.rotations is not None:
+            turns = _unit(surface.rotations)
+    else:
+        ends = surface.radii if isinstance(surface, Capsules) else 0.0
+        halves = np.stack([surface.radii, surface.radii, 0.5 * surface.lengths + ends], axis=1)
+        axes, which = np.unique(_unit(surface.axes), axis=0, return_inverse=True)
+        turns = np.array([onto(tuple(axis)) or still for axis in axes.tolist()])[which.ravel()]
+    if not np.array_equal(at.turn, np.eye(3)):
+        several, which = np.unique(turns, axis=0, return_inverse=True)
+        turns = np.array([after(at.quaternion, tuple(turn)) or still for turn in several.tolist()])[which.ravel()]
+    kind = type(surface).__name__.lower()
+    return Solids(i, kind, at.placed(surface.centers.T).T, np.asarray(halves), np.asarray(turns))
+
+
+def _unit(rows: Floats) -> Floats:
+    """Vectors, or quaternions, of any length, as those of length 1."""
+    return np.asarray(rows / np.sqrt((rows**2).sum(axis=1, keepdims=True)))
+
+
+def matrices(turns: Floats) -> Floats:
+    """The rotations (n, 3, 3) of quaternions (n, 4)."""
+    w, x, y, z = turns.T
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def curves(solids: Solids, most: int = MANY) -> list[Floats]:
+    """Curves (k, 3) of at most so many of them, evenly chosen: three ellipses, of a box or a cylinder its outlines."""
+    some = slice(None, None, math.ceil(len(solids.centers) / most))
+    angle = np.linspace(0.0, 2.0 * math.pi, _CIRCLE)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    of_one = []
+    for k in range(3):
+        flat = _CORNERS if solids.kind == "boxes" or (solids.kind == "cylinders" and k < 2) else circle
+        of_one.append(np.insert(flat, k, 0.0, axis=1))
+    turns = matrices(solids.turns[some])
+    placed = [
+        solids.centers[some, None] + np.einsum("nij,nkj->nki", turns, solids.halves[some, None] * one)
+        for one in of_one
+    ]  # fmt: skip
+    return [curve for one in zip(*placed, strict=True) for curve in one]
