@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .bodies.placing import place
     from .bodies.shapes import chain, dumbbell, rigid, tetrahedron
     from .bodies.state import Bodies
+    from .ensemble.report import report
     from .ensemble.sweeping import sweep
     from .errors import CompleteError, FileError, RunError, SceneError, SwarmError, WallTimeError
     from .filling import fill
@@ -72,6 +73,7 @@ _HOMES = {
     "bodies.placing": ("place",),
     "bodies.shapes": ("chain", "dumbbell", "rigid", "tetrahedron"),
     "bodies.state": ("Bodies",),
+    "ensemble.report": ("report",),
     "ensemble.sweeping": ("sweep",),
     "errors": ("FileError", "CompleteError", "RunError", "SceneError", "SwarmError", "WallTimeError"),
     "filling": ("fill",),
@@ -109,8 +111,8 @@ __all__ = [
     "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab",
     "Source", "Sphere", "Spheres", "Stadium", "Sticky", "Strain", "SwarmError", "Torus", "Trajectory", "Translation",
     "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history",
-    "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "pack", "place", "rigid", "simulate", "sweep",
-    "tetrahedron",
+    "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "pack", "place", "report", "rigid", "simulate",
+    "sweep", "tetrahedron",
 ]  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from . import interrupt
 from .commands.export import export
 from .commands.info import info
 from .commands.pictures import animate, plot, record, view
+from .commands.report import report
 from .commands.run import run
 from .commands.sweep import sweep
 from .errors import SceneError, SwarmError
@@ -51,6 +52,7 @@ app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavit
 app.command(epilog="Example:  swarm record cavity.h5 -o cavity.rrd")(record)
 app.command(epilog="Example:  swarm view cavity.rrd -o cavity.png --times 0,5,10")(view)
 app.command(epilog="Example:  swarm plot cavity.h5 -o cavity.png")(plot)
+app.command(epilog="Example:  swarm report cavity.h5 -o cavity.html, or swarm report FOLDER of a sweep")(report)
 app.command(epilog="Example:  swarm animate cavity.h5 -o cavity.mp4 --frames 100")(animate)
 app.command(epilog="Example:  swarm export cavity.h5 -o cavity.vtkhdf --frames ::10")(export)
 

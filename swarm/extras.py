@@ -17,6 +17,7 @@ _PACKAGES = {
     "notebook": "'rerun-sdk[notebook]' scikit-image contourpy",
     "cluster": "distributed",
     "gsd": "gsd",
+    "report": "jinja2 matplotlib scikit-image",
 }
 
 

@@ -16,6 +16,8 @@ from ..output.replaced import replaced
 from .plan import STEM, Plan, Variant
 
 TABLES = ("csv", "parquet")
+# The copy of the sweep file in the folder.
+KEPT = "sweep.toml"
 Status = dict[str, Any]
 
 
@@ -82,6 +84,11 @@ class Results:
             for path in (*files, self.impacts(variant)):
                 if path is not None:
                     path.unlink(missing_ok=True)
+
+    def keep_file(self) -> None:
+        """Keep the sweep file in the folder, for whoever asks later what the runs are."""
+        with replaced(self.folder / KEPT, "sweep file") as file:
+            file.write(self.plan.path.read_bytes())
 
     def add(self, variant: Variant, status: Status) -> None:
         """Note the end of a run."""

@@ -141,6 +141,7 @@ def carry_out(path: str | os.PathLike[str], options: SweepOptions) -> Outcome:
         if options.overwrite:
             results.remove()
         results.find()
+        results.keep_file()
         stopped = _run(plan, results, options, began)
         results.write()
     return Outcome(results, stopped, time.monotonic() - began)

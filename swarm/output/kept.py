@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from . import layout
+from . import layout, provenance
 from .presented import Presented
 from .stored import finite
 
@@ -109,3 +109,29 @@ class Kept(Presented):
     def scene_text(self) -> str | None:
         """The scene file that was run."""
         return self._text("scene_file") if self._has("parameters/scene_file") else None
+
+    @property
+    def until(self) -> float | None:
+        """The end that the run was to reach [s]; None in files of older versions, and of runs on clusters."""
+        with self._reading("its end") as file:
+            return float(finite(file["parameters/until"][()])) if "parameters/until" in file else None
+
+    @property
+    def threads(self) -> int | None:
+        """The threads of the last session of the run; None as for `until`."""
+        with self._reading("its threads") as file:
+            return int(file["parameters/threads"][()]) if "parameters/threads" in file else None
+
+    @property
+    def wall_times(self) -> NDArray[np.float64] | None:
+        """The seconds that the run had taken in all its sessions when each frame was written; None as for `until`."""
+        with self._reading("its wall times") as file:
+            if "parameters/wall_time" not in file:
+                return None
+            return finite(file["parameters/wall_time"][: len(file["parameters/time"])])
+
+    @property
+    def makers(self) -> dict[str, str]:
+        """What made the file, and when: "name", "version", "python", "numpy", "numba", "hdf5", "machine", "date"."""
+        with self._reading("what made it") as file:
+            return provenance.creator_of(file)

@@ -71,7 +71,8 @@ def frames(file: Any, path: Path) -> int:
     for name in (f"parameters/{text}" for text in texts):
         if name in file and (h5py.check_string_dtype(dataset(file, name).dtype) is None or file[name].shape != ()):
             raise ValueError(f"{name} must be a text")
-    for name, kinds in (("seed", _INTEGER), ("copies", _INTEGER), ("volume", _REAL)):
+    whole = ("seed", "copies", "threads")
+    for name, kinds in (*((name, _INTEGER) for name in whole), ("volume", _REAL), ("until", _REAL)):
         if f"parameters/{name}" in file:
             dataset(file, f"parameters/{name}", kinds, ())
     count = int(dataset(file, "parameters/particles", _INTEGER, ())[()])
@@ -79,6 +80,8 @@ def frames(file: Any, path: Path) -> int:
     n = int(time.shape[0])
     require_fits(time, n, path)
     dataset(file, "parameters/frame", _INTEGER, (n,))
+    if "parameters/wall_time" in file:
+        dataset(file, "parameters/wall_time", _REAL, (n,))
     if "observables" in file:
         for name in file["observables"]:
             value = dataset(file, f"observables/{name}/value", _NUMBER)

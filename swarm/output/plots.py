@@ -1,6 +1,8 @@
 """A run in one picture: time series that show whether it went well, speeds, and the particles."""
 
+import functools
 import textwrap
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -203,3 +205,31 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     if (alike := speeds.of_all(content)) is not None:
         title += f",\neach with {amount(alike, 'm/s')}" if alike else ", all at rest"
     figure.suptitle(title, fontsize=10)
+
+
+# --- Of one thing each, for pages ------------------------------------------------------------------------
+
+
+def graphs_of(content: Content, shapes: list[Shape]) -> list[tuple[str, Callable[[Any], None]]]:
+    """The graphs that say something: what each shows, and the function that draws it in axes."""
+    shown: list[tuple[str, Callable[[Any], None]]] = []
+    for group, curves in _shown(content, shapes).items():
+        title = series.title_of(group, content.scene.plane)[0]
+        shown.append((title, functools.partial(_one, content=content, plot={group: curves})))
+    if spread := speeds.of_frames(content):
+        shown.append(("speeds", functools.partial(speeds.draw, content=content, spread=spread)))
+    return shown
+
+
+def _one(axes: Any, content: Content, plot: dict[str, graphs.Curves]) -> None:
+    _series([axes], content, plot, 1)
+
+
+def picture_of_places(
+    content: Content, name: str, shapes: list[Shape], size: tuple[float, float], most: int
+) -> style.Picture:
+    """The particles, or the bodies, of a frame among their walls, without a title."""
+    picture = style.picture(*size)
+    _places(picture, content, content.frames[name], shapes, most)
+    picture.suptitle("")
+    return picture

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .exported import Progress
+    from .page.html import Page
     from .shown_film import Film
 
 
@@ -159,6 +160,33 @@ class Presented(Stored):
         with needed_by("a film", "animation"):
             from . import shown_film
         return shown_film.film_of(self, frames, fps, size, particles)
+
+    def report(self: Any, path: str | Path | None = None, *, overwrite: bool = False) -> "Page":
+        """A page of the run: its scene, whether it went well, graphs, numbers, its speed, and how to reproduce it.
+
+        One file in HTML, some 0.5 MB, for any browser: it needs no other file and no network, is light or dark as the
+        reader's system, and prints well.
+
+        Args:
+            path: `.html`, where the page is written; None: it is only returned.
+            overwrite: replace an existing file.
+
+        Returns:
+            A `Page`, which a notebook shows, and which has `html`, the text, and `save(path)`.
+
+        Raises:
+            SceneError: the file exists or has another suffix, the trajectory is damaged or holds no frame, or jinja2,
+                matplotlib or scikit-image is not installed.
+            FileError: the file cannot be written.
+        """
+        with needed_by("a report", "report"):
+            from .page import html, run
+        if path is not None:
+            html.checked_target(path, overwrite, (self.path,))
+        page = run.of_trajectory(self)
+        if path is not None:
+            page.save(path, overwrite=overwrite)
+        return page
 
     def to_xarray(self: Any) -> "xarray.Dataset":
         """The trajectory as a Dataset of xarray, with the dimensions time, particle, axis and surface.

@@ -8,7 +8,8 @@ particles/all/spin (frames, N, 3) [rad/s]; particles/all/{mass,id} (N,), and
 of a run with sources particles/all/{birth_time,birth_source} (N,), where who comes later is at NaN;
 observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
 number that were run, parameters/start, a digest of them at the start, parameters/seed, of thermal walls, and
-parameters/observables, the names of those of one's own, if there are any. Of bodies:
+parameters/observables, the names of those of one's own, if there are any; parameters/{until,threads}, and
+parameters/wall_time (frames,) [s], the seconds that the run had taken, but of runs on clusters. Of bodies:
 parameters/body, the table of one as TOML text, parameters/copies, their number n, and connectivity/bonds (B n, 2);
 point p of copy i is particle p n + i. All elements share one step and one time dataset by hard links. writer.py
 writes it.

@@ -14,10 +14,10 @@ from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
 from ..state import State
-from ..version import VERSION
 from . import paths
 from .appended import AppendedFile, put
 from .layout import ABSORBED, ARRAYS, BIRTHS, COLLISIONS, COUNTS, ESCAPES, IMAGES, KEPT, PARTS, RADII, SPINS
+from .provenance import Course, makers
 from .storage import Storage
 
 if TYPE_CHECKING:
@@ -68,6 +68,9 @@ class TrajectoryWriter(AppendedFile):
         self._kept = storage.kept(identity.get("first", 0))
         self._count, self._mass, self._text = len(particles), particles.mass[self._kept], scene_text
         self._identity, self._births = identity, particles.births
+        # How the run goes, from who knows it, before the context begins.
+        self.course: Course | None = None
+        self._wall_time: Any = None
         self._radius, self._turns, self._volume = particles.radius, particles.spin is not None, particles.volume
         self._edges: Any = None
 
@@ -85,7 +88,7 @@ class TrajectoryWriter(AppendedFile):
         h5md.attrs["version"] = np.array([1, 1], dtype=np.int32)
         h5md.create_group("author").attrs["name"] = "swarm"
         creator = h5md.create_group("creator")
-        creator.attrs["name"], creator.attrs["version"] = "swarm", VERSION
+        creator.attrs.update(makers())
         parameters = file.create_group("parameters")
         arrays: dict[str, Any] = {}
         texts = descriptions(self._scene, self._method, self._storage, arrays)
@@ -93,8 +96,13 @@ class TrajectoryWriter(AppendedFile):
         for name, value in {**texts, **long, "particles": self._count, **self._identity}.items():
             parameters[name] = value
         self._describe(parameters)
-        self._step = parameters.create_dataset("frame", (0,), np.int64, maxshape=(None,), chunks=(1024,))
-        self._time = parameters.create_dataset("time", (0,), np.float64, maxshape=(None,), chunks=(1024,))
+        self._step, self._time = (
+            parameters.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(1024,))
+            for name, kind in (("frame", np.int64), ("time", np.float64))
+        )
+        if self.course is not None:
+            parameters["until"], parameters["threads"] = self.course.until, self.course.threads
+            self._wall_time = parameters.create_dataset("wall_time", (0,), np.float64, maxshape=(None,), chunks=(1024,))
         self._values: dict[str, Any] = {}
         self._observables: dict[str, Any] = {}
         n = len(self._mass)
@@ -147,6 +155,9 @@ class TrajectoryWriter(AppendedFile):
     def _find(self) -> None:
         parameters = self._file["parameters"]
         self._step, self._time = parameters["frame"], parameters["time"]
+        self._wall_time = parameters.get("wall_time") if self.course is not None else None
+        if self._wall_time is not None and self.course is not None:
+            parameters["until"][()], parameters["threads"][()] = self.course.until, self.course.threads
         kept = [name for name in KEPT if f"particles/all/{name}" in self._file]
         self._edges = self._file.get("particles/all/box/edges/value")
         groups = {"particles/all": kept, "observables": list(self._file["observables"])}
@@ -189,6 +200,8 @@ class TrajectoryWriter(AppendedFile):
                 put(self._edges, first, [_edges_of(self._scene)] * len(frames))
             for name, dataset in self._observables.items():
                 put(dataset, first, [seen[name] for seen in observed])
+            if self._wall_time is not None and self.course is not None:
+                put(self._wall_time, first, [self.course.clock()] * len(frames))
             self._file.flush()
             put(self._step, first, numbers)
             put(self._time, first, times)

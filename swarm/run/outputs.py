@@ -72,9 +72,13 @@ def _trajectory(task: Task, session: Session) -> "Writer | None":
     options = task.options
     if options.trajectory is None:
         return None
+    from ..output.provenance import Course
     from ..output.writer import TrajectoryWriter  # h5py takes 0.2 s to import
 
-    return TrajectoryWriter(
+    writer = TrajectoryWriter(
         options.trajectory, options.storage, task.scene, task.method, task.bodies or task.particles,
         options.scene_text, session.identity, session.first > 0,
     )  # fmt: skip
+    if not task.is_shard:
+        writer.course = Course(options.until, options.thread_count(), session.wall_time)
+    return writer

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from ..output.page.html import Page
+    from ..output.plots import Content
     from ..output.sequence import Frames
     from ..output.shown_film import Film
 
@@ -199,8 +201,49 @@ class Result:
         """
         with needed_by("a plot", "plot"):
             from ..output import plots
+        return plots.figure_of(self._content("plot"), figsize, particles)
+
+    def report(self, path: str | Path | None = None, *, overwrite: bool = False) -> "Page":
+        """A page of the run, one file in HTML, which a notebook shows; see `Trajectory.report`.
+
+        Without a trajectory it does not say how to reproduce the run.
+
+        Args:
+            path: `.html`, where the page is written; None: it is only returned.
+            overwrite: replace an existing file.
+
+        Raises:
+            SceneError: the file exists or has another suffix, the trajectory is damaged, or jinja2, matplotlib or
+                scikit-image is not installed.
+            FileError: the file cannot be written.
+
+        >>> import swarm
+        >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+        >>> result = swarm.simulate(cavity, swarm.fill(cavity, 10, speed=1.0), swarm.Impact(), until=2.0, every=0.5)
+        >>> page = result.report()
+        >>> page.title, page.html[:15]
+        ('10 particles in a sphere: Impact, 2 s', '<!DOCTYPE html>')
+        """
+        with needed_by("a report", "report"):
+            from ..output.page import html, run
+        if self.trajectory is not None and self.trajectory.is_file():
+            from ..output.trajectory import load
+
+            with load(self.trajectory) as written:
+                return written.report(path, overwrite=overwrite)
+        if path is not None:
+            html.checked_target(path, overwrite, ())
+        page = run.of_content(self._content("report"), self.wall_time)
+        if path is not None:
+            page.save(path, overwrite=overwrite)
+        return page
+
+    def _content(self, what: str) -> "Content":
+        """What a picture shows of the run."""
+        from ..output import plots
+
         if self.scene is None or self.method is None:
-            raise SceneError("plot needs a Result that knows its scene and its method, got one without them")
+            raise SceneError(f"{what} needs a Result that knows its scene and its method, got one without them")
         body = None if self.bodies is None else self.bodies.body
         name, frames = "", {}
         if self.trajectory is not None and self.trajectory.is_file():
@@ -210,5 +253,4 @@ class Result:
             with load(self.trajectory) as written:
                 frames = {"start": written.frame(0)} if written.has_particles() else {}
         frames["end"] = self.particles
-        content = plots.Content(name, self.scene, self.method, body, len(self.particles), self.observables, frames)
-        return plots.figure_of(content, figsize, particles)
+        return plots.Content(name, self.scene, self.method, body, len(self.particles), self.observables, frames)

@@ -1,0 +1,126 @@
+"""The graphs of a sweep: each main observable against each parameter that varies, its mean and its spread."""
+
+from typing import Any
+
+import numpy as np
+
+from ..columns import NAMES
+from ..output import style
+from ..output.amounts import plain
+from ..output.page.pictures import Drawn, svg
+from .folder import SweepFolder
+
+# Graphs of each parameter, curves of another parameter in one, and values of a parameter that are numbers on an axis.
+_MOST, _CURVES, _LABELS = 6, 6, 12
+# What says the most, the first the most; [unit].
+_MAIN = {
+    "kinetic_energy": "J", "total_energy": "J", "dissipated_energy": "J", "pressure": "Pa", "impacts": "",
+    "collisions": "", "escaped": "", "absorbed": "", "born": "", "crossings": "", "wall_heat": "J", "wall_work": "J",
+    "work": "J", "source_energy": "J", "potential_energy": "J", "sliding": "", "impulse": "N s", "energy_error": "",
+    "max_penetration": "m",
+}  # fmt: skip
+# Numbers that differ by less, as a part of the largest, are one; errors below are those of round-off.
+_SAME, _ROUND_OFF, _ERRORS = 1e-9, 1e-12, ("energy_error", "max_penetration")
+_REPEATS = "seed"
+
+
+def drawn(sweep: SweepFolder) -> list[tuple[str, list[Drawn]]]:
+    """Of each parameter that varies its graphs."""
+    names = main_observables(sweep)
+    rows = [row for row in sweep.rows if row["state"] == "done"]
+    if not rows:
+        return []
+    return [(key, [_graph(sweep, rows, key, name) for name in names]) for key in sweep.varying()] if names else []
+
+
+def main_observables(sweep: SweepFolder) -> list[str]:
+    """The observables that differ between runs and say the most; those of one's own come first."""
+    columns = {name: _numbers([row.get(name) for row in sweep.rows]) for name in sweep.observables}
+    columns = {name: values[np.isfinite(values)] for name, values in columns.items()}
+    found = [name for name, values in columns.items() if len(values) and _differ(values)]
+    found = [name for name in found if name not in _ERRORS or columns[name].max() > _ROUND_OFF]
+    stems = list(_MAIN)
+    own = [name for name in found if not any(name == known or name.startswith(f"{known}_") for known in NAMES)]
+    told = sorted((name for name in found if _stem(name) in _MAIN), key=lambda name: stems.index(_stem(name)))
+    chosen: list[str] = []
+    for name in [*own, *told]:
+        # Without gravity the total energy is the kinetic one.
+        if not any(_alike(columns[name], columns[other]) for other in chosen):
+            chosen.append(name)
+    return chosen[:_MOST]
+
+
+def _differ(values: Any) -> bool:
+    return bool(np.ptp(values) > _SAME * np.abs(values).max())
+
+
+def _alike(one: Any, other: Any) -> bool:
+    return len(one) == len(other) and bool((np.abs(one - other) <= _SAME * np.abs(one).max()).all())
+
+
+def worst(sweep: SweepFolder) -> list[tuple[str, str]]:
+    """The largest error of the energy and the largest penetration of all runs, as far as these have them."""
+    told = []
+    for name, what, unit in zip(
+        _ERRORS, ("largest error of the energy", "largest penetration"), ("", "m"), strict=True
+    ):
+        values = {str(row["file"]): row[name] for row in sweep.rows if isinstance(row.get(name), (int, float))}
+        if values:
+            file = max(values, key=lambda file: values[file])
+            of = unit or "of the worst particle's energy"
+            told.append((what, f"{plain(values[file], 2)} {of}, in {file}" if values[file] else "none"))
+    return told
+
+
+def _stem(name: str) -> str:
+    """The observable of a column such as impulse_0."""
+    return next((known for known in _MAIN if name == known or name.removeprefix(f"{known}_").isdecimal()), "")
+
+
+def _graph(sweep: SweepFolder, rows: list[dict[str, Any]], key: str, name: str) -> Drawn:
+    others = [one for one in sweep.varying() if one != key and not one.endswith(_REPEATS)]
+    split = next((one for one in others if 1 < len({str(row[one]) for row in rows}) <= _CURVES), None)
+    places, labels = _places([row[key] for row in rows])
+    with style.applied():
+        figure = style.picture(4.2, 2.9)
+        axes = figure.subplots()
+        groups = list(dict.fromkeys(str(row[split]) for row in rows)) if split else [""]
+        for colour, group in zip(style.CURVES, groups, strict=False):
+            mine = [k for k, row in enumerate(rows) if not split or str(row[split]) == group]
+            _curve(axes, places[mine], _numbers([rows[k].get(name) for k in mine]), colour, group)
+        if labels:
+            axes.set_xticks(range(len(labels)), labels)
+        elif (places == places.round()).all():
+            from matplotlib.ticker import MaxNLocator
+
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        if split:
+            axes.legend(title=split, fontsize=7.5, title_fontsize=7.5)
+        axes.set_xlabel(key)
+        unit = _MAIN.get(_stem(name), "")
+        axes.set_title(f"{name}{f' [{unit}]' * bool(unit)}")
+        return Drawn(svg(figure, f"{name} against {key}"), "")
+
+
+def _curve(axes: Any, places: Any, values: Any, colour: str, label: str) -> None:
+    """The mean at each place with the standard deviation of a run, and the runs."""
+    known = np.isfinite(values)
+    places, values = places[known], values[known]
+    where = np.unique(places)
+    mean = [values[places == x].mean() for x in where]
+    spread = [values[places == x].std(ddof=1) if (places == x).sum() > 1 else 0.0 for x in where]
+    axes.plot(places, values, ".", color=colour, alpha=0.35, markersize=3)
+    axes.errorbar(where, mean, spread, color=colour, marker="o", label=label)
+
+
+def _places(values: list[Any]) -> tuple[Any, list[str]]:
+    """Where values are on an axis, and their labels where they are no numbers."""
+    if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
+        return np.array(values, np.float64), []
+    texts = [str(value) for value in values]
+    known = list(dict.fromkeys(texts))
+    return np.array([known.index(text) for text in texts], np.float64), [f"{text:.12}" for text in known]
+
+
+def _numbers(values: list[Any]) -> Any:
+    return np.array([value if isinstance(value, (int, float)) else np.nan for value in values], np.float64)

@@ -1,0 +1,165 @@
+"""The report of a sweep, and of whatever a path is of."""
+
+import os
+import shlex
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from ..extras import needed_by
+from ..output import paths
+
+if TYPE_CHECKING:
+    from ..output.page.html import Page
+
+
+def report(
+    path: str | os.PathLike[str], output: str | os.PathLike[str] | None = None, *, overwrite: bool = False
+) -> "Page":
+    """A page of a run, or of a sweep: one file in HTML for any browser, which a notebook shows.
+
+    Of a run it is that of `Trajectory.report`. Of a sweep it has the table of all runs, which a click on a column
+    sorts, graphs of the main observables over each parameter, mean and spread, the sweep file, how to reproduce it, and
+    links to the files of the runs.
+
+    Args:
+        path: a trajectory, or the folder of a sweep.
+        output: `.html`, where the page is written; None: it is only returned.
+        overwrite: replace an existing file.
+
+    Returns:
+        A `Page`, which has `html`, the text, and `save(path)`. Links to files are relative to `output`, or to the
+        folder that holds that of the sweep.
+
+    Raises:
+        SceneError: the path is neither a trajectory nor the folder of a sweep, what is there is damaged, the file
+            exists or has another suffix, or jinja2, matplotlib or scikit-image is not installed.
+        FileError: the file cannot be written.
+
+    >>> import swarm, tempfile
+    >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    >>> start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=folder + "/run.h5")
+    ...     page = swarm.report(folder + "/run.h5")
+    >>> page.title
+    '1 particle in a sphere: Impact, 1 s'
+    """
+    source = paths.given("path", path)
+    if output is None:
+        return page_of(source, None)
+    target = checked(source, Path(output), overwrite)
+    page = page_of(source, target)
+    page.save(target, overwrite=overwrite)
+    return page
+
+
+def checked(source: Path, output: Path | None, overwrite: bool) -> Path:
+    """The file of the report of a run or a folder; a SceneError if it cannot be written."""
+    with needed_by("a report", "report"):
+        from ..output.page import html
+    named = source.resolve() if source.is_dir() else source
+    target = named.with_name(f"{named.name}.html") if source.is_dir() else source.with_suffix(".html")
+    return html.checked_target(target if output is None else output, overwrite, () if source.is_dir() else (source,))
+
+
+def page_of(source: Path, target: Path | None) -> "Page":
+    """The report of a run or of a folder; its links are as of the file `target`."""
+    with needed_by("a report", "report"):
+        from ..output.page import run
+    if source.is_dir():
+        return of_folder(source, source.resolve().parent if target is None else target.resolve().parent)
+    from ..output.trajectory import load
+
+    run.require_trajectory(source)
+    with load(source) as trajectory:
+        return run.of_trajectory(trajectory)
+
+
+def of_folder(folder: Path, place: Path) -> "Page":
+    """The report of the folder of a sweep, whose links are as of a file in the folder `place`."""
+    from ..output.page.html import Page, filled
+    from . import curves
+    from .folder import found
+
+    sweep = found(folder)
+    states = [str(row["state"]) for row in sweep.rows]
+    told = ", ".join(f"{states.count(state)} {state}" for state in ("done", "failed", "waiting") if state in states)
+    spent = sum(row["wall_time"] for row in sweep.rows if isinstance(row["wall_time"], (int, float)))
+    name = folder.resolve().name
+    title = (
+        f"Sweep {name}: {len(states)} run{'s' * (len(states) != 1)}, over {' and '.join(sweep.varying()) or 'nothing'}"
+    )
+    failed = ["error"] * ("failed" in states)
+    shown = [*sweep.parameters, "state", *failed, "wall_time", *curves.main_observables(sweep)]
+    shown += [one for one in ("energy_error", "max_penetration") if one in sweep.observables and one not in shown]
+    page = filled(
+        "sweep.html.j2",
+        title=title,
+        about=f"folder {name} · {told} · {spent:.3g} s of runs in all",
+        notes=_notes(sweep, states),
+        failures=[(row["file"], row["error"], _told(row, sweep)) for row in sweep.rows if row["state"] == "failed"],
+        columns=["file", *shown],
+        rows=[[(row["file"], _link(folder / str(row["file"]), place)), *(_cell(row.get(one)) for one in shown)]
+              for row in sweep.rows],
+        table=None if sweep.table is None else (sweep.table.name, _link(sweep.table, place)),
+        left_out=len(set(sweep.observables) - set(shown)),
+        graphs=curves.drawn(sweep),
+        worst=[("runs", told), *curves.worst(sweep), ("wall time", f"{spent:.4g} s of all runs together")],
+        sweep_file=sweep.text or "",
+        command=_command(sweep),
+        name=name,
+    )  # fmt: skip
+    return Page(title, page)
+
+
+def _told(row: dict[str, Any], sweep: Any) -> str:
+    return ", ".join(f"{key} = {row.get(key)}" for key in sweep.parameters)
+
+
+def _notes(sweep: Any, states: list[str]) -> list[Any]:
+    """Whether the sweep goes on, or was stopped."""
+    from ..output.page.run import Note, is_written
+
+    waiting = states.count("waiting")
+    if sweep.table is not None and is_written(sweep.table):
+        return [Note(f"The sweep runs now: {waiting} of {len(states)} runs have not ended.")]
+    if waiting:
+        again = f"swarm sweep {shlex.quote(str(sweep.path / 'sweep.toml'))} -o {shlex.quote(str(sweep.path))} --resume"
+        return [
+            Note(f"The sweep is not complete: {waiting} of {len(states)} runs have not ended. Go on with it:", again)
+        ]
+    if sweep.table is None:
+        return [Note("The sweep was killed before its table was written: runs that had not ended are not here.")]
+    return []
+
+
+def _command(sweep: Any) -> str:
+    """The command that carries out the sweep again, or "" where its file is not there."""
+    if sweep.text is None:
+        return ""
+    from ..output.page.reproduce import plugins_of
+
+    try:
+        plugins = plugins_of(tomllib.loads(sweep.text))
+    except ValueError:
+        plugins = ""
+    return f"swarm sweep again.toml -o again{plugins}"
+
+
+def _link(file: Path, place: Path) -> str:
+    """The address of a file as seen from a folder, or "" where there is none."""
+    if not file.is_file():
+        return ""
+    try:
+        return quote(os.path.relpath(file.resolve(), place).replace(os.sep, "/"))
+    except ValueError:  # another drive of Windows
+        return file.resolve().as_uri()
+
+
+def _cell(value: Any) -> tuple[str, Any]:
+    """A cell as it is shown, and as it is sorted by."""
+    if isinstance(value, float):
+        return f"{value:.6g}", repr(value)
+    return ("", "") if value is None else (str(value), str(value))

@@ -1,0 +1,1 @@
+"""Reports: pages in HTML that need nothing besides themselves."""

@@ -1,0 +1,277 @@
+"""Reports of runs: what a page says, that it needs nothing besides itself, and that runs can be reproduced by it."""
+
+import re
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from pages import Read
+
+import swarm
+from swarm.output import paths
+from swarm.output.page import html, pictures
+
+SCENE = """
+gravity = [0.0, 0.0, -9.81]
+[particles]
+count = 20
+speed = 1.0
+seed = 3
+[[surface]]
+kind = "sphere"
+radius = 0.5
+[method]
+kind = "impact"
+[run]
+until = 1.0
+every = 0.25
+"""
+SECTIONS = ["verdicts", "scene", "series", "numbers", "speed", "reproduce"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A run of a scene file, in a file whose name is a tag."""
+    folder = tmp_path_factory.mktemp("<script>alert(1)<")
+    job = folder / "scene.toml"
+    job.write_text(SCENE)
+    run(folder / "<b>run.h5", scene_text=SCENE)
+    return folder
+
+
+def run(path, until=1.0, **options):
+    scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=(0.0, 0.0, -9.81))
+    start = swarm.fill(scene, 20, speed=1.0, seed=3)
+    return swarm.simulate(
+        scene, start, swarm.Impact(), until=until, every=0.25, trajectory=path, compile="never", **options
+    )
+
+
+@pytest.fixture(scope="module")
+def page(folder):
+    return swarm.report(folder / "<b>run.h5")
+
+
+def test_a_page_has_its_sections_and_needs_nothing_besides_itself(page):
+    read = Read(page.html)
+    assert [name for name in read.ids if not re.match(r"g\d+-", name)] == SECTIONS
+    assert not re.search(r"""(src|href|srcset)\s*=\s*["'](https?:)?//""", page.html)
+    assert "script" not in read.tags
+    assert len(page.html) < 2e6
+    assert read.tags.count("svg") >= 4
+    assert read.tags.count("picture") == 2
+
+
+def test_it_says_what_ran_how_well_and_how_fast(page):
+    read = Read(page.html)
+    assert page.title == "20 particles in a sphere, under gravity: Impact, 1 s"
+    assert "✓ holds" in read.texts["verdicts"]
+    assert "energy" in read.texts["verdicts"]
+    for word in ("wall time", "threads", "swarm", "Python", "NumPy", "Numba", "HDF5", "machine", np.__version__):
+        assert word in read.texts["speed"]
+    assert "9.81" in read.texts["scene"]
+    assert SCENE.strip() in read.texts["reproduce"]
+    assert "swarm run '<b>run.toml' -o again.h5" in read.texts["reproduce"]
+
+
+def test_names_are_escaped(page):
+    assert "<b>run" not in page.html
+    assert "&lt;b&gt;run.h5" in page.html
+
+
+def test_texts_of_a_scene_file_are_escaped(tmp_path):
+    evil = SCENE + "# </pre><script>alert(1)</script>\n"
+    run(tmp_path / "run.h5", scene_text=evil)
+    page = swarm.report(tmp_path / "run.h5")
+    assert "<script" not in page.html
+    assert "<script>alert(1)</script>" in Read(page.html).texts["reproduce"]
+
+
+def test_it_is_written_where_it_may_be(folder, page, tmp_path):
+    target = tmp_path / "page.html"
+    with swarm.load(folder / "<b>run.h5") as trajectory:
+        assert trajectory.report(target).title == page.title
+        before = target.read_text()
+        with pytest.raises(swarm.SceneError, match=r"report: .*page.html exists"):
+            trajectory.report(target)
+        trajectory.report(target, overwrite=True)
+    assert Read(before).ids == Read(target.read_text()).ids
+    with pytest.raises(swarm.SceneError, match=r"ends in \.html, got .*page\.pdf"):
+        page.save(tmp_path / "page.pdf")
+    with pytest.raises(swarm.SceneError, match="does not exist; create it first"):
+        page.save(tmp_path / "no" / "page.html")
+    with pytest.raises(swarm.SceneError, match=r"is also the page\.html that it is of"):
+        html.checked_target(target, True, (target,))
+
+
+def test_a_notebook_shows_it(page):
+    shown = page._repr_html_()
+    assert shown.startswith("<iframe")
+    assert "<script" not in shown
+    assert "&lt;!DOCTYPE html&gt;" in shown
+
+
+def test_a_result_without_a_trajectory_has_one_too(tmp_path):
+    scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    result = swarm.simulate(scene, swarm.fill(scene, 5, speed=1.0), swarm.Impact(), until=1.0, compile="never")
+    read = Read(result.report(tmp_path / "page.html").html)
+    assert "keep the script" in read.texts["reproduce"]
+    assert (tmp_path / "page.html").is_file()
+
+
+def test_the_wall_times_of_frames_and_what_made_the_file_are_kept(folder):
+    with swarm.load(folder / "<b>run.h5") as trajectory:
+        assert (np.diff(trajectory.wall_times) >= 0.0).all()
+        assert len(trajectory.wall_times) == len(trajectory) == 5
+        assert trajectory.until == 1.0
+        assert trajectory.threads >= 1
+        assert {"name", "version", "python", "numpy", "numba", "hdf5", "machine", "date"} <= set(trajectory.makers)
+
+
+# --- How to reproduce it ---------------------------------------------------------------------------------
+
+
+def last(path):
+    with swarm.load(path) as trajectory:
+        return trajectory.frame(-1).position
+
+
+def reproduce(page, folder):
+    return Read(page.html).texts["reproduce"]
+
+
+def test_the_lines_of_python_give_the_same_bits(folder, page, tmp_path):
+    lines = reproduce(page, folder).split("In Python")[1]
+    done = subprocess.run([sys.executable, "-c", lines], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert (last(folder / "again.h5") == last(folder / "<b>run.h5")).all()
+
+
+def test_a_run_of_python_gets_a_scene_file(tmp_path):
+    run(tmp_path / "run.h5", seed=4)
+    told = reproduce(swarm.report(tmp_path / "run.h5"), tmp_path)
+    assert "only this file holds" in told
+    text = told[told.index("gravity = ") : told.index("In Python")]
+    (tmp_path / "again.toml").write_text(text)
+    swarm_run = [sys.executable, "-m", "swarm", "run", "again.toml", "-o", "again.h5", "--quiet"]
+    done = subprocess.run(swarm_run, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (last(tmp_path / "again.h5") == last(tmp_path / "run.h5")).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"frames": "none"}, "keeps no particles"),
+        ({"frames": 3}, "every 3th particle only"),
+        ({"precision": "float32"}, "in float32"),
+    ],
+    ids=str,
+)
+def test_what_cannot_be_reproduced_is_said(options, told, tmp_path):
+    run(tmp_path / "run.h5", **options)
+    assert told in reproduce(swarm.report(tmp_path / "run.h5"), tmp_path)
+
+
+# --- Runs of all kinds -----------------------------------------------------------------------------------
+
+
+def cut(path):
+    """A run that was stopped after three frames."""
+
+    def stop(frame):
+        if frame.number == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(path, progress=stop)
+
+
+def test_a_run_that_was_cut_says_so(tmp_path):
+    cut(tmp_path / "run.h5")
+    told = Read(swarm.report(tmp_path / "run.h5").html).texts[""]
+    assert "This run is not complete: it was stopped at" in told
+    assert "of 1 s" in told
+
+
+def test_a_run_that_goes_on_says_so(folder, monkeypatch, tmp_path):
+    run(tmp_path / "run.h5")
+    import filelock
+
+    with filelock.FileLock(paths.lock_of(tmp_path / "run.h5")):
+        assert "A run writes this file now" in Read(swarm.report(tmp_path / "run.h5").html).texts[""]
+
+
+def test_files_of_older_versions_have_one(tmp_path):
+    run(tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        for name in ("until", "threads", "wall_time"):
+            del file[f"parameters/{name}"]
+        for name in ("python", "date", "machine"):
+            del file["h5md/creator"].attrs[name]
+    read = Read(swarm.report(tmp_path / "run.h5").html)
+    assert "not kept" in read.texts["speed"]
+
+
+def test_one_frame_and_no_particle_to_draw(tmp_path):
+    run(tmp_path / "run.h5", frames="none")
+    read = Read(swarm.report(tmp_path / "run.h5").html)
+    assert "keeps none of them" in read.texts["scene"]
+    assert "picture" not in read.tags
+
+
+KINDS = {
+    "bodies": lambda: (
+        (room := swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])), swarm.place(room, swarm.dumbbell(0.1, 1.0), 2), {}
+    ),
+    "plane": lambda: (
+        (flat := swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)], plane="z")), swarm.fill(flat, 4, speed=1.0), {}
+    ),
+    "balls": lambda: (
+        (gas := swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])), swarm.fill(gas, 4, speed=1.0, radius=0.05), {}
+    ),
+    "period": lambda: (
+        (cell := swarm.Scene(surfaces=[swarm.Sphere(radius=0.2, side="outside")], period=(1.0, 1.0, 1.0))),
+        swarm.fill(cell, 4, speed=1.0), {},
+    ),
+    "union": lambda: (
+        (both := swarm.Scene(surfaces=[swarm.Union([swarm.Sphere(0.5), swarm.Box((0.8, 0.2, 0.2))])])),
+        swarm.fill(both, 4, speed=1.0), {"counters": [swarm.Counter(swarm.Plane((1.0, 0.0, 0.0)))]},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_run_has_one(kind, tmp_path):
+    scene, start, options = KINDS[kind]()
+    path = tmp_path / "run.h5"
+    swarm.simulate(scene, start, swarm.Impact(), until=0.5, every=0.25, trajectory=path, compile="never", **options)
+    read = Read(swarm.report(path).html)
+    assert set(SECTIONS) <= set(read.ids)
+    assert "swarm.simulate" in read.texts["reproduce"]
+
+
+def test_bad_input_is_a_sentence(folder, tmp_path):
+    for path, told in (
+        (tmp_path / "absent.h5", "there is no file"),
+        (folder / "scene.toml", "is not an HDF5 file"),
+        (tmp_path, "is not the folder of a sweep: expected results.csv"),
+    ):
+        with pytest.raises(swarm.SceneError, match=told):
+            swarm.report(path)
+    log = tmp_path / "log.h5"
+    run(tmp_path / "run.h5", impacts=log)
+    with pytest.raises(swarm.SceneError, match="is a log of impacts, of which there is no report"):
+        swarm.report(log)
+    whole = (tmp_path / "run.h5").read_bytes()
+    (tmp_path / "bad.h5").write_bytes(whole[:100] + bytes(900) + whole[1000:])
+    with pytest.raises(swarm.SceneError, match=r"bad\.h5 is damaged"):
+        swarm.report(tmp_path / "bad.h5")
+
+
+def test_very_many_frames_are_pixels(monkeypatch, folder):
+    monkeypatch.setattr(pictures, "_LARGEST", 1000)
+    read = Read(swarm.report(folder / "<b>run.h5").html)
+    assert "svg" not in read.tags
