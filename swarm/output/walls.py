@@ -11,7 +11,8 @@ import numpy as np
 
 from . import vtkhdf
 from .exported import Exported
-from .shapes import Shape, shapes_of, since_start
+from .shape import Shape
+from .shapes import shapes_of, since_start
 
 # Bodies of one surface that are drawn: each has some 200 vertices.
 _MOST = 20_000
