@@ -1,4 +1,4 @@
-"""Curves on triangles: where planes cut them, their edges, and those where two of them meet at an angle."""
+"""Curves on triangles: where numbers at their corners are 0, as at a height, and where two meet at an angle."""
 
 import math
 from typing import NamedTuple
@@ -10,23 +10,16 @@ from ..state import Floats
 
 Indices = NDArray[np.int64]
 
-# Planes across each axis.
-_PLANES = 5
 # Neighbours whose normals differ by more than this angle meet at an edge [rad].
 _EDGE = math.radians(30.0)
 
 
-def across(points: Floats, triangles: Indices, frame: Floats, planes: int = _PLANES) -> list[Floats]:
-    """The curves in which planes across the axes of a frame, the columns of a matrix, cut triangles."""
-    curves: list[Floats] = []
-    for axis in frame.T if len(points) else ():
-        along = points @ axis
-        for place in np.linspace(along.min(), along.max(), planes + 2)[1:-1]:
-            curves += _section(points, triangles, along - place)
-    return curves
+def levels(points: Floats, triangles: Indices, heights: Floats) -> list[Floats]:
+    """The curves in which horizontal planes at some heights [m] cut triangles."""
+    return [curve for height in heights for curve in zeros(points, triangles, points[:, 2] - height)]
 
 
-def _section(points: Floats, triangles: Indices, above: Floats) -> list[Floats]:
+def zeros(points: Floats, triangles: Indices, above: Floats) -> list[Floats]:
     """The curves at which a function of points is 0."""
     is_above = above > 0.0
     mixed = triangles[is_above[triangles].any(axis=1) & ~is_above[triangles].all(axis=1)]
@@ -118,3 +111,9 @@ def finer(curve: Floats, step: float) -> Floats:
     many = np.maximum(1, np.ceil(pieces / step).astype(np.int64))
     place = np.concatenate([k + np.arange(n) / n for k, n in enumerate(many.tolist())] + [[float(len(pieces))]])
     return np.stack([np.interp(place, np.arange(len(curve)), one) for one in curve.T], axis=1)
+
+
+def turning(points: Floats, triangles: Indices, faces: NDArray[np.bool_]) -> Indices:
+    """The sides (E, 2) between a triangle that faces and one that does not."""
+    found = _sides(points, triangles)
+    return np.asarray(found.ends[found.is_pair][faces[found.mine] != faces[found.other]])

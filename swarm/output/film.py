@@ -18,10 +18,11 @@ from .. import checks
 from ..errors import FileError, SceneError
 from ..plane import shown_as
 from ..state import Floats
-from . import colours, drawing, paths, style
-from .balls import Balls
+from . import colours, drawing, flat, framed, paths, style
 from .drawn import Drawn
-from .shapes import Shape, shapes_of, since_start
+from .scenery import Scenery, red_green_blue
+from .shape import Shape
+from .shapes import shapes_of, since_start
 
 _SUFFIXES = (".mp4", ".gif")
 # Pixels of a side of the film.
@@ -31,9 +32,6 @@ _LEAST, _MOST = 64, 8192
 _DPI, _ROOM = 120, 240
 # Hundredths of a second, in which a GIF counts; viewers take less than 2 for 10.
 _HUNDREDTHS, _FASTEST = 100.0, 50.0
-
-# Of each wall whether it is of a solid, and its curves.
-Wires = list[tuple[bool, list[Floats]]]
 
 
 # Matplotlib's writers draw every frame anew, twice; these take what `_Film` has drawn.
@@ -132,10 +130,6 @@ def _reason(error: Exception) -> str:
     return str(error)
 
 
-def _wires(shapes: list[Shape]) -> Wires:
-    return [(shape.solid, shape.wires) for shape in shapes]
-
-
 class _Film:
     """The picture, whose artists change from frame to frame."""
 
@@ -143,10 +137,9 @@ class _Film:
         self._trajectory, self._scene = trajectory, trajectory.scene
         self._seen, start = trajectory.observed(), trajectory.frame(numbers[0])
         self._drawn = drawn = Drawn(len(start), trajectory.body, most, start.radius)
-        self._start, self._between = start.position, dict[tuple[int, float], Wires]()
+        self._start, self._between = start.position, dict[tuple[int, float], list[Shape]]()
         self._changes = self._scene.moves() or self._scene.has_doors()
         self._shapes = shapes_of(self._scene, start.position)
-        self._walls = _wires(self._shapes)
         # Of those that come during the run nobody may be there at the start.
         shown = trajectory.frame(numbers[-1]) if np.isnan(start.position[0]).any() else start
         self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, shown)
@@ -158,20 +151,24 @@ class _Film:
         self._across = across = self._scene.across()
         self._axes = drawing.view(self.picture, across)
         self._title = self.picture.suptitle("t", fontsize=10, color=drawing.LIGHT)
-        at = drawn.points(start.position).T
-        box = self._box(numbers)
+        found = self._found(numbers)
+        self._scenery: Scenery | None = None
+        self._walls: list[Any] = []
+        self._dots: Any = None
         if across is not None:
-            self._dots, self._wires = drawing.flat(
-                self._axes, across, at, drawing.LIGHT, self._walls, box, drawn.radius
+            at = drawn.points(start.position).T
+            self._dots, self._walls = flat.flat(
+                self._axes, across, at, drawing.LIGHT, self._shapes, found, drawn.radius
             )
+            # Walls are before particles, and all that is still is drawn once, but for these.
+            self._walls = [one for one in self._walls if self._changes or one.get_zorder() > self._dots.get_zorder()]
+            changing = [*self._walls, self._dots]
         else:
-            size = 0.0 if len(drawn.triangles) else 1.0
-            self._dots, self._wires = drawing.particles(
-                self._axes, at, drawing.LIGHT, self._walls, size, box, drawn.radius
-            )
-        # What lies in front of the dots, or changes, is drawn in every frame, and all else once.
-        self._wires = [one for one in self._wires if self._changes or one.get_zorder() > self._dots.get_zorder()]
-        for artist in (*self._wires, self._dots, self._title):
+            self._scenery = Scenery(self._axes, self._shapes, found)
+            self._scenery.walls()
+            self._scenery.near_lines()
+            changing = [*self._scenery.front, *(self._scenery.still if self._changes else [])]
+        for artist in (*changing, self._title):
             artist.set_animated(True)
         scale = self._scale
         drawing.colour_bar(self.picture, self._axes, scale.quantity, scale.low, scale.high)
@@ -179,66 +176,75 @@ class _Film:
         self.picture.set_layout_engine("none")
         self._still = self._canvas.copy_from_bbox(self.picture.bbox)
 
-    def _box(self, numbers: list[int]) -> tuple[Floats, Floats]:
-        """The box of all frames."""
-        boxes = []
-        for k in numbers:
+    def _found(self, numbers: list[int]) -> list[Floats]:
+        """The points that the picture shows: the walls of all frames, and particles where these do not enclose them."""
+        found = []
+        for k in numbers if self._changes or framed.is_open(self._shapes) else numbers[:1]:
             points = self._drawn.points(self._trajectory.frame(k).position).T
-            boxes.append(drawing.around(points, self._walls_at(k), self._drawn.radius))
-        return np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
+            found += framed.ends(framed.around(points, self._walls_at(k), self._drawn.radius))
+        return found
 
-    def _walls_at(self, k: int) -> Wires:
-        """The curves of every wall at frame k, which are those of the start, moved."""
+    def _walls_at(self, k: int) -> list[Shape]:
+        """Every wall at frame k: those of the start, moved."""
         if self._scene.has_doors() or any(shape.motion is not None for shape in self._shapes):
             # Where doors shut, or parts of a union move, other walls are there.
             return self._walls_then(float(self._seen["time"][k]))
         if not self._scene.moves():
-            return self._walls
-        moved = []
+            return self._shapes
         places = self._seen["wall_position"][k], self._seen["wall_orientation"][k]
-        for shape in self._shapes:
-            turn, way = since_start(self._scene, shape, self._seen["time"][k], places)
-            moved.append((shape.solid, [curve @ turn.T + way for curve in shape.wires]))
-        return moved
+        moments = self._seen["time"][k]
+        return [shape.moved(*since_start(self._scene, shape, moments, places)) for shape in self._shapes]
 
-    def _walls_then(self, time: float) -> Wires:
-        """The curves of the walls that are there at a time [s], drawn once from one instant to the next."""
+    def _walls_then(self, time: float) -> list[Shape]:
+        """The walls that are there at a time [s], made once from one instant to the next."""
         which = bisect.bisect_right(self._scene.instants, time), time if self._scene.moves() else 0.0
         if which not in self._between:
-            self._between[which] = _wires(shapes_of(self._scene, self._start, time))
+            self._between[which] = shapes_of(self._scene, self._start, time)
         return self._between[which]
-
-    def _put(self, points: Floats, colour: Floats) -> None:
-        """Show the particles at points (n, 3) in colours (n, 3)."""
-        dots, across = self._dots, self._across
-        if isinstance(dots, Balls):
-            dots.place(points)
-        else:
-            dots.set_offsets(points[:, :2] if across is None else shown_as(across, points))
-        if self._drawn.radius is not None:
-            dots.paint(colour)
-            return
-        if across is None:
-            dots.set_3d_properties(points[:, 2], "z")
-        dots.set_facecolor(colour)
 
     def show(self, k: int) -> None:
         """Draw frame k on the canvas."""
         drawn = self._drawn
         position, packed, tints = drawn.coloured(self._trajectory.frame(k), self._scale, self._values)
-        across = self._across
-        self._put(position.T, drawing.red_green_blue(packed))
-        if self._changes:
-            for artist, (_solid, curves) in zip(self._wires, self._walls_at(k), strict=True):
-                artist.set_segments(curves if across is None else [shown_as(across, curve) for curve in curves])
-        ties = drawing.ties(self._axes, *drawn.ties(position.T, packed, tints)) if across is None else []
         of = f" of {drawn.count}" if drawn.shown < drawn.count else ""
-        self._title.set_text(f"{drawn.shown}{of} {drawn.noun}, t = {self._seen['time'][k]:.4g} s")
+        self._title.set_text(f"t = {self._seen['time'][k]:.4g} s,  {drawn.shown}{of} {drawn.noun}")
         self._canvas.restore_region(self._still)
-        for artist in sorted((*self._wires, self._dots, *ties), key=lambda artist: artist.get_zorder()):
-            if across is None:
-                artist.do_3d_projection()
+        if self._scenery is None:
+            artists, gone = self._in_plane(k, position, packed)
+        else:
+            artists, gone = self._in_space(k, position, packed, tints)
+        for artist in sorted(artists, key=lambda artist: artist.get_zorder()):
             self._axes.draw_artist(artist)
         self.picture.draw_artist(self._title)
-        for tie in ties:
-            tie.remove()
+        for artist in gone:
+            artist.remove()
+
+    def _in_plane(self, k: int, position: Floats, packed: Any) -> tuple[list[Any], list[Any]]:
+        """The artists of a frame, and those of them that are its own."""
+        dots, across = self._dots, self._across
+        assert across is not None
+        dots.set_offsets(shown_as(across, position.T))
+        colour = red_green_blue(packed)
+        if self._drawn.radius is not None:
+            dots.paint(colour)
+        else:
+            dots.set_facecolor(colour)
+        walls = self._walls
+        if self._changes:
+            walls = flat.draw_walls(self._axes, across, self._walls_at(k), float(np.ptp(self._axes.get_xlim())))
+        return [*walls, dots], walls if self._changes else []
+
+    def _in_space(self, k: int, position: Floats, packed: Any, tints: Any) -> tuple[list[Any], list[Any]]:
+        """The artists of a frame, and those of them that are its own."""
+        scenery = self._scenery
+        assert scenery is not None
+        walls = list[Any]()
+        if self._changes:
+            scenery.clear()
+            scenery.shapes = self._walls_at(k)
+            scenery.walls()
+            scenery.near_lines()
+            walls = scenery.still
+        lines, faces = self._drawn.ties(position.T, packed, tints)
+        mine = scenery.matter(position.T, packed, lines, faces, self._drawn.radius)
+        return [*walls, *mine, *scenery.front], mine

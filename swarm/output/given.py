@@ -15,7 +15,7 @@ from .curves import Indices, neighbours
 from .cut import Smooth
 
 # Points around the tube of a torus and along it, parts of the height of an outline, and points of a line on it.
-_AROUND, _ALONG, _HIGH, _FINE = 24, 96, 8, 201
+_AROUND, _ALONG, _HIGH, _FINE = 32, 96, 8, 201
 
 Triangles = tuple[Floats, Indices]
 

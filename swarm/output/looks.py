@@ -8,18 +8,19 @@ import rerun.blueprint as rrb
 
 from ..plane import across_of, along
 from ..state import Floats
-from . import series
+from . import series, style
 from .colours import BACKGROUND, Scale, curve_colour, rgb
 from .drawn import Drawn
 from .playback import LINES, MESH, PARTICLES
-from .shapes import Shape
+from .shape import Shape
 
-_CAVITY, _SOLID = (120, 150, 180, 20), (205, 150, 105, 150)
+# The colours of matplotlib's pictures.
+_CAVITY, _SOLID = (*rgb(style.CAVITY), 60), (*rgb(style.SOLID), 255)
+_CAVITY_WIRE, _SOLID_WIRE = (*rgb(style.CAVITY_LINE), 255), (*rgb(style.SOLID_LINE), 255)
 # The distance of the eye above a plane, in widths of the scene.
 _EYE = 1.3
 # Between the faces of bodies, which have no shading.
 _EDGE = (10, 10, 12, 255)
-_CAVITY_WIRE, _SOLID_WIRE = (150, 175, 200, 160), (235, 180, 130, 255)
 SOLID_LOOKS = _SOLID, _SOLID_WIRE
 
 
@@ -54,10 +55,12 @@ def log_walls(stream: Any, shapes: list[Shape], center: Floats, static: bool = T
             stream.log(f"{path_of(shape)}/mesh", mesh, static=static)
         elif not static:
             stream.log(f"{path_of(shape)}/mesh", rr.Clear(recursive=False))
-        if shape.wires or not static:
-            wires = [curve - center for curve in shape.wires]
-            lines = rr.LineStrips3D(wires, colors=[wire], radii=rr.Radius.ui_points(0.5))
-            stream.log(f"{path_of(shape)}/wires", lines, static=static)
+        for part, curves, width in (("wires", shape.edges, 0.8), ("levels", shape.levels, 0.4)):
+            if curves or not static:
+                lines = rr.LineStrips3D(
+                    [curve - center for curve in curves], colors=[wire], radii=rr.Radius.ui_points(width)
+                )
+                stream.log(f"{path_of(shape)}/{part}", lines, static=static)
 
 
 def log_series(stream: Any, lines: list[series.Line]) -> None:
@@ -73,8 +76,8 @@ def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floa
     of = f" of {drawn.count}" if drawn.shown < drawn.count else ""
     every = f", every {stride}th frame" if stride > 1 else ""
     text = (
-        f"**{drawn.shown}{of} {drawn.noun}{every}**. Colour: {scale.quantity}, from {scale.low:g} (blue) over "
-        f"{0.5 * (scale.low + scale.high):g} (red) to {scale.high:g} (orange). On the "
+        f"**{drawn.shown}{of} {drawn.noun}{every}**. Colour: {scale.quantity}, from {scale.low:g} (dark blue) over "
+        f"{0.5 * (scale.low + scale.high):g} (magenta) to {scale.high:g} (orange). On the "
         f"plots {series.NOTHING:g} is the logarithm of 0."
     )
     if center.any():

@@ -15,6 +15,7 @@ from rerun.chunk import RrdReader
 from ..errors import FileError, SceneError
 from ..state import Floats
 from . import paths
+from .shape import Shape
 from .sources import DAMAGE, DamagedError, reason, require_file
 
 _BEGIN = b"RRF"
@@ -27,7 +28,7 @@ _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scala
 _RADII = "Points3D:radii"
 _STRIPS, _TINTS, _CORNERS = "LineStrips3D:strips", "LineStrips3D:colors", "Mesh3D:vertex_positions"
 _WAYS, _TURNS = "Transform3D:translation", "Transform3D:mat3x3"
-_TRIANGLES, _PAINT = "Mesh3D:triangle_indices", "Mesh3D:vertex_colors"
+_TRIANGLES, _PAINT, _NORMALS = "Mesh3D:triangle_indices", "Mesh3D:vertex_colors", "Mesh3D:vertex_normals"
 
 Colours = NDArray[np.uint32]
 
@@ -46,7 +47,6 @@ class Playback:
         about: meaning of the colours: quantity, low, high; number of particles or bodies, how many are shown, stride of
             frames; "noun": "particles" or "bodies".
         center: (3,) the origin of the positions in the file [m], which those given here are not less.
-        wires: of each surface, whether it is a solid and its curves, at the start.
         radius: of balls (n,) [m], None of points.
 
     Raises:
@@ -115,12 +115,11 @@ class Playback:
         self.names: dict[str, str] = {
             entity: kept.as_py()[0] for (entity, name), kept in self._static.items() if name == "SeriesLines:names"
         }
-        strips = {entity: kept for (entity, name), kept in self._static.items() if name == _STRIPS}
-        self._walls = [entity.rpartition("/")[0] for entity in strips]
-        self._changing = sorted(e for e, name in self._rows if name == _STRIPS and e.startswith((_SURFACES, _SOLIDS)))
-        self.wires: list[tuple[bool, list[Floats]]] = [
-            (entity.startswith(_SOLIDS), [np.array(strip) for strip in kept.as_py()]) for entity, kept in strips.items()
-        ]
+        shown = [e for e, name in (*self._static, *self._rows) if name in (_STRIPS, _CORNERS)]
+        walls = {e.rpartition("/")[0]: None for e in shown if e.startswith((_SURFACES, _SOLIDS))}
+        self._walls = list(walls)
+        changing = {e.rpartition("/")[0] for e, name in self._rows if name in (_STRIPS, _CORNERS)}
+        self._still = {wall: self._shape(wall, None) for wall in walls if wall not in changing}
         sizes = self._static.get((PARTICLES, _RADII))
         wide = np.array([] if sizes is None else sizes.as_py(), np.float64)
         # Those of dots are below 0: points of the screen.
@@ -128,22 +127,36 @@ class Playback:
         triangles = self._static.get((MESH, _TRIANGLES))
         self._triangles = np.array([] if triangles is None else triangles.as_py(), np.int64).reshape(-1, 3)
 
-    def wires_at(self, number: int) -> list[tuple[bool, list[Floats]]]:
-        """The curves of each surface at the frame of this number: surfaces may move."""
+    def shapes_at(self, number: int) -> list[Shape]:
+        """The walls at the frame of this number: they may move, or come and go."""
         found = []
-        for (solid, curves), wall in zip(self.wires, self._walls, strict=True):
+        for wall in self._walls:
+            shape = self._still.get(wall) or self._shape(wall, number)
             way, turn = (np.array(self._row(wall, name, number)) for name in (_WAYS, _TURNS))
-            if turn.size:
-                # Rerun keeps matrices column by column: this is the transpose.
-                curves = [curve @ turn.reshape(3, 3) + way for curve in curves]
-            found.append((solid, [curve + self.center for curve in curves]))
-        return found + [self._wires_then(entity, number) for entity in self._changing]
+            # Rerun keeps matrices column by column: this is the transpose.
+            turned = turn.reshape(3, 3).T if turn.size else np.eye(3)
+            found.append(shape.moved(turned, (way if turn.size else np.zeros(3)) + self.center))
+        return found
 
-    def _wires_then(self, entity: str, number: int) -> tuple[bool, list[Floats]]:
-        """The curves of a surface that comes and goes at the frame of this number."""
-        latest = max((k for k in self._rows[entity, _STRIPS] if k <= number), default=-1)
-        strips = self._row(entity, _STRIPS, latest)
-        return entity.startswith(_SOLIDS), [np.array(strip) + self.center for strip in strips]
+    def _shape(self, wall: str, number: int | None) -> Shape:
+        """A wall as it is in the file, which comes and goes, or as it is at the frame of a number."""
+
+        def column(part: str, name: str) -> Any:
+            kept = self._static.get((f"{wall}/{part}", name)) if number is None else None
+            if kept is not None:
+                return kept.as_py() or []
+            if number is None:
+                return []
+            rows = self._rows.get((f"{wall}/{part}", name), {})
+            latest = max((k for k in rows if k <= number), default=-1)
+            return self._row(f"{wall}/{part}", name, latest) or []
+
+        mesh = [np.reshape(column("mesh", name), (-1, 3)) for name in (_CORNERS, _TRIANGLES, _NORMALS)]
+        edges, levels = ([np.array(strip) for strip in column(part, _STRIPS)] for part in ("wires", "levels"))
+        name, solid = wall.rpartition("/")[2], wall.startswith(_SOLIDS)
+        corners, triangles, normals = mesh
+        return Shape(name, solid, corners.astype(float), triangles.astype(np.int64), normals.astype(float), edges,
+                     levels=levels, many=not edges and not levels)  # fmt: skip
 
     def frame(self, number: int) -> tuple[Floats, Colours]:
         """Positions (n, 3) and colours (n,), 0xRRGGBBAA, of the frame of this number."""

@@ -20,7 +20,8 @@ from . import colours, drawing, graphs, series, speeds, style, verdicts, words
 from .amounts import amount, many
 from .drawn import Drawn
 from .replaced import named_when_whole
-from .shapes import Shape, shapes_of
+from .shape import Shape
+from .shapes import shapes_of
 
 # Most particles drawn, or points of bodies.
 SHOWN = 5000
@@ -28,6 +29,8 @@ SHOWN = 5000
 _WIDE, _CELL, _HIGH, _LINE, _LETTERS = 12.5, 2.5, 2.35, 0.17, 14.0
 # Which part of a picture the time series have beside the particles; and its least height [inches].
 _SERIES, _LEAST = 0.66, 6.4
+# The least part of the width that particles have, and the part of the height that a vessel has of its panel.
+_FEWEST, _TALL = 0.24, 0.8
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,10 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
     picture = style.picture(wide, high)
     right: Any = picture
     if end is not None:
-        left, right = picture.subfigures(1, 2, width_ratios=[1.0 - _SERIES, _SERIES], squeeze=False).ravel()
+        # As wide as the vessel fills the height, as far as the series have room.
+        shown = drawing.aspect(shapes, end.position.T, scene.across()) * _TALL * high / wide
+        part = 1.0 - min(max(shown, _FEWEST), 1.0 - _SERIES)
+        left, right = picture.subfigures(1, 2, width_ratios=[1.0 - part, part], squeeze=False).ravel()
         _places(left, content, end, shapes, most)
     above, below = right.subfigures(2, 1, height_ratios=[max(high - text, 0.1), text], squeeze=False).ravel()
     cells = []
@@ -194,9 +200,8 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     position, packed, tints = drawn.coloured(end, scale, values)
     across = content.scene.across()
     axes = drawing.view(figure, across)
-    wires = [(shape.solid, shape.wires) for shape in shapes]
-    drawing.frame(axes, position.T, packed, wires, *drawn.ties(position.T, packed, tints), across, drawn.radius)
-    drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high)
+    drawing.frame(axes, position.T, packed, shapes, *drawn.ties(position.T, packed, tints), across, drawn.radius)
+    drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high, [packed])
     count = content.count // (1 if content.body is None else len(content.body))
     shown = many(count) if drawn.shown == count else f"{many(drawn.shown)} of {many(count)}"
     noun = drawn.noun if end.radius is None else "balls" if content.scene.plane is None else "discs"

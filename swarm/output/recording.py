@@ -2,9 +2,9 @@
 
 /scene/particles              Points3D, a frame's; coloured; of bodies, their points
 /scene/bodies/lines, .../mesh LineStrips3D and Mesh3D of bodies, a frame's; which points a triangle has is static
-/scene/surfaces/0_KIND/       mesh: Mesh3D, wires: LineStrips3D; static; /scene/solids/... likewise; of one that moves
-                              also Transform3D, a frame's, from where it is at the start; where there are doors not
-                              static, but from each frame on in which others are there
+/scene/surfaces/0_KIND/       mesh: Mesh3D, wires (edges) and levels: LineStrips3D; static; /scene/solids/... likewise;
+                              of one that moves also Transform3D, a frame's, from where it is at the start; where there
+                              are doors not static, but from each frame on in which others are there
                               fields of more than 2000 solids have bodies: Points3D with radii, Boxes3D, ... for mesh
 /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
 /time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds

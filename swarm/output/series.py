@@ -15,7 +15,7 @@ from ..surfaces.surface import Surface
 from ..surfaces.union import part_at
 from .named import name_of
 from .nouns import labels
-from .shapes import Shape
+from .shape import Shape
 
 # Stands for the logarithm of zero.
 NOTHING = -18.0

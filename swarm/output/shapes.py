@@ -1,60 +1,25 @@
-"""The walls of a scene as shapes to draw, for any phi: triangles, their area, and the curves of a wire frame."""
+"""The walls of a scene as shapes to draw, for any phi."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..motion import WallMotion, pose
+from ..motion import pose
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces import Spheres
-from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
-from ..surfaces.union import Joined, Place
+from ..surfaces.union import Joined
 from . import sharp
-from .gridded import NOTHING, Corners, Grids, balls, each_body, foam, given_box, placed
+from .gridded import NOTHING, Corners, balls, box_around, each_body, foam, given_box, placed
 from .named import name_of
 from .parts import parts_of
 from .planar import PlaneWalls
+from .shape import Shape, levelled
 from .solids import is_of_solids
-
-
-@dataclass(frozen=True)
-class Shape:
-    """The part of one surface that is a wall of the volume.
-
-    Attributes:
-        name: its number and kind, such as "0_ellipsoid"; of a part of a union, "0_union_1_cylinder".
-        surface: the number of the surface in the scene; place: of a part in that.
-        motion: of a part of a union its own; else None, and it moves with the surface.
-        solid: whether particles are kept out of it.
-        vertices, triangles, normals: (V, 3) [m], (T, 3), (V, 3).
-        wires: curves (k, 3) [m].
-        height: of the ribbon that the triangles are, in a scene of two dimensions [m]; else None.
-    """
-
-    name: str
-    solid: bool
-    vertices: Floats
-    triangles: NDArray[np.int64]
-    normals: Floats
-    wires: list[Floats]
-    height: float | None = None
-    surface: int = 0
-    place: Place = ()
-    motion: WallMotion | None = None
-
-    def area(self) -> float:
-        """Of the triangles [m^2]; in a scene of two dimensions the length of the curves [m]."""
-        if self.height is not None:
-            return float(sum(np.sqrt((np.diff(curve, axis=0) ** 2).sum(axis=1)).sum() for curve in self.wires))
-        a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
-        return float(0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum())
 
 
 def those_there(positions: Floats) -> Floats:
@@ -73,29 +38,26 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
     positions = those_there(positions)
     if scene.plane is not None:
         return _shapes_in_plane(scene, positions, time, most)
-    walls = Grids(scene, positions, time)
-    # On a grid around all of them the many bodies of a scene would be too small, and a grid around each too slow.
+    box = box_around(scene, positions, time)
+    # Each of the many bodies of a scene has a grid of its own.
     grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
-    sharp_ones = _sharp(scene, walls.box, time)
-    shapes = []
+    found = list[Shape]()
+    sharp_ones = _sharp(scene, box, time)
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
         bodies = bodies_of(surface) or int(i in grouped)
-        mesh, wires = NOTHING, list[Floats]()
-        if not bodies and sharp_ones:
-            shapes += sharp_ones[i]
+        if not bodies:
+            found += sharp_ones[i]
             continue
+        mesh, edges = NOTHING, list[Floats]()
         if not surface.is_there(time) or (bodies > most and is_of_solids(surface)):
             pass
         elif isinstance(surface, Spheres):
-            mesh, wires = placed(at, *(foam(surface) if surface.is_foam() else balls(surface)))
-        elif bodies:
-            mesh, wires = placed(at, *each_body(surface, given_box(walls.box, at)))
+            mesh, edges = placed(at, *(foam(surface) if surface.is_foam() else balls(surface)))
         else:
-            mesh, wires = walls.drawn(i, at)
-        name = name_of(scene, i)
+            mesh, edges = placed(at, *each_body(surface, given_box(box, at)))
         solid = surface.is_solid() or i in grouped
-        shapes.append(Shape(name, solid, *mesh, wires, surface=i))
-    return shapes
+        found.append(Shape(name_of(scene, i), solid, *mesh, edges, surface=i, many=True))
+    return levelled(found)
 
 
 def bodies_of(surface: Surface) -> int:
@@ -104,18 +66,16 @@ def bodies_of(surface: Surface) -> int:
 
 
 def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
-    """The shapes of every surface, those of each part of unions, where one has parts, triangles or an outline."""
-    if not any(isinstance(surface, (Joined, Mesh, Outlined)) for surface in scene.surfaces):
-        return {}
+    """The shapes of every surface but those of many bodies, of unions those of each part."""
     found: dict[int, list[Shape]] = {}
     for part in parts_of(scene, time):
         whole = scene.surfaces[part.owner]
         if not bodies_of(whole):
             there = part.surface.is_there(time)
-            mesh, wires = sharp.drawn(part, box, time) if there else (NOTHING, [])
+            mesh, edges = sharp.drawn(part, box, time) if there else (NOTHING, [])
             motion = part.surface.motion if part.place else None
             shape = Shape(
-                name_of(scene, part.owner, part.place), part.solid, *mesh, wires, None, part.owner, part.place, motion
+                name_of(scene, part.owner, part.place), part.solid, *mesh, edges, None, part.owner, part.place, motion
             )  # fmt: skip
             found.setdefault(part.owner, []).append(shape)
     return found

@@ -1,4 +1,4 @@
-"""A part of a surface as triangles and wires with its edges sharp: each smooth wall by itself, cut by all others."""
+"""A part of a surface as triangles with its edges sharp: each smooth wall by itself, cut by all others."""
 
 import itertools
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ _FINE = 200
 _SEEN, _AGAIN = 0.4, 3
 
 Box = tuple[Floats, Floats]
-# Points (V, 3) [m], triangles (T, 3), normals (V, 3); and the curves of wires.
+# Points (V, 3) [m], triangles (T, 3), normals (V, 3); and its edges.
 Walls = tuple[tuple[Floats, Indices, Floats], list[Floats]]
 
 
@@ -87,9 +87,8 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
         level = placed.level(given.sides(surface), list(part.covers), [])
         for line in given.corners(surface, float(low[2]), float(high[2])):
             edges += curves.runs(line, level(line) <= 0.0)
-    wires = edges + curves.across(vertices, cells, frame)
     here = at.placed(vertices.T).T, cells, at.turned(np.concatenate(normals).T).T
-    return here, [at.placed(wire.T).T for wire in wires]
+    return here, [at.placed(edge.T).T for edge in edges]
 
 
 def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
@@ -106,9 +105,8 @@ def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
         edges = [run for edge in fine for run in curves.runs(edge, level(edge) <= 0.0)]
         points, triangles, rims = cut(wall, points, triangles, level)
         edges += curves.joined(points, rims)
-    wires = edges + curves.across(points, triangles, frame)
     # Triangles go round the normals out of the mesh.
-    return given.shaded(points, triangles if part.solid else triangles[:, ::-1]), wires
+    return given.shaded(points, triangles if part.solid else triangles[:, ::-1]), edges
 
 
 def _pieces(placed: _Placed) -> Iterator[tuple[Any, Smooth]]:

@@ -74,7 +74,7 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     picture = style.picture(5.4 * _COLUMNS, 5.0 * above + 2.7 * below)
     top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()
     about = playback.about
-    across, cells = across_of(about.get("plane") or None), []
+    across, cells, packed = across_of(about.get("plane") or None), [], []
     for place, k in enumerate(frames):
         at = above, min(_COLUMNS, len(frames)), place + 1
         cells.append(top.add_subplot(*at) if found else drawing.view(top, across, *at))
@@ -86,13 +86,14 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
             cells[-1].set_axis_off()
         else:
             number = playback.numbers[k]
-            ties = playback.lines(number), playback.faces(number)
-            wires, radius = playback.wires_at(number), playback.radius
-            drawing.frame(cells[-1], *playback.frame(number), wires, *ties, across, radius)
-    drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"])
+            ties, points = (playback.lines(number), playback.faces(number)), playback.frame(number)
+            drawing.frame(cells[-1], *points, playback.shapes_at(number), *ties, across, playback.radius)
+            packed.append(points[1])
+    drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"], packed or None)
     count = "1 frame" if len(playback.times) == 1 else f"{len(playback.times)} frames"
     title = f"{playback.path.name}: {about['shown']} of {about['particles']} {about['noun']}, {count}"
-    top.suptitle(f"{title}; drawn by {by.split(',')[0]}", fontsize=11, color=drawing.LIGHT)
+    top.suptitle(title, fontsize=11)
+    top.text(0.995, 0.005, f"drawn by {by.split(',')[0]}", ha="right", va="bottom", fontsize=7, color=drawing.LIGHT)
     for place, (group, curves) in enumerate(plots.items()):
         graphs.lines(
             bottom.add_subplot(below, _COLUMNS, place + 1), *series.title_of(group, about.get("plane") or None), curves

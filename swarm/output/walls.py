@@ -19,7 +19,8 @@ import numpy as np
 
 from . import vtkhdf
 from .exported import Exported
-from .shapes import Shape, shapes_of, since_start
+from .shape import Shape
+from .shapes import shapes_of, since_start
 from .solids import MANY, Solids, solids_of
 
 KINDS = ("spheres", "boxes", "cylinders", "capsules", "ellipsoids")

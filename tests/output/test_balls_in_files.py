@@ -6,12 +6,14 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import swarm
-from swarm.output import drawing, facts, style
+from swarm.output import drawing, facts, framed, style
 from swarm.output.background import Background
-from swarm.output.balls import Balls, Discs
+from swarm.output.balls import Discs
 from swarm.output.drawn import Drawn
 from swarm.output.layout import COLLISIONS, RADII
 from swarm.output.playback import Playback
+from swarm.output.raster import Raster
+from swarm.output.shapes import shapes_of
 from swarm.output.storage import Storage
 from swarm.output.writer import TrajectoryWriter
 from swarm.snapshot import Snapshot
@@ -189,32 +191,25 @@ def test_texts_say_how_large_and_how_full(run):
 
 def test_discs_and_balls_are_as_large_as_they_are(run):
     figure = run.plot(figsize=(12.0, 6.0))
-    FigureCanvasAgg(figure).draw()
-    axes = figure.subfigs[0].axes[0]
-    kind = Balls if run.scene.plane is None else Discs
-    (drawn,) = (one for one in axes.collections if isinstance(one, kind))
     if run.scene.plane is not None:
+        (drawn,) = (one for one in figure.subfigs[0].axes[0].collections if isinstance(one, Discs))
         assert drawn.get_widths().tolist() == (2.0 * RADIUS).tolist()
         return
-    # In perspective what is nearer is larger: each is compared with a length at its place.
-    sizes = np.sort(np.sqrt(drawn.get_sizes()))[::-1] / 72.0 * figure.dpi
-    corners = np.array([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]])
-    from mpl_toolkits.mplot3d import proj3d
-
-    x, y, _depth = proj3d.proj_transform(*corners.T, axes.get_proj())
-    metre = np.hypot(*np.diff(axes.transData.transform(np.column_stack([x, y])), axis=0)[0])
-    # The x axis is seen at an angle: cos of 60 degrees from the side, 30 from above.
-    slant = np.sqrt(1.0 - (np.cos(np.radians(30.0)) * np.cos(np.radians(60.0))) ** 2)
-    assert sizes[0] == pytest.approx(2.0 * RADIUS[-1] * metre / slant, rel=0.15)
+    raster = Raster(np.array([-1.0, -1.0]), np.array([1.0, 1.0]), 400.0)
+    raster.balls(np.array([[0.1, 0.2, 0.3], [-0.5, 0.0, 0.0]]), np.array([0.25, 0.1]), np.zeros((2, 3)))
+    there = np.isfinite(raster.depth)
+    assert there.sum() / 400.0**2 == pytest.approx(np.pi * (0.25**2 + 0.1**2), rel=3e-3)
+    assert raster.depth.max() == pytest.approx(0.3 + 0.25, abs=1e-4)
 
 
 def test_a_near_ball_hides_a_far_one():
     figure = style.picture(4.0, 4.0)
     axes = drawing.view(figure, None)
-    eye = np.array([0.433, -0.75, 0.5])
-    red, blue = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+    room = shapes_of(swarm.Scene([swarm.Sphere(1.0)]), np.zeros((3, 1)))
+    eye = framed.eye_of(room, [room[0].vertices]).near
     points, radius = np.array([0.5 * eye, -0.5 * eye]), np.array([0.2, 0.2])
-    drawing.particles(axes, points, np.array([red, blue]), [], radius=radius)
+    colours = np.array([0xFF0000FF, 0x0000FFFF], np.uint32)
+    drawing.frame(axes, points, colours, room, radius=radius)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     seen = np.asarray(canvas.buffer_rgba())[..., :3].astype(int)

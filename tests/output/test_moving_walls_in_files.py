@@ -78,10 +78,10 @@ def test_particles_are_inside_the_walls_of_their_frame(run):
 def test_the_recording_moves_them(run):
     folder, _scene, result = run
     held, seen = playback.Playback(folder / "run.rrd"), result.observables
-    at_start = dict(zip(held._walls, held.wires_at(0), strict=True))
     for k in range(5):
-        for (entity, (_solid, curves)), (_same, moved) in zip(at_start.items(), held.wires_at(k), strict=True):
-            i = int(entity.rpartition("/")[2].partition("_")[0])
+        for shape, then in zip(held.shapes_at(0), held.shapes_at(k), strict=True):
+            i = int(shape.name.partition("_")[0])
+            curves, moved = [shape.vertices, *shape.wires], [then.vertices, *then.wires]
             first, now = (matrix(tuple(seen["wall_orientation"][j, i])) for j in (0, k))
             places = seen["wall_position"][0, i], seen["wall_position"][k, i]
             for before, after in zip(curves, moved, strict=True):
@@ -93,29 +93,30 @@ def test_the_recording_moves_them(run):
 def test_pictures_show_the_walls_of_their_time(run, tmp_path, monkeypatch):
     """The contact sheet of several frames, and the plot of the last one."""
     folder, scene, result = run
-    seen, drawn, draw = result.observables, [], drawing.particles
+    seen, drawn, draw = result.observables, [], drawing.frame
     monkeypatch.setattr(
         drawing,
-        "particles",
-        lambda axes, *rest, **more: drawn.append([wires for _solid, wires in rest[2]]) or draw(axes, *rest, **more),
+        "frame",
+        lambda axes, points, packed, shapes, *rest: drawn.append(shapes) or draw(axes, points, packed, shapes, *rest),
     )
     held = playback.Playback(folder / "run.rrd")
     sheet.draw_sheet(held, tmp_path / "sheet.png", [0.0, 0.5, 1.0], False)
-    for k, wires in zip((0, 2, 4), drawn, strict=True):
-        for (_solid, curves), shown in zip(held.wires_at(k), wires, strict=True):
-            np.testing.assert_array_equal(np.vstack(shown), np.vstack(curves))
-    for wall in range(len(drawn[0])):
-        i = int(held._walls[wall].rpartition("/")[2].partition("_")[0])
-        way = np.abs(np.vstack(drawn[2][wall]) - np.vstack(drawn[0][wall])).max()
+    for k, shapes in zip((0, 2, 4), drawn, strict=True):
+        for held_one, shown in zip(held.shapes_at(k), shapes, strict=True):
+            np.testing.assert_array_equal(shown.vertices, held_one.vertices)
+            np.testing.assert_array_equal(np.vstack(shown.wires), np.vstack(held_one.wires))
+    for first, last in zip(drawn[0], drawn[2], strict=True):
+        i = int(first.name.partition("_")[0])
+        way = np.abs(last.vertices - first.vertices).max()
         stays = (seen["wall_position"][0, i] == seen["wall_position"][-1, i]).all()
         stays &= (seen["wall_orientation"][0, i] == seen["wall_orientation"][-1, i]).all()
         assert (way == 0.0) == stays
     with swarm.load(folder / "run.h5") as trajectory:
         plots.draw_plot(trajectory, tmp_path / "run.png")
     still = scene.placed(seen["wall_position"][-1], seen["wall_orientation"][-1]) if scene.reacts() else scene
-    for i, wires in enumerate(drawn[3]):
-        if wires:
-            off = np.abs(still.distances_outside(np.vstack(wires).T, 1.0)[i])
+    for i, shape in enumerate(drawn[3]):
+        if shape.wires:
+            off = np.abs(still.distances_outside(np.vstack(shape.wires).T, 1.0)[i])
             assert np.median(off) <= 2e-3
     assert (tmp_path / "sheet.png").stat().st_size > 20_000
     assert (tmp_path / "run.png").stat().st_size > 20_000

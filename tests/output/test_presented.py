@@ -7,12 +7,14 @@ import types
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from matplotlib.collections import PathCollection
 from PIL import Image
 
 import swarm
 from swarm import columns, notebook
 from swarm.errors import FileError, SceneError
-from swarm.output import film, labelled, playback, recording, widget
+from swarm.output import film, framed, labelled, playback, recording, widget
+from swarm.output.shapes import shapes_of
 
 RATE, FRAMES = 1.5, 5
 SCENE = swarm.Scene(
@@ -97,9 +99,11 @@ def test_a_figure_of_a_result_without_a_trajectory():
     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
     result = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, compile="never")
     figure = result.plot()
-    places = next(axes for axes in figure.axes if axes.name == "3d")
-    dots = next(one for one in places.collections if type(one).__name__ == "Path3DCollection")
-    np.testing.assert_allclose(np.ravel(dots._offsets3d), result.particles.position[:, 0])
+    places = figure.subfigs[0].axes[0]
+    dots = next(one for one in places.collections if isinstance(one, PathCollection))
+    shapes = shapes_of(cavity, result.particles.position)
+    eye = framed.eye_of(shapes, framed.around(result.particles.position.T, shapes))
+    np.testing.assert_allclose(dots.get_offsets(), eye.seen(result.particles.position.T)[:, :2])
     assert not [axes for axes in figure.axes if axes.get_title().startswith("Speeds")]
     for wrong in ({"particles": 0}, {"figsize": 3.0}, {"figsize": (1.0, -1.0)}):
         with pytest.raises(SceneError, match=next(iter(wrong))):
@@ -147,19 +151,23 @@ def test_a_frame_is_what_matplotlib_draws(run):
     for k in (0, 3):
         made.show(k)
         pictures.append(np.array(made.picture.canvas.buffer_rgba()))
-    for artist in (*made._wires, made._dots, made._title):
+    # As a picture of its own, of what the last frame shows
+    scenery = made._scenery
+    position, packed, tints = made._drawn.coloured(run[1].frame(3), made._scale, made._values)
+    scenery.matter(position.T, packed, *made._drawn.ties(position.T, packed, tints))
+    for artist in (*scenery.still, *scenery.front, made._title):
         artist.set_animated(False)
     made.picture.canvas.draw()
     start, end = ((one != np.array(made.picture.canvas.buffer_rgba())).any(axis=2).mean() for one in pictures)
-    assert end < 0.001  # where a wire crosses a letter of an axis
+    assert end < 0.001
     assert start > 0.01
     angle = RATE * 0.75
-    x, y, _z = np.concatenate(made._walls[1][1]).T
-    turned = np.concatenate(made._walls_at(3)[1][1])[:, :2].T
+    x, y, _z = made._shapes[1].vertices.T
+    turned = made._walls_at(3)[1].vertices[:, :2].T
     np.testing.assert_allclose(
         turned, [np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y], atol=1e-12
     )
-    np.testing.assert_array_equal(np.concatenate(made._walls_at(3)[0][1]), np.concatenate(made._walls[0][1]))
+    np.testing.assert_array_equal(made._walls_at(3)[0].vertices, made._shapes[0].vertices)
 
 
 def test_what_a_film_refuses(run, tmp_path, monkeypatch):

@@ -104,10 +104,12 @@ def test_series_are_the_observables(run):
 
 def test_walls_are_mesh_and_wires(run):
     held = playback.Playback(run[0] / "run.rrd")
-    assert {"/scene/surfaces/0_sphere/mesh", "/scene/surfaces/0_sphere/wires"} <= set(held.entities)
-    ((solid, curves),) = held.wires
-    assert not solid
-    np.testing.assert_allclose(np.linalg.norm(np.vstack(curves), axis=1), 0.5, rtol=1e-3)
+    assert {"/scene/surfaces/0_sphere/mesh", "/scene/surfaces/0_sphere/levels"} <= set(held.entities)
+    (shape,) = held.shapes_at(0)
+    assert not shape.solid
+    np.testing.assert_allclose(np.linalg.norm(np.vstack(shape.levels), axis=1), 0.5, rtol=2e-3)
+    np.testing.assert_allclose(np.linalg.norm(shape.vertices, axis=1), 0.5, rtol=1e-6)
+    np.testing.assert_allclose(shape.normals, -2.0 * shape.vertices, atol=1e-6)
 
 
 def test_the_blueprint_is_in_it_and_pauses_at_the_start(run):
@@ -352,7 +354,7 @@ def test_walls_that_come_and_go_are_recorded_from_each_instant_on(tmp_path):
     path = tmp_path / "doors.rrd"
     swarm.simulate(scene, start, swarm.Impact(), until=0.5, every=0.1, recording=path)
     held = playback.Playback(path)
-    seen = [[curves for _solid, curves in held.wires_at(number)] for number in range(6)]
+    seen = [[shape.wires for shape in held.shapes_at(number)] for number in range(6)]
     assert [len(ball) > 0 for ball, _post in map(sorted_by_size, seen)] == 6 * [True]
     assert [len(of_post) > 0 for _ball, of_post in map(sorted_by_size, seen)] == [k == 3 for k in range(6)]
     for number, walls in enumerate(seen):

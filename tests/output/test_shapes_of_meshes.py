@@ -58,8 +58,10 @@ def test_smooth_ones_are_smoothly_shaded():
     (shape,) = shapes_of(swarm.Scene([swarm.Mesh(points, triangles)]), NOWHERE)
     assert len(shape.vertices) == 2000
     assert ((shape.normals + shape.vertices) ** 2).sum(axis=1).max() < 0.01
-    # No edges, so that it is seen by the planes across it.
-    assert 15 <= len(shape.wires) <= 20
+    # No edges: it is seen by its levels.
+    assert not shape.edges
+    assert len(shape.levels) == 6
+    assert all(np.ptp(level[:, 2]) < 1e-12 for level in shape.levels)
 
 
 def test_many_triangles_are_drawn_in_a_second():

@@ -12,7 +12,8 @@ from matplotlib import rc_context
 
 from .. import plots, style
 from ..amounts import amount
-from ..shapes import Shape, shapes_of
+from ..shape import Shape
+from ..shapes import shapes_of
 
 # Of a graph, and of a picture of particles [inches]; pixels an inch of the latter, and most particles in it.
 _GRAPH, _PLACES, _DPI, _SHOWN = (5.0, 2.8), (5.0, 4.6), 170, 5000

@@ -1,0 +1,54 @@
+"""Where the eye of a picture is: a parallel projection with z up, chosen from how far the walls reach."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..state import Floats
+
+# Azimuths and elevations [degrees]: of a vessel as wide as deep; of one that is much wider than deep, or deeper than
+# wide; of a tall one, of a flat one, and of a board.
+_AZIMUTH, _WIDE, _DEEP = -60.0, -78.0, -12.0
+_ELEVATION, _TALL, _FLAT, _BOARD = 20.0, 14.0, 42.0, 10.0
+# One extent so many times another one is much wider; a board is so many times wider and higher than it is deep.
+_MUCH, _THIN = 4.0, 6.0
+# An extent below this part of the largest one is that of nothing.
+_NOTHING = 1e-9
+
+
+class Eye(NamedTuple):
+    """Directions to the right, up, and towards the eye: unit vectors."""
+
+    right: Floats
+    up: Floats
+    near: Floats
+
+    def seen(self, points: Floats) -> Floats:
+        """Points (..., 3) [m] as they are seen: to the right, up, and towards the eye [m]."""
+        return np.asarray(points @ np.stack([self.right, self.up, self.near], axis=1))
+
+
+def eye_at(azimuth: float, elevation: float) -> Eye:
+    """The eye at these angles [degrees], of longitude from the x axis, and above the horizon."""
+    turn, height = math.radians(azimuth), math.radians(elevation)
+    near = np.array([math.cos(height) * math.cos(turn), math.cos(height) * math.sin(turn), math.sin(height)])
+    right = np.array([-math.sin(turn), math.cos(turn), 0.0])
+    return Eye(right, np.cross(near, right), near)
+
+
+def eye_for(low: Floats, high: Floats, below: bool = False) -> Eye:
+    """The eye from which the two largest extents of a box show, from above, or from below."""
+    x, y, z = np.maximum(high - low, _NOTHING * float((high - low).max()) or 1.0).tolist()
+    ratio = math.log(x / y) / math.log(_MUCH)
+    azimuth = _AZIMUTH + (
+        min(1.0, ratio) * (_WIDE - _AZIMUTH) if ratio > 0.0 else min(1.0, -ratio) * (_DEEP - _AZIMUTH)
+    )
+    if min(max(x, y), z) > _THIN * min(x, y):
+        elevation = _BOARD
+    else:
+        steep = math.log(z / math.sqrt(x * y)) / math.log(_MUCH)
+        elevation = _ELEVATION + (
+            min(1.0, steep) * (_TALL - _ELEVATION) if steep > 0.0 else min(1.0, -steep) * (_FLAT - _ELEVATION)
+        )
+    return eye_at(azimuth, -elevation if below else elevation)

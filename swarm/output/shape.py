@@ -1,0 +1,89 @@
+"""A wall to draw: triangles, their area, edges, and curves at some heights."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion import WallMotion
+from ..state import Floats
+from ..surfaces.union import Place
+from . import curves
+
+# Heights at which levels are drawn, of which a shape has this many, or else its own; triangles of many bodies that are
+# too many for these.
+_LEVELS, _FEW, _MOST = 6, 3, 100_000
+# Triangles whose normals differ from the vertical by less than this lie on a level.
+_UPRIGHT = 1e-6
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The part of one surface that is a wall of the volume.
+
+    Attributes:
+        name: its number and kind, such as "0_ellipsoid"; of a part of a union, "0_union_1_cylinder".
+        surface: the number of the surface in the scene; place: of a part in that.
+        motion: of a part of a union its own; else None, and it moves with the surface.
+        solid: whether particles are kept out of it.
+        vertices, triangles, normals: (V, 3) [m], (T, 3), (V, 3).
+        edges: curves (k, 3) [m]: creases, rims, and the ends of openings.
+        height: of the ribbon that the triangles are, in a scene of two dimensions [m]; else None.
+        many: whether it is that of many bodies.
+        levels: its curves at some heights, the same of all shapes.
+    """
+
+    name: str
+    solid: bool
+    vertices: Floats
+    triangles: NDArray[np.int64]
+    normals: Floats
+    edges: list[Floats]
+    height: float | None = None
+    surface: int = 0
+    place: Place = ()
+    motion: WallMotion | None = None
+    many: bool = False
+    levels: list[Floats] = field(default_factory=list)
+
+    @property
+    def wires(self) -> list[Floats]:
+        """All of its curves: edges and levels."""
+        return self.edges + self.levels
+
+    def area(self) -> float:
+        """Of the triangles [m^2]; in a scene of two dimensions the length of the curves [m]."""
+        if self.height is not None:
+            return float(sum(np.sqrt((np.diff(curve, axis=0) ** 2).sum(axis=1)).sum() for curve in self.edges))
+        a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
+        return float(0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum())
+
+    def moved(self, turn: Floats, way: Floats) -> "Shape":
+        """The shape whose point that was at x is at turn x + way."""
+        placed = [[curve @ turn.T + way for curve in of] for of in (self.edges, self.levels)]
+        return replace(self, vertices=self.vertices @ turn.T + way, normals=self.normals @ turn.T,
+                       edges=placed[0], levels=placed[1])  # fmt: skip
+
+
+def levelled(shapes: list[Shape]) -> list[Shape]:
+    """The shapes with their levels, between the lowest and the highest point of all of them."""
+    ends = [(shape.vertices[:, 2].min(), shape.vertices[:, 2].max()) for shape in shapes if len(shape.vertices)]
+    if not ends:
+        return shapes
+    low, high = min(a for a, _b in ends), max(b for _a, b in ends)
+    heights = np.linspace(low, high, _LEVELS + 2)[1:-1]
+    return [
+        shape if shape.many and len(shape.triangles) > _MOST else replace(shape, levels=_levels(shape, heights))
+        for shape in shapes
+    ]
+
+
+def _levels(shape: Shape, heights: Floats) -> list[Floats]:
+    """The curves at these heights, but for walls that lie on one."""
+    if not len(shape.vertices):
+        return []
+    low, high = shape.vertices[:, 2].min(), shape.vertices[:, 2].max()
+    if ((low < heights) & (heights < high)).sum() < _FEW:
+        heights = np.linspace(low, high, _LEVELS + 2)[1:-1]
+    steep = np.abs(shape.normals[:, 2]) < 1.0 - _UPRIGHT
+    return curves.levels(shape.vertices, shape.triangles[steep[shape.triangles].any(axis=1)], heights)

@@ -1,0 +1,183 @@
+"""Particles among their walls: what solids hide, silhouettes, levels, and how much of a panel a vessel fills."""
+
+import math
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+import swarm
+from swarm.output import drawing, flat, framed, style, triad
+from swarm.output.eye import eye_at, eye_for
+from swarm.output.raster import Raster
+from swarm.output.scenery import Scenery
+from swarm.output.shapes import shapes_of
+from swarm.output.silhouette import silhouette
+
+NOWHERE = np.zeros((3, 1))
+RED = 0xFF0000FF
+VESSELS = {
+    "sphere": swarm.Scene([swarm.Sphere(0.5)]),
+    "tray": swarm.Scene([swarm.Box((1.0, 0.8, 0.05))]),
+    "silo": swarm.Scene([swarm.Cylinder(0.1, length=2.0)]),
+    "board": swarm.Scene([swarm.Box((1.0, 0.02, 1.2))]),
+    "tube that lies": swarm.Scene([swarm.Cylinder(1e-6, length=20e-6, axis=(1.0, 0.0, 0.0))]),
+    "far away": swarm.Scene([swarm.Torus(500.0, 100.0, center=(1e6, 2e6, 0.0))]),
+    "with a ball": swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside")]),
+}
+
+
+def drawn(scene, points, figsize=(5.0, 4.0), **more):
+    """The axes and the scenery of points, all in red."""
+    with style.applied():
+        figure = style.picture(*figsize)
+        axes = drawing.view(figure, None)
+        shapes = shapes_of(scene, np.asarray(points).T)
+        scenery = drawing.frame(axes, np.asarray(points), np.full(len(points), RED, np.uint32), shapes, **more)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+    return axes, scenery, np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
+
+
+def test_a_particle_behind_a_solid_is_hidden_and_one_before_it_is_seen():
+    scene = VESSELS["with a ball"]
+    shapes = shapes_of(scene, NOWHERE)
+    eye = framed.eye_of(shapes, [shape.vertices for shape in shapes])
+    for place, seen in ((0.3 * eye.near, True), (-0.3 * eye.near, False), (-0.3 * eye.near + 0.21 * eye.right, True)):
+        _axes, _scenery, picture = drawn(scene, [place])
+        reds = (picture[..., 0] > picture[..., 2] + 150) & (picture[..., 1] < 90)
+        assert reds.any() == seen
+
+
+@pytest.mark.parametrize("angles", [(0.0, 0.0), (-60.0, 20.0), (30.0, 80.0)])
+def test_the_silhouette_of_a_sphere_is_a_circle(angles):
+    (shape,) = shapes_of(swarm.Scene([swarm.Sphere(0.5, (1.0, 2.0, 3.0))]), NOWHERE)
+    eye = eye_at(*angles)
+    seen = eye.seen(np.vstack(silhouette(shape, eye))) - eye.seen(np.array([1.0, 2.0, 3.0]))
+    assert np.hypot(*seen.T[:2]) == pytest.approx(0.5, rel=0.01)
+    around = np.sort(np.arctan2(seen[:, 1], seen[:, 0]))
+    assert np.diff(around, append=around[0] + 2.0 * math.pi).max() < 0.2
+
+
+def test_of_a_faceted_mesh_it_is_where_facets_turn_away():
+    (shape,) = shapes_of(swarm.Scene([swarm.Mesh(*cube())]), NOWHERE)
+    eye = eye_at(-60.0, 20.0)
+    length = sum(np.sqrt((np.diff(c, axis=0) ** 2).sum(axis=1)).sum() for c in silhouette(shape, eye))
+    assert length == pytest.approx(6.0)  # of the twelve edges six
+
+
+def cube():
+    corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners, [three for a, b, c, d in quads for three in ((a, b, c), (a, c, d))]
+
+
+@pytest.mark.parametrize("name", VESSELS)
+def test_contours_are_level_and_lie_on_their_wall(name):
+    for shape in shapes_of(VESSELS[name], NOWHERE):
+        wide = np.ptp(shape.vertices, axis=0).max()
+        assert len(shape.levels) >= 3
+        for level in shape.levels:
+            assert np.ptp(level[:, 2]) <= 1e-9 * wide + 1e-12 * np.abs(level).max()
+
+
+@pytest.mark.parametrize("figsize", [(5.0, 4.0), (3.0, 7.0), (9.0, 3.0)])
+@pytest.mark.parametrize("name", VESSELS)
+def test_the_vessel_fills_its_panel_and_is_within_it(name, figsize):
+    shapes = shapes_of(VESSELS[name], NOWHERE)
+    middle = np.vstack([shape.vertices for shape in shapes]).mean(axis=0)
+    axes, scenery, _picture = drawn(VESSELS[name], [middle], figsize)
+    seen = scenery.eye.seen(np.vstack([shape.vertices for shape in shapes]))[:, :2]
+    corners = axes.transData.transform(np.array([seen.min(axis=0), seen.max(axis=0)]))
+    panel = axes.figure.bbox
+    assert (corners[0] >= (panel.x0, panel.y0)).all()
+    assert (corners[1] <= (panel.x1, panel.y1)).all()
+    wide, tall = (corners[1] - corners[0]) / (panel.width, panel.height)
+    assert max(wide, tall) >= 0.8
+
+
+@pytest.mark.parametrize(
+    ("extents", "across"), [((1.0, 0.05, 1.0), 1), ((0.05, 1.0, 1.0), 0), ((1.0, 1.0, 0.05), 2), ((9.0, 1.0, 0.5), 1)]
+)
+def test_the_eye_shows_what_is_wide(extents, across):
+    """It looks along the direction in which there is least, more or less."""
+    half = 0.5 * np.array(extents)
+    eye = eye_for(-half, half)
+    assert eye.near[2] > 0.0
+    assert np.abs(eye.right) @ extents > 0.6 * max(extents[:2])
+    if across != 2:
+        assert np.abs(eye.near).argmax() == across
+    frame = np.stack(eye)
+    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15)
+
+
+def test_who_is_far_away_does_not_widen_the_picture_and_is_counted():
+    scene = swarm.Scene([swarm.Sphere(0.5, openings=[swarm.Sphere(0.2, (0.0, 0.0, 0.5))])])
+    axes, _scenery, _picture = drawn(scene, [[0.0, 0.0, 0.0], [0.0, 0.0, 100.0], [70.0, 0.0, 0.0]])
+    assert np.ptp(axes.get_ylim()) < 2.0
+    assert "2 are beyond this picture" in [text.get_text() for text in axes.texts]
+
+
+def test_what_is_open_is_drawn_as_far_as_most_of_its_particles():
+    points = np.random.default_rng(1).normal(size=(200, 3))
+    points[7] = 1e4
+    found = np.vstack(framed.around(points, []))
+    assert len(found) == 2 * 199
+    nobody = framed.around(np.full((3, 3), np.nan), [])
+    low, high = framed.window(eye_at(0.0, 20.0), nobody)
+    assert (high > low).all()
+
+
+def test_a_triangle_is_where_it_is_and_the_nearest_one_is_seen():
+    raster = Raster(np.zeros(2), np.ones(2), 100.0)
+    seen = np.array([[0.1, 0.1, 1.0], [0.9, 0.1, 1.0], [0.1, 0.9, 5.0]])
+    raster.triangles(seen, np.array([[0, 1, 2]]), np.eye(3))
+    assert np.isfinite(raster.depth).sum() == pytest.approx(0.5 * 80**2, abs=60)
+    assert raster.depth[49, 49] == pytest.approx(1.0 + 4.0 * (0.495 - 0.1) / 0.8)
+    assert raster.colour[49, 49].sum() == pytest.approx(1.0)
+    before = raster.depth.copy()
+    raster.triangles(seen - (0.0, 0.0, 9.0), np.array([[2, 1, 0]]), np.zeros((3, 3)))
+    np.testing.assert_array_equal(raster.depth, before)
+    assert raster.hides(np.array([0.3, 0.3, 0.0]))
+    assert not raster.hides(np.array([0.3, 0.3, 9.0]))
+    assert not raster.hides(np.array([7.0, 0.3, 0.0]))
+    assert not raster.hides(np.full(3, np.nan))
+
+
+def test_lengths_are_round():
+    assert [triad.round_length(x) for x in (0.28, 1.0, 4.99, 5.0, 7e-6)] == pytest.approx([0.2, 1.0, 2.0, 5.0, 5e-6])
+    told = [triad.length_in_words(x) for x in (0.2, 2.0, 5e-3, 2e-6, 5e3, 1e-8, 1e-13)]
+    assert told == ["20 cm", "2 m", "5 mm", "2 µm", "5 km", "10 nm", "1e-13 m"]
+
+
+def test_in_a_plane_what_closed_walls_enclose_is_filled():
+    scene = swarm.Scene([swarm.Box((1.0, 0.5, 0.1)), swarm.Sphere(0.1, side="outside")], plane="z")
+    figure = style.picture(4.0, 3.0)
+    axes = drawing.view(figure, 2)
+    shapes = shapes_of(scene, NOWHERE)
+    flat.flat(axes, 2, np.array([[0.3, 0.0, 0.0]]), "red", shapes)
+    areas = [sum(area(loop) for loop in patch.get_path().to_polygons()) for patch in axes.patches]
+    assert areas == pytest.approx([2.0, math.pi * 0.01], rel=0.01)
+
+
+def area(loop):
+    (x, y), (u, v) = loop[:-1].T, loop[1:].T
+    return abs(0.5 * float((x * v - u * y).sum()))
+
+
+def test_where_all_have_one_speed_there_are_words_and_no_bar():
+    with style.applied():
+        for colours, bars in (([RED, RED], 1), ([RED, 0x0000FFFF], 2)):
+            figure = style.picture(4.0, 4.0)
+            axes = drawing.view(figure, None)
+            drawing.colour_bar(figure, axes, "speed [m/s]", 0.0, 2.0, [np.array(colours, np.uint32)])
+            assert len(figure.axes) == bars
+            words = figure._supxlabel.get_text() if figure._supxlabel else ""
+            assert words.startswith("all at one speed, ") == (bars == 1)
+
+
+def test_a_scenery_without_walls():
+    with style.applied():
+        figure = style.picture(3.0, 3.0)
+        axes = drawing.view(figure, None)
+        assert isinstance(drawing.frame(axes, np.empty((0, 3)), np.empty(0, np.uint32), []), Scenery)
