@@ -31,16 +31,17 @@ def run(until: float) -> swarm.Result:
 
 def draw(seen: dict[str, np.ndarray], file: Path) -> None:
     """The energies over time, and how constant their sum is."""
-    from swarm.output.style import BLUE, GREEN, ORANGE, RED, ink
+    from swarm.output.style import ENERGIES, ink
 
     title = "An elastic block falls on a plane: its fall becomes vibration and comes back, and the sum stays"
     with page(file, title, 1, 2, (9.0, 3.9)) as (energies, error):
-        named = {"kinetic": ("kinetic", RED), "potential": ("of gravity", GREEN), "contact": ("elastic", ORANGE)}
-        for name, (label, color) in {**named, "total": ("sum", ink())}.items():
-            energies.plot(seen["time"], seen[f"{name}_energy"], color=color, label=label)
+        named = {"kinetic": "kinetic", "potential": "of gravity", "contact": "elastic", "total": "sum"}
+        for name, label in named.items():
+            colour = ENERGIES.get(name, ink())
+            energies.plot(seen["time"], seen[f"{name}_energy"], color=colour, label=label)
         energies.set(title="energies", ylabel="energy [J]", ylim=(None, 1.25 * seen["total_energy"].max()))
         energies.legend(loc="upper center", ncols=4)
-        error.plot(seen["time"], 1e15 * seen["energy_error"], ".", color=BLUE, markersize=3, markeredgewidth=0.0)
+        error.plot(seen["time"], 1e15 * seen["energy_error"], ".", color=ink(), markersize=3, markeredgewidth=0.0)
         error.set(title="energy error: round-off", ylabel="relative error [$10^{-15}$]", ylim=(0.0, None))
         for one in (energies, error):
             one.set(xlabel="time [s]", xlim=(0.0, seen["time"][-1]))

@@ -52,7 +52,7 @@ def draw(seen: dict[str, np.ndarray], paths: list[np.ndarray], file: Path) -> No
         side.plot(rods[:, 0], rods[:, 2], "o-", color=ink(), label="rods at the start")
         side.set(title="both bobs for 5 s, from the side", xlabel="x [m]", ylabel="z [m]", aspect="equal")
         side.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        error.plot(seen["time"], 1e13 * seen["energy_error"], ".", color=BLUE, markersize=3, markeredgewidth=0.0)
+        error.plot(seen["time"], 1e13 * seen["energy_error"], ".", color=ink(), markersize=3, markeredgewidth=0.0)
         largest = 1e13 * seen["energy_error"].max()
         error.set(title="energy error", ylim=(0.0, 1.3 * largest), xlim=(0.0, seen["time"][-1]))
         error.set(xlabel="time [s]", ylabel="relative error [$10^{-13}$]")
