@@ -1,4 +1,4 @@
-"""An elastic block that bounces on a plane: its fall turns into vibration and back, and the sum stays.
+"""An elastic block that bounces on a plane: most of its fall turns into vibration, and the sum stays.
 
     python -m examples.bouncing_block
 
@@ -33,12 +33,12 @@ def draw(seen: dict[str, np.ndarray], file: Path) -> None:
     """The energies over time, and how constant their sum is."""
     from swarm.output.style import ENERGIES, ink
 
-    title = "An elastic block falls on a plane: its fall becomes vibration and comes back, and the sum stays"
+    title = "An elastic block falls on a plane: most of its fall becomes vibration, and the sum stays"
     with page(file, title, 1, 2, (9.0, 3.9)) as (energies, error):
         named = {"kinetic": "kinetic", "potential": "of gravity", "contact": "elastic", "total": "sum"}
         for name, label in named.items():
             colour = ENERGIES.get(name, ink())
-            energies.plot(seen["time"], seen[f"{name}_energy"], color=colour, label=label)
+            energies.plot(seen["time"], seen[f"{name}_energy"], color=colour, linewidth=1.0, label=label)
         energies.set(title="energies", ylabel="energy [J]", ylim=(None, 1.25 * seen["total_energy"].max()))
         energies.legend(loc="upper center", ncols=4)
         error.plot(seen["time"], 1e15 * seen["energy_error"], ".", color=ink(), markersize=3, markeredgewidth=0.0)
