@@ -244,5 +244,6 @@ def main(quick: bool) -> None:
         told += [f"{name}: {advice(name, found)}.", *races(name, found)]
         if not quick:
             write(name, found)
-            figure.accuracy(name, found, front(found, -1), advice(name, found))
+            file = f"accuracy-{name.replace(' ', '-')}-{name_of_machine()}"
+            figure.accuracy(name, found, front(found, -1), advice(name, found), machine(), file)
     print("\n".join(told))

@@ -18,7 +18,7 @@ import swarm
 from swarm.methods.base import Method
 
 from . import figure, yardstick
-from .report import Row, show, write
+from .report import Row, machine, name_of_machine, show, write
 
 SPEED = 0.5
 SCENES = {
@@ -195,7 +195,8 @@ def main(quick: bool) -> None:
     rows += [row_of(case, values, limits) for case, values in found.items()]
     if not quick:
         write(rows, "throughput")
-        figure.throughput(found, limits, [name for name, way in METHODS.items() if way.step])
+        fixed = [name for name, way in METHODS.items() if way.step]
+        figure.throughput(found, limits, fixed, machine(), f"throughput-{name_of_machine()}")
 
 
 _ITEMS = {

@@ -20,6 +20,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page, vessel
 
 TEMPERATURE, GRAVITY = 1.0, 2.0
 SIDES, HOLE = 16, 0.06
@@ -97,40 +98,39 @@ def run(count: int, opens: float = 20.0, until: float = 100.0, frames: int = 40)
     return Storage(mesh, time, part, np.sqrt(law * (1.0 - law) / count), law, kept.particles.position)
 
 
+def draw(storage: Storage, file: Path) -> None:
+    """The bottle with what it stores, and the storage curve."""
+    from swarm.output.style import CAVITY_LINE, GREEN, ORANGE
+
+    mesh, title = storage.mesh, "A storage bottle from an STL file keeps its gas until a shutter in its floor opens"
+    with page(file, title, 1, 2, (9.0, 4.4)) as (place, axes):
+        shape = place.figure.add_subplot(place.get_subplotspec(), projection="3d")
+        place.remove()
+        parts = {"bottle": CAVITY_LINE, "shutter": ORANGE}
+        pieces = [(mesh.vertices[mesh.triangles[mesh.group == mesh.names.index(name)]], c) for name, c in parts.items()]
+        vessel(shape, pieces, storage.shown[:, :1500])
+        shape.set_title(f"{len(mesh)} triangles, 1500 particles at 20 s")
+        axes.axvspan(20.0, storage.time[-1], color=ORANGE, alpha=0.15, linewidth=0.0, label="shutter is open")
+        law(axes, storage.time, storage.law, "law: n v A/4 leave in a second")
+        run = {"fmt": ".", "color": GREEN, "markersize": 5, "label": "run, with standard errors"}
+        axes.errorbar(storage.time, storage.part, storage.error, **run)
+        axes.set(xlabel="time [s]", ylabel="part of the particles", title="what is stored", yscale="log")
+        axes.set_yticks([0.2, 0.3, 0.5, 0.7, 1.0], ["0.2", "0.3", "0.5", "0.7", "1"], minor=False)
+        axes.set_yticks([], minor=True)
+        axes.legend(loc="lower left")
+
+
 def main() -> None:
     """Run, draw and print."""
     ask = Asked(__doc__, "bottle_from_stl.png", "plot")
     ask.add_argument("--count", type=int, default=8000)
     asked = ask.parse_args()
-    from matplotlib import pyplot
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    from .paper.plotting import BLUE, GREY, RED
-
     storage = run(asked.count)
     mesh = storage.mesh
     print(f"{mesh}: {1e3 * mesh.volume():.1f} litres, groups {', '.join(mesh.names)}")
     off = np.abs(storage.part - storage.law)[storage.error > 0.0] / storage.error[storage.error > 0.0]
     print(f"{storage.part[-1]:.4f} are left, {storage.law[-1]:.4f} by the law, {off.max():.1f} errors off at most")
-    picture = pyplot.figure(figsize=(7.4, 3.8))
-    shape = picture.add_subplot(1, 2, 1, projection="3d")
-    for name, colour in (("bottle", (0.5, 0.6, 0.7, 0.15)), ("shutter", (0.8, 0.2, 0.2, 0.6))):
-        triangles = mesh.triangles[mesh.group == mesh.names.index(name)]
-        edges = (0.3, 0.3, 0.3, 0.25)
-        shape.add_collection3d(
-            Poly3DCollection(mesh.vertices[triangles], facecolor=colour, edgecolor=edges, linewidths=0.4)
-        )
-    shape.scatter(*storage.shown[:, :1500], s=1.0, color=BLUE, linewidths=0.0)
-    shape.set(xlim=(-0.4, 0.4), ylim=(-0.4, 0.4), zlim=(0.0, 0.9), title=f"{len(mesh)} triangles of an STL file")
-    shape.set_box_aspect((0.8, 0.8, 0.9))
-    shape.set_axis_off()
-    axes = picture.add_subplot(1, 2, 2)
-    axes.plot(storage.time, storage.law, color=GREY, linewidth=0.8, label="law")
-    axes.errorbar(storage.time, storage.part, storage.error, fmt=".", color=RED, label="run")
-    axes.set(xlabel="time [s]", ylabel="part that is stored", title="the shutter opens at 20 s", yscale="log")
-    axes.legend(frameon=False)
-    picture.tight_layout()
-    picture.savefig(asked.output, dpi=130)
+    draw(storage, asked.output)
     print(f"written {asked.output}")
 
 

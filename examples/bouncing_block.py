@@ -1,9 +1,11 @@
-"""An elastic block that bounces on a plane: its fall turns into vibration and back, and the sum stays.
+"""An elastic block that bounces on a plane: most of its fall turns into vibration, and the sum stays.
 
     python -m examples.bouncing_block
 
 The block is made of tetrahedra of Saint Venant and Kirchhoff; each node that reaches the plane strikes it.
 """
+
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +13,7 @@ import swarm
 from swarm.bodies.elastic import block
 
 from .asked import Asked
+from .page import page
 
 YOUNG, POISSON, DENSITY = 1e5, 0.3, 1000.0
 SIZES, CELLS, HEIGHT = (0.2, 0.1, 0.1), (2, 1, 1), 0.1
@@ -26,25 +29,33 @@ def run(until: float) -> swarm.Result:
     return swarm.simulate(scene, start, swarm.Impact(dt=STEP), until=until, every=EVERY)
 
 
+def draw(seen: dict[str, np.ndarray], file: Path) -> None:
+    """The energies over time, and how constant their sum is."""
+    from swarm.output.style import ENERGIES, ink
+
+    title = "An elastic block falls on a plane: most of its fall becomes vibration, and the sum stays"
+    with page(file, title, 1, 2, (9.0, 3.9)) as (energies, error):
+        named = {"kinetic": "kinetic", "potential": "of gravity", "contact": "elastic", "total": "sum"}
+        for name, label in named.items():
+            colour = ENERGIES.get(name, ink())
+            energies.plot(seen["time"], seen[f"{name}_energy"], color=colour, linewidth=1.0, label=label)
+        energies.set(title="energies", ylabel="energy [J]", ylim=(None, 1.25 * seen["total_energy"].max()))
+        energies.legend(loc="upper center", ncols=4)
+        error.plot(seen["time"], 1e15 * seen["energy_error"], ".", color=ink(), markersize=3, markeredgewidth=0.0)
+        error.set(title="energy error: round-off", ylabel="relative error [$10^{-15}$]", ylim=(0.0, None))
+        for one in (energies, error):
+            one.set(xlabel="time [s]", xlim=(0.0, seen["time"][-1]))
+
+
 def main() -> None:
     """Run, draw and print."""
-    from .paper.plotting import BLUE, GREEN, GREY, RED, page
-
     ask = Asked(__doc__, "bouncing_block.png", "plot")
     ask.add_argument("--until", type=float, default=2.0)
     asked = ask.parse_args()
     seen = run(asked.until).observables
     print(f"{seen['impacts'][-1]} impacts, energy error {seen['energy_error'].max():.1e}")
     print(f"largest share of the elastic energy {(seen['contact_energy'] / seen['total_energy']).max():.2f}")
-    with page(asked.output, "An elastic block bounces on a plane", 1, 2, (8.0, 3.2)) as (energies, error):
-        named = {"kinetic": RED, "potential": GREEN, "contact": BLUE, "total": GREY}
-        for name, color in named.items():
-            label = "elastic" if name == "contact" else name
-            energies.plot(seen["time"], seen[f"{name}_energy"], color=color, label=label)
-        energies.set(title="energy", xlabel="time [s]", ylabel="energy [J]")
-        energies.legend(loc="upper right", bbox_to_anchor=(1.0, 0.95), ncols=2)
-        error.semilogy(seen["time"], np.maximum(seen["energy_error"], 1e-17), ".", color=BLUE, markersize=1.5)
-        error.set(title="energy error", xlabel="time [s]", ylabel="relative")
+    draw(seen, asked.output)
     print(f"written {asked.output}")
 
 

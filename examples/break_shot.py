@@ -16,6 +16,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import page
 
 # [m], [kg], [m/s]; the table is 2.54 m by 1.27 m between its cushions.
 LONG, SHORT, RADIUS, MASS, SPEED = 1.27, 0.635, 0.028575, 0.17, 9.0
@@ -78,25 +79,32 @@ def draw(game: Game, file: Path) -> None:
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Circle, Rectangle
 
-    from .paper.plotting import BLUE, GREEN, GREY, page
+    from swarm.output.style import BLUE, CAVITY, CAVITY_LINE, GREY, RED, ink
 
-    with page(file, "A break shot", 2, 2, (8.0, 4.8)) as axes:
+    title = "A break shot: the red ball comes from the left with 9 m/s, and fifteen blue ones scatter"
+    with page(file, title, 2, 2, (8.4, 4.9)) as axes:
         for one, time in zip(axes, SHOWN, strict=True):
             k = int(np.argmin(np.abs(game.time - time)))
             gone = game.escape_time <= game.time[k]
-            one.add_patch(Rectangle((-LONG, -SHORT), 2.0 * LONG, 2.0 * SHORT, facecolor="#dfeee4", edgecolor=GREEN))
+            cloth = Rectangle((-LONG, -SHORT), 2.0 * LONG, 2.0 * SHORT, facecolor=CAVITY, edgecolor=CAVITY_LINE)
+            one.add_patch(cloth)
             for x, y in [(x, y) for x in (-LONG, 0.0, LONG) for y in (-SHORT, SHORT)]:
-                one.add_patch(Circle((x, y), POCKET, color=GREY))
+                one.add_patch(Circle((x, y), POCKET, color=ink()))
             balls: list[Any] = [Circle(tuple(r), RADIUS) for r in game.position[k, :2].T]
-            for chosen, colour in ((slice(0, 1), "black"), (slice(1, None), BLUE)):
+            for chosen, colour in ((slice(0, 1), RED), (slice(1, None), BLUE)):
                 shown = [ball for ball, away in zip(balls[chosen], gone[chosen], strict=True) if not away]
-                one.add_collection(PatchCollection(shown, facecolor=colour))
+                one.add_collection(PatchCollection(shown, facecolor=colour, zorder=3))
             if k > 0:
                 since = game.position[max(0, k - 10) : k + 1, :2]
-                one.plot(*np.moveaxis(since[:, :, ~gone], 1, 0), color=GREY, linewidth=0.6)
-            one.set(title=f"{game.time[k]:.2f} s, {int(gone.sum())} pocketed", aspect="equal")
-            one.set(xlim=(-LONG - 0.1, LONG + 0.1), ylim=(-SHORT - 0.1, SHORT + 0.1), xticks=[], yticks=[])
+                one.plot(*np.moveaxis(since[:, :, ~gone], 1, 0), color=GREY, linewidth=0.8)
+            in_pockets = int(gone.sum())
+            number = {0: "none is", 1: "one is"}.get(in_pockets, f"{in_pockets} are")
+            one.set(title=f"after {game.time[k]:g} s: {number} in pockets", aspect="equal")
+            one.set(xlim=(-LONG - 0.1, LONG + 0.1), ylim=(-SHORT - 0.1, SHORT + 0.1))
             one.axis("off")
+        metre = axes[2]
+        metre.plot([-LONG, -LONG + 1.0], [-SHORT - 0.16] * 2, color=ink(), linewidth=2.0, clip_on=False)
+        metre.text(-LONG + 1.05, -SHORT - 0.16, "1 m", va="center")
 
 
 def main() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page
 
 SWEEP = Path(__file__).parent / "sweeps" / "cooling.toml"
 WIDTH, SPEED = 0.2, 1.0
@@ -21,7 +22,7 @@ WIDTH, SPEED = 0.2, 1.0
 MIDPOINTS = (np.arange(400) + 0.5) / 400
 
 
-def law(restitution: float, times: np.ndarray) -> np.ndarray:
+def haff(restitution: float, times: np.ndarray) -> np.ndarray:
     """Mean energy over that of the start: the crossings of a direction last 1, q, q^2, ... of the first, q = 1/e."""
     q, v = 1.0 / restitution, SPEED * MIDPOINTS
     after_first = times[:, None, None] * v[:, None] / WIDTH - MIDPOINTS
@@ -47,16 +48,20 @@ def curves(folder: Path) -> dict[float, tuple[np.ndarray, np.ndarray]]:
 
 def draw(found: dict[float, tuple[np.ndarray, np.ndarray]], file: Path) -> None:
     """Every gas as dots, the law as a line."""
-    from .paper.plotting import GREY, page
+    from swarm.output.style import CURVES
 
-    with page(file, "A gas between walls that take energy", 1, 1, (5.0, 4.0)) as axes:
-        for k, (restitution, (times, energies)) in enumerate(found.items()):
-            axes[0].plot(times[1:], law(restitution, times[1:]), color=GREY, linewidth=0.8)
+    with page(file, "A gas loses its energy to the walls of its box", 1, 1, (6.4, 4.6)) as (axes,):
+        for colour, (restitution, (times, energies)) in zip(CURVES, found.items(), strict=False):
+            first = colour == CURVES[0]
+            law(
+                axes, times[1:], haff(restitution, times[1:]), "law of this box, slope -2 in the end" if first else None
+            )
             for energy in energies:
-                axes[0].plot(times[1:], energy[1:], ".", color=f"C{k}", markersize=3)
-            axes[0].plot([], [], ".", color=f"C{k}", label=f"e = {restitution:g}")
-        axes[0].set(xscale="log", yscale="log", xlabel="time [s]", ylabel="energy over that of the start")
-        axes[0].legend()
+                axes.plot(times[1:], energy[1:], ".", color=colour, markersize=4)
+            lost = f"walls leave {100.0 * restitution:g} % of the normal speed: {len(energies)} gases"
+            axes.plot([], [], ".", color=colour, label=lost)
+        axes.set(xscale="log", yscale="log", xlabel="time [s]", ylabel="energy, over that of the start")
+        axes.legend(loc="lower left")
 
 
 def main() -> None:
@@ -69,7 +74,7 @@ def main() -> None:
     found = curves(asked.folder or asked.output.with_suffix(""))
     for restitution, (times, energies) in found.items():
         mean, error = energies[:, -1].mean(), energies[:, -1].std(ddof=1) / math.sqrt(len(energies))
-        expected = law(restitution, times[-1:])[0]
+        expected = haff(restitution, times[-1:])[0]
         print(f"e = {restitution:g}: {mean:.3e} of the energy is left, +- {error:.1e}; by the law {expected:.3e}")
     draw(found, asked.output)
     print(f"written {asked.output}")

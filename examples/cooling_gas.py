@@ -17,6 +17,7 @@ import swarm
 
 from .asked import Asked
 from .hard_spheres import cell_of, collision_time, lattice
+from .page import law, page
 
 RESTITUTIONS = (0.95, 0.9, 0.8)
 PACKING, SIDE, TAUS, FRAMES = 0.05, 20, 10.0, 60
@@ -56,19 +57,22 @@ def run(restitution: float, side: int = SIDE, taus: float = TAUS, packing: float
 
 def draw(found: dict[float, Cooled], file: Path) -> None:
     """The energy over time, and how far it is from the law."""
-    from .paper.plotting import BLUE, GREEN, GREY, RED, page
+    from swarm.output.style import CURVES
 
     fine = np.geomspace(0.05, TAUS, 200)
-    with page(file, "A gas of balls that lose energy when they meet", 1, 2, (8.0, 3.2)) as axes:
-        axes[0].plot(fine, (1.0 + fine) ** -2.0, color=GREY, label="Haff's law")
-        axes[1].axhline(0.0, color=GREY)
-        for (e, one), colour in zip(found.items(), (BLUE, RED, GREEN), strict=False):
-            law = (1.0 + one.time) ** -2.0
-            axes[0].plot(one.time[1:], one.energy[1:], ".", color=colour, label=f"e = {e:g}")
-            axes[1].plot(one.time, 100.0 * (one.energy / law - 1.0), color=colour)
-        axes[0].set(xscale="log", yscale="log", xlabel="time, in tau", ylabel="temperature, over that of the start")
-        axes[0].legend()
-        axes[1].set(xlabel="time, in tau", ylabel="off the law [%]", ylim=(-5.0, 5.0))
+    title = "A gas of balls that lose energy when they meet cools by Haff's law, and no longer when they cluster"
+    with page(file, title, 1, 2, (9.0, 3.8)) as (temperature, off):
+        law(temperature, fine, (1.0 + fine) ** -2.0, "Haff's law, $1/(1+t/\\tau)^2$")
+        law(off, None, 0.0, "Haff's law")
+        for (e, one), colour in zip(found.items(), CURVES, strict=False):
+            haff = (1.0 + one.time) ** -2.0
+            temperature.plot(one.time[1:], one.energy[1:], ".", color=colour, label=f"restitution {e:g}")
+            off.plot(one.time, 100.0 * (one.energy / haff - 1.0), color=colour, label=f"restitution {e:g}")
+        temperature.set(xscale="log", yscale="log", title="temperature", ylabel="over that of the start")
+        off.set(title="temperature, less the law", ylabel="part of the law [%]", ylim=(-5.0, 5.0))
+        for axes in (temperature, off):
+            axes.set(xlabel=r"time, over Haff's $\tau$")
+            axes.legend(loc="lower left")
 
 
 def main() -> None:

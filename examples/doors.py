@@ -17,11 +17,14 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page, solid
 
 # k_B T [J] of particles of mass 1 kg, and their mean speed.
 TEMPERATURE = 1.0
 MEAN_SPEED = math.sqrt(8.0 * TEMPERATURE / math.pi)
 HALF, HOLE, BALL = 0.5, 0.04, 0.15
+# Pictures show the particles within this height of the middle [m].
+SLAB = 0.12
 WARM: Any = {"temperature": TEMPERATURE}
 AREA = math.pi * HOLE**2
 
@@ -75,23 +78,61 @@ def _flow(time: np.ndarray, part: np.ndarray, law: np.ndarray, run: Any) -> Flow
     return Flow(time, part, np.sqrt(law * (1.0 - law) / len(start)), law, ends, at)
 
 
-def draw(flow: Flow, file: Path, lines: list[list[tuple[float, float]]], names: tuple[str, ...]) -> None:
-    """The particles at two times, seen along z, between walls; and the part over time."""
-    from .paper.plotting import BLUE, GREY, RED, page
+def draw(flow: Flow, file: Path, names: tuple[str, ...], walls: Any, opened: tuple[float, float, str]) -> None:
+    """The particles at two times, seen along z, between what `walls` draws; and the part over time."""
+    from swarm.output.style import BLUE, ORANGE
 
     title, label, *captions = names
-    with page(file, title, 1, 3, (11.0, 3.5)) as axes:
+    since, until, what = opened
+    with page(file, title, 1, 3, (11.0, 4.0)) as axes:
         for one, points, caption in zip(axes, flow.shown, captions, strict=False):
-            some = slice(None, None, max(1, points.shape[1] // 4000))
-            one.plot(points[0, some], points[1, some], ".", color=BLUE, markersize=1.0)
-            for line in lines:
-                one.plot(*zip(*line, strict=True), color="black", linewidth=1.5)
+            slab = points[:2, np.abs(points[2]) < SLAB]
+            one.plot(*slab[:, :2500], ".", color=BLUE, markersize=2.5, markeredgewidth=0.0)
+            walls(one, one is axes[0])
             one.set(title=caption, aspect="equal", xlabel="x [m]", ylabel="y [m]")
             one.grid(visible=False)
-        axes[2].plot(flow.time, flow.law, color=GREY, linewidth=0.8, label="law")
-        axes[2].errorbar(flow.time, flow.part, flow.error, fmt=".", color=RED, label="run")
-        axes[2].set(xlabel="time [s]", ylabel=label)
+            one.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2))
+        axes[2].axvspan(since, until, color=ORANGE, alpha=0.15, linewidth=0.0, label=what)
+        law(axes[2], flow.time, flow.law, "law: n v A/4 pass a hole in a second")
+        axes[2].errorbar(
+            flow.time, flow.part, flow.error, fmt=".", color=BLUE, markersize=5, label="run, with standard errors"
+        )
+        axes[2].set(xlabel="time [s]", title=label, ylabel="part of all particles", xlim=(0.0, flow.time[-1]))
+        axes[2].set_ylim(top=1.08)
         axes[2].legend()
+
+
+def draw_vessel(axes: Any, shut: bool) -> None:
+    """The section of the vessel at z = 0, with its shutter if that is there."""
+    from swarm.output.style import CAVITY_LINE, ORANGE
+
+    axes.plot(
+        HALF * np.array([-1, 1, 1, -1, -1]), HALF * np.array([-1, -1, 1, 1, -1]), color=CAVITY_LINE, linewidth=2.0
+    )
+    for x in (-0.25, 0.25):
+        solid(axes, (x, 0.0), BALL)
+    dashes = {} if shut else {"linestyle": ":", "linewidth": 1.0}
+    axes.plot(
+        [0.0, 0.0],
+        [-HALF, HALF],
+        color=ORANGE,
+        label="shutter" if shut else "where it was",
+        **{"linewidth": 2.5, **dashes},
+    )
+
+
+def draw_rooms(axes: Any, shut: bool) -> None:
+    """The section of the rooms at z = 0, with the door."""
+    from swarm.output.style import CAVITY_LINE, ORANGE
+
+    low, high = -2.0 * HALF, HALF
+    axes.plot([low, high, high, low, low], [-HALF, -HALF, HALF, HALF, -HALF], color=CAVITY_LINE, linewidth=2.0)
+    for side in (-1.0, 1.0):
+        axes.plot([0.0, 0.0], [side * HOLE, side * HALF], color=CAVITY_LINE, linewidth=2.0)
+    axes.plot(
+        [0.0, 0.0], [-HOLE, HOLE], color=ORANGE, linewidth=4.0 if shut else 1.5, linestyle="-" if shut else ":",
+        label="door" if shut else "door, open",
+    )  # fmt: skip
 
 
 def main() -> None:
@@ -99,18 +140,14 @@ def main() -> None:
     ask = Asked(__doc__, "doors.png", "plot")
     ask.add_argument("--particles", type=int, default=20_000)
     asked = ask.parse_args()
-    half = [(-HALF, -HALF), (HALF, -HALF), (HALF, HALF), (-HALF, HALF), (-HALF, -HALF)]
-    rooms = [[(x * HALF, y * HALF) for x, y in ((0, -1), (-2, -1), (-2, 1), (0, 1))],
-             [(x * HALF, y * HALF) for x, y in ((0, 1), (1, 1), (1, -1), (0, -1))],
-             [(0.0, -HALF), (0.0, -HOLE)], [(0.0, HOLE), (0.0, HALF)]]  # fmt: skip
     shut, opened = shutter(asked.particles), door(asked.particles)
-    captions = "at 1 s, as the shutter goes", "0.15 s later"
-    title = "A shutter, and a valve that is open from 20 to 140 s"
+    title = "A gas behind a shutter fills the vessel once that has gone; later a valve lets it out"
+    captions = "in the vessel", "1 s, as the shutter goes", "0.15 s later: fast ones are there"
     file = asked.output.with_name("shutter.png")
-    draw(shut, file, [half], (title, "part of the particles inside", *captions))
-    captions = "at 5 s, as the door opens", "at 200 s"
-    title = "A door between two rooms"
-    draw(opened, asked.output, rooms, (title, "part of the particles in the left room", *captions))
+    draw(shut, file, (title, *captions), draw_vessel, (20.0, 140.0, "valve is open"))
+    title = "A door opens between a full room and an empty one of half its size: their densities become equal"
+    captions = "in the left room", "5 s, as the door opens", "200 s"
+    draw(opened, asked.output, (title, *captions), draw_rooms, (5.0, opened.time[-1], "door is open"))
     for name, flow in (("through the valve", shut), ("through the door", opened)):
         off = np.abs(flow.part - flow.law)[flow.error > 0.0] / flow.error[flow.error > 0.0]
         print(

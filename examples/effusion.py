@@ -16,6 +16,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page
 
 HALF, BALL, HOLE = 0.5, 0.3, 0.025
 # k_B T [J] of particles of mass 1 kg
@@ -87,23 +88,34 @@ def run(count: int, hot: bool, until: float = 2.0, frames: int = 20) -> Gas:
 
 def draw(cold: Gas, hot: Gas, file: Path) -> None:
     """What is left, how far that is from the law, and the energy of a particle inside."""
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import BLUE, RED
 
-    kinds = (("elastic walls", cold, BLUE), ("walls at a temperature", hot, RED))
-    with page(file, "Effusion of a gas without collisions", 1, 3, (11.0, 3.5)) as axes:
+    kinds = (("elastic walls", cold, BLUE), ("walls of one temperature", hot, RED))
+    title = "A gas leaves its box through a small hole: between elastic walls fast particles go first, and it cools"
+    with page(file, title, 1, 3, (11.0, 3.8)) as axes:
         for name, gas, color in kinds:
-            axes[0].plot(gas.time, gas.law, color=GREY, linewidth=0.8)
-            axes[0].plot(gas.time, gas.left, ".", color=color, label=name)
-            axes[1].errorbar(gas.time[1:], gas.left[1:] - gas.law[1:], gas.error[1:], fmt=".", color=color)
-            axes[2].plot(gas.time, gas.energy_law, color=GREY, linewidth=0.8)
-            axes[2].plot(gas.time, gas.energy, ".", color=color)
-        axes[0].set(yscale="log", ylabel="part of the particles inside")
-        axes[0].legend()
-        axes[1].axhline(0.0, color=GREY, linewidth=0.8)
-        axes[1].set(ylabel="less the law, with standard errors")
-        axes[2].set(ylabel="mean energy inside, over that of the start")
+            first = gas is cold
+            law(axes[0], gas.time, gas.law, "laws" if first else None)
+            axes[0].plot(gas.time, gas.left, ".", color=color, markersize=5, label=name)
+            axes[1].errorbar(
+                gas.time[1:],
+                100.0 * (gas.left[1:] - gas.law[1:]),
+                100.0 * gas.error[1:],
+                fmt=".",
+                color=color,
+                label=name,
+            )
+            law(axes[2], gas.time, gas.energy_law, "laws" if first else None)
+            axes[2].plot(gas.time, gas.energy, ".", color=color, markersize=5, label=name)
+        axes[0].set(yscale="log", title="particles inside", ylabel="part of those at the start")
+        axes[0].set_yticks([0.2, 0.3, 0.5, 0.7, 1.0], ["0.2", "0.3", "0.5", "0.7", "1"], minor=False)
+        axes[0].set_yticks([], minor=True)
+        law(axes[1], None, 0.0, "law")
+        axes[1].set(title="the same, less the law, with standard errors", ylabel="% of the particles", ylim=(-1.5, 1.5))
+        axes[2].set(title="mean energy of those inside", ylabel="over that of the start", ylim=(0.4, 1.05))
         for one in axes:
-            one.set(xlabel=r"time $\langle v\rangle A/4V$")
+            one.set(xlabel="time, in $4V/A\\langle v\\rangle$")
+            one.legend(loc="lower left")
 
 
 def main() -> None:

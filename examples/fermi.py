@@ -14,6 +14,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page
 
 # Amplitude of the wall [m], its distance [m], and its frequency, so that it moves as sin(t).
 AMPLITUDE, LENGTH, FREQUENCY = 0.02, 1.0, 0.5 / np.pi
@@ -61,16 +62,29 @@ def in_fifty_digits(speed: float, amplitude: float, impacts: int) -> tuple[float
 
 def draw(places: np.ndarray, velocities: np.ndarray, file: Path) -> None:
     """The phase space once a period, and the largest and smallest speed of each particle."""
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import BLUE, RED
 
     speeds = np.abs(velocities)
-    with page(file, "Fermi's accelerator, once a period", 1, 2, (8.5, 3.8)) as axes:
-        for k, colour in enumerate(np.where(np.ptp(speeds, axis=0) > 0.1, RED, BLUE)):
-            axes[0].plot(places[:, k], velocities[:, k], ",", color=colour)
-        axes[0].set(xlabel="x [m]", ylabel="velocity away from the wall at rest [m/s]", ylim=(0.0, 0.9))
-        axes[1].fill_between(speeds[0], speeds.min(axis=0), speeds.max(axis=0), color=BLUE, alpha=0.4, linewidth=0.0)
-        axes[1].plot(speeds[0], speeds[0], color=GREY, linewidth=0.8)
+    title = "A ball between a wall at rest and one that swings: slow ones wander in chaos, fast ones keep their speed"
+    with page(file, title, 1, 2, (10.0, 4.2)) as axes:
+        for colour, chosen, name in (
+            (RED, np.ptp(speeds, axis=0) > 0.1, "speed changes by more than 0.1 m/s"),
+            (BLUE, np.ptp(speeds, axis=0) <= 0.1, "by less"),
+        ):
+            axes[0].plot(places[:, chosen].ravel(), velocities[:, chosen].ravel(), ",", color=colour, alpha=0.6)
+            axes[0].plot([], [], "o", color=colour, label=name)
+        axes[0].set(title="each particle, once a period: a dot", xlabel="place x [m]", xlim=(0.0, 1.0))
+        axes[0].set(ylabel="velocity away from the wall at rest [m/s]", ylim=(0.0, 0.9))
+        axes[0].legend(loc="upper right", framealpha=0.9, frameon=True)
+        axes[0].grid(False)
+        axes[1].fill_between(
+            speeds[0], speeds.min(axis=0), speeds.max(axis=0), color=BLUE, alpha=0.4, linewidth=0.0,
+            label=f"from the least to the largest in {len(places) - 1} periods",
+        )  # fmt: skip
+        law(axes[1], speeds[0], speeds[0], "the speed at the start")
+        axes[1].set(title="which speeds a particle reaches", ylim=(0.0, None), xlim=(0.0, 2.0))
         axes[1].set(xlabel="speed at the start [m/s]", ylabel="speeds since then [m/s]")
+        axes[1].legend(loc="upper left")
 
 
 def main() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import page, solid
 
 # Distance of pegs and of rows, radius of a peg with a grain, depth of the bins, half the thickness of a divider [m].
 ROWS, SPACING, RADIUS, DEPTH, DIVIDER = 12, 0.02, 0.006, 0.08, 0.0008
@@ -94,30 +95,33 @@ def paths(count: int, until: float = 6.0) -> np.ndarray:
 
 def draw(found: Filled, smooth: Filled, file: Path) -> None:
     """The board with some paths, and the bins beside the binomial law."""
-    from matplotlib.patches import Circle, Rectangle
+    from matplotlib.patches import Rectangle
 
-    from .paper.plotting import BLUE, GREEN, GREY, RED, page
+    from swarm.output.style import BLUE, GREEN, ORANGE, RED, SOLID_LINE, ink
 
-    with page(file, "Galton's board: 12 rows, 78 pegs", 1, 2, (8.0, 4.2)) as axes:
+    title = "Galton's board: twelve rows of rough pegs fill the bins by the binomial law, smooth pegs do not"
+    with page(file, title, 1, 2, (10.0, 4.6)) as axes:
         for x, _y, z in pegs():
-            axes[0].add_patch(Circle((1e3 * x, 1e3 * z), 1e3 * RADIUS, color="0.75"))
+            solid(axes[0], (1e3 * x, 1e3 * z), 1e3 * RADIUS)
         for x, _y, z in pegs()[-ROWS:]:
-            axes[0].add_patch(
-                Rectangle((1e3 * (x - DIVIDER), 1e3 * (z - DEPTH)), 2e3 * DIVIDER, 1e3 * DEPTH, color="0.6")
-            )
+            corner = 1e3 * (x - DIVIDER), 1e3 * (z - DEPTH)
+            axes[0].add_patch(Rectangle(corner, 2e3 * DIVIDER, 1e3 * DEPTH, color=SOLID_LINE))
         for path, colour in zip(np.moveaxis(paths(3), 2, 0), (BLUE, RED, GREEN), strict=True):
-            axes[0].plot(1e3 * path[:, 0], 1e3 * path[:, 2], color=colour, linewidth=0.7)
-        axes[0].set(
-            xlabel="x [mm]", ylabel="z [mm]", aspect="equal", xlim=(-130.0, 130.0), ylim=(1e3 * FLOOR, 1e3 * LID)
-        )
+            axes[0].plot(1e3 * path[:, 0], 1e3 * path[:, 2], color=colour, linewidth=0.8)
+            axes[0].plot(1e3 * path[-1, 0], 1e3 * path[-1, 2] + 2.0, "o", color=colour, markersize=4)
+        axes[0].set(title="the paths of three grains of 20 000", xlabel="x [mm]", ylabel="z [mm]", aspect="equal")
+        axes[0].set(xlim=(-130.0, 130.0), ylim=(1e3 * FLOOR, 1e3 * LID))
         axes[0].grid(False)
         number, count = np.arange(ROWS + 1), found.bins.sum()
-        axes[1].bar(number, found.bins / count, color=BLUE, alpha=0.5, label="rough pegs")
-        axes[1].step(number, smooth.bins / count, where="mid", color=GREY, label="smooth pegs, restitution 0.5")
-        axes[1].errorbar(
-            number, binomial(), np.sqrt(binomial() / count), fmt=".", color=RED, label="binomial, with standard errors"
+        axes[1].bar(number, found.bins / count, color=BLUE, alpha=0.45, label="run, rough pegs")
+        axes[1].step(
+            number, smooth.bins / count, where="mid", color=ORANGE, label="run, smooth pegs, which take half the speed"
         )
-        axes[1].set(xlabel="bin", ylabel="part of the grains", ylim=(0.0, 0.46))
+        axes[1].errorbar(
+            number, binomial(), np.sqrt(binomial() / count), fmt="_", color=ink(), markersize=14,
+            label="binomial law, with standard errors",
+        )  # fmt: skip
+        axes[1].set(title="where they end", xlabel="bin, from the left", ylabel="part of the grains", ylim=(0.0, 0.46))
         axes[1].legend(loc="upper center")
 
 

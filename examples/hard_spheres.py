@@ -14,6 +14,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page
 
 PACKINGS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.49)
 # The balls along a side of the lattice; collisions of each before it is measured; frames.
@@ -85,21 +86,24 @@ def measure(packing: float, collisions: int, side: int = SIDE) -> Measured:
 
 def draw(found: dict[float, Measured], file: Path) -> None:
     """Z over the packing, and how far it is from the law."""
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import BLUE, GREEN
 
     packing, fine = np.array(list(found)), np.linspace(0.0, 0.5, 200)
     z, error = (np.array([one[k] for one in found.values()]) for k in range(2))
-    law = np.asarray(carnahan_starling(packing))
-    with page(file, "Hard spheres: the equation of state", 1, 2, (8.0, 3.2)) as axes:
-        axes[0].plot(fine, carnahan_starling(fine), color=GREY, label="Carnahan and Starling")
-        axes[0].plot(packing, z, "o", color=BLUE, markersize=4, label="swarm")
-        axes[0].set(xlabel="packing", ylabel="p V/(N k T)")
-        axes[0].legend()
-        axes[1].axhline(0.0, color=GREY)
-        axes[1].plot(fine, 100.0 * (kolafa(fine) / carnahan_starling(fine) - 1.0), color=RED, label="Kolafa")
-        axes[1].legend(loc="lower left")
-        axes[1].errorbar(packing, 100.0 * (z / law - 1.0), 100.0 * error / law, fmt=".", color=BLUE)
-        axes[1].set(xlabel="packing", ylabel="off Carnahan and Starling [%]", ylim=(-0.5, 0.5))
+    starling = np.asarray(carnahan_starling(packing))
+    title = "The pressure of a gas of hard spheres follows the known equations of state to 0.3 %"
+    with page(file, title, 1, 2, (9.0, 3.8)) as axes:
+        run = {"fmt": "o", "color": BLUE, "label": "run, with standard errors"}
+        law(axes[0], fine, carnahan_starling(fine), "Carnahan and Starling, 1969")
+        axes[0].errorbar(packing, z, error, **run)
+        axes[0].set(title="pressure, over that of an ideal gas", ylabel="$pV/NkT$", ylim=(0.0, None))
+        law(axes[1], None, 0.0, "Carnahan and Starling")
+        axes[1].plot(fine, 100.0 * (kolafa(fine) / carnahan_starling(fine) - 1.0), color=GREEN, label="Kolafa, 1986")
+        axes[1].errorbar(packing, 100.0 * (z / starling - 1.0), 100.0 * error / starling, **run)
+        axes[1].set(title="the same, less Carnahan and Starling", ylabel="difference [%]", ylim=(-0.5, 0.5))
+        for one, place in zip(axes, ("upper left", "lower left"), strict=True):
+            one.set(xlabel="packing: part of the volume within balls", xlim=(0.0, 0.51))
+            one.legend(loc=place)
 
 
 def main() -> None:

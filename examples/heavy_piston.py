@@ -16,6 +16,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page
 
 HALF, LENGTH, THICK, RADIUS = 0.5, 1.0, 0.02, 0.2
 # k_B T [J] of the gas below and of that above, of particles of 1 kg
@@ -83,16 +84,20 @@ def late_difference(found: Shared) -> tuple[float, float]:
 
 def draw(found: Shared, file: Path) -> None:
     """The place of the piston and the temperatures over time."""
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import BLUE, GREEN, RED
 
-    with page(file, "A heavy piston between two gases", 1, 2, (8.0, 3.2)) as axes:
-        axes[0].plot(found.time, found.place, color=GREY)
-        axes[0].set(xlabel="time [s]", ylabel="place of the piston, over the half length")
+    title = "A piston between a cold gas and a hot one: its own thermal motion makes their temperatures equal"
+    with page(file, title, 1, 2, (9.0, 3.8)) as axes:
+        axes[0].plot(found.time, found.place, color=GREEN, label="piston")
+        law(axes[0], None, 0.0, "the middle")
+        axes[0].set(title="height of the piston", ylabel="over half the length of the vessel", ylim=(-0.6, 0.4))
         axes[1].plot(found.time, found.above, color=RED, label="gas above")
         axes[1].plot(found.time, found.below, color=BLUE, label="gas below")
-        axes[1].axhline(0.5 * (found.below[0] + found.above[0]), color=GREY, linewidth=0.8)
-        axes[1].set(xlabel="time [s]", ylabel="temperature [J]")
-        axes[1].legend()
+        law(axes[1], None, 0.5 * (found.below[0] + found.above[0]), "mean of both at the start")
+        axes[1].set(title="temperature of the gases", ylabel="kinetic temperature $k_BT$ [J]", ylim=(0.0, 1.8))
+        for one in axes:
+            one.set(xlabel="time [s]", xlim=(0.0, found.time[-1]))
+            one.legend(loc="lower right")
 
 
 def main() -> None:

@@ -17,6 +17,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page, solid
 
 # Narrower than the gap at which a straight line through the lattice is free for ever: w < 4/sqrt(3) - 2 = 0.309.
 GAPS = (0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25, 0.275, 0.3)
@@ -108,37 +109,40 @@ def mean_of(values: np.ndarray) -> tuple[float, float]:
 
 def draw(found: dict[float, Measured], memory: dict[float, float], file: Path) -> None:
     """D over the gap, its ratio to the law of narrow gaps, and the path of a particle."""
-    from matplotlib.patches import Circle
-
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import BLUE, GREEN
 
     gaps, fine = np.array(list(found)), np.linspace(1e-3, 0.305, 200)
     value, error = np.transpose([one.diffusion for one in found.values()])
-    law, remembered = (np.array([f(w) for w in gaps]) for f in (machta_zwanzig, memory.__getitem__))
+    hops, remembered = (np.array([f(w) for w in gaps]) for f in (machta_zwanzig, memory.__getitem__))
     path = run(PATH_GAP, 1, 120.0, 0.05)[0][:, :, 0]
-    with page(file, "Diffusion in the periodic Lorentz gas", 1, 3, (9.0, 3.2)) as axes:
-        axes[0].plot(fine, [machta_zwanzig(w) for w in fine], color=GREY, label="hops without memory")
-        axes[0].plot(gaps, remembered, color=RED, label="hops that remember the last")
-        axes[0].errorbar(gaps, value, error, fmt=".", color=BLUE, label="swarm")
-        axes[0].set(xlabel="gap w between discs of radius 1", ylabel="diffusion coefficient D at speed 1")
-        axes[0].legend()
-        axes[1].axhline(1.0, color=GREY)
-        axes[1].plot(gaps, remembered / law, color=RED)
-        axes[1].errorbar(gaps, value / law, error / law, fmt=".", color=BLUE)
-        axes[1].set(xlabel="gap w", ylabel="D over that of hops without memory")
-        draw_path(axes[2], path, BLUE, Circle)
+    title = "A particle hops between discs and diffuses: the wider the gaps, the less often it goes back"
+    with page(file, title, 1, 3, (11.0, 3.9)) as axes:
+        draw_path(axes[0], path, BLUE)
+        told = {"label": "hops that remember the last one", "color": GREEN}
+        ran = {"fmt": "o", "color": BLUE, "label": "run, with standard errors"}
+        law(axes[1], fine, [machta_zwanzig(w) for w in fine], "hops without memory (Machta, Zwanzig)")
+        axes[1].plot(gaps, remembered, **told)
+        axes[1].errorbar(gaps, value, error, **ran)
+        axes[1].set(title="diffusion coefficient D", ylabel="D at speed 1 m/s [m²/s]", ylim=(0.0, 0.33))
+        law(axes[2], None, 1.0, "hops without memory")
+        axes[2].plot(gaps, remembered / hops, **told)
+        axes[2].errorbar(gaps, value / hops, error / hops, **ran)
+        axes[2].set(title="D, over that of hops without memory", ylabel="ratio", ylim=(0.85, 1.65))
+        for one in axes[1:]:
+            one.set(xlabel="gap w between discs of radius 1 m [m]", xlim=(0.0, 0.31))
+            one.legend(loc="upper left")
 
 
-def draw_path(axes: Any, path: np.ndarray, colour: str, circle: Any) -> None:
+def draw_path(axes: Any, path: np.ndarray, colour: str) -> None:
     """A path among the discs."""
     a, middle = 2.0 + PATH_GAP, 0.5 * (path.min(axis=0) + path.max(axis=0))
     half = 0.5 * np.ptp(path, axis=0).max() + 1.0
-    axes.plot(*path.T, color=colour, linewidth=0.7)
+    axes.plot(*path.T, color=colour, linewidth=0.8)
     for i, j in np.ndindex(2 * WIDE + 1, 2 * WIDE + 1):
         x, y = i - WIDE + 0.5 * (j % 2), np.sqrt(0.75) * (j - WIDE)
-        axes.add_patch(circle((a * x, a * y), 1.0, color="0.8"))
+        solid(axes, (a * x, a * y), 1.0)
     axes.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half), aspect="equal")
-    axes.set(xlabel="x", ylabel="y")
+    axes.set(title=f"a path of 120 s, w = {PATH_GAP:g} m", xlabel="x [m]", ylabel="y [m]")
     axes.grid(False)
 
 

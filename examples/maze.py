@@ -15,6 +15,7 @@ import swarm
 from swarm import scene_file
 
 from .asked import Asked
+from .page import outline, page
 
 SCENE = Path(__file__).parent / "scenes" / "maze.toml"
 
@@ -28,19 +29,23 @@ def run(count: int | None = None, until: float | None = None) -> tuple[swarm.Sce
 
 def draw(scene: swarm.Scene, result: swarm.Result, file: Path) -> None:
     """The maze with those who are left in it, and how many are left over time."""
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import BLUE, RED
 
-    with page(file, "A maze", 1, 2, (12.0, 4.2)) as axes:
-        for curve in scene.surfaces[0].curves():
-            axes[0].plot(*curve[:, :2].T, color=GREY)
+    title = "A maze: most particles find the exit, some need very long"
+    with page(file, title, 1, 2, (10.0, 3.9), width_ratios=(1.35, 1.0)) as axes:
+        outline(axes[0], scene)
         left = np.isnan(result.escape_time)
-        for who, color, size in ((left, BLUE, 2.0), (~left, RED, 1.0)):
-            axes[0].plot(*result.particles.position[:2, who], ".", color=color, markersize=size)
-        axes[0].set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
-        axes[0].set_title("at the end: who is in it still (blue), who has left (red)", fontsize=9)
+        for who, color, name in ((left, BLUE, "still in it"), (~left, RED, "where each went out")):
+            axes[0].plot(
+                *result.particles.position[:2, who], ".", color=color, markersize=3.0, markeredgewidth=0.0, label=name
+            )
+        axes[0].set(title=f"{len(left)} particles after {result.observables['time'][-1]:g} s")
+        axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, markerscale=3.0)
         times = np.sort(np.nan_to_num(result.escape_time, nan=np.inf))
         axes[1].loglog(times, 1.0 - np.arange(1, len(times) + 1) / len(times), color=BLUE)
-        axes[1].set(xlabel="time [s]", ylabel="part that is left", xlim=(1.0, None))
+        axes[1].set(title="who is still in it", xlabel="time [s]", ylabel="part of the particles", xlim=(1.0, None))
+        axes[1].set_yticks([0.3, 0.4, 0.5, 0.7, 1.0], ["0.3", "0.4", "0.5", "0.7", "1"], minor=False)
+        axes[1].set_yticks([], minor=True)
 
 
 def main() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, outline, page
 
 # The radius of the cap, the width of the stem and its length [m].
 RADIUS, STEM, LENGTH = 1.0, 0.3424, 0.8
@@ -57,28 +58,34 @@ def run(count: int, until: float = 1000.0) -> Run:
 
 def draw(found: Run, file: Path) -> None:
     """Where each path starts and whether it stays, a path of each kind, and how many are left over time."""
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import BLUE, RED
 
-    with page(file, "Bunimovich's mushroom", 1, 3, (12.0, 3.8)) as axes:
+    title = "Bunimovich's mushroom: who circles in the cap stays for ever, all others find the stem and leave"
+    with page(file, title, 1, 3, (11.0, 3.9)) as axes:
         scene = mushroom()
         for one in axes[:2]:
-            for curve in scene.surfaces[0].curves():
-                one.plot(*curve[:, :2].T, color=GREY)
-            one.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+            outline(one, scene)
         stays = found.stays()
         some = slice(0, 3000)
-        for kept, color in ((stays[some], BLUE), (~stays[some], RED)):
-            axes[0].plot(*found.start.position[:2, some][:, kept], ".", color=color, markersize=1.5)
-        axes[0].set_title("starts: who stays (blue), who leaves (red)", fontsize=9)
-        for who, color in ((np.flatnonzero(stays)[3], BLUE), (np.argsort(np.abs(found.escape_time - 40.0))[0], RED)):
-            axes[1].plot(*_path(scene, found.start, int(who)).T, color=color, linewidth=0.5)
-        axes[1].set_title("a path of each kind, 40 s", fontsize=9)
+        for kept, color, name in ((stays[some], BLUE, "stay"), (~stays[some], RED, "leave")):
+            starts = found.start.position[:2, some][:, kept]
+            axes[0].plot(*starts, ".", color=color, markersize=2.5, markeredgewidth=0.0, label=name)
+        axes[0].set(title="starts of 3000 particles")
+        chosen = (
+            (np.flatnonzero(stays)[3], BLUE, "stays"),
+            (np.argsort(np.abs(found.escape_time - 40.0))[0], RED, "leaves"),
+        )
+        for who, color, name in chosen:
+            axes[1].plot(*_path(scene, found.start, int(who)).T, color=color, linewidth=0.7, label=name)
+        axes[1].set(title="a path of each kind, 40 s")
+        for one in axes[:2]:
+            one.legend(loc="lower right", markerscale=4.0)
         times = np.sort(np.nan_to_num(found.escape_time, nan=np.inf))
         left = 1.0 - np.arange(1, len(times) + 1) / len(times)
-        axes[2].semilogx(times, left, color=BLUE)
-        axes[2].axhline(STAYS, color=GREY, linewidth=0.8)
-        axes[2].set(xlabel="time [s]", ylabel="part that is left", ylim=(0.7, 1.0))
-        axes[2].set_title(f"line: {100.0 * STAYS:.2f} %", fontsize=9)
+        law(axes[2], None, STAYS, f"law: {100.0 * STAYS:.2f} % stay")
+        axes[2].semilogx(times, left, color=BLUE, label="run")
+        axes[2].set(title="who is still inside", xlabel="time [s]", ylabel="part of the particles", ylim=(0.7, 1.0))
+        axes[2].legend()
 
 
 def _path(scene: swarm.Scene, start: swarm.Particles, who: int) -> np.ndarray:

@@ -23,6 +23,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page
 
 # The ball: radius [m], loss at an impact, most probable speed [m/s].
 RADIUS, LOSS, PROBABLE = 1.0, 0.01, 1.0
@@ -106,28 +107,35 @@ def bottle(count: int, until: float = 400.0) -> tuple[Curve, np.ndarray, float]:
 
 def draw(one: Curve, thermal: Curve, neutrons: Curve, whole: np.ndarray, file: Path) -> None:
     """The curves beside their laws, and how far they are from them."""
-    from .paper.plotting import BLUE, GREEN, GREY, RED, page
+    from swarm.output.style import BLUE, GREEN, GREY, PINK, RED
 
-    with page(file, "Storage of a gas that is lost at impacts; lines: the laws", 1, 3, (11.0, 3.6)) as axes:
-        kinds = (("one speed: exponential", one, BLUE), ("Maxwellian gas", thermal, RED))
+    title = "Gases that are lost at walls: one speed is lost exponentially, a thermal gas by a tail, as the laws say"
+    with page(file, title, 1, 3, (11.0, 4.0)) as axes:
+        kinds = (("one speed: exponential", one, BLUE), ("thermal: a tail", thermal, RED))
         for name, curve, color in kinds:
-            axes[0].plot(curve.time, curve.law, color=color, linewidth=0.8)
             seen = curve.left > 0.0
-            axes[0].plot(curve.time[seen], curve.left[seen], ".", color=color, label=name)
+            law(axes[0], curve.time, curve.law, "laws" if curve is thermal else None)
+            axes[0].plot(curve.time[seen], curve.left[seen], ".", color=color, markersize=5, label=name)
         tail = thermal.time[thermal.time > 4.0]
-        axes[0].plot(tail, 8.0 / (math.sqrt(math.pi) * tail**3), "--", color=GREY, label=r"$8/\sqrt{\pi}\tau^3$")
-        axes[0].set(xscale="log", yscale="log", ylim=(2e-6, 2.0), xlabel=r"time $\tau=s\,v_p\,t$")
-        axes[0].set(ylabel="part of the particles that is left", title="ball with diffuse walls, loss 0.01 an impact")
-        axes[1].plot(neutrons.time, neutrons.law, color=GREEN, linewidth=0.8)
-        axes[1].plot(neutrons.time, neutrons.left, ".", color=GREEN, label="those too slow to rise to the top")
-        axes[1].plot(neutrons.time, whole, ".", color=GREY, label="all: the fast ones leave within seconds")
+        law(axes[0], tail, 8.0 / (math.sqrt(math.pi) * tail**3), r"its tail, $8/\sqrt{\pi}\tau^3$", "--")
+        axes[0].set(xscale="log", yscale="log", ylim=(3e-7, 2.0), xlabel=r"time $\tau$, in lifetimes $1/s\,v_p$")
+        axes[0].set(ylabel="part of the particles that is left", title="ball, 1 % is lost at an impact")
+        law(axes[1], neutrons.time, neutrons.law, "law of the slow ones")
+        axes[1].plot(
+            neutrons.time, neutrons.left, ".", color=GREEN, markersize=5, label="those too slow to rise to the top"
+        )
+        axes[1].plot(neutrons.time, whole, ".", color=PINK, markersize=5, label="all: fast ones leave within seconds")
         axes[1].set(xscale="log", yscale="log", xlabel="time [s]", ylabel="part of the neutrons that is left")
-        axes[1].set(title="bottle open at the top, 1 m, with gravity")
-        for name, curve, color in (*kinds, ("slow neutrons", neutrons, GREEN)):
-            axes[2].plot(curve.time, curve.off(), ".-", color=color, linewidth=0.5, label=name)
-        axes[2].axhspan(-3.0, 3.0, color="0.95")
-        axes[2].set(xscale="log", ylim=(-4.0, 6.0), xlabel=r"time $\tau$, or [s]")
-        axes[2].set(ylabel="less the law, in standard errors", title="what is left beside the law")
+        axes[1].set(title="neutrons in a bottle 1 m high, open above")
+        axes[2].axhspan(-3.0, 3.0, color=GREY, alpha=0.15, linewidth=0.0, label="within three errors")
+        for name, curve, color in (
+            ("one speed", one, BLUE),
+            ("thermal gas", thermal, RED),
+            ("slow neutrons", neutrons, GREEN),
+        ):
+            axes[2].plot(curve.time, curve.off(), ".-", color=color, linewidth=0.6, markersize=5, label=name)
+        axes[2].set(xscale="log", ylim=(-4.0, 7.5), xlabel=r"time $\tau$, of neutrons [s]")
+        axes[2].set(ylabel="in standard errors", title="what is left, less the law")
         for place, panel in zip(("lower left", "lower left", "upper left"), axes, strict=True):
             panel.legend(loc=place)
 

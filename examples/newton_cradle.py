@@ -14,6 +14,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import page
 
 COUNT, RADIUS, HALF, FRAMES = 6, 0.05, 1.0, 600
 
@@ -63,17 +64,20 @@ CRADLES = {
 
 def draw(found: dict[str, Swung], file: Path) -> None:
     """Where the balls are over time, as wide as they are."""
-    from .paper.plotting import BLUE, GREEN, GREY, RED, page
+    from swarm.output.style import CURVES
 
-    with page(file, "Newton's cradle on a rail", 1, len(found), (9.0, 4.2)) as axes:
+    title = "Newton's cradle on a rail: as many balls leave the row as came, unless one is heavier or energy is lost"
+    with page(file, title, 1, len(found), (11.0, 4.8), sharey=True) as axes:
         for one, (name, swung) in zip(axes, found.items(), strict=True):
-            for k in range(COUNT):
+            for k, colour in enumerate(CURVES):
                 x = swung.place[:, k]
-                colour = (BLUE, RED, GREEN, GREY, "C1", "C4")[k]
-                one.fill_betweenx(swung.time, x - RADIUS, x + RADIUS, color=colour, linewidth=0.0)
+                one.fill_betweenx(
+                    swung.time, x - RADIUS, x + RADIUS, color=colour, linewidth=0.0, label=f"ball {k + 1}"
+                )
             one.set(title=name, xlabel="place [m]", xlim=(-HALF, HALF), ylim=(0.0, swung.time[-1]))
             one.grid(False)
-        axes[0].set(ylabel="time [s]")
+        axes[0].set(ylabel="time [s], upwards")
+        axes[0].figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=COUNT)
 
 
 def main() -> None:

@@ -14,13 +14,14 @@ balls as from mirrors, off rough ones in any direction, as from a wall with a te
 
 import time
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import swarm
 
 from .asked import Asked
+from .page import law, page, solid
 
 POROSITIES = (0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1)
 CLOSED, ROUGH_LIMIT = 0.0317, 9.0 / 13.0
@@ -74,33 +75,32 @@ def run(porosity: float, rough: bool, balls: int = 4_000, count: int = 1_000, fl
 
 def draw(found: dict[bool, dict[float, Bed]], file: Path) -> None:
     """A section of a bed, mean free path and diffusion over the porosity."""
-    from matplotlib.patches import Circle
+    from swarm.output.style import BLUE, ORANGE, RED
 
-    from .paper.plotting import BLUE, GREY, RED, page
-
-    with page(file, "A gas in a bed of balls that overlap", 1, 3, (9.0, 3.2)) as axes:
+    title = "A gas in a bed of balls that overlap: its free path is known exactly, its diffusion falls as pores close"
+    with page(file, title, 1, 3, (11.0, 3.9)) as axes:
         centers, size = packing(0.4, 4_000, rough=False, seed=0).surfaces[0].centers, radius(0.4, 4_000)
         for x, y, z in centers:
             if abs(z - 0.5) < size:
-                axes[0].add_patch(Circle((x, y), np.sqrt(size**2 - (z - 0.5) ** 2), color="0.7"))
+                solid(axes[0], (x, y), np.sqrt(size**2 - (z - 0.5) ** 2))
         axes[0].set(xlim=(0.25, 0.75), ylim=(0.25, 0.75), aspect="equal", xlabel="x [m]", ylabel="y [m]")
         axes[0].grid(False)
-        axes[0].set_title("section, porosity 0.4")
+        axes[0].set_title("section of a bed, 40 % of it is free")
         for rough, colour, name in ((False, BLUE, "smooth balls"), (True, RED, "rough balls")):
             beds = list(found[rough].values())
             porosity = [bed.porosity[0] for bed in beds]
-            axes[1].errorbar(
-                porosity, *np.transpose([bed.free_path for bed in beds]), fmt=".", color=colour, label=name
-            )
-            axes[2].errorbar(porosity, *np.transpose([bed.diffusion for bed in beds]), fmt=".", color=colour)
-            axes[2].plot(1.0, ROUGH_LIMIT if rough else 1.0, "o", fillstyle="none", color=colour, markersize=6.0)
-        axes[1].axhline(1.0, color=GREY, linewidth=0.8)
-        axes[1].set(xlabel="porosity", ylabel="mean free path, over $1/(n\\pi a^2)$", ylim=(0.98, 1.02))
-        axes[1].legend(loc="lower center")
-        axes[2].axvline(CLOSED, color=GREY, linewidth=0.8)
-        axes[2].set(
-            xlabel="porosity", ylabel="D over $v/(3n\\pi a^2)$; rings: few balls", ylim=(0.0, 1.1), xlim=(0.0, 1.03)
-        )
+            dots = {"fmt": "o", "color": colour, "label": name}
+            axes[1].errorbar(porosity, *np.transpose([bed.free_path for bed in beds]), **dots)
+            axes[2].errorbar(porosity, *np.transpose([bed.diffusion for bed in beds]), **dots)
+            star: dict[str, Any] = {"label": "law of few balls"} if rough else {}
+            axes[2].plot(1.0, ROUGH_LIMIT if rough else 1.0, "*", color=colour, markersize=11, clip_on=False, **star)
+        law(axes[1], None, 1.0, "law, $1/n\\pi a^2$")
+        axes[1].set(title="mean free path", ylabel="over $1/n\\pi a^2$", ylim=(0.96, 1.04))
+        axes[2].axvline(CLOSED, color=ORANGE, label="pores are closed")
+        axes[2].set(title="diffusion coefficient", ylabel="over $v/3n\\pi a^2$", ylim=(0.0, 1.1))
+        for one, place in zip(axes[1:], ("upper right", "lower right"), strict=True):
+            one.set(xlabel="porosity: part that is free", xlim=(0.0, 1.0))
+            one.legend(loc=place)
 
 
 def main() -> None:

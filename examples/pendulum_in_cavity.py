@@ -13,6 +13,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import page
 
 RADIUS, RODS, MASSES, GRAVITY = 0.5, (0.4, 0.4), (1.0, 1.0), 9.81
 TOP = (0.0, 0.0, 0.35)
@@ -37,10 +38,28 @@ def run(until: float, order: int = 2, file: Path | None = None) -> swarm.Result:
     )  # fmt: skip
 
 
+def draw(seen: dict[str, np.ndarray], paths: list[np.ndarray], file: Path) -> None:
+    """The paths of both bobs from the side, and the energies over time."""
+    from swarm.output.style import BLUE, CAVITY, CAVITY_LINE, RED, ink
+
+    title = "A double pendulum in a ball strikes its wall: after every blow the energy is what it was"
+    with page(file, title, 1, 2, (9.0, 4.0)) as (side, error):
+        circle = np.linspace(0.0, 2.0 * np.pi, 400)
+        side.fill(RADIUS * np.cos(circle), RADIUS * np.sin(circle), facecolor=CAVITY, edgecolor=CAVITY_LINE, alpha=0.4)
+        for path, color, name in zip(paths, (RED, BLUE), ("upper bob", "lower bob"), strict=True):
+            side.plot(path[0, :1000], path[2, :1000], color=color, linewidth=0.7, label=name)
+        rods = np.array([TOP, *(path[:, 0] for path in paths)])
+        side.plot(rods[:, 0], rods[:, 2], "o-", color=ink(), label="rods at the start")
+        side.set(title="both bobs for 5 s, from the side", xlabel="x [m]", ylabel="z [m]", aspect="equal")
+        side.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        error.plot(seen["time"], 1e13 * seen["energy_error"], ".", color=ink(), markersize=3, markeredgewidth=0.0)
+        largest = 1e13 * seen["energy_error"].max()
+        error.set(title="energy error", ylim=(0.0, 1.3 * largest), xlim=(0.0, seen["time"][-1]))
+        error.set(xlabel="time [s]", ylabel="relative error [$10^{-13}$]")
+
+
 def main() -> None:
     """Run, draw and print."""
-    from .paper.plotting import BLUE, GREY, RED, page
-
     ask = Asked(__doc__, "pendulum_in_cavity.png", "plot")
     ask.add_argument("--until", type=float, default=20.0)
     asked = ask.parse_args()
@@ -52,14 +71,7 @@ def main() -> None:
     print(
         f"rods {seen['link_error'].max():.1e} of their lengths, deepest {seen['max_penetration'].max():.1e} m outside"
     )
-    with page(asked.output, "A double pendulum in a ball", 1, 2, (7.0, 3.4)) as (side, energy):
-        circle = np.linspace(0.0, 2.0 * np.pi, 400)
-        side.plot(RADIUS * np.cos(circle), RADIUS * np.sin(circle), color=GREY)
-        for path, color in zip(paths, (RED, BLUE), strict=True):
-            side.plot(path[0, :1000], path[2, :1000], color=color, linewidth=0.6)
-        side.set(title="the bobs for 5 s, from the side", xlabel="x [m]", ylabel="z [m]", aspect="equal")
-        energy.semilogy(seen["time"], np.maximum(seen["energy_error"], 1e-17), ".", color=BLUE, markersize=1.5)
-        energy.set(title="energy error", xlabel="time [s]", ylabel="relative")
+    draw(seen, paths, asked.output)
     print(f"written {asked.output}")
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page
 
 HALF, LENGTH, RADIUS = 0.5, 1.0, 0.18
 # kinetic temperature k_B T [J] of particles of mass 1 kg, and the part of the length that is left at the end
@@ -72,17 +73,22 @@ def growth(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
 
 def draw(found: Compressed, file: Path) -> None:
     """Temperature over volume, beside the adiabatic law."""
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import BLUE
 
-    with page(file, "A slow piston and a gas without collisions", 1, 2, (8.0, 3.2)) as axes:
-        law = found.volume ** (-2.0 / 3.0)
-        axes[0].plot(found.volume, law, color=GREY, label="$V^{-2/3}$")
-        axes[0].errorbar(found.volume, found.temperature, found.error, fmt=".", color=BLUE, label="gas")
-        axes[0].set(xlabel="volume, over that of the start", ylabel="temperature, over that of the start")
-        axes[0].legend()
-        axes[1].errorbar(found.volume, found.temperature / law - 1.0, found.error / law, fmt=".", color=RED)
-        axes[1].axhline(0.0, color=GREY, linewidth=0.8)
-        axes[1].set(xlabel="volume, over that of the start", ylabel="$T V^{2/3} - 1$, with standard errors")
+    title = "A slow piston compresses a gas: it warms by the adiabatic law"
+    with page(file, title, 1, 2, (9.0, 3.8)) as axes:
+        run = {"fmt": "o", "color": BLUE, "label": "run, with standard errors"}
+        adiabatic = found.volume ** (-2.0 / 3.0)
+        law(axes[0], found.volume, adiabatic, "adiabatic law, $V^{-2/3}$")
+        axes[0].errorbar(found.volume, found.temperature, found.error, **run)
+        axes[0].set(title="temperature", ylabel="over that of the start")
+        law(axes[1], None, 0.0, "adiabatic law")
+        off, error = found.temperature / adiabatic - 1.0, found.error / adiabatic
+        axes[1].errorbar(found.volume, 100.0 * off, 100.0 * error, **run)
+        axes[1].set(title="the same, less the law", ylabel="part of the law [%]", ylim=(-0.3, 0.3))
+        for one in axes:
+            one.set(xlabel="volume, over that of the start")
+            one.legend(loc="upper right")
 
 
 def main() -> None:

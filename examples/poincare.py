@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 import swarm
 
 from .asked import Asked
+from .page import page
 
 Floats = NDArray[np.float64]
 # Of all of them: v^2 + 2 g z, with g = 1.
@@ -44,17 +45,19 @@ def section(degrees: float, orbits: int, until: float) -> tuple[NDArray[np.int32
 
 def draw(path: Path) -> None:
     """The section at three angles."""
-    import matplotlib.pyplot as plt
+    from swarm.output.style import CURVES
 
-    figure, panels = plt.subplots(1, 3, figsize=(9.0, 3.4), sharey=True, layout="constrained")
-    angles = {45.0: "regular", 32.0: "islands and chaos", 55.0: "chaotic"}
-    for panel, (degrees, title) in zip(panels, angles.items(), strict=True):
-        orbit, along, away = section(degrees, 60, 250.0)
-        panel.scatter(along, away**2, s=0.9, c=orbit % 10, cmap="tab10", linewidths=0.0, antialiaseds=False)
-        panel.set(title=f"{degrees:g} degrees: {title}", xlim=(-1, 1), ylim=(0, 1))
-        panel.set_xlabel("velocity along the wall [m/s]")
-    panels[0].set_ylabel("velocity away from it, squared [m²/s²]")
-    figure.savefig(path, dpi=100)
+    angles = {45.0: "45°: regular, each on its line", 32.0: "32°: islands in a sea", 55.0: "55°: chaos"}
+    title = "A ball bounces in a wedge: each impact on one wall is a dot, sixty balls in six colours"
+    with page(path, title, 1, 3, (11.0, 4.0), sharey=True) as panels:
+        for panel, (degrees, name) in zip(panels, angles.items(), strict=True):
+            orbit, along, away = section(degrees, 60, 250.0)
+            for k, colour in enumerate(CURVES):
+                some = orbit % len(CURVES) == k
+                panel.plot(along[some], away[some] ** 2, ".", color=colour, markersize=2.0, markeredgewidth=0.0)
+            panel.set(title=name, xlim=(-1, 1), ylim=(0, 1), xlabel="velocity along the wall [m/s]")
+            panel.grid(False)
+        panels[0].set_ylabel("velocity away from it, squared [m²/s²]")
 
 
 def main() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, outline, page
 
 # The half circles of a `Stadium`, by the numbers of its sides.
 ARCS = 1, 3
@@ -94,29 +95,29 @@ def paths(ratio: float, apart: float, until: float, frames: int) -> np.ndarray:
 
 def draw(found: list[tuple[float, float]], file: Path) -> None:
     """Two paths that part, their distance over time, and the exponent over the shape of the stadium."""
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import BLUE, GREEN, RED
 
     pair = paths(2.0, 1e-9, 60.0, 6000)
-    with page(file, "Bunimovich's stadium", 1, 3, (12.0, 3.6)) as axes:
-        curves = table(2.0).surfaces[0].curves()
-        for curve in curves:
-            axes[0].plot(*curve[:, :2].T, color=GREY)
+    title = "Bunimovich's stadium: two particles that begin a nanometre apart part exponentially"
+    with page(file, title, 1, 3, (11.0, 3.6), width_ratios=(1.3, 1.0, 1.0)) as axes:
+        outline(axes[0], table(2.0))
         last = 4600
-        axes[0].plot(*pair[:last, 0].T, color=BLUE, linewidth=0.6)
-        axes[0].plot(*pair[:last, 1].T, color=RED, linewidth=0.6)
-        axes[0].set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
-        axes[0].set_title("two that begin 1e-9 m apart, 46 s", fontsize=9)
+        axes[0].plot(*pair[:last, 0].T, color=BLUE, linewidth=0.8, label="one")
+        axes[0].plot(*pair[:last, 1].T, color=RED, linewidth=0.8, label="the other")
+        axes[0].plot(*pair[0, 0], "o", color=BLUE, label="start of both")
+        axes[0].set(title="their paths in 46 s at 1 m/s")
+        axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3)
         time = np.linspace(0.0, 60.0, len(pair))
-        axes[1].semilogy(time, np.hypot(*(pair[:, 1] - pair[:, 0]).T), color=BLUE)
+        axes[1].semilogy(time, np.hypot(*(pair[:, 1] - pair[:, 0]).T), color=GREEN, label="run")
         rate = found[RATIOS.index(2.0)][0]
-        axes[1].semilogy(time[:5000], 1e-9 * np.exp(rate * time[:5000]), color=GREY, linestyle="--")
-        axes[1].set(xlabel="time [s]", ylabel="their distance [m]", ylim=(1e-10, 10.0))
-        axes[1].set_title(f"dashed: exp({rate:.3f} t)", fontsize=9)
+        law(axes[1], time[:5000], 1e-9 * np.exp(rate * time[:5000]), f"law: exp({rate:.3f} t)", "--")
+        axes[1].set(title="their distance", xlabel="time t [s]", ylabel="distance [m]", ylim=(1e-10, 10.0))
+        axes[1].legend(loc="lower right")
         value, error = np.array(found).T
-        axes[2].errorbar(RATIOS, value, error, fmt=".-", color=BLUE)
-        axes[2].set(
-            xscale="log", xlabel="length of a line, in radii", ylabel="Lyapunov exponent [v/r]", ylim=(0.0, None)
-        )
+        axes[2].errorbar(RATIOS, value, error, fmt="o-", linewidth=0.8, color=GREEN)
+        axes[2].set(title="Lyapunov exponent", xscale="log", ylim=(0.0, None))
+        axes[2].set(xlabel="length of a straight side, in radii", ylabel="exponent, in speed over radius")
+        axes[2].set_xticks([0.1, 1.0, 8.0], ["0.1", "1", "8"])
 
 
 def main() -> None:

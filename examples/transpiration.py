@@ -18,6 +18,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page
 
 HALF, APART, BORE, LENGTH = 0.5, 1.3, 0.1, 0.4
 # k_B T [J] of both chambers, of particles of mass 1 kg
@@ -71,16 +72,24 @@ def run(count: int, until: float, frames: int) -> Gas:
 
 def draw(gas: Gas, file: Path) -> None:
     """Both pressures and their ratio by time."""
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import BLUE, GREEN, RED
 
-    with page(file, "Thermal transpiration between two chambers", 1, 2, (9.0, 3.5)) as axes:
-        for pressure, hot, color in zip(gas.pressure, TEMPERATURES, (BLUE, RED), strict=True):
-            axes[0].plot(gas.time, pressure, color=color, linewidth=0.8, label=f"{hot:g} J")
-        axes[0].set(xlabel="time [s]", ylabel="pressure [Pa]", ylim=(0.0, None))
-        axes[0].legend()
-        axes[1].plot(gas.time, gas.pressure[0] / gas.pressure[1], color=BLUE, linewidth=0.8)
-        axes[1].axhline(RATIO, color=GREY, linewidth=0.8)
-        axes[1].set(xlabel="time [s]", ylabel="ratio of the pressures, and $(T_1/T_2)^{1/2}$", ylim=(0.0, 1.1))
+    title = "Two chambers of two temperatures, joined by a tube: their pressures settle, and not at one value"
+    with page(file, title, 1, 2, (9.0, 3.8)) as axes:
+        kinds = zip(gas.pressure, TEMPERATURES, (BLUE, RED), ("cold", "hot"), strict=True)
+        for pressure, warmth, color, name in kinds:
+            label = f"{name} chamber, $k_BT$ = {warmth:g} J"
+            axes[0].plot(gas.time, pressure, color=color, linewidth=1.0, label=label)
+        axes[0].set(title="pressures", ylabel="pressure [Pa]", ylim=(0.0, None))
+        ratio = gas.pressure[0] / gas.pressure[1]
+        axes[1].plot(gas.time, ratio, color=GREEN, linewidth=1.0, label="run")
+        law(axes[1], None, RATIO, "law, $(T_1/T_2)^{1/2}$")
+        axes[1].lines[-1].set_zorder(3)
+        law(axes[1], None, 1.0, "dense gas: equal pressures", "--")
+        axes[1].set(title="cold over hot", ylabel="ratio of the pressures", ylim=(0.0, 1.1))
+        for one in axes:
+            one.set(xlabel="time [s]", xlim=(0.0, gas.time[-1]))
+            one.legend(loc="lower right")
 
 
 def main() -> None:

@@ -17,6 +17,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page
 
 # Length over radius of tubes, and Clausing's factors to the digits of later computations.
 FACTORS = {1.0: 0.6720, 2.0: 0.5142, 5.0: 0.3105, 10.0: 0.1910}
@@ -79,22 +80,28 @@ def run(count: int, length: float, stays: float = 12.0, seed: int = 1) -> Flow:
 
 def draw(flows: dict[float, Flow], file: Path) -> None:
     """The number in each tube, the density along it, and the factors."""
-    from .paper.plotting import BLUE, GREY, RED, page
+    from swarm.output.style import CURVES
 
-    with page(file, "Flow through a tube without collisions", 1, 3, (11.0, 3.5)) as axes:
-        for color, (ratio, flow) in zip((BLUE, RED, "tab:green", "tab:purple"), flows.items(), strict=False):
-            axes[0].plot(
-                flow.time / flow.time[-1], flow.inside / flow.inside.max(), color=color, label=f"L/R = {ratio:g}"
-            )
-            axes[1].plot(flow.place, flow.density, ".-", color=color)
-            axes[2].errorbar(ratio, flow.factor - FACTORS[ratio], flow.error, fmt="o", color=color)
-        axes[0].set(xlim=(0.0, 0.6), xlabel="time, of the run", ylabel="particles in the tube, over the most")
-        axes[0].legend()
-        axes[1].set(xlabel="place along the tube", ylabel="density, over its mean")
-        axes[2].axhline(0.0, color=GREY, linewidth=0.8)
-        axes[2].set(xscale="log", xlabel="L/R", ylabel="part that comes through, less Clausing's factor")
+    title = "A gas flows through tubes without collisions: the longer the tube, the more turn back, as Clausing says"
+    with page(file, title, 1, 3, (11.0, 3.9)) as axes:
+        for color, (ratio, flow) in zip(CURVES, flows.items(), strict=False):
+            name = f"length {ratio:g} radii"
+            axes[0].plot(flow.time / flow.time[-1], flow.inside / flow.inside.max(), color=color, label=name)
+            axes[1].plot(flow.place, flow.density, ".-", markersize=5, color=color, label=name)
+            off, error = 100.0 * (flow.factor - FACTORS[ratio]), 100.0 * flow.error
+            label = f"{flow.factor:.4f} come through"
+            axes[2].errorbar(ratio, off, error, fmt="o", color=color, label=label)
+        axes[0].set(xlim=(0.0, 1.0), ylim=(0.0, 1.05), title="particles in the tube", ylabel="over the most")
+        axes[0].set(xlabel="time, over the run; inlet closes at 1/3")
+        axes[1].set(title="density along the tube", xlabel="place, over the length", ylabel="over its mean")
+        axes[1].set(xlim=(0.0, 1.0), ylim=(0.0, None))
+        law(axes[2], None, 0.0, "Clausing's factor")
+        axes[2].set(xscale="log", xlabel="length over radius", ylabel="% of the particles", ylim=(-0.3, 0.5))
+        axes[2].set(title="who comes through, less the law")
         axes[2].set_xticks(list(flows), [f"{ratio:g}" for ratio in flows], minor=False)
         axes[2].set_xticks([], minor=True)
+        for one, place in zip(axes, ("center right", "lower left", "upper left"), strict=True):
+            one.legend(loc=place)
 
 
 def main() -> None:

@@ -20,6 +20,7 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law, page
 from .tube_flow import FACTORS
 
 # Chamber and tube [m]: radius and half a length along x; the tube begins at the chamber's end.
@@ -130,50 +131,55 @@ def draw_vessel(axes: Any, gas: Vacuum) -> None:
     """The section at y = 0, with the gauges in the colour of what they show."""
     from matplotlib.patches import Circle
 
-    from .paper.plotting import BLUE, RED
+    from swarm.output.style import CAVITY, CAVITY_LINE, GREEN, MAP, PINK
 
     end = HALF + LENGTH
     upper = np.array([[-HALF, 0.0], [-HALF, WIDE], [HALF, WIDE], [HALF, NARROW], [end, NARROW]])
-    for sign in (1.0, -1.0):
-        axes.plot(upper[:, 0], sign * upper[:, 1], color="0.2")
-    axes.plot([end, end], [-NARROW, NARROW], color=BLUE, linewidth=4.0)
-    axes.text(end + 0.05, 0.0, f"pump\n$c={CAPTURE:g}$", color=BLUE, va="center")
-    axes.plot([INLET[0] - PATCH, INLET[0] + PATCH], [-WIDE, -WIDE], color=RED, linewidth=4.0)
-    arrow = {"arrowstyle": "->", "color": RED}
-    axes.annotate("gas inlet", (INLET[0], -WIDE), (INLET[0], -WIDE - 0.2), color=RED, ha="center", arrowprops=arrow)
+    whole = np.concatenate([upper, upper[::-1] * (1.0, -1.0)])
+    axes.fill(*whole.T, facecolor=CAVITY, edgecolor=CAVITY_LINE, linewidth=1.5, alpha=0.6)
+    axes.plot([end, end], [-NARROW, NARROW], color=PINK, linewidth=4.0)
+    axes.text(end, NARROW + 0.22, f"pump, takes\n{100.0 * CAPTURE:g} % of hits", color=PINK, ha="center", va="center")
+    axes.plot([INLET[0] - PATCH, INLET[0] + PATCH], [-WIDE, -WIDE], color=GREEN, linewidth=4.0)
+    arrow = {"arrowstyle": "->", "color": GREEN}
+    axes.annotate("gas inlet", (INLET[0], -WIDE), (INLET[0], -WIDE - 0.25), color=GREEN, ha="center", arrowprops=arrow)
     values = np.concatenate([gas.balls, gas.discs])
-    colours = axes.scatter([], [], c=[], cmap="viridis", vmin=0.0, vmax=max(1.2, values.max()))
+    colours = axes.scatter([], [], c=[], cmap=MAP, vmin=0.0, vmax=max(1.2, values.max()))
     for (x, z), value in zip(BALLS, gas.balls, strict=True):
         axes.add_patch(Circle((x, z), GAUGE, facecolor=colours.to_rgba(value), edgecolor="none"))
-        axes.text(x, z + 1.4 * GAUGE, f"{value:.2f}", ha="center", fontsize=7)
-    for x, value in zip(DISCS, gas.discs, strict=True):
+        axes.text(x, z + 1.3 * GAUGE, f"{value:.2f}", ha="center", fontsize=8.5)
+    for k, (x, value) in enumerate(zip(DISCS, gas.discs, strict=True)):
         axes.plot([x, x], [-DISC, DISC], color=colours.to_rgba(value), linewidth=4.0)
-        axes.text(x, NARROW + 0.03, f"{value:.2f}", ha="center", fontsize=6)
-    axes.set(aspect="equal", xlim=(-HALF - 0.05, end + 0.3), ylim=(-WIDE - 0.3, WIDE + 0.1))
+        place = x - 0.03 * (k == 0), -NARROW - 0.09 - 0.09 * (k % 2)
+        axes.text(*place, f"{value:.2f}", ha="center" if k else "left", fontsize=8.5)
+    axes.set(aspect="equal", xlim=(-HALF - 0.05, end + 0.25), ylim=(-WIDE - 0.35, WIDE + 0.05))
+    axes.set_title("gauges and what they show")
     axes.set_axis_off()
-    scale = axes.inset_axes((0.45, 0.12, 0.5, 0.04))
+    scale = axes.inset_axes((0.5, 0.1, 0.48, 0.04))
     axes.figure.colorbar(colours, cax=scale, orientation="horizontal", label="pressure, over $QkT/S$")
 
 
 def draw(gas: Vacuum, file: Path) -> None:
     """The vessel with its gauges, the pressure along the axis, and the numbers over time."""
-    from .paper.plotting import BLUE, GREEN, GREY, RED, page
+    from swarm.output.style import BLUE, CAVITY, GREEN, PINK
 
-    with page(file, "A vacuum chamber: gas inlet, tube and pump", 1, 3, (12.0, 3.6)) as axes:
+    title = "Gas comes into a vacuum chamber and leaves by a tube to a pump: gauges show the pressure everywhere"
+    with page(file, title, 1, 3, (11.0, 4.0), width_ratios=(1.15, 1.0, 1.0)) as axes:
         draw_vessel(axes[0], gas)
         axis = np.linspace(-HALF, HALF + LENGTH, 400)
-        axes[1].plot(axis, expected(axis), color=GREY, linewidth=0.8, label="law: $Q/S$, and a straight fall")
+        law(axes[1], axis, expected(axis), "law: level, and a straight fall")
         middle = [k for k, (_x, z) in enumerate(BALLS) if z == 0.0]
-        axes[1].plot([BALLS[k][0] for k in middle], gas.balls[middle], "o", color=GREEN, label="balls on the axis")
-        axes[1].plot(DISCS, gas.discs, "s", color=BLUE, label="discs in the tube")
-        axes[1].axvspan(HALF, HALF + LENGTH, color="0.95")
-        axes[1].text(HALF + 0.5 * LENGTH, 1.12, "tube", ha="center")
-        axes[1].set(ylim=(0.0, 1.25), xlabel="place along the axis [m]", ylabel="pressure, over $QkT/S$")
+        axes[1].plot([BALLS[k][0] for k in middle], gas.balls[middle], "o", color=BLUE, label="balls on the axis")
+        axes[1].plot(DISCS, gas.discs, "s", color=PINK, label="discs in the tube")
+        axes[1].axvspan(HALF, HALF + LENGTH, color=CAVITY, alpha=0.4, linewidth=0.0)
+        axes[1].text(HALF + 0.5 * LENGTH, 1.14, "tube", ha="center")
+        axes[1].text(0.0, 1.14, "chamber", ha="center")
+        axes[1].set(title="pressure along the axis", ylim=(0.0, 1.25), xlim=(-HALF, HALF + LENGTH))
+        axes[1].set(xlabel="place [m]", ylabel="over $QkT/S$")
         axes[1].legend(loc="lower left")
-        axes[2].plot(gas.time, 1.0 - np.exp(-gas.time), color=GREY, linewidth=0.8, label=r"law: $1-e^{-St/V}$")
-        axes[2].plot(gas.time, gas.inside, ".", color=RED, label="in the vessel, over $QV/S$")
-        axes[2].plot(gas.time, gas.pumped, ".", color=BLUE, label="captured by the pump, of all that come")
-        axes[2].set(xlabel="time, over $V/S$", ylabel="particles", ylim=(0.0, 1.45))
+        law(axes[2], gas.time, 1.0 - np.exp(-gas.time), r"law: $1-e^{-St/V}$")
+        axes[2].plot(gas.time, gas.inside, ".", color=GREEN, markersize=5, label="in the vessel, over $QV/S$")
+        axes[2].plot(gas.time, gas.pumped, ".", color=PINK, markersize=5, label="captured, of all that come")
+        axes[2].set(title="particles over time", xlabel="time, over $V/S$", ylabel="number", ylim=(0.0, 1.5))
         axes[2].legend(loc="upper left")
 
 

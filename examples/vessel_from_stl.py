@@ -16,6 +16,8 @@ import numpy as np
 import swarm
 
 from .asked import Asked
+from .page import law as line
+from .page import page, vessel
 
 GRAVITY, TEMPERATURE, MASS = 9.81, 4.0, 1.0
 HEIGHT, LOBES, DEPTH, TWIST = 1.0, 3, 0.18, 4.0
@@ -79,38 +81,41 @@ def law(z: np.ndarray) -> np.ndarray:
     return radius(z) ** 2 * np.exp(-MASS * GRAVITY * z / TEMPERATURE)
 
 
+def draw(gas: Gas, file: Path) -> None:
+    """The vase with the gas in it, and the density over the height."""
+    from swarm.output.style import BLUE, CAVITY_LINE
+
+    title = "A gas between the warm walls of a vase from an STL file: it is denser below, by the barometric law"
+    with page(file, title, 1, 2, (9.0, 4.6)) as (place, axes):
+        shape = place.figure.add_subplot(place.get_subplotspec(), projection="3d")
+        place.remove()
+        vertices, triangles = vase(60, 72)
+        vessel(shape, [(vertices[triangles], CAVITY_LINE)], gas.paths[-1][:, :2000])
+        shape.set_title("vase, 1 m high, with 2000 of the particles")
+        z = np.linspace(0.0, HEIGHT, 400)
+        axes.hist(
+            gas.heights, bins=50, range=(0.0, HEIGHT), density=True, color=BLUE, alpha=0.45, orientation="horizontal",
+            label="run",
+        )  # fmt: skip
+        line(axes, law(z) / (law(z).mean() * HEIGHT), z, "barometric law times the area of the section")
+        axes.lines[-1].set(zorder=3)
+        axes.set(xlabel="particles at a height, over all [1/m]", ylabel="height [m]", title="where they are")
+        axes.set(ylim=(0.0, HEIGHT))
+        axes.legend(loc="upper right")
+
+
 def main() -> None:
     """Run, draw and print."""
     ask = Asked(__doc__, "vessel_from_stl.png", "plot", "mesh")
     ask.add_argument("--count", type=int, default=4000)
     ask.add_argument("--until", type=float, default=20.0)
     asked = ask.parse_args()
-    from matplotlib import pyplot
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    from .paper.plotting import BLUE, RED
-
     gas = run(asked.count, asked.until)
     seen = gas.result.observables
     print(f"{gas.surface}: within {1e3 * gas.surface.mesh_error:.2g} mm of the mesh")
     print(f"{seen['impacts'][-1]} impacts, energy error {seen['energy_error'].max():.1e}, warmth of the walls included")
     print(f"deepest {seen['max_penetration'].max():.1e} m outside")
-    picture = pyplot.figure(figsize=(7.4, 3.8))
-    shape = picture.add_subplot(1, 2, 1, projection="3d")
-    vertices, triangles = vase(60, 72)
-    shape.add_collection3d(Poly3DCollection(vertices[triangles], facecolor=(0.5, 0.6, 0.7, 0.12), edgecolor="none"))
-    shape.scatter(*gas.paths[-1][:, :1500], s=1.0, color=BLUE, linewidths=0.0)
-    shape.set(xlim=(-0.4, 0.4), ylim=(-0.4, 0.4), zlim=(0.0, 1.0), title=f"{asked.count} particles in a vase from STL")
-    shape.set_box_aspect((0.8, 0.8, 1.0))
-    shape.set_axis_off()
-    axes = picture.add_subplot(1, 2, 2)
-    z = np.linspace(0.0, HEIGHT, 400)
-    axes.hist(gas.heights, bins=50, range=(0.0, HEIGHT), density=True, color=BLUE, alpha=0.4, label="particles")
-    axes.plot(z, law(z) / (law(z).mean() * HEIGHT), color=RED, label="barometric law")
-    axes.set(xlabel="height [m]", ylabel="density [1/m]", title="where they are")
-    axes.legend(frameon=False)
-    picture.tight_layout()
-    picture.savefig(asked.output, dpi=130)
+    draw(gas, asked.output)
     print(f"written {asked.output}")
 
 

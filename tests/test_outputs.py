@@ -40,7 +40,7 @@ def test_examples_that_draw_ask_alike():
     drawing = [
         path
         for path in (ROOT / "examples").glob("*.py")
-        if "savefig" in path.read_text() or "page(" in path.read_text()
+        if path.stem != "page" and ("savefig" in path.read_text() or "page(" in path.read_text())
     ]
     assert sorted(f"examples.{path.stem}" for path in drawing) == DRAWN
 

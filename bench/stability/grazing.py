@@ -82,7 +82,7 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 def draw(cells: Sequence[Cell]) -> None:
     """Cost and distance, two heat maps."""
-    drawn, panels = figure.subplots(2, 12.0, 4.2)
+    drawn, panels = figure.subplots(2, 11.0, 4.2)
     for axes, (value, title, low, high) in zip(
         panels,
         (("seconds", "wall time a crossing [s]", -6.0, -1.0), ("distance", "distance/R", -16.0, 0.0)),
@@ -91,8 +91,9 @@ def draw(cells: Sequence[Cell]) -> None:
         columns, rows, values = picture.table(cells, "angle", "shortest_flight", value)
         names = [f"{r:.0e}" + (" (default)" if r == DEFAULT else "") for r in rows]
         image = picture.heat(axes, [f"{c:.0e}" for c in columns], names, values, low, high)
+        axes.tick_params(axis="x", rotation=60)
         axes.set(title=f"{title}, {CROSSINGS} crossings", xlabel="angle to the wall [rad]")
         drawn.colorbar(image, ax=axes, label=f"log₁₀ of the {value}")
     panels[0].set_ylabel("shortest_flight / crossing time")
-    drawn.suptitle("Impact in a sphere, from grazing to steep", fontsize=11)
+    drawn.suptitle("Impact in a sphere: from grazing to steep the cost has a bound, set by the shortest flight")
     picture.save(drawn, cells, "grazing")

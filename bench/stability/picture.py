@@ -24,28 +24,31 @@ def table(cells: Sequence[Cell], x: str, y: str, value: str) -> tuple[list[float
 
 def heat(axes: Any, columns: list[str], rows: list[str], values: np.ndarray, low: float, high: float) -> Any:
     """Colours of log10(values) from low to high; a cross where a value is infinite."""
+    from swarm.output.style import CAVITY, MAP, ink
+
     with np.errstate(divide="ignore"):
         logarithms = np.log10(np.where(np.isfinite(values), values, np.nan))
-    image = axes.imshow(
-        np.clip(logarithms, low, high), origin="lower", aspect="auto", cmap="cividis", vmin=low, vmax=high
-    )
-    axes.set_facecolor("0.85")
+    image = axes.imshow(np.clip(logarithms, low, high), origin="lower", aspect="auto", cmap=MAP, vmin=low, vmax=high)
+    axes.grid(False)
+    axes.set_facecolor(CAVITY)
     crossed, ended = np.nonzero(np.isinf(values))
-    axes.plot(ended, crossed, "x", color="0.25", markersize=5)
+    axes.plot(ended, crossed, "x", color=ink(), markersize=5)
     # Every second label where there are many.
     every = 1 + len(columns) // 10
-    axes.set_xticks(range(0, len(columns), every), columns[::every], fontsize=8)
-    axes.set_yticks(range(len(rows)), rows, fontsize=8)
+    axes.set_xticks(range(0, len(columns), every), columns[::every])
+    axes.set_yticks(range(len(rows)), rows)
     return image
 
 
 def words(axes: Any, image: Any, values: np.ndarray, wording: Callable[[float], str]) -> None:
     """Each finite value in its cell, dark on light and light on dark."""
+    from swarm.output.style import ink
+
     for row, column in zip(*np.nonzero(np.isfinite(values)), strict=True):
         light = image.get_array()[row, column] > 0.5 * (image.norm.vmin + image.norm.vmax)
         axes.text(
             column, row, wording(values[row, column]), ha="center", va="center", fontsize=7,
-            color="black" if light else "white",
+            color=ink() if light else "white",
         )  # fmt: skip
 
 

@@ -90,14 +90,21 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 def draw(cells: Sequence[Cell]) -> None:
     """One curve a method and scene."""
-    drawn, axes = figure.subplots(1, 9.0, 4.2)
-    for colour, (name, mine) in zip(figure.COLOURS, _curves(cells).items(), strict=False):
+    drawn, axes = figure.subplots(1, 9.0, 4.4)
+    for colour, (name, mine) in zip(figure.colours(), _curves(cells).items(), strict=False):
         # Zero has no place on a logarithmic axis.
         errors = [max(c["energy_error"], 1e-17) for c in mine]
         axes.plot([c["impacts"] for c in mine], errors, color=colour, marker="o", markersize=4, label=name)
-    axes.plot(_IMPACTS, [bar(n) for n in _IMPACTS], color="0.5", linestyle="--", label=r"$5\cdot 10^{-16}\sqrt{n}$")
+    axes.plot(
+        _IMPACTS,
+        [bar(n) for n in _IMPACTS],
+        color=figure.colours()[-1],
+        linestyle="--",
+        label=r"$5\cdot 10^{-16}\sqrt{n}$",
+    )
     axes.set(xscale="log", yscale="log", xlabel="impacts of a particle, n", ylabel="relative energy error")
-    axes.set_title(f"the worst of {PARTICLES} particles (plain: {_PLAIN_PARTICLES})", fontsize=11)
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=9)
+    axes.set_title(
+        f"Round-off adds up in plain reflections, not in Impact: worst of {PARTICLES} particles ({_PLAIN_PARTICLES})"
+    )
+    axes.legend()
     picture.save(drawn, cells, "roundoff")

@@ -95,7 +95,7 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 def draw(cells: Sequence[Cell]) -> None:
     """One heat map a method."""
-    drawn, panels = figure.subplots(len(METHODS), 12.0, 3.8)
+    drawn, panels = figure.subplots(len(METHODS), 11.0, 3.8)
     for axes, method in zip(panels, METHODS, strict=True):
         mine = [cell for cell in cells if cell["method"] == method.__name__]
         columns, rows, values = picture.table(mine, "stiffness", "exponent", "energy_error")
@@ -104,5 +104,7 @@ def draw(cells: Sequence[Cell]) -> None:
         axes.tick_params(axis="x", rotation=60)
     panels[0].set_ylabel("exponent a")
     drawn.colorbar(image, ax=panels, label="log₁₀ of the energy error")
-    drawn.suptitle(f"worst relative energy error after {IMPACTS} impacts; x: the run ended with an error", fontsize=11)
+    drawn.suptitle(
+        f"Worst energy error after {IMPACTS} impacts: Penalty keeps it at any stiffness (x: ended with an error)"
+    )
     picture.save(drawn, cells, "stiffness")

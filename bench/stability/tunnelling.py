@@ -111,7 +111,7 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 def draw(cells: Sequence[Cell]) -> None:
     """Escapes over the ratio, one row a method."""
-    drawn, axes = figure.subplots(1, 10.0, 3.4)
+    drawn, axes = figure.subplots(1, 11.0, 3.6)
     methods, ratios = (list(dict.fromkeys(cell[key] for cell in cells)) for key in ("method", "ratio"))
     ranked = [{**cell, "rank": methods.index(cell["method"])} for cell in cells]
     _columns, _rows, values = picture.table(ranked, "ratio", "rank", "escaped")
@@ -119,10 +119,8 @@ def draw(cells: Sequence[Cell]) -> None:
     picture.words(axes, image, values, lambda part: f"{100.0 * part:.0f} %")
     for cell in ranked:
         if cell["outcome"] == "refused":
-            axes.text(ratios.index(cell["ratio"]), cell["rank"], "\n\nrefused", ha="center", va="center", fontsize=6)
-    axes.set_xticks(range(len(ratios)), [f"{ratio:.2g}" for ratio in ratios], fontsize=8)
+            axes.text(ratios.index(cell["ratio"]), cell["rank"], "\n\nrefused", ha="center", va="center", fontsize=7)
+    axes.set_xticks(range(len(ratios)), [f"{ratio:.2g}" for ratio in ratios])
     axes.set_xlabel("speed · dt / thickness of the solid")
-    axes.set_title(
-        f"particles on the wrong side of a thin solid after {IMPACTS} impacts; x: the run ended", fontsize=10
-    )
+    axes.set_title(f"Particles that have passed a thin solid after {IMPACTS} impacts; x: the run ended with an error")
     picture.save(drawn, cells, "tunnelling")

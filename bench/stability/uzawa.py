@@ -77,7 +77,7 @@ def told(cells: Sequence[Cell]) -> list[str]:
 
 def draw(cells: Sequence[Cell]) -> None:
     """The energy that is left over one plane, sweeps over the next, the rate over the third."""
-    drawn, panels = figure.subplots(3, 12.0, 4.2)
+    drawn, panels = figure.subplots(3, 11.0, 4.4)
     names = {
         "gap": "gap before contact / normal way of the step",
         "exponent": "exponent a",
@@ -93,11 +93,11 @@ def draw(cells: Sequence[Cell]) -> None:
         ((key, number),) = fixed.items()
         columns, rows, values = picture.table([c for c in cells if c[key] == number], x, y, value)
         image = picture.heat(axes, [f"{c:.2g}" for c in columns], [f"{r:.3g}" for r in rows], values, *scales[value])
-        wording = {"left": lambda one: f"{math.log10(one):.0f}", "sweeps": "{:.0f}".format, "rate": "{:.2f}".format}
+        wording = {"left": lambda one: f"{math.log10(one):.0f}", "sweeps": "{:.0f}".format, "rate": "{:.1f}".format}
         picture.words(axes, image, values, wording[value])
         axes.set(xlabel=names[x], ylabel=names[y])
-        axes.set_title(title, fontsize=10)
+        axes.set_title(title, fontsize=9)
         axes.tick_params(axis="x", rotation=60)
         drawn.colorbar(image, ax=axes, label=r"$\log_{10}$" + f" of {title.split(',')[0].split(':')[0]}")
-    drawn.suptitle(f"Uzawa's loop in one contact at 45°, {_SWEEPS} sweeps at most; x: not converged", fontsize=11)
+    drawn.suptitle(f"Uzawa's loop converges where a = 1 and the step begins at the wall (x: not in {_SWEEPS} sweeps)")
     picture.save(drawn, cells, "uzawa")

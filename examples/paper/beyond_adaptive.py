@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import swarm
 
+from ..page import page
 from .cases import DT, PENALTY, ROUND_OFF, SPHERE, SPHERE_ENERGY, history, state_ii
-from .plotting import BLUE, CONSTRAINT_BAR, GREY, RED, SWEEP, curve, page
+from .plotting import CONSTRAINT_BAR, SWEEP, curve
 from .table import Row, convergence
 
 FILE = "beyond_3_adaptive.png"
@@ -38,17 +39,19 @@ def energy_error(loop: swarm.ContactHistory) -> float:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Constraint and energy over the sweeps."""
+    from swarm.output.style import BLUE, GREY, RED
+
     file = folder / FILE
-    title = "Beyond the paper 3: State II made State I, sphere, a = 1"
-    with page(file, title, 1, 2, (7.0, 3.4)) as (constraint, energy):
+    title = "Beyond the paper 3: steps that are cut at the impact converge"
+    with page(file, title, 1, 2, (9.0, 3.9)) as (constraint, energy):
         constraint.set_yscale("log")
         for loop, colour, label in ((numbers.fixed, RED, "fixed steps"), (numbers.exact, BLUE, "cut at the impact")):
             curve(constraint, loop, loop.constraint, color=colour, label=label)
             curve(energy, loop, loop.kinetic_energy, color=colour, label=label)
         constraint.axhline(CONSTRAINT_BAR, color=GREY, linestyle="--", label="the paper's tolerance")
         energy.axhline(SPHERE_ENERGY, color=GREY, linestyle="--", label="before the contact")
-        constraint.set(ylabel="constraint Φ$_1$  (m)")
-        energy.set(ylabel="kinetic energy after the step (J)", ylim=(0.0, 0.135))
+        constraint.set(title="how far outside the step ends", ylabel="constraint Φ$_1$ [m]")
+        energy.set(title="energy after the step", ylabel="kinetic energy [J]", ylim=(0.0, 0.135))
         for axes in (constraint, energy):
             axes.set(xlabel=SWEEP, xlim=(0, 51))
             axes.legend(loc="center right")

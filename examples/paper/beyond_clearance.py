@@ -12,8 +12,8 @@ import numpy as np
 
 import swarm
 
+from ..page import page
 from .cases import Floats
-from .plotting import BLUE, GREY, RED, page
 from .table import Row
 
 FILE = "beyond_5_clearance.png"
@@ -72,21 +72,23 @@ def energy_left(motion: Motion) -> float:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Both paths in the hole, from the dot, and the energies over time."""
+    from swarm.output.style import BLUE, CAVITY_LINE, RED, ink
+
     file = folder / FILE
-    title = "Beyond the paper 5: pin with clearance in an elliptical hole, gravity downwards"
-    with page(file, title, 1, 3, (10.0, 3.0)) as (stiff, rigid, axes):
+    title = "Beyond the paper 5: a pin loose in a hole keeps its energy by Penalty, not by fixed steps of Uzawa"
+    with page(file, title, 1, 3, (11.0, 3.6)) as (stiff, rigid, axes):
         for hole, motion, colour, label in (
             (stiff, numbers.hertz, BLUE, "Penalty, a = 1.5: stiff walls"),
             (rigid, numbers.uzawa, RED, "Uzawa, fixed steps: State II"),
         ):
             angle = np.linspace(0.0, 2.0 * np.pi, 361)
-            hole.plot(1e3 * WIDTH * np.cos(angle), 1e3 * HEIGHT * np.sin(angle), color=GREY)
+            hole.plot(1e3 * WIDTH * np.cos(angle), 1e3 * HEIGHT * np.sin(angle), color=CAVITY_LINE)
             x, y, _z = 1e3 * motion.path
             hole.plot(x, y, color=colour, linewidth=0.5)
-            hole.plot(x[0], y[0], color="black", marker="o")
-            hole.set(title=label, xlabel="x of the pin's centre (mm)", ylabel="y (mm)", aspect="equal")
+            hole.plot(x[0], y[0], color=ink(), marker="o")
+            hole.set(title=label, xlabel="x of the pin's centre [mm], from the dot", ylabel="y [mm]", aspect="equal")
             axes.plot(motion.result.observables["time"], 1e6 * energy(motion), color=colour, label=label)
-        axes.set(xlabel="time (s)", ylabel="energy above rest (µJ)", ylim=(0.0, None))
+        axes.set(title="energy above that at rest", xlabel="time [s]", ylabel="energy [µJ]", ylim=(0.0, None))
         axes.legend(loc="lower left")
     return file
 

@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import swarm
 
+from ..page import page
 from .cases import DT, ELLIPSOID, ELLIPSOID_ENERGY, PENALTY, ROUND_OFF, history, on_the_ellipsoid
-from .plotting import BLUE, CONSTRAINT_BAR, GREY, RED, SWEEP, curve, page
+from .plotting import CONSTRAINT_BAR, SWEEP, curve
 from .table import Row, convergence
 
 FILE = "beyond_1_ellipsoid_composite.png"
@@ -38,9 +39,11 @@ def energy_error(loop: swarm.ContactHistory) -> float:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Constraint and energy over the sweeps."""
+    from swarm.output.style import BLUE, GREY, RED
+
     file = folder / FILE
-    title = "Beyond the paper 1: its ellipsoid, State I, composite gradient"
-    with page(file, title, 1, 2, (7.0, 3.4)) as (constraint, energy):
+    title = "Beyond the paper 1: the composite gradient converges on its ellipsoid"
+    with page(file, title, 1, 2, (9.0, 3.9)) as (constraint, energy):
         constraint.set_yscale("log")
         energy.set_yscale("log")
         for loop, colour, label in (
@@ -50,8 +53,8 @@ def draw(numbers: Numbers, folder: Path) -> Path:
             curve(constraint, loop, loop.constraint, color=colour, label=label)
             curve(energy, loop, abs(loop.kinetic_energy / ELLIPSOID_ENERGY - 1.0), color=colour, label=label)
         constraint.axhline(CONSTRAINT_BAR, color=GREY, linestyle="--", label="the paper's tolerance, a = 1")
-        constraint.set(ylabel="constraint Φ$_1$  (no unit)")
-        energy.set(ylabel="relative error of the energy")
+        constraint.set(title="how far outside the step ends", ylabel="constraint Φ$_1$ [1]")
+        energy.set(title="energy after the step", ylabel="relative error")
         constraint.legend(loc="center right")
         for axes in (constraint, energy):
             axes.set(xlabel=SWEEP, xlim=(0, 51))

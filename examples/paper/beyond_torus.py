@@ -7,8 +7,9 @@ import numpy as np
 
 import swarm
 
+from ..page import page
 from .cases import DT, MASS, PENALTY, ROUND_OFF, SPHERE_ENERGY, Floats
-from .plotting import BLUE, CONSTRAINT_BAR, GREY, SWEEP, curve, page
+from .plotting import CONSTRAINT_BAR, SWEEP, curve
 from .table import Row
 
 FILE = "beyond_2_torus.png"
@@ -65,9 +66,11 @@ def sweeps_at_tolerance(numbers: Numbers) -> list[int]:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Constraint and energy over the sweeps, a line a contact."""
+    from swarm.output.style import BLUE, GREY
+
     file = folder / FILE
-    title = f"Beyond the paper 2: torus, State I, a = 1, Gonzalez's gradient, {CONTACTS} contacts"
-    with page(file, title, 1, 2, (7.0, 3.4)) as (constraint, energy):
+    title = f"Beyond the paper 2: on a torus, which is no quadric, all {CONTACTS} contacts converge"
+    with page(file, title, 1, 2, (9.0, 3.9)) as (constraint, energy):
         constraint.set_yscale("log")
         energy.set_yscale("log")
         for loop in numbers.loops:
@@ -75,8 +78,9 @@ def draw(numbers: Numbers, folder: Path) -> Path:
             curve(constraint, loop, loop.constraint, **line)
             curve(energy, loop, abs(loop.kinetic_energy / SPHERE_ENERGY - 1.0), **line)
         constraint.axhline(CONSTRAINT_BAR, color=GREY, linestyle="--", label="the paper's tolerance")
-        constraint.set(ylabel="constraint Φ$_1$  (m)")
-        energy.set(ylabel="relative error of the energy")
+        constraint.set(title="how far outside the step ends", ylabel="constraint Φ$_1$ [m]")
+        constraint.plot([], [], color=BLUE, marker="o", label="a contact each")
+        energy.set(title="energy after the step", ylabel="relative error")
         constraint.legend()
         for axes in (constraint, energy):
             axes.set(xlabel=SWEEP, xlim=(0, None))

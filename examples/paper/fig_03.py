@@ -7,8 +7,8 @@ import numpy as np
 
 from swarm.contact.regularisation import regularisation
 
+from ..page import page
 from .cases import Floats
-from .plotting import BLUE, GREEN, GREY, RED, page
 from .table import Row
 
 FILE = "fig_03_regularisation.png"
@@ -33,11 +33,13 @@ def numbers() -> Numbers:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Phi over g."""
+    from swarm.output.style import BLUE, GREEN, PINK, RED
+
     file = folder / FILE
-    with page(file, "Fig. 3: regularised constraint") as (axes,):
-        for a, values, colour in zip(EXPONENTS, numbers.values, (RED, BLUE, GREEN, GREY), strict=True):
+    with page(file, "Fig. 3: the constraint has a corner for a = 1") as (axes,):
+        for a, values, colour in zip(EXPONENTS, numbers.values, (BLUE, RED, GREEN, PINK), strict=True):
             axes.plot(numbers.gaps, values, color=colour, label=f"a = {a:g}")
-        axes.set(xlabel="gap g (m), outside for g > 0", ylabel="Φ(g; a)  (m$^{(a+1)/2}$)")
+        axes.set(xlabel="gap g [m], outside for g > 0", ylabel="Φ(g; a) [m$^{(a+1)/2}$]")
         axes.legend(loc="upper left")
     return file
 

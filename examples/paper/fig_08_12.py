@@ -7,8 +7,9 @@ import numpy as np
 
 import swarm
 
+from ..page import page
 from .cases import DT, PENALTY, SPHERE, SPHERE_ENERGY, Approach, history, state_i
-from .plotting import BLUE, CONSTRAINT_BAR, GREY, RED, SWEEP, curve, page
+from .plotting import CONSTRAINT_BAR, SWEEP, curve
 from .table import Row, convergence
 
 FILE = "fig_08_12_state_i.png"
@@ -31,9 +32,11 @@ def numbers() -> Numbers:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Six panels over the sweeps."""
+    from swarm.output.style import BLUE, GREY, RED
+
     file = folder / FILE
-    title = r"Figs. 8-12: State I on the sphere, $\alpha$ = 10$^4$, h = 0.025 s"
-    with page(file, title, 2, 3, (9.0, 5.2)) as (multiplier, part, spring, energy, constraint, place):
+    title = "Figs. 8 to 12: a step from the surface of a sphere (State I): a = 1 converges, a = 1.5 does not"
+    with page(file, title, 2, 3, (11.0, 6.2)) as (multiplier, part, spring, energy, constraint, place):
         constraint.set_yscale("log")
         for loop, colour, label in ((numbers.linear, BLUE, "a = 1"), (numbers.hertz, RED, "a = 1.5")):
             line = {"color": colour, "label": label}
@@ -45,15 +48,14 @@ def draw(numbers: Numbers, folder: Path) -> Path:
             curve(place, loop, 1e3 * (np.linalg.norm(loop.position, axis=1) - 0.5), **line)
         energy.axhline(SPHERE_ENERGY, color=GREY, linestyle="--", label="before the contact")
         constraint.axhline(CONSTRAINT_BAR, color=GREY, linestyle="--", label="tolerance")
-        multiplier.set(ylabel="multiplier λ  (N, J/m$^{1.25}$)")
-        part.set(ylabel="force of the multiplier (N)")
-        spring.set(ylabel="force of the penalty (N)")
-        energy.set(ylabel="kinetic energy after the step (J)", ylim=(0.0, 0.135))
-        constraint.set(ylabel="constraint Φ$_1$  (m, m$^{1.25}$)")
-        place.set(ylabel="distance outside, |r$_1$| - R (mm)")
-        for axes in (multiplier, energy, constraint):
-            axes.legend()
+        multiplier.set(ylabel="multiplier λ [N, J/m$^{1.25}$]")
+        part.set(ylabel="force of the multiplier [N]")
+        spring.set(ylabel="force of the penalty [N]")
+        energy.set(ylabel="kinetic energy after the step [J]", ylim=(0.0, 0.135))
+        constraint.set(ylabel="constraint Φ$_1$ [m, m$^{1.25}$]")
+        place.set(ylabel="distance outside, |r$_1$| - R [mm]")
         for axes in (multiplier, part, spring, energy, constraint, place):
+            axes.legend()
             axes.set(xlabel=SWEEP, xlim=(0, 51))
     return file
 

@@ -7,8 +7,8 @@ import numpy as np
 
 import swarm
 
+from ..page import page
 from .cases import DT, PENALTY, SPHERE, Floats, history, state_i
-from .plotting import BLUE, GREY, RED, page
 from .table import Row
 
 FILE = "fig_13_trajectory.png"
@@ -45,20 +45,24 @@ def angles(numbers: Numbers) -> tuple[float, float]:
 def draw(numbers: Numbers, folder: Path) -> Path:
     """The path in the cavity, and the contact step magnified."""
     file = folder / FILE
-    with page(file, "Fig. 13: path of the particle, State I, a = 1", 1, 2, (7.0, 3.6)) as (whole, near):
+    with page(
+        file, "Fig. 13: steps to the wall, one along a chord of it, and away at the same angle", 1, 2, (9.0, 4.4)
+    ) as (whole, near):
         for axes in (whole, near):
             _path(axes, numbers)
-            axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
-        whole.set(xlim=(-0.55, 0.55), ylim=(-0.55, 0.55))
+            axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+        whole.set(title="path of the particle", xlim=(-0.55, 0.55), ylim=(-0.55, 0.55))
         x, y = numbers.contact.mean(axis=0)[:2]
-        near.set(xlim=(x - 0.03, x + 0.03), ylim=(y - 0.03, y + 0.03))
+        near.set(title="the contact step", xlim=(x - 0.03, x + 0.03), ylim=(y - 0.03, y + 0.03))
         near.legend(loc="upper right")
     return file
 
 
 def _path(axes: Any, numbers: Numbers) -> None:
+    from swarm.output.style import BLUE, CAVITY_LINE, RED
+
     angle = np.linspace(0.0, 2.0 * np.pi, 2001)
-    axes.plot(0.5 * np.cos(angle), 0.5 * np.sin(angle), color=GREY, label="sphere")
+    axes.plot(0.5 * np.cos(angle), 0.5 * np.sin(angle), color=CAVITY_LINE, label="wall of the sphere")
     axes.plot(*numbers.path.T[:2], color=BLUE, marker="o", markersize=2.0, label="free steps")
     axes.plot(*numbers.contact.T[:2], color=RED, marker="o", label="contact step")
 

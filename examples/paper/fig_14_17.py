@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import swarm
 
+from ..page import page
 from .cases import DT, PENALTY, SPHERE, SPHERE_ENERGY, Approach, history, state_ii
-from .plotting import BLUE, CONSTRAINT_BAR, GREY, RED, SWEEP, curve, page
+from .plotting import CONSTRAINT_BAR, SWEEP, curve
 from .table import Row, convergence
 
 FILE = "fig_14_17_state_ii.png"
@@ -29,9 +30,11 @@ def numbers() -> Numbers:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Four panels over the sweeps."""
+    from swarm.output.style import BLUE, GREY, RED
+
     file = folder / FILE
-    title = r"Figs. 14-17: State II (45°) on the sphere, $\alpha$ = 10$^4$, h = 0.025 s"
-    with page(file, title, 2, 2, (7.0, 5.2)) as (multiplier, force, energy, constraint):
+    title = "Figs. 14 to 17: a step from inside the sphere (State II) does not converge"
+    with page(file, title, 2, 2, (9.0, 6.4)) as (multiplier, force, energy, constraint):
         constraint.set_yscale("log")
         for loop, colour, label in ((numbers.linear, BLUE, "a = 1"), (numbers.hertz, RED, "a = 1.5")):
             line = {"color": colour, "label": label}
@@ -42,10 +45,10 @@ def draw(numbers: Numbers, folder: Path) -> Path:
             curve(constraint, loop, loop.constraint, **line)
         energy.axhline(SPHERE_ENERGY, color=GREY, linestyle="--", label="before the contact")
         constraint.axhline(CONSTRAINT_BAR, color=GREY, linestyle="--", label="tolerance")
-        multiplier.set(ylabel="multiplier λ  (N, J/m$^{1.25}$)")
-        force.set(ylabel="force (N)")
-        energy.set(ylabel="kinetic energy after the step (J)", ylim=(0.0, 0.135))
-        constraint.set(ylabel="constraint Φ$_1$  (m, m$^{1.25}$)")
+        multiplier.set(ylabel="multiplier λ [N, J/m$^{1.25}$]")
+        force.set(ylabel="force [N]")
+        energy.set(ylabel="kinetic energy after the step [J]", ylim=(0.0, 0.135))
+        constraint.set(ylabel="constraint Φ$_1$ [m, m$^{1.25}$]")
         for axes in (multiplier, force, energy, constraint):
             axes.set(xlabel=SWEEP, xlim=(0, 51))
         for axes in (multiplier, energy, constraint):

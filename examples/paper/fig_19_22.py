@@ -7,6 +7,7 @@ import numpy as np
 
 import swarm
 
+from ..page import page
 from .cases import (
     DT,
     ELLIPSOID,
@@ -20,7 +21,7 @@ from .cases import (
     history,
     on_the_ellipsoid,
 )
-from .plotting import BLUE, GREY, RED, SWEEP, curve, page
+from .plotting import SWEEP, curve
 from .table import Row, convergence
 
 FILE = "fig_19_22_ellipsoid.png"
@@ -45,11 +46,13 @@ def numbers() -> Numbers:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Four panels over the sweeps, with the paper's numbers on them."""
+    from swarm.output.style import BLUE, GREY, RED
+
     file = folder / FILE
-    title = r"Figs. 19-22: State I on the ellipsoid, a = 4, $\alpha$ = 10$^7$ J, mean-value gradient"
+    title = "Figs. 19 to 22: with the mean-value gradient, on an ellipsoid, the loop does not converge"
     paper = {"color": RED, "marker": "s", "fillstyle": "none", "markersize": 6.0, "linestyle": "none"}
     loop = numbers.loop
-    with page(file, title, 2, 2, (7.0, 5.2)) as (multiplier, force, energy, constraint):
+    with page(file, title, 2, 2, (9.0, 6.4)) as (multiplier, force, energy, constraint):
         constraint.set_yscale("log")
         curve(multiplier, loop, loop.multiplier, color=BLUE, label="swarm")
         multiplier.plot(PAPER_SWEEPS, PAPER_MULTIPLIERS, **paper, label="printed in the paper")
@@ -61,10 +64,10 @@ def draw(numbers: Numbers, folder: Path) -> Path:
         curve(constraint, loop, loop.constraint, color=BLUE, label="swarm")
         bar = np.sqrt(2.0 * TOLERANCE / PENALTY)
         constraint.axhline(bar, color=GREY, linestyle="--", label="tolerance")
-        multiplier.set(ylabel="multiplier λ  (J)")
-        force.set(ylabel="force (N)")
-        energy.set(ylabel="kinetic energy after the step (J)", ylim=(0.0, 0.26))
-        constraint.set(ylabel="constraint Φ$_1$  (no unit)")
+        multiplier.set(ylabel="multiplier λ [J]")
+        force.set(ylabel="force [N]")
+        energy.set(ylabel="kinetic energy after the step [J]", ylim=(0.0, 0.26))
+        constraint.set(ylabel="constraint Φ$_1$ [1]")
         for axes in (multiplier, force, energy, constraint):
             axes.set(xlabel=SWEEP, xlim=(0, 51))
             axes.legend()

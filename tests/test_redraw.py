@@ -1,0 +1,47 @@
+"""Pictures of benchmarks are drawn again from the tables of their reports, which that does not change."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from children import python
+
+from bench import redraw
+
+pytest.importorskip("matplotlib")
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "bench" / "results"
+
+
+def test_pictures_are_made_of_tables_alone(tmp_path):
+    """One of each kind."""
+    tables = [
+        "accuracy-soft-sphere-amd-epyc-avx2-2-cores.csv",
+        "throughput-amd-epyc-avx2-2-cores.csv",
+        "stability-tunnelling.csv",
+    ]
+    for name in tables:
+        shutil.copy(RESULTS / name, tmp_path)
+    done = python("-m", "bench.redraw", str(tmp_path), cwd=ROOT)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert sorted(path.stem for path in tmp_path.glob("*.png")) == sorted(Path(name).stem for name in tables)
+    for name in tables:
+        assert (tmp_path / name).read_bytes() == (RESULTS / name).read_bytes(), name
+
+
+def test_a_case_of_the_table_is_what_it_was(monkeypatch):
+    """Scenes and methods have commas in their names."""
+    given = []
+    monkeypatch.setattr(redraw.figure, "throughput", lambda found, limits, *rest: given.append((found, limits, rest)))
+    redraw.redraw_throughput(RESULTS / "throughput-amd-epyc-avx2-2-cores.csv")
+    ((found, limits, (_fixed, where, _file)),) = given
+    table = [row["what"] for row in redraw.rows(RESULTS / "throughput-amd-epyc-avx2-2-cores.csv")]
+    assert sorted([*limits, *map(str, found)]) == sorted(table)
+    assert all("thr" not in name for name in limits)
+    assert where == "AMD EPYC, AVX2, 2 cores"
+
+
+def test_a_folder_that_is_not_there_is_a_sentence(tmp_path):
+    done = python("-m", "bench.redraw", str(tmp_path / "nothing"), cwd=ROOT)
+    assert done.returncode == 2
+    assert "is no folder" in done.stderr
