@@ -227,7 +227,7 @@ class Presented(Stored):
             if in_notebook:
                 from . import widget
 
-                widget.load()
+                widget.bring_widget()
             from . import recording
         recording.show(self, recording.Settings(particles, color, megabytes, live=not in_notebook))
 

@@ -288,7 +288,7 @@ def show(trajectory: Any, settings: Settings) -> None:
     if not settings.live:
         from . import widget
 
-        widget.show(stream)
+        widget.display_below(stream)
 
 
 def record(trajectory: Any, path: Path | None, settings: Settings, overwrite: bool = False) -> Any:

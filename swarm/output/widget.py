@@ -16,7 +16,7 @@ _HEIGHT = 600
 _shown: list[Any] = []
 
 
-def load() -> None:
+def bring_widget() -> None:
     """Import the widget, whose module decides when it is imported where browsers get the viewer from.
 
     By default that is Rerun's server. Where this machine does not reach it, browsers get it from here, unless the
@@ -41,7 +41,7 @@ def _is_reached() -> bool:
     return True
 
 
-def show(stream: Any) -> None:
+def display_below(stream: Any) -> None:
     """Show the recording of a stream below the cell that runs."""
     from rerun.notebook import Viewer  # which imports half of Jupyter
 

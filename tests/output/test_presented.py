@@ -314,7 +314,7 @@ def test_a_notebook_shows_the_recording(run, tmp_path, monkeypatch):
     run[1].show(particles=10)
     assert "RERUN_NOTEBOOK_ASSET" not in os.environ
     monkeypatch.setenv("RERUN_NOTEBOOK_ASSET", "serve-local")
-    widget.load()
+    widget.bring_widget()
     assert (asked, hidden, len(widget._shown)) == (["server", "server"], [{"top": "hidden"}], 1)
     shown[0].save(tmp_path / "run.rrd")
     shown[0].flush()
