@@ -69,7 +69,7 @@ def export(
         paths.check_target(one, overwrite, "export")
     with together(target, targets, stale) as parts:
         if kind == ".obj":
-            form.write(trajectory, number, *parts)
+            form.write_objects(trajectory, number, *parts)
             if progress is not None:
                 progress(1, 1)
         else:
@@ -80,7 +80,7 @@ def export(
 def _write(form: Any, chosen: Exported, parts: list[Path]) -> None:
     """Write the particles and, if there are files for them, the walls and the solids of large fields."""
     if form.__name__.endswith(".ply"):
-        form.write(chosen, parts)
+        form.write_sequence(chosen, parts)
         return
     if len(parts) > 1:
         from . import walls

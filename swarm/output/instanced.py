@@ -17,7 +17,7 @@ from .solids import Solids, curves, matrices
 _BALL_BYTES, _SOLID_BYTES = 16, 40
 
 
-def size_of(solids: Solids) -> int:
+def bytes_of(solids: Solids) -> int:
     """Bytes in a recording."""
     each = _BALL_BYTES if solids.kind == "spheres" else _SOLID_BYTES
     return each * len(solids.centers) + sum(12 * len(curve) for curve in curves(solids))

@@ -32,7 +32,7 @@ def materials_of(target: Path) -> Path:
     return target.with_suffix(".mtl")
 
 
-def write(trajectory: Any, number: int, path: Path, materials: Path) -> None:
+def write_objects(trajectory: Any, number: int, path: Path, materials: Path) -> None:
     """Write the walls at a frame, and their materials."""
     scene, time = trajectory.scene, float(trajectory.times[number])
     encode = msgspec.json.Encoder().encode

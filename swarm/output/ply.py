@@ -52,7 +52,7 @@ def older(target: Path) -> list[Path]:
     return found
 
 
-def write(chosen: Exported, files: list[Path]) -> None:
+def write_sequence(chosen: Exported, files: list[Path]) -> None:
     """Write a file for each frame."""
     writer = _Writer(chosen)
     for moment, path in zip(chosen.moments(), files, strict=True):

@@ -133,7 +133,7 @@ class RecordingWriter:
         self._series = series.lines_of(self._scene, self._method, self._shapes, self._body, self._more)
         fixed = sum(24 * len(s.vertices) + 12 * len(s.triangles) + 12 * sum(map(len, s.wires)) for s in self._shapes)
         many = solids.solids_of(self._scene, 0.0)
-        fixed += sum(map(instanced.size_of, many))
+        fixed += sum(map(instanced.bytes_of, many))
         lines, triangles = len(self._drawn.lines), len(self._drawn.triangles)
         points = self._at_start.shape[1] * (2 if triangles else 1)
         frame = _PARTICLE_BYTES * points + _LINE_BYTES * lines + _NUMBER_BYTES * (4 + len(self._series))
