@@ -12,7 +12,7 @@ _BINS = 50
 # Speeds that differ by less than this part of themselves are one: an impact rounds them.
 _ALIKE = 1e-9
 # Up to this largest difference of the cumulated distributions the law of Maxwell says something.
-_NEAR = 0.2
+_NEAR = 0.1
 # A histogram with more than this part in one bin says nothing.
 _ALL = 0.8
 Spread = dict[str, Floats]
