@@ -76,6 +76,8 @@ def lines(axes: Any, view: str, logarithm: bool, drawn: Curves, limit: float | N
     factor, written = prefixed(size, unit) if unit else (1.0, "")
     duration = max(float(times[-1]) for times, _values in drawn.values() if len(times))
     scale, second = prefixed(duration, "s")
+    if len(drawn) == 1 and "total, all kinetic" in drawn:
+        axes.set_title("Energy of all, kinetic")
     scaled = {name: (times * scale, values * factor) for name, (times, values) in drawn.items()}
     ends = _curves(axes, scaled, unit in _RATES)
     axes.set_xlim(
@@ -92,13 +94,17 @@ def lines(axes: Any, view: str, logarithm: bool, drawn: Curves, limit: float | N
 
 
 def _merged(drawn: Curves) -> Curves:
-    """The curves with the total once, where all energy is kinetic."""
-    if not {"total", "kinetic"} <= drawn.keys() or not np.allclose(
-        drawn["total"][1], drawn["kinetic"][1], rtol=ROUND_OFF, atol=0.0
-    ):
+    """The curves of energies without those that are round-off of the total, and that once where all is kinetic."""
+    if "total" not in drawn or not len(drawn["total"][1]):
         return drawn
-    rest = {name: curve for name, curve in drawn.items() if name not in ("total", "kinetic")}
-    return {"total, all kinetic": drawn["total"], **rest}
+    total = drawn["total"][1]
+    least = ROUND_OFF * max(float(np.abs(values).max()) for _times, values in drawn.values())
+    rest = {name: curve for name, curve in drawn.items() if np.abs(curve[1]).max() > least or name == "total"}
+    if "kinetic" not in rest or not np.allclose(total, rest["kinetic"][1], rtol=0.0, atol=least):
+        return rest
+    return {"total, all kinetic": drawn["total"]} | {
+        n: curve for n, curve in rest.items() if n not in ("total", "kinetic")
+    }
 
 
 def _error(values: Floats) -> Floats:
@@ -211,8 +217,8 @@ def _errors(axes: Any, drawn: Curves, limit: float | None, unit: str) -> None:
     values = np.concatenate([values for _times, values in drawn.values()])
     worst, least = float(values.max()), float(values[values > 0.0].min())
     told = f"at most {plain(worst, 2)} {unit}".strip()
-    if worst > (limit or 0.0) and worst > _DECADES * max(least, limit or 0.0):
-        low = 10.0 ** np.floor(np.log10(max(least, 1e-2 * (limit or least))))
+    if limit is not None and worst > _DECADES * max(least, limit):
+        low = 10.0 ** np.floor(np.log10(max(least, 1e-2 * limit)))
         axes.set_yscale("log", nonpositive="mask")
         axes.set_ylim(low, worst * 3.0)
     else:

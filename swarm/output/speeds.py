@@ -8,11 +8,12 @@ from ..state import Floats
 from . import style
 from .amounts import amount, prefixed
 
-_BINS = 50
+# Most bins of a histogram, and fewest; of few speeds so many are in each.
+_BINS, _FEWEST, _EACH = 50, 8, 10
 # Speeds that differ by less than this part of themselves are one: an impact rounds them.
 _ALIKE = 1e-9
 # Up to this largest difference of the cumulated distributions the law of Maxwell says something.
-_NEAR = 0.2
+_NEAR = 0.1
 # A histogram with more than this part in one bin says nothing.
 _ALL = 0.8
 Spread = dict[str, Floats]
@@ -65,7 +66,7 @@ def maxwell(speeds: Floats, mean_square: float, dimensions: int) -> Floats:
 
 def draw(axes: Any, content: Any, spread: Spread) -> None:
     """Histograms of the speeds, and the law of Maxwell of the same mean energy where they are near it."""
-    top = _top(spread)
+    top, bins = _top(spread), min(_BINS, max(_FEWEST, min(map(len, spread.values())) // _EACH))
     factor, unit = prefixed(top, "m/s")
     for name, values in spread.items():
         colour = style.GREY if name == "start" and len(spread) > 1 else style.BLUE
@@ -75,31 +76,31 @@ def draw(axes: Any, content: Any, spread: Spread) -> None:
             axes.axvline(place, color=colour, linewidth=1.4, linestyle="--",
                          label=f"{when} all {amount(float(values.mean()), 'm/s', 3)}")  # fmt: skip
             continue
-        counts, edges = np.histogram(values, bins=_BINS, range=(0.0, top))
+        counts, edges = np.histogram(values, bins=bins, range=(0.0, top))
         look: dict[str, Any] = {"fill": True, "alpha": 0.35} if colour == style.GREY else {"linewidth": 1.6}
         axes.stairs(100.0 * counts / len(values), edges * factor, color=colour, label=when, **look)
-    _law(axes, content, spread, top, factor)
+    _law(axes, content, spread, top / bins, factor)
     axes.set_xlim(0.0, top * factor)
     axes.set_ylim(0.0, 1.35 * axes.get_ylim()[1])
     axes.set_title("Speeds" if content.body is None else "Speeds of points")
-    axes.set_ylabel(f"% in each of {_BINS} bins")
+    axes.set_ylabel(f"% in each of {bins} bins")
     axes.set_xlabel(f"speed [{unit}]")
     axes.legend(loc="upper right", fontsize=8)
 
 
-def _law(axes: Any, content: Any, spread: Spread, top: float, factor: float) -> None:
+def _law(axes: Any, content: Any, spread: Spread, bin_width: float, factor: float) -> None:
     """The law of Maxwell of the last speeds, where these are near it."""
     values, frame = list(spread.values())[-1], list(content.frames.values())[-1]
     masses = frame.mass
     if content.body is not None or np.ptp(masses) > 1e-9 * masses.max() or _is_single(values) or len(values) < _BINS:
         return
     dimensions = 3 if content.scene.plane is None else 2
-    at = np.linspace(0.0, top, 400)
+    at = np.linspace(0.0, _top(spread), 400)
     density = maxwell(at, float((values**2).mean()), dimensions)
     law = np.cumsum(density) * at[1]
     measured = np.searchsorted(np.sort(values), at) / len(values)
     if np.abs(law - measured).max() < _NEAR:
-        axes.plot(at * factor, 100.0 * density * top / _BINS, color=style.RED, linewidth=1.2, linestyle=":",
+        axes.plot(at * factor, 100.0 * density * bin_width, color=style.RED, linewidth=1.2, linestyle=":",
                   label="Maxwell, same energy")  # fmt: skip
 
 

@@ -153,7 +153,8 @@ def _penetration(content: Any) -> list[Verdict]:
     outside = f"at most {amount(deepest, 'm', 2)} outside a rigid wall"
     if deepest <= limit:
         return [Verdict("walls", True, f"{outside}, round-off of {amount(size, 'm', 2)}")]
-    return [Verdict("walls", False, f"{outside}, where round-off explains {amount(limit, 'm', 1)}")]
+    why = "the tolerance of the loop" if content.method.has_multipliers() else "round-off"
+    return [Verdict("walls", False, f"{outside}, where {why} explains {amount(limit, 'm', 1)}")]
 
 
 def penetration_limit(content: Any) -> float:
