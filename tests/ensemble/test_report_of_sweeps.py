@@ -1,0 +1,103 @@
+"""Reports of sweeps: the folder as it is found, its table, its graphs, and what a page says of runs that failed."""
+
+import json
+import shutil
+
+import pytest
+from pages import Read
+
+import swarm
+from swarm.ensemble import curves
+from swarm.ensemble.folder import found
+
+SWEEP = """
+[particles]
+count = 5
+speed = 1.0
+[[surface]]
+kind = "sphere"
+radius = 0.5
+[method]
+kind = "impact"
+[run]
+until = 1.0
+every = 0.5
+compile = "never"
+[sweep]
+"surface.0.restitution" = [0.5, 0.9]
+"particles.seed" = {range = 2}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("sweeps")
+    (place / "gas.toml").write_text(SWEEP)
+    swarm.sweep(place / "gas.toml", place / "gas<script>", processes=1)
+    return place / "gas<script>"
+
+
+@pytest.fixture(scope="module")
+def page(folder):
+    return swarm.report(folder)
+
+
+def test_a_page_has_the_table_the_graphs_and_the_sweep_file(folder, page):
+    read = Read(page.html)
+    assert {"numbers", "graphs", "runs", "reproduce"} <= set(read.ids)
+    assert "failures" not in read.ids
+    assert read.tags.count("tr") >= 5
+    # Of two parameters, each observable that differs.
+    assert read.tags.count("svg") == 2 * len(curves.main_observables(found(folder)))
+    assert SWEEP.strip() in read.texts["reproduce"]
+    assert "swarm sweep again.toml -o again" in read.texts["reproduce"]
+    assert page.title.startswith("Sweep gas<script>: 4 runs, over surface.0.restitution and particles.seed")
+
+
+def test_names_of_folders_are_escaped_and_links_lead_to_files(folder, page):
+    assert "<script>:" not in page.html
+    links = Read(page.html).links
+    assert len(links) == 5
+    assert all(link.startswith("gas%3Cscript%3E/") for link in links)
+    inside = Read(swarm.report(folder, folder / "page.html", overwrite=True).html)
+    assert all((folder / link).is_file() for link in inside.links)
+
+
+def test_what_comes_first_is_what_differs(folder):
+    names = curves.main_observables(found(folder))
+    assert names[0] == "kinetic_energy"
+    assert "total_energy" not in names  # the same without gravity
+    assert "energy_error" not in names  # round-off
+
+
+def test_a_sweep_that_is_not_complete_and_a_run_that_failed_say_so(folder, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    status = sorted(file for file in copy.glob("*.json"))[0]
+    told = json.loads(status.read_text())
+    status.write_text(json.dumps({**told, "state": "failed", "error": "it went <b>wrong</b>"}))
+    read = Read(swarm.report(copy).html)
+    assert "1 run failed" in read.texts["failures"]
+    assert "it went <b>wrong</b>" in read.texts["failures"]
+    assert "it went <b>wrong</b>" in read.texts["runs"]
+    text = (copy / "results.csv").read_text()
+    for file in copy.glob("*.json"):
+        file.unlink()
+    (copy / "results.csv").write_text(text.replace(",done,", ",waiting,", 1))
+    assert "not complete: 1 of 4 runs have not ended" in Read(swarm.report(copy).html).texts[""]
+
+
+def test_a_sweep_without_its_table_or_its_file_has_a_page(folder, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    (copy / "results.csv").unlink()
+    (copy / "sweep.toml").unlink()
+    read = Read(swarm.report(copy).html)
+    assert read.tags.count("tr") >= 5
+    assert "does not hold the sweep file" in read.texts["reproduce"]
+
+
+def test_a_table_that_is_none_is_a_sentence(tmp_path):
+    (tmp_path / "results.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(swarm.SceneError, match=r"results\.csv is not the table of a sweep: expected the columns file"):
+        swarm.report(tmp_path)
