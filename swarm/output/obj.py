@@ -17,7 +17,8 @@ from ..scene import Scene
 from ..state import Floats
 from ..surfaces.instant import side_of
 from . import style
-from .shapes import Shape, bodies_of, shapes_of, since_start
+from .shape import Shape
+from .shapes import bodies_of, shapes_of, since_start
 
 # Bodies of one surface that are drawn: each has some 200 vertices.
 _MOST = 20_000
