@@ -13,7 +13,6 @@ from ..state import Floats
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
 from ..surfaces.surface import Surface
-from .curves import joined
 from .cut import Smooth, cut
 
 # The box in which a scene is drawn is so many of its parts wider than the walls, two on each side.
@@ -73,8 +72,9 @@ def foam(spheres: Spheres) -> tuple[Triangles, list[Floats]]:
 
     # Points on a ball stay on it: between two of them no others are made that matter.
     wall = Smooth(lambda points: np.zeros(len(points)), lambda points: spheres.gradient(points.T).T)
-    points, triangles, rims = cut(wall, vertices, triangles, level)
-    return (points, triangles, -wall.normals(points)), joined(points, rims)
+    points, triangles, _rims = cut(wall, vertices, triangles, level)
+    # Where balls of coarse triangles meet, edges would be zigzags.
+    return (points, triangles, -wall.normals(points)), []
 
 
 def balls(spheres: Spheres, count: int = _COARSE) -> tuple[Triangles, list[Floats]]:

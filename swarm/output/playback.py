@@ -140,6 +140,9 @@ class Playback:
 
     def _shape(self, wall: str, number: int | None) -> Shape:
         """A wall as it is in the file, which comes and goes, or as it is at the frame of a number."""
+        # Its curves are sent whenever it comes or goes, its mesh where there is one.
+        sent = self._rows.get((f"{wall}/levels", _STRIPS)) or self._rows.get((f"{wall}/wires", _STRIPS), {})
+        latest = -1 if number is None else max((k for k in sent if k <= number), default=-1)
 
         def column(part: str, name: str) -> Any:
             kept = self._static.get((f"{wall}/{part}", name)) if number is None else None
@@ -147,8 +150,6 @@ class Playback:
                 return kept.as_py() or []
             if number is None:
                 return []
-            rows = self._rows.get((f"{wall}/{part}", name), {})
-            latest = max((k for k in rows if k <= number), default=-1)
             return self._row(f"{wall}/{part}", name, latest) or []
 
         mesh = [np.reshape(column("mesh", name), (-1, 3)) for name in (_CORNERS, _TRIANGLES, _NORMALS)]

@@ -33,7 +33,7 @@ def content_of(method, scene=SPHERE, start=None, **keywords):
 
 def drawn(content):
     figure = plots.figure_of(content, None, 100)
-    return {axes.get_ylabel(): axes for axes in figure.axes if axes.name != "3d"}, figure
+    return {axes.get_ylabel(): axes for axes in figure.axes if axes.axison}, figure
 
 
 # --- Errors --------------------------------------------------------------------------------------------------

@@ -48,7 +48,9 @@ def test_a_recording_keeps_the_centre(tmp_path, name):
                 position = trajectory.frame(k).position
                 np.testing.assert_allclose(one.frame(k)[0], position.T, rtol=0.0, atol=1e-7)
                 assert len(np.unique(one.frame(k)[0][:, 1])) == 40
-                balls = np.vstack([curve for solid, curves in one.wires_at(k) if solid for curve in curves])
+                balls = np.vstack(
+                    [part for shape in one.shapes_at(k) if shape.solid for part in (shape.vertices, *shape.wires)]
+                )
                 at = trajectory.times[k]
                 gaps = scene.gaps(balls.T, float(at))[1]
                 assert np.abs(gaps).max() < 2e-3
