@@ -182,7 +182,7 @@ def _smooth(wall: Any) -> Smooth:
 def _frame(surface: Surface) -> tuple[Floats, Surface]:
     """A frame along the axes of a surface, the columns of a matrix, and the surface in that."""
     whole: Any = surface
-    own: dict[str, Any] = {"motion": None}
+    own: dict[str, Any] = {"motion": None, "mass": None, "inertia": None}
     frame = np.eye(3)
     if isinstance(whole, Outlined):
         frame = whole.frame
@@ -195,7 +195,7 @@ def _frame(surface: Surface) -> tuple[Floats, Surface]:
     if hasattr(whole, "center"):
         own |= {"rotation": None, "center": _in(frame, whole.center)}
     elif whole.rotation is not None:
-        return np.eye(3), replace(whole, motion=None)
+        return np.eye(3), replace(whole, motion=None, mass=None, inertia=None)
     return frame, replace(whole, **own)
 
 

@@ -253,7 +253,7 @@ def test_whole_bodies_are_recorded(run, tmp_path):
     held = playback.Playback(tmp_path / "run.rrd")
     assert playback.is_whole(held.path)
     assert (held.about["noun"], held.about["particles"], held.about["shown"]) == ("bodies", COPIES, 8)
-    assert len(held.wires) == 1
+    assert len(held.shapes_at(0)) == 1
     for number in (0, FRAMES - 1):
         shown = frames[number].contact_points()[:, :, ::4].astype(np.float32)
         positions, packed = held.frame(number)
