@@ -378,7 +378,7 @@ def test_a_film_draws_what_is_there(tmp_path, motion):
     run(scene, start, until=1.5, frames=3, trajectory=tmp_path / "run.h5")
     with swarm.load(tmp_path / "run.h5") as trajectory:
         film = _Film(trajectory, [0, 1, 2, 3], (320, 240), 10)
-        counts = [[len(curves) for _solid, curves in film._walls_at(k)] for k in range(4)]
+        counts = [[len(shape.wires) for shape in film._walls_at(k)] for k in range(4)]
         assert [one[1] > 0 for one in counts] == [False, True, False, False]
         assert all(one[0] > 0 for one in counts)
         assert trajectory.animate(tmp_path / "run.gif", size=(160, 120)).stat().st_size > 0

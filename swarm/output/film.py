@@ -22,7 +22,7 @@ from . import colours, drawing, flat, framed, paths, style
 from .drawn import Drawn
 from .scenery import Scenery, red_green_blue
 from .shape import Shape
-from .shapes import shapes_of, since_start
+from .shapes import cell_of, shapes_of, since_start
 
 _SUFFIXES = (".mp4", ".gif")
 # Pixels of a side of the film.
@@ -164,7 +164,7 @@ class _Film:
             self._walls = [one for one in self._walls if self._changes or one.get_zorder() > self._dots.get_zorder()]
             changing = [*self._walls, self._dots]
         else:
-            self._scenery = Scenery(self._axes, self._shapes, found)
+            self._scenery = Scenery(self._axes, self._shapes + cell_of(self._scene), found)
             self._scenery.walls()
             self._scenery.near_lines()
             changing = [*self._scenery.front, *(self._scenery.still if self._changes else [])]

@@ -21,7 +21,7 @@ from .amounts import amount, many
 from .drawn import Drawn
 from .replaced import named_when_whole
 from .shape import Shape
-from .shapes import shapes_of
+from .shapes import cell_of, shapes_of
 
 # Most particles drawn, or points of bodies.
 SHOWN = 5000
@@ -201,7 +201,15 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     position, packed, tints = drawn.coloured(end, scale, values)
     across = content.scene.across()
     axes = drawing.view(figure, across)
-    drawing.frame(axes, position.T, packed, shapes, *drawn.ties(position.T, packed, tints), across, drawn.radius)
+    drawing.frame(
+        axes,
+        position.T,
+        packed,
+        shapes + cell_of(content.scene),
+        *drawn.ties(position.T, packed, tints),
+        across,
+        drawn.radius,
+    )
     drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high, [packed])
     count = content.count // (1 if content.body is None else len(content.body))
     shown = many(count) if drawn.shown == count else f"{many(drawn.shown)} of {many(count)}"

@@ -1,5 +1,6 @@
 """The walls of a scene as shapes to draw, for any phi."""
 
+import itertools
 import math
 
 import numpy as np
@@ -58,6 +59,20 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
         solid = surface.is_solid() or i in grouped
         found.append(Shape(name_of(scene, i), solid, *mesh, edges, surface=i, many=True))
     return levelled(found)
+
+
+def cell_of(scene: Scene) -> list[Shape]:
+    """The edges of the cell of a period, from the origin on, where a scene has no walls around its particles."""
+    period = scene.period
+    if period is None or None in period or scene.plane or not all(one.is_solid() for one in scene.surfaces):
+        return []
+    lengths = np.array(period, np.float64)
+    edges = []
+    for axis in range(3):
+        for signs in itertools.product((0.0, 1.0), repeat=2):
+            ends = np.insert(np.tile(np.array(signs), (2, 1)), axis, (0.0, 1.0), axis=1) * lengths
+            edges.append(ends)
+    return [Shape("cell", False, *NOTHING, edges)]
 
 
 def bodies_of(surface: Surface) -> int:

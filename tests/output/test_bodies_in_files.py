@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from children import python
-from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from matplotlib.collections import LineCollection
 
 import swarm
 from swarm import observables, scene_file, summary
@@ -324,7 +324,8 @@ def test_pictures_show_bodies_and_the_error_of_links(run, tmp_path, monkeypatch)
     body, drawn = frames[0].body, {}
     monkeypatch.setattr(series, "VIEWS", {name: (name, log) for name, (_title, log) in series.VIEWS.items()})
     monkeypatch.setattr(graphs, "lines", lambda axes, view, logarithm, curves, limit=0: drawn.update({view: curves}))
-    cells = []
+    cells, ties, draw = [], [], drawing.frame
+    monkeypatch.setattr(drawing, "frame", lambda *given: ties.append(given[4:6]) or draw(*given))
     monkeypatch.setattr(drawing, "colour_bar", lambda picture, axes, *meaning: cells.append(axes))
     with swarm.load(path) as trajectory:
         recording.record(trajectory, tmp_path / "run.rrd", recording.Settings())
@@ -337,18 +338,18 @@ def test_pictures_show_bodies_and_the_error_of_links(run, tmp_path, monkeypatch)
         np.testing.assert_allclose(10.0**errors, [1e-18, 3e-16, 6e-16, 9e-16])
         assert list(found["impacts"]) == ["all bodies"]
         assert "work of anchors" not in found["energy"]
-    kind, count = (Poly3DCollection, 12 * COPIES) if body is CUBE else (Line3DCollection, 2 * COPIES)
-    for axes in (cells[0], cells[1][0]):
-        (collection,) = [one for one in axes.collections if type(one) is kind and len(vertices_of(one)) == count]
-        places = np.asarray(vertices_of(collection))[:, : 3 if body is CUBE else 2]
+    count = 12 * COPIES if body is CUBE else 2 * COPIES
+    for axes, (lines, faces) in zip((cells[0], cells[1][0]), ties, strict=True):
+        places = np.asarray((faces if body is CUBE else lines)[0])
+        assert len(places) == count
         expected = frames[-1].contact_points()
         assert places.min() == pytest.approx(expected.min(), abs=1e-6)
         assert places.max() == pytest.approx(expected.max(), abs=1e-6)
-
-
-def vertices_of(collection):
-    """The corners of each line or face."""
-    return collection._segments3d if isinstance(collection, Line3DCollection) else collection._faces
+        if body is CUBE:
+            assert any(np.asarray(image.get_array())[..., 3].any() for image in axes.get_images())
+        else:
+            (bonds,) = (one for one in axes.collections if one.get_zorder() == 2.0 and isinstance(one, LineCollection))
+            assert len(bonds.get_segments()) == count
 
 
 # --- Summaries --------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from swarm.output import drawing, flat, framed, style, triad
 from swarm.output.eye import eye_at, eye_for
 from swarm.output.raster import Raster
 from swarm.output.scenery import Scenery
-from swarm.output.shapes import shapes_of
+from swarm.output.shapes import cell_of, shapes_of
 from swarm.output.silhouette import silhouette
 
 NOWHERE = np.zeros((3, 1))
@@ -181,3 +181,12 @@ def test_a_scenery_without_walls():
         figure = style.picture(3.0, 3.0)
         axes = drawing.view(figure, None)
         assert isinstance(drawing.frame(axes, np.empty((0, 3)), np.empty(0, np.uint32), []), Scenery)
+
+
+def test_the_cell_of_a_period_has_twelve_edges():
+    (cell,) = cell_of(swarm.Scene([], period=(1.0, 2.0, 3.0)))
+    assert len(cell.edges) == 12
+    assert sum(np.sqrt((np.diff(edge, axis=0) ** 2).sum()) for edge in cell.edges) == pytest.approx(4.0 * 6.0)
+    assert np.vstack(cell.edges).min() == 0.0
+    assert np.vstack(cell.edges).max(axis=0).tolist() == [1.0, 2.0, 3.0]
+    assert not cell_of(VESSELS["sphere"])
