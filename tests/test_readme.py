@@ -154,7 +154,17 @@ def test_the_commands_run_in_their_order(tmp_path, monkeypatch):
     (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "sweep.toml").write_text(f'{SCENE}\n[sweep]\n"particles.seed" = [1, 2]\n')
     found = list(commands())
-    assert {words[0] for words in found} == {"run", "record", "view", "plot", "animate", "export", "info", "sweep"}
+    assert {words[0] for words in found} == {
+        "run",
+        "record",
+        "view",
+        "plot",
+        "animate",
+        "export",
+        "info",
+        "report",
+        "sweep",
+    }
     assert len(found) >= 12
     for words in found:
         outputs = [after for word, after in itertools.pairwise(words) if word in ("-o", "--record")]

@@ -247,7 +247,8 @@ KINDS = {
 def test_every_kind_of_run_has_one(kind, tmp_path):
     scene, start, options = KINDS[kind]()
     path = tmp_path / "run.h5"
-    swarm.simulate(scene, start, swarm.Impact(), until=0.5, every=0.25, trajectory=path, compile="never", **options)
+    method = swarm.Impact(dt=0.01) if kind == "bodies" else swarm.Impact()
+    swarm.simulate(scene, start, method, until=0.5, every=0.25, trajectory=path, compile="never", **options)
     read = Read(swarm.report(path).html)
     assert set(SECTIONS) <= set(read.ids)
     assert "swarm.simulate" in read.texts["reproduce"]

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from markupsafe import Markup
 from matplotlib import rc_context
+from matplotlib.text import Text
 
 from .. import plots, style
 from ..amounts import amount
@@ -37,14 +38,17 @@ def of_places(content: plots.Content) -> list[Drawn]:
     for name, k in (("start", 0), ("end", -1)):
         if name in content.frames:
             moment = amount(float(times[k]), "s")
-            picture = _png(lambda dark, name=name, k=k: _placed(content, name, k), f"particles at {moment}")
+            picture = _png(lambda dark, name=name, k=k: _placed(content, name, k, dark), f"particles at {moment}")
             found.append(Drawn(picture, f"At the {name}, {moment}"))
     return found
 
 
-def _placed(content: plots.Content, name: str, k: int) -> Any:
+def _placed(content: plots.Content, name: str, k: int, dark: bool) -> Any:
     """A figure of the particles of a frame."""
-    return plots.picture_of_places(content, name, _shapes(content, k), _PLACES, _SHOWN)
+    figure = plots.picture_of_places(content, name, _shapes(content, k), _PLACES, _SHOWN)
+    for text in figure.findobj(Text) if dark else ():
+        text.set_color(style.ink())  # its grey is that of a light background
+    return figure
 
 
 def _shapes(content: plots.Content, k: int) -> list[Shape]:
