@@ -19,7 +19,9 @@ from ..errors import FileError, SceneError
 from ..plane import shown_as
 from ..state import Floats
 from . import colours, drawing, flat, framed, paths, style
+from .amounts import many
 from .drawn import Drawn
+from .gone import gone_at, without
 from .scenery import Scenery, red_green_blue
 from .shape import Shape
 from .shapes import cell_of, shapes_of, since_start
@@ -135,13 +137,16 @@ class _Film:
 
     def __init__(self, trajectory: Any, numbers: list[int], pixels: tuple[int, int], most: int) -> None:
         self._trajectory, self._scene = trajectory, trajectory.scene
-        self._seen, start = trajectory.observed(), trajectory.frame(numbers[0])
+        self._seen, (start, last) = trajectory.observed(), (trajectory.frame(numbers[k]) for k in (0, -1))
         self._drawn = drawn = Drawn(len(start), trajectory.body, most, start.radius)
-        self._start, self._between = start.position, dict[tuple[int, float], list[Shape]]()
+        # Walls without an end are drawn around the particles of the first frame and of the last.
+        self._around = np.concatenate([framed.most_of(one.position) for one in (start, last)], axis=1)
+        self._between = dict[tuple[int, float], list[Shape]]()
+        self._noun = drawn.noun if drawn.radius is None else "balls" if self._scene.plane is None else "discs"
         self._changes = self._scene.moves() or self._scene.has_doors()
-        self._shapes = shapes_of(self._scene, start.position)
+        self._shapes = shapes_of(self._scene, self._around)
         # Of those that come during the run nobody may be there at the start.
-        shown = trajectory.frame(numbers[-1]) if np.isnan(start.position[0]).any() else start
+        shown = last if np.isnan(start.position[0]).any() else start
         self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, shown)
         # With half a pixel round-off takes none away.
         dpi = _DPI * min(1.0, min(pixels) / _ROOM)
@@ -199,15 +204,17 @@ class _Film:
         """The walls that are there at a time [s], made once from one instant to the next."""
         which = bisect.bisect_right(self._scene.instants, time), time if self._scene.moves() else 0.0
         if which not in self._between:
-            self._between[which] = shapes_of(self._scene, self._start, time)
+            self._between[which] = shapes_of(self._scene, self._around, time)
         return self._between[which]
 
     def show(self, k: int) -> None:
         """Draw frame k on the canvas."""
         drawn = self._drawn
-        position, packed, tints = drawn.coloured(self._trajectory.frame(k), self._scale, self._values)
-        of = f" of {drawn.count}" if drawn.shown < drawn.count else ""
-        self._title.set_text(f"t = {self._seen['time'][k]:.4g} s,  {drawn.shown}{of} {drawn.noun}")
+        frame = without(self._trajectory.frame(k), gone_at(self._trajectory, k))
+        position, packed, tints = drawn.coloured(frame, self._scale, self._values)
+        here = int((~np.isnan(position[0])).sum()) if drawn.noun == "particles" else drawn.shown
+        of = f" of {many(drawn.count)}" if here < drawn.count else ""
+        self._title.set_text(f"t = {self._seen['time'][k]:.4g} s,  {many(here)}{of} {self._noun}")
         self._canvas.restore_region(self._still)
         if self._scenery is None:
             artists, gone = self._in_plane(k, position, packed)

@@ -11,15 +11,18 @@ from matplotlib.ticker import MaxNLocator
 from ..plane import along, shown_as
 from ..state import Floats
 from .balls import Discs
+from .framed import near_most
 from .shape import Shape
 from .style import CAVITY, CAVITY_LINE, SOLID, SOLID_LINE
-from .triad import INK
+from .triad import INK, say_beyond
 
 _FEW_WIRES = 300
 # Around a vessel, as a part of its width.
 _ROOM = 0.02
 # Ends of curves so near to each other, as a part of the width of all, are one point.
 _SAME = 2e-3
+# An opening is at most this part of the length of the wall around it.
+_OPEN = 0.34
 
 
 def ends_in_plane(across: int, found: list[Floats]) -> tuple[Floats, Floats]:
@@ -43,7 +46,7 @@ def flat(
     """
     if found is None:
         some = [np.concatenate(shape.edges) for shape in shapes if shape.edges]
-        there = points[~np.isnan(points[:, 0])]
+        there = near_most(points[~np.isnan(points[:, 0])])
         found = some if any(shape.edges and not shape.solid for shape in shapes) else [*some, there]
     found = [one for one in found if len(one)] or [np.zeros((1, 3))]
     low, high = ends_in_plane(across, found)
@@ -55,7 +58,10 @@ def flat(
         dots = axes.scatter(*shown_as(across, points).T, c=colour, s=dot, linewidths=0.0, zorder=2)
     else:
         dots = Discs(axes, shown_as(across, points), radius, colour)
-    axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room), aspect="equal")
+    low, high = low - room, high + room
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    at = shown_as(across, points)
+    say_beyond(axes, int(((at < low) | (at > high)).any(axis=1).sum()))
     for axis, k in zip((axes.xaxis, axes.yaxis), along(across), strict=True):
         axis.set_major_locator(MaxNLocator(5, min_n_ticks=2))
         axis.set_tick_params(colors=INK, labelsize=8)
@@ -73,7 +79,7 @@ def draw_walls(axes: Any, across: int, shapes: list[Shape], wide: float) -> list
         solid: [shown_as(across, c) for s in shapes if s.solid == solid for c in s.edges] for solid in (False, True)
     }
     for solid, inside in ((False, CAVITY), (True, SOLID)):
-        closed = _loops(lines[solid], _SAME * wide)
+        closed = _loops(lines[solid], _SAME * wide, 0.0 if solid else _OPEN)
         if closed:
             path = Path.make_compound_path(*(Path(loop, closed=True) for loop in closed))
             alpha = 1.0 if solid else 0.28
@@ -89,21 +95,63 @@ def draw_walls(axes: Any, across: int, shapes: list[Shape], wide: float) -> list
     return drawn
 
 
-def _loops(lines: list[Floats], same: float) -> list[Floats]:
-    """The closed curves that lines form whose ends are so near to each other [m]."""
-    alone = [line for line in lines if len(line) > 2 and np.abs(line[0] - line[-1]).max() <= same]
-    others = [line for line in lines if len(line) > 1 and np.abs(line[0] - line[-1]).max() > same]
-    found = list(alone)
+def _loops(lines: list[Floats], same: float, opened: float) -> list[Floats]:
+    """The closed curves that lines form whose ends are so near to each other [m], or are those of an opening.
+
+    An opening is at most this part of the length of what it joins.
+    """
+    chains = [line for line in lines if len(line) > 1]
+    found = [line for line in chains if len(line) > 2 and _apart(line[0], line[-1]) <= same]
+    chains = _chained([line for line in chains if _apart(line[0], line[-1]) > same], same)
+    if opened:
+        chains = _across_openings(chains, opened)
+    return found + [one for one in chains if len(one) > 2 and _apart(one[0], one[-1]) <= same]
+
+
+def _apart(one: Floats, other: Floats) -> float:
+    return float(np.abs(one - other).max())
+
+
+def _chained(others: list[Floats], same: float) -> list[Floats]:
+    """Lines with those whose ends are theirs as one."""
+    found = []
     while others:
-        loop = others.pop()
-        while others and np.abs(loop[0] - loop[-1]).max() > same:
+        chain = others.pop()
+        turned = False
+        while others and _apart(chain[0], chain[-1]) > same:
             ends = np.array([(one[0], one[-1]) for one in others])
-            far = np.abs(ends - loop[-1]).max(axis=2)
+            far = np.abs(ends - chain[-1]).max(axis=2)
             k, end = np.unravel_index(far.argmin(), far.shape)
             if far[k, end] > same:
-                break
+                if turned:
+                    break
+                chain, turned = chain[::-1], True
+                continue
             one = others.pop(int(k))
-            loop = np.concatenate([loop, one[::-1] if end else one])
-        if len(loop) > 2 and np.abs(loop[0] - loop[-1]).max() <= same:
-            found.append(loop)
+            chain = np.concatenate([chain, one[::-1] if end else one])
+        found.append(chain)
     return found
+
+
+def _across_openings(chains: list[Floats], opened: float) -> list[Floats]:
+    """Chains joined from end to end, the nearest ends first, where an opening is short beside them."""
+    ready, chains = list[Floats](), list(chains)
+    while chains and len(chains) <= _FEW_WIRES:
+        ends = np.array([(one[0], one[-1]) for one in chains]).reshape(-1, 2)
+        far = np.sqrt(((ends[:, None] - ends) ** 2).sum(axis=2))
+        np.fill_diagonal(far, np.inf)
+        i, j = sorted(int(k) for k in np.unravel_index(far.argmin(), far.shape))
+        one, other = chains[i // 2], chains[j // 2]
+        within = _length(one) + (_length(other) if i // 2 != j // 2 else 0.0)
+        if far[i, j] > opened * within:
+            break
+        chains = [chain for k, chain in enumerate(chains) if k not in (i // 2, j // 2)]
+        if i // 2 == j // 2:
+            ready.append(np.concatenate([one, one[:1]]))
+        else:
+            chains.append(np.concatenate([one if i % 2 else one[::-1], other[::-1] if j % 2 else other]))
+    return ready + chains
+
+
+def _length(chain: Floats) -> float:
+    return float(np.sqrt((np.diff(chain, axis=0) ** 2).sum(axis=1)).sum())

@@ -9,6 +9,8 @@ from .shape import Shape
 
 # Who is farther than this many times the distance that 95 % of all are within does not widen an open picture.
 _FAR, _MOSTLY = 3.0, 0.95
+# Of more points than this some are looked at.
+_ENOUGH = 100_000
 # Directions in which ends of points are looked for.
 _DIRECTIONS = np.random.default_rng(1).normal(size=(64, 3))
 
@@ -19,7 +21,7 @@ def around(points: Floats, shapes: list[Shape], radius: Floats | None = None) ->
     there = points[~np.isnan(points[:, 0])]
     if is_open(shapes):
         wide = 0.0 if radius is None else radius[~np.isnan(points[:, 0])][:, None]
-        near = _near(there)
+        near = _are_near(there)
         found += [(there - wide)[near], (there + wide)[near]]
     found = [part for part in found if len(part)]
     return found or [np.zeros((1, 3))]
@@ -32,12 +34,22 @@ def is_open(shapes: list[Shape]) -> bool:
 
 def ends(found: list[Floats]) -> list[Floats]:
     """Some of these points, between which the others are, in every direction that is looked for."""
-    turned = np.concatenate(found)
+    turned = np.concatenate([one[:: 1 + len(one) // _ENOUGH] for one in found])
     chosen = turned @ _DIRECTIONS.T
     return [turned[np.unique(np.concatenate([chosen.argmin(axis=0), chosen.argmax(axis=0)]))]]
 
 
-def _near(points: Floats) -> NDArray[np.bool_]:
+def near_most(points: Floats) -> Floats:
+    """Those of points (N, 3) that are not far away from most."""
+    return np.asarray(points[_are_near(points)])
+
+
+def most_of(positions: Floats) -> Floats:
+    """Those of positions (3, N) that are there, and not far away from most."""
+    return near_most(positions[:, ~np.isnan(positions[0])].T).T
+
+
+def _are_near(points: Floats) -> NDArray[np.bool_]:
     """Who is not far away from most."""
     if not len(points):
         return np.empty(0, bool)

@@ -3,7 +3,7 @@
 import functools
 import textwrap
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,8 @@ from ..scene import Scene
 from . import colours, drawing, graphs, series, speeds, style, verdicts, words
 from .amounts import amount, many
 from .drawn import Drawn
+from .framed import most_of
+from .gone import Gone, gone_at, how_many_left, without
 from .replaced import named_when_whole
 from .shape import Shape
 from .shapes import cell_of, shapes_of
@@ -31,6 +33,8 @@ _WIDE, _CELL, _HIGH, _LINE, _LETTERS = 12.5, 2.5, 2.35, 0.17, 14.0
 _SERIES, _LEAST = 0.66, 6.4
 # The least part of the width that particles have, and the part of the height that a vessel has of its panel.
 _FEWEST, _TALL = 0.24, 0.8
+# What a vessel has above and below it [inches]: a title, a triad and a colour bar, or axes and a colour bar.
+_AROUND, _AROUND_PLANE = 1.8, 1.8
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,7 @@ class Content:
         count: number of particles, or of points of bodies, that were run.
         seen: the observables, one entry a frame.
         frames: the particles at the "start" and at the "end", as far as they are known.
+        gone: who of them has escaped or was absorbed by then.
     """
 
     name: str
@@ -51,6 +56,11 @@ class Content:
     count: int
     seen: dict[str, NDArray[Any]]
     frames: dict[str, Particles]
+    gone: dict[str, Gone] = field(default_factory=dict)
+
+    def inside(self, name: str) -> Particles:
+        """The particles of a frame, with those that have gone at NaN."""
+        return without(self.frames[name], self.gone.get(name))
 
 
 def draw_plot(trajectory: Any, target: Path) -> None:
@@ -70,6 +80,8 @@ def content_of(trajectory: Any) -> Content:
     trajectory.require_frames()
     last = len(trajectory) - 1
     numbers = {"start": 0, "end": last} if last else {"start": 0}
+    numbers = numbers if trajectory.has_particles() else {}
+    left = {name: gone_at(trajectory, k) for name, k in numbers.items()}
     return Content(
         trajectory.path.name,
         trajectory.scene,
@@ -77,7 +89,8 @@ def content_of(trajectory: Any) -> Content:
         trajectory.body,
         trajectory.count,
         trajectory.observed(),
-        {name: trajectory.frame(k) for name, k in numbers.items()} if trajectory.has_particles() else {},
+        {name: trajectory.frame(k) for name, k in numbers.items()},
+        {name: one for name, one in left.items() if one is not None},
     )
 
 
@@ -94,11 +107,12 @@ def figure_of(content: Content, figsize: Any, particles: int) -> style.Picture:
 
 def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.Picture:
     (wide, high), scene, times = size, content.scene, content.seen["time"]
-    end = content.frames.get("end", content.frames.get("start"))
+    last = "end" if "end" in content.frames else "start"
+    end = content.inside(last) if last in content.frames else None
     still = scene
     if scene.reacts():
         still = scene.placed(content.seen["wall_position"][-1], content.seen["wall_orientation"][-1])
-    shapes = shapes_of(still, np.zeros((3, 1)) if end is None else end.position, float(times[-1]))
+    shapes = shapes_of(still, np.zeros((3, 1)) if end is None else most_of(end.position), float(times[-1]))
     plots, spread = _shown(content, shapes), speeds.of_frames(content)
     count, width = len(plots) + bool(spread), wide * (1.0 if end is None else _SERIES)
     told = _sentences(content, width)
@@ -109,10 +123,10 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
     right: Any = picture
     if end is not None:
         # As wide as the vessel fills the height, as far as the series have room.
-        shown = drawing.aspect(shapes, end.position.T, scene.across()) * _TALL * high / wide
-        part = 1.0 - min(max(shown, _FEWEST), 1.0 - _SERIES)
+        aspect = drawing.aspect(shapes, end.position.T, scene.across())
+        part = 1.0 - min(max(aspect * _TALL * high / wide, _FEWEST), 1.0 - _SERIES)
         left, right = picture.subfigures(1, 2, width_ratios=[1.0 - part, part], squeeze=False).ravel()
-        _places(left, content, end, shapes, most)
+        _places(_middle(left, aspect, scene.across()), content, last, shapes, most)
     above, below = right.subfigures(2, 1, height_ratios=[max(high - text, 0.1), text], squeeze=False).ravel()
     cells = []
     for part, number in zip(above.subfigures(len(rows), 1, squeeze=False).ravel(), rows, strict=True):
@@ -191,10 +205,22 @@ def _write(figure: Any, told: list[tuple[str, bool | None]], high: float) -> Non
         line += text.count("\n") + 1
 
 
-def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], most: int) -> None:
-    """The particles, or the bodies, at the end."""
+def _middle(figure: Any, aspect: float, across: int | None) -> Any:
+    """The middle of a panel, as high as a vessel of this aspect with its title and its colour bar."""
+    box = figure.bbox
+    wide, high = box.width / figure.dpi, box.height / figure.dpi
+    needed = wide / aspect + (_AROUND_PLANE if across is not None else _AROUND)
+    if needed >= high:
+        return figure
+    beside = 0.5 * (high - needed)
+    return figure.subfigures(3, 1, height_ratios=[beside, needed, beside])[1]
+
+
+def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most: int) -> None:
+    """The particles, or the bodies, of a frame: those that are there."""
+    end = content.inside(name)
     drawn = Drawn(len(end), content.body, most, end.radius)
-    start = content.frames.get("start", end)
+    start = content.frames.get("start", content.frames[name])
     # Of those that come during the run nobody may be there at the start.
     start = end if np.isnan(start.position[0]).any() else start
     scale, values = colours.colouring("speed", content.scene, content.method, start)
@@ -212,12 +238,17 @@ def _places(figure: Any, content: Content, end: Particles, shapes: list[Shape], 
     )
     drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high, [packed])
     count = content.count // (1 if content.body is None else len(content.body))
-    shown = many(count) if drawn.shown == count else f"{many(drawn.shown)} of {many(count)}"
+    left = how_many_left(content.seen, content.gone.get(name))
+    here = drawn.shown if content.body else int((~np.isnan(position[0])).sum())
+    count -= sum(left.values())
+    shown = many(count) if here == count else f"{many(here)} of {many(count)}"
     noun = drawn.noun if end.radius is None else "balls" if content.scene.plane is None else "discs"
     noun = noun if count > 1 else {"bodies": "body"}.get(noun, noun.removesuffix("s"))
-    title = f"{shown} {noun}, t = {amount(float(content.seen['time'][-1]), 's')}"
+    title = f"{shown} {noun}{' inside' * bool(left)}, t = {amount(float(content.seen['time'][-1]), 's')}"
     if (alike := speeds.of_all(content)) is not None:
         title += f",\neach with {amount(alike, 'm/s')}" if alike else ", all at rest"
+    if left:
+        title += f"\n{' and '.join(f'{many(n)} {how}' for how, n in left.items())}, not drawn"
     figure.suptitle(title, fontsize=10)
 
 
@@ -244,6 +275,6 @@ def picture_of_places(
 ) -> style.Picture:
     """The particles, or the bodies, of a frame among their walls, without a title."""
     picture = style.picture(*size)
-    _places(picture, content, content.frames[name], shapes, most)
+    _places(picture, content, name, shapes, most)
     picture.suptitle("")
     return picture

@@ -19,7 +19,7 @@ from .raster import Raster, corners_of, lit
 from .shape import Shape
 from .silhouette import silhouette
 from .style import CAVITY, CAVITY_LINE, SOLID, SOLID_LINE
-from .triad import BAR, INK, STRIP, draw_triad
+from .triad import BAR, STRIP, draw_triad, say_beyond
 
 # Around a vessel, as a part of its width or height; pixels of a raster for each of the picture, and the most.
 _ROOM, _FINE, _MOST = 0.025, 1.5, 1600.0
@@ -200,12 +200,7 @@ class Scenery:
             drawn += self._bonds(*lines)
             drawn.append(self.dots(seen, colour, len(points)))
         outside = ((seen[:, :2] < self.low) | (seen[:, :2] > self.high)).any(axis=1).sum()
-        if outside:
-            words = f"{outside} {'is' if outside == 1 else 'are'} beyond this picture"
-            drawn.append(self.axes.text(
-                1.0, 1.0, words, transform=self.axes.transAxes, ha="right", va="top", fontsize=7.5, color=INK,
-                style="italic", zorder=6,
-            ))  # fmt: skip
+        drawn += say_beyond(self.axes, int(outside))
         return drawn
 
     def dots(self, seen: Floats, colour: Floats, count: int) -> Any:

@@ -1,6 +1,7 @@
 """A wall to draw: triangles, their area, edges, and curves at some heights."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,10 @@ class Shape:
 
     def area(self) -> float:
         """Of the triangles [m^2]; in a scene of two dimensions the length of the curves [m]."""
+        return self._area
+
+    @cached_property
+    def _area(self) -> float:
         if self.height is not None:
             return float(sum(np.sqrt((np.diff(curve, axis=0) ** 2).sum(axis=1)).sum() for curve in self.edges))
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))

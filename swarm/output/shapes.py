@@ -26,7 +26,7 @@ from .solids import is_of_solids
 def those_there(positions: Floats) -> Floats:
     """The positions (3, N) of particles that are there, not NaN; the origin if nobody is."""
     there = ~np.isnan(positions[0])
-    if there.all():
+    if len(there) and there.all():
         return positions
     return positions[:, there] if there.any() else np.zeros((3, 1))
 

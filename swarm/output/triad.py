@@ -1,4 +1,4 @@
-"""A small triad of axes at a corner of a picture, and a bar with a length."""
+"""A small triad of axes at a corner of a picture, a bar with a length, and how many are beyond it."""
 
 import math
 from typing import Any
@@ -55,3 +55,12 @@ def draw_triad(axes: Any, eye: Eye, most: float) -> None:
     above = bar + ScaledTranslation(0.0, 3.0 / 72.0, scale)
     axes.text(right - 0.5 * length, 0.0, length_in_words(length), fontsize=_LETTERS, color=INK, ha="center",
               va="bottom", transform=above, clip_on=False)  # fmt: skip
+
+
+def say_beyond(axes: Any, outside: int) -> list[Any]:
+    """Say in a corner how many particles are beyond a picture, if any are; returns the artists."""
+    if not outside:
+        return []
+    words = f"{outside} {'is' if outside == 1 else 'are'} beyond this picture"
+    return [axes.text(1.0, 1.0, words, transform=axes.transAxes, ha="right", va="top", fontsize=7.5, color=INK,
+                      style="italic", zorder=6)]  # fmt: skip

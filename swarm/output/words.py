@@ -41,7 +41,7 @@ def _brief(scene: Scene, brief: int) -> str:
     if solids:
         told += f" {'with' if around else 'among'} {_several(scene, solids, brief)}" + " in it" * bool(around)
     if flat and brief < 5:
-        told = f"in a billiard of two dimensions: {told.removeprefix('in ')}"
+        told = f"in a billiard of two dimensions: {told.strip().removeprefix('in ')}"
     if scene.period is not None:
         told = "in a cell that repeats" + f" {told}" * bool(told) * (brief < 5)
     leans = any(name in told for name in (" floor", " lid", " slope"))

@@ -241,6 +241,7 @@ class Result:
     def _content(self, what: str) -> "Content":
         """What a picture shows of the run."""
         from ..output import plots
+        from ..output.gone import gone_of
 
         if self.scene is None or self.method is None:
             raise SceneError(f"{what} needs a Result that knows its scene and its method, got one without them")
@@ -253,4 +254,5 @@ class Result:
             with load(self.trajectory) as written:
                 frames = {"start": written.frame(0)} if written.has_particles() else {}
         frames["end"] = self.particles
-        return plots.Content(name, self.scene, self.method, body, len(self.particles), self.observables, frames)
+        left = {"end": gone_of((self.escape_time, self.absorbed_time))} if body is None else {}
+        return plots.Content(name, self.scene, self.method, body, len(self.particles), self.observables, frames, left)

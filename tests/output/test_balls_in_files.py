@@ -192,7 +192,7 @@ def test_texts_say_how_large_and_how_full(run):
 def test_discs_and_balls_are_as_large_as_they_are(run):
     figure = run.plot(figsize=(12.0, 6.0))
     if run.scene.plane is not None:
-        (drawn,) = (one for one in figure.subfigs[0].axes[0].collections if isinstance(one, Discs))
+        (drawn,) = (one for axes in figure.axes for one in axes.collections if isinstance(one, Discs))
         assert drawn.get_widths().tolist() == (2.0 * RADIUS).tolist()
         return
     raster = Raster(np.array([-1.0, -1.0]), np.array([1.0, 1.0]), 400.0)

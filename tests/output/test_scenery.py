@@ -4,10 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PathCollection
+from matplotlib.text import Text
 
 import swarm
-from swarm.output import drawing, flat, framed, style, triad
+from swarm.output import drawing, flat, framed, plots, style, triad
 from swarm.output.eye import eye_at, eye_for
 from swarm.output.raster import Raster
 from swarm.output.scenery import Scenery
@@ -190,3 +193,78 @@ def test_the_cell_of_a_period_has_twelve_edges():
     assert np.vstack(cell.edges).min() == 0.0
     assert np.vstack(cell.edges).max(axis=0).tolist() == [1.0, 2.0, 3.0]
     assert not cell_of(VESSELS["sphere"])
+
+
+def a_channel(width, hole):
+    """A polygon with a hole in its right side, and its area."""
+    exits = [swarm.Box((0.1, 0.5 * hole, 1.0), center=(2.0, 0.5 * width, 0.0))]
+    corners = [[0.0, 0.0], [2.0, 0.0], [2.0, width], [0.0, width]]
+    return swarm.Scene([swarm.Polygon(corners, openings=exits)], plane="z"), 2.0 * width
+
+
+@pytest.mark.parametrize(("width", "hole"), [(1.0, 0.2), (0.5, 0.3)])
+def test_in_a_plane_it_is_filled_across_an_opening(width, hole):
+    scene, inside = a_channel(width, hole)
+    axes = drawing.view(style.picture(4.0, 3.0), 2)
+    flat.flat(axes, 2, np.array([[0.3, 0.1, 0.0]]), "red", shapes_of(scene, NOWHERE))
+    (patch,) = axes.patches
+    assert sum(area(loop) for loop in patch.get_path().to_polygons()) == pytest.approx(inside, rel=0.01)
+
+
+def test_what_is_open_far_and_wide_is_not_filled():
+    corner = [np.array([[1.0, 0.0], [0.0, 0.0]]), np.array([[0.0, 0.0], [0.0, 1.0]])]
+    assert flat._loops(corner, 1e-3, 0.34) == []
+    (loop,) = flat._loops([*corner, np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.2]])], 1e-3, 0.34)
+    assert area(loop) == pytest.approx(1.0)
+    two_walls = [np.array([[0.0, 0.0], [3.0, 0.0]]), np.array([[0.0, 1.0], [3.0, 1.0]])]
+    (loop,) = flat._loops(two_walls, 1e-3, 0.34)
+    assert area(loop) == pytest.approx(3.0)
+
+
+def test_in_an_open_plane_who_is_far_away_is_counted():
+    points = np.random.default_rng(1).normal(size=(200, 3))
+    points[:3] *= 1e4
+    axes = drawing.view(style.picture(4.0, 3.0), 2)
+    flat.flat(axes, 2, points, "red", shapes_of(swarm.Scene([swarm.Sphere(0.5, side="outside")], plane="z"), NOWHERE))
+    assert np.ptp(axes.get_xlim()) < 20.0
+    assert "3 are beyond this picture" in [text.get_text() for text in axes.texts]
+
+
+def a_leak(folder):
+    """A run of which particle 0 escapes at once, and 1 stays."""
+    scene, _inside = a_channel(1.0, 0.2)
+    start = swarm.Particles([[1.0, 1.0], [0.5, 0.2], [0.0, 0.0]], [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    swarm.simulate(scene, start, swarm.Impact(), until=2.0, every=1.0, trajectory=folder / "leak.h5")
+    return swarm.load(folder / "leak.h5")
+
+
+def test_who_has_escaped_is_not_drawn_and_is_counted(tmp_path):
+    with a_leak(tmp_path) as trajectory:
+        content = plots.content_of(trajectory)
+        assert np.isnan(content.inside("end").position[0]).tolist() == [True, False]
+        assert not np.isnan(content.frames["end"].position).any()
+        figure = trajectory.plot()
+        told = [one.get_text() for one in figure.findobj(Text) if "inside, t" in one.get_text()]
+        assert told == ["1 particle inside, t = 2 s,\neach with 1 m/s\n1 escaped, not drawn"]
+        (dots,) = [one for axes in figure.findobj(Axes) for one in axes.collections if isinstance(one, PathCollection)]
+        assert (~np.ma.getmaskarray(dots.get_offsets())).all(axis=1).sum() == 1
+
+
+@pytest.mark.parametrize("name", ["tray", "tube that lies", "board"])
+def test_title_vessel_and_bar_are_together_in_the_middle_of_a_panel(name, tmp_path):
+    scene = VESSELS[name]
+    start = swarm.fill(scene, 50, speed=1e-3, seed=1)
+    start.velocity[:, 0] *= 2.0
+    swarm.simulate(scene, start, swarm.Impact(), until=1e-4, trajectory=tmp_path / "run.h5")
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        figure = trajectory.plot(figsize=(12.0, 9.0))
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    (title,) = [one for one in figure.findobj(Text) if "50 particles, t" in one.get_text()]
+    (bar,) = [one for one in figure.findobj(Text) if one.get_text().startswith("speed [") and one.get_fontsize() == 8.5]
+    top, bottom = (one.get_window_extent() for one in (title, bar))
+    assert 0.5 * (top.y1 + bottom.y0) == pytest.approx(0.5 * figure.bbox.height, abs=0.08 * figure.bbox.height)
+    (walls,) = [axes for axes in figure.axes if axes.images]
+    box = walls.get_window_extent()
+    assert 0.0 < top.y0 - box.y1 < 0.1 * figure.bbox.height
+    assert 0.0 < box.y0 - bottom.y1 < 0.1 * figure.bbox.height
