@@ -143,6 +143,8 @@ class _Film:
         self._around = np.concatenate([framed.most_of(one.position) for one in (start, last)], axis=1)
         self._between = dict[tuple[int, float], list[Shape]]()
         self._noun = drawn.noun if drawn.radius is None else "balls" if self._scene.plane is None else "discs"
+        if drawn.count == 1:
+            self._noun = "body" if drawn.noun == "bodies" else self._noun.removesuffix("s")
         self._changes = self._scene.moves() or self._scene.has_doors()
         self._shapes = shapes_of(self._scene, self._around)
         # Of those that come during the run nobody may be there at the start.

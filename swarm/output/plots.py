@@ -243,7 +243,7 @@ def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most:
     count -= sum(left.values())
     shown = many(count) if here == count else f"{many(here)} of {many(count)}"
     noun = drawn.noun if end.radius is None else "balls" if content.scene.plane is None else "discs"
-    noun = noun if count > 1 else {"bodies": "body"}.get(noun, noun.removesuffix("s"))
+    noun = noun if count != 1 else {"bodies": "body"}.get(noun, noun.removesuffix("s"))
     title = f"{shown} {noun}{' inside' * bool(left)}, t = {amount(float(content.seen['time'][-1]), 's')}"
     if (alike := speeds.of_all(content)) is not None:
         title += f",\neach with {amount(alike, 'm/s')}" if alike else ", all at rest"

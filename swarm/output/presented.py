@@ -106,7 +106,7 @@ class Presented(Stored):
     ) -> Path:
         """Write a film of the particles or bodies among their walls, coloured by speed.
 
-        200 frames of 10 000 particles take 17 s of one core. Walls are drawn as they bound the volume at the start, and
+        200 frames of 10 000 particles take 15 s of one core. Walls are drawn as they bound the volume at the start, and
         moved where they move. The path that it returns shows nothing in a notebook: `film` does.
 
         Args:

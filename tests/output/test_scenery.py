@@ -10,7 +10,7 @@ from matplotlib.collections import PathCollection
 from matplotlib.text import Text
 
 import swarm
-from swarm.output import drawing, flat, framed, plots, style, triad
+from swarm.output import drawing, film, flat, framed, plots, style, triad
 from swarm.output.eye import eye_at, eye_for
 from swarm.output.raster import Raster
 from swarm.output.scenery import Scenery
@@ -268,3 +268,58 @@ def test_title_vessel_and_bar_are_together_in_the_middle_of_a_panel(name, tmp_pa
     box = walls.get_window_extent()
     assert 0.0 < top.y0 - box.y1 < 0.1 * figure.bbox.height
     assert 0.0 < box.y0 - bottom.y1 < 0.1 * figure.bbox.height
+
+
+def shown_film(trajectory):
+    """A film of all frames, of which the last is shown."""
+    numbers = list(range(len(trajectory)))
+    with style.applied():
+        picture = film._Film(trajectory, numbers, (320, 240), 100)
+    picture.show(numbers[-1])
+    return picture
+
+
+def test_a_film_tells_how_many_are_inside(tmp_path):
+    with a_leak(tmp_path) as trajectory:
+        picture = shown_film(trajectory)
+    assert picture._title.get_text() == "t = 2 s,  1 of 2 particles"
+    assert np.isnan(picture._dots.get_offsets()).any(axis=1).sum() == 1
+
+
+def test_a_film_between_planes_shows_also_the_last_frame(tmp_path):
+    scene = swarm.Scene([swarm.Plane((0.0, 0.0, 1.0), 0.5), swarm.Plane((0.0, 0.0, -1.0), 0.5)])
+    points = np.random.default_rng(1).uniform(-0.1, 0.1, (3, 50))
+    start = swarm.Particles(points, 50.0 * points)
+    swarm.simulate(scene, start, swarm.Impact(), until=1.0, every=0.5, trajectory=tmp_path / "run.h5")
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        scenery = shown_film(trajectory)._scenery
+        seen = scenery.eye.seen(trajectory.frame(-1).position.T)[:, :2]
+    assert (seen >= scenery.low).all()
+    assert (seen <= scenery.high).all()
+
+
+def test_ends_of_very_many_points_are_looked_for_among_some():
+    points = np.random.default_rng(1).uniform(-1.0, 1.0, (3 * framed._ENOUGH, 3))
+    found = np.vstack(framed.ends([points]))
+    assert len(found) <= 128
+    assert np.ptp(found @ np.array([0.0, 0.0, 1.0])) > 1.9
+
+
+def test_balls_of_a_film_are_called_so(tmp_path):
+    scene = swarm.Scene([swarm.Sphere(0.5)], pairs=swarm.Pairs())
+    start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], radius=0.1)
+    swarm.simulate(scene, start, swarm.Impact(), until=0.1, trajectory=tmp_path / "run.h5")
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        assert shown_film(trajectory)._title.get_text() == "t = 0.1 s,  1 ball"
+
+
+@pytest.mark.parametrize("plane", ["z", None])
+def test_where_all_have_gone_there_are_only_walls(plane, tmp_path):
+    exits = [swarm.Box((0.1, 0.2, 1.0), center=(1.0, 0.0, 0.0))]
+    scene = swarm.Scene([swarm.Box((1.0, 0.5, 0.5), openings=exits)], plane=plane)
+    start = swarm.Particles([[0.0, 0.1], [0.0, 0.1], [0.0, 0.0]], [[1.0, 2.0], [0.0, 0.0], [0.0, 0.0]])
+    swarm.simulate(scene, start, swarm.Impact(), until=3.0, every=1.5, trajectory=tmp_path / "run.h5")
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        told = [one.get_text() for one in trajectory.plot().findobj(Text)]
+        assert shown_film(trajectory)._title.get_text() == "t = 3 s,  0 of 2 particles"
+    assert any(one.endswith("\n2 escaped, not drawn") and one.startswith("0 particles inside") for one in told)
