@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from ..output.content import Content
     from ..output.page.html import Page
-    from ..output.plots import Content
     from ..output.sequence import Frames
     from ..output.shown_film import Film
 
@@ -240,7 +240,7 @@ class Result:
 
     def _content(self, what: str) -> "Content":
         """What a picture shows of the run."""
-        from ..output import plots
+        from ..output.content import Content
 
         if self.scene is None or self.method is None:
             raise SceneError(f"{what} needs a Result that knows its scene and its method, got one without them")
@@ -253,4 +253,4 @@ class Result:
             with load(self.trajectory) as written:
                 frames = {"start": written.frame(0)} if written.has_particles() else {}
         frames["end"] = self.particles
-        return plots.Content(name, self.scene, self.method, body, len(self.particles), self.observables, frames)
+        return Content(name, self.scene, self.method, body, len(self.particles), self.observables, frames)
