@@ -48,6 +48,15 @@ _MOST = 6
 _DECADES = 1e3
 # The least distance between labels of curves, in heights of the axes.
 _APART = 0.085
+# The width of a plot [inches], at least.
+_CELL = 2.5
+
+
+def rows_of(count: int, width: float) -> list[int]:
+    """How many plots are in each row, as even as may be, the longer rows last: they fill the width."""
+    columns = max(1, min(round(width / _CELL), -(-count // 2)))
+    rows = max(1, -(-count // columns))
+    return [count // rows + (k >= rows - count % rows) for k in range(rows)]
 
 
 def lines(axes: Any, view: str, logarithm: bool, drawn: Curves, limit: float | None = ROUND_OFF) -> None:

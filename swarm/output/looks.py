@@ -2,14 +2,12 @@
 
 from typing import Any
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from ..plane import across_of, along
 from ..state import Floats
 from . import series, style
-from .colours import BACKGROUND, Scale, curve_colour, rgb
+from .colours import BACKGROUND, curve_colour, rgb
 from .drawn import Drawn
 from .playback import LINES, MESH, PARTICLES
 from .shape import Shape
@@ -17,8 +15,9 @@ from .shape import Shape
 # The colours of matplotlib's pictures.
 _CAVITY, _SOLID = (*rgb(style.CAVITY), 60), (*rgb(style.SOLID), 255)
 _CAVITY_WIRE, _SOLID_WIRE = (*rgb(style.CAVITY_LINE), 255), (*rgb(style.SOLID_LINE), 255)
-# The distance of the eye above a plane, in widths of the scene.
-_EYE = 1.3
+# Plots that are seen at once, and which these are: those of other groups come after them.
+_SEEN = 4
+_FIRST = ("energy", "number", "impacts", "pressure", "force", "crossings", "heat", "energy_error", "penetration")
 # Between the faces of bodies, which have no shading.
 _EDGE = (10, 10, 12, 255)
 SOLID_LOOKS = _SOLID, _SOLID_WIRE
@@ -71,55 +70,23 @@ def log_series(stream: Any, lines: list[series.Line]) -> None:
             stream.log(line.path, rr.SeriesLines(colors=[colour], names=[line.name], widths=[1.5]), static=True)
 
 
-def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floats, plane: str | None = None) -> None:
-    """Log the meaning of the colours, what is shown of how many, the origin, and the plane of two dimensions."""
-    of = f" of {drawn.count}" if drawn.shown < drawn.count else ""
-    every = f", every {stride}th frame" if stride > 1 else ""
-    text = (
-        f"**{drawn.shown}{of} {drawn.noun}{every}**. Colour: {scale.quantity}, from {scale.low:g} (dark blue) over "
-        f"{0.5 * (scale.low + scale.high):g} (magenta) to {scale.high:g} (orange). On the "
-        f"plots {series.NOTHING:g} is the logarithm of 0."
-    )
-    if center.any():
-        text += f" Positions are less {tuple(center.tolist())} m."
-        stream.log("/about", rr.AnyValues(center=center), static=True)
-    if plane is not None:
-        stream.log("/about", rr.AnyValues(plane=plane), static=True)
-    stream.log("/about", rr.TextDocument(text, media_type="text/markdown"), static=True)
-    values = rr.AnyValues(**vars(scale), particles=drawn.count, shown=drawn.shown, stride=stride, noun=drawn.noun)
-    stream.log("/about", values, static=True)
-
-
-def eye_above(plane: str | None, shapes: list[Shape], center: Floats) -> Any:
-    """The eye that sees the plane of a scene of two dimensions from above, all of its walls; None where it has none."""
-    across = across_of(plane)
-    curves = [curve - center for shape in shapes for curve in shape.wires]
-    if across is None or not curves:
-        return None
-    points = np.concatenate(curves)
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle, up = 0.5 * (low + high), np.zeros(3)
-    place = middle.copy()
-    place[across] += _EYE * float((high - low).max())
-    up[along(across)[1]] = 1.0
-    return rrb.EyeControls3D(position=place, look_target=middle, eye_up=up)
-
-
 def blueprint(lines: list[series.Line], noun: str, eye: Any = None, plane: str | None = None) -> rrb.Blueprint:
     """The 3-D view, from an eye or from where it shows all, beside the plots, paused at the start."""
     scene = rrb.Spatial3DView(
         origin="/scene", name=noun, background=BACKGROUND, line_grid=rrb.LineGrid3D(visible=False), eye_controls=eye
     )
-    plots = []
-    for group, together in series.views_of(lines).items():
+    views, plots = series.views_of(lines), []
+    for group in sorted(views, key=lambda group: _FIRST.index(group) if group in _FIRST else len(_FIRST)):
         view, logarithm = series.title_of(group, plane)
-        legend = rrb.PlotLegend(visible=len(together) > 1)
+        legend = rrb.PlotLegend(rrb.Corner2D.RightTop, visible=len(views[group]) > 1)
         name = f"{view}, log10" if logarithm else view
-        paths = [line.path for line in together]
+        paths = [line.path for line in views[group]]
         plots.append(rrb.TimeSeriesView(origin="/", contents=paths, name=name, plot_legend=legend))
-    about = rrb.TextDocumentView(origin="/about", name="legend")
+    seen, rest = rrb.Vertical(*plots[:_SEEN], name="graphs"), rrb.Vertical(*plots[_SEEN:], name="more graphs")
+    graphs = rrb.Tabs(seen, rest, active_tab=0) if plots[_SEEN:] else seen
+    about = rrb.TextDocumentView(origin="/about", name="what is shown")
     return rrb.Blueprint(
-        rrb.Horizontal(rrb.Vertical(scene, about, row_shares=[8, 1]), rrb.Vertical(*plots), column_shares=[3, 2]),
+        rrb.Horizontal(rrb.Vertical(scene, about, row_shares=[5, 1]), graphs, column_shares=[1, 1]),
         rrb.TimePanel(timeline="frame", play_state="paused", state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),

@@ -21,7 +21,7 @@ from .sources import DAMAGE, DamagedError, reason, require_file
 _BEGIN = b"RRF"
 _ABOUT = ("quantity", "low", "high", "particles", "shown", "stride")
 # Recordings of older versions do not say them.
-_NOUN, _CENTER, _PLANE = "noun", "center", "plane"
+_NOUN, _CENTER, _PLANE, _TITLE, _VERDICTS = "noun", "center", "plane", "title", "verdicts"
 # The entities of particles, and of bodies; recordings are written with them too.
 PARTICLES, LINES, MESH = "/scene/particles", "/scene/bodies/lines", "/scene/bodies/mesh"
 _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
@@ -45,7 +45,8 @@ class Playback:
         series: path -> (times, values).
         names: path -> name in the legend.
         about: meaning of the colours: quantity, low, high; number of particles or bodies, how many are shown, stride of
-            frames; "noun": "particles" or "bodies".
+            frames; "noun": "particles" or "bodies"; "title": the run in words, if it ended.
+        verdicts: sentences on whether the run went well, "✓ walls: no particle ..."; None if it does not say so.
         center: (3,) the origin of the positions in the file [m], which those given here are not less.
         radius: of balls (n,) [m], None of points.
 
@@ -83,7 +84,12 @@ class Playback:
             batch = chunk.to_record_batch()
             columns = dict(zip(batch.schema.names, batch.columns, strict=True))
             if "frame" not in columns:
-                self._static |= {(entity, name): column[0] for name, column in columns.items()}
+                # Rerun may send what was logged at once as rows of one chunk.
+                self._static |= {
+                    (entity, name): [one for one in column if one.is_valid][-1]
+                    for name, column in columns.items()
+                    if column.null_count < len(column)
+                }
                 continue
             numbers = columns["frame"].to_pylist()
             if _SCALARS in columns:
@@ -99,8 +105,9 @@ class Playback:
         for name in _ABOUT:
             if name not in said:
                 raise ValueError(f"it does not say its {name}")
-        known = (*_ABOUT, _NOUN, _PLANE)
+        known = (*_ABOUT, _NOUN, _PLANE, _TITLE)
         self.about = {_NOUN: "particles", **{name: said[name].as_py()[0] for name in known if name in said}}
+        self.verdicts: list[str] | None = said[_VERDICTS].as_py() if _VERDICTS in said else None
         self.center = np.array(said[_CENTER].as_py()) if _CENTER in said else np.zeros(3)
         moments = scalars.pop("/time")
         # A crash may have left more points than rows of the time series.

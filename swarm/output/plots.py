@@ -1,9 +1,7 @@
 """A run in one picture: time series that show whether it went well, speeds, and the particles."""
 
 import functools
-import textwrap
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,56 +9,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import checks
-from ..bodies.body import Body
 from ..errors import SceneError
-from ..methods import Method
-from ..particles import Particles
-from ..scene import Scene
-from . import colours, drawing, graphs, series, speeds, style, verdicts, words
+from . import colours, drawing, graphs, sentences, series, speeds, style, verdicts, words
 from .amounts import amount, many
+from .content import Content
 from .drawn import Drawn
 from .framed import most_of
-from .gone import Gone, gone_at, how_many_left, without
+from .gone import gone_at, how_many_left
 from .replaced import named_when_whole
 from .shape import Shape
 from .shapes import cell_of, shapes_of
 
 # Most particles drawn, or points of bodies.
 SHOWN = 5000
-# [inches]: of a picture, of one time series, of a line of a sentence; and letters of one in an inch.
-_WIDE, _CELL, _HIGH, _LINE, _LETTERS = 12.5, 2.5, 2.35, 0.17, 14.0
+# [inches]: the width of a picture, and the height of one time series.
+_WIDE, _HIGH = 12.5, 2.35
 # Which part of a picture the time series have beside the particles; and its least height [inches].
 _SERIES, _LEAST = 0.66, 6.4
 # The least part of the width that particles have, and the part of the height that a vessel has of its panel.
 _FEWEST, _TALL = 0.24, 0.8
 # What a vessel has above and below it [inches]: a title, a triad and a colour bar, or axes and a colour bar.
 _AROUND, _AROUND_PLANE = 1.8, 1.8
-
-
-@dataclass(frozen=True)
-class Content:
-    """The part of a run that a picture shows.
-
-    Attributes:
-        name: of the file, or "".
-        count: number of particles, or of points of bodies, that were run.
-        seen: the observables, one entry a frame.
-        frames: the particles at the "start" and at the "end", as far as they are known.
-        gone: who of them has escaped or was absorbed by then.
-    """
-
-    name: str
-    scene: Scene
-    method: Method
-    body: Body | None
-    count: int
-    seen: dict[str, NDArray[Any]]
-    frames: dict[str, Particles]
-    gone: dict[str, Gone] = field(default_factory=dict)
-
-    def inside(self, name: str) -> Particles:
-        """The particles of a frame, with those that have gone at NaN."""
-        return without(self.frames[name], self.gone.get(name))
 
 
 def draw_plot(trajectory: Any, target: Path) -> None:
@@ -115,9 +84,9 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
     shapes = shapes_of(still, np.zeros((3, 1)) if end is None else most_of(end.position), float(times[-1]))
     plots, spread = _shown(content, shapes), speeds.of_frames(content)
     count, width = len(plots) + bool(spread), wide * (1.0 if end is None else _SERIES)
-    told = _sentences(content, width)
-    text = _LINE * (1.0 + sum(sentence.count("\n") + 1 for sentence, _holds in told))
-    rows = _rows(count, width)
+    told = sentences.in_lines(verdicts.marked(content), width)
+    text = sentences.height_of_lines(told)
+    rows = graphs.rows_of(count, width)
     high = high or max(_LEAST, _HIGH * len(rows) + text + 0.4)
     picture = style.picture(wide, high)
     right: Any = picture
@@ -134,7 +103,7 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
     _series(cells[: len(plots)], content, plots, rows[-1] - bool(spread))
     if spread:
         speeds.draw(cells[-1], content, spread)
-    _write(below, told, text)
+    sentences.write_below(below, told, text)
     picture.suptitle(words.title(content), fontsize=12)
     return picture
 
@@ -147,7 +116,7 @@ def _shown(content: Content, shapes: list[Shape]) -> dict[str, graphs.Curves]:
         values = line.values(times, seen)
         known = ~np.isnan(values)
         drawn[line.path] = line.name, times[known], values[known]
-    return {group: curves for group, curves in series.plots_of(drawn).items() if not _says_nothing(group, curves)}
+    return {group: curves for group, curves in series.plots_of(drawn).items() if not series.says_nothing(group, curves)}
 
 
 def _series(cells: list[Any], content: Content, plots: dict[str, graphs.Curves], last: int) -> None:
@@ -170,39 +139,6 @@ def _with_inside(content: Content) -> dict[str, NDArray[Any]]:
         born = np.sum(seen["born"], axis=1) if "born" in seen else 0
         seen["inside"] = verdicts.at_start(content) + born - gone
     return seen
-
-
-def _says_nothing(group: str, curves: dict[str, tuple[Any, Any]]) -> bool:
-    """Whether a sentence says it all: rates of one frame, and errors that are none."""
-    values = [values for _times, values in curves.values()]
-    if not any(len(column) for column in values):
-        return True
-    return series.VIEWS[group][1] and all((column <= series.NOTHING).all() for column in values)
-
-
-def _rows(count: int, width: float) -> list[int]:
-    """How many plots are in each row, as even as may be, the longer rows last: they fill the width."""
-    columns = max(1, min(round(width / _CELL), -(-count // 2)))
-    rows = max(1, -(-count // columns))
-    return [count // rows + (k >= rows - count % rows) for k in range(rows)]
-
-
-def _sentences(content: Content, width: float) -> list[tuple[str, bool | None]]:
-    """What should hold of the run, in lines of this width [inches], and whether it does."""
-    marks = {True: "✓", False: "✗", None: "·"}
-    found = [one for one in verdicts.judged(content) if one.about != "numbers" or not one.holds]
-    letters = max(30, round(width * _LETTERS))
-    told = [(f"{marks[one.holds]} {one.about}: {one.text}", one.holds) for one in found]
-    return [(textwrap.fill(text, letters, subsequent_indent="    "), holds) for text, holds in told]
-
-
-def _write(figure: Any, told: list[tuple[str, bool | None]], high: float) -> None:
-    """Sentences, one below the other, in a figure of this height [inches]; what does not hold is red."""
-    line = 0.3
-    for text, holds in told:
-        figure.text(0.02, 1.0 - line * _LINE / high, text, va="top", fontsize=8.5,
-                    color=style.RED if holds is False else style.ink())  # fmt: skip
-        line += text.count("\n") + 1
 
 
 def _middle(figure: Any, aspect: float, across: int | None) -> Any:

@@ -32,7 +32,8 @@ from ..errors import FileError, SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
-from . import colours, instanced, looks, paths, series, solids, viewer
+from . import about, colours, instanced, looks, paths, series, sight, solids, viewer
+from .content import Content
 from .drawn import Drawn
 from .origin import origin_of
 from .playback import LINES, MESH, PARTICLES
@@ -98,7 +99,7 @@ class RecordingWriter:
             if not os.access(path if path.exists() else path.parent, os.W_OK):
                 raise FileError(f"cannot write the recording {path}: no permission")
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
-        self._last, self._body = frames - 1, body
+        self._last, self._body, self._start, self.count = frames - 1, body, start, len(start)
         self._fed = start.births is not None or bool(np.isnan(start.position).any())
         self._drawn = drawn = Drawn(len(start), body, settings.particles, start.radius)
         some = {"collisions": start.radius is not None, "rotational_energy": start.spin is not None}
@@ -113,6 +114,8 @@ class RecordingWriter:
         self._rows: list[tuple[int, float, dict[str, Any]]] = []
         self._before: list[tuple[int, float, dict[str, Any]]] = []
         self._due = 0.0
+        # The observables of all frames that are recorded, for the words about the run.
+        self._seen: list[dict[str, Any]] = []
         # Where walls come and go they are sent from each instant on, of which this is the number.
         self._has_doors, self._instant = scene.has_doors() and not scene.moves(), -1
         self._failed = False
@@ -145,7 +148,7 @@ class RecordingWriter:
         try:
             sinks += [rr.FileSink(self._path)] if self._path else []
             plane = self._scene.plane
-            eye = looks.eye_above(plane, self._shapes, self._center)
+            eye = sight.eye_controls(plane, self._shapes, self._at_start.T, self._center)
             blueprint = looks.blueprint(self._series, self._drawn.noun, eye, plane)
             if sinks:
                 self.stream.set_sinks(*sinks, default_blueprint=blueprint)
@@ -158,7 +161,7 @@ class RecordingWriter:
         if not self._has_doors:
             self._log_solids(many, static=True)
         looks.log_series(self.stream, self._series)
-        looks.log_about(self.stream, self._drawn, self._scale, self._stride, self._center, self._scene.plane)
+        about.log_about(self.stream, self._drawn, self._scale, self._stride, self._center, self._scene.plane)
         return self._write
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
@@ -166,6 +169,8 @@ class RecordingWriter:
             return  # another flush never returns
         try:
             self._send_rows()
+            if error is None and self._seen:
+                self._log_outcome()
             self.stream.flush(timeout_sec=_LONGEST)
             if self._url or self._path:
                 self.stream.disconnect()
@@ -185,6 +190,7 @@ class RecordingWriter:
             colour.append(packed)
             lines.append(tints)
             self._rows.append((number, moment, seen))
+            self._seen.append({**seen, "time": moment})
         points = rows(shown, np.float32)
         try:
             self._send_points(numbers, times, points, np.array(colour), np.array(lines))
@@ -205,6 +211,12 @@ class RecordingWriter:
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self.stream))
             atexit.unregister(rr.rerun_shutdown)
             raise FileError(f"cannot write frame {numbers[0]} to the recording {self._path}: {error}") from error
+
+    def _log_outcome(self) -> None:
+        """Log the run in words, as plots have it above and below."""
+        seen = {name: np.array([row[name] for row in self._seen]) for name in self._seen[0]}
+        known = {"start": self._start}
+        about.log_outcome(self.stream, Content("", self._scene, self._method, self._body, self.count, seen, known))
 
     def _send_points(self, numbers: Any, times: Any, points: Any, colour: Any, lines: Any) -> None:
         """Send points (frames, n, 3) with their colours, and what ties them together."""
@@ -302,6 +314,7 @@ def record(trajectory: Any, path: Path | None, settings: Settings, overwrite: bo
     seen = trajectory.observed()
     scene, method, body = trajectory.scene, trajectory.method, trajectory.body
     writer = RecordingWriter(path, overwrite, scene, method, start, frames, settings, body)
+    writer.count = trajectory.count
     if np.isnan(start.position[0]).all():
         # All come during the run.
         writer.colour_by(trajectory.frame(frames - 1))

@@ -223,6 +223,14 @@ def plots_of(curves: Mapping[str, tuple[str, Floats, Floats]]) -> dict[str, dict
     return plots
 
 
+def says_nothing(group: str, curves: Mapping[str, tuple[Floats, Floats]]) -> bool:
+    """Whether a sentence says all that a plot shows: rates of one frame, and errors that are none."""
+    values = [values for _times, values in curves.values()]
+    if not any(len(column) for column in values):
+        return True
+    return VIEWS[group][1] and all(bool((column <= NOTHING).all()) for column in values)
+
+
 def _place(path: str) -> tuple[int, ...]:
     """The order of an entity: of its plot, of an energy, and of a surface by its number."""
     group, name = group_of(path), path.rpartition("/")[2]

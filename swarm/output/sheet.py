@@ -9,11 +9,22 @@ from matplotlib.image import imread
 
 from ..errors import RunError, SceneError
 from ..plane import across_of
-from . import drawing, graphs, series, style, viewer
+from . import drawing, graphs, sentences, series, style, viewer
+from .amounts import many
 from .playback import Playback
 from .replaced import named_when_whole
 
 _COLUMNS = 3
+# [inches]: the width of a frame, and the height of a row of them.
+_CELL, _HIGH = 5.4, 5.0
+# The part of the width by which plots are counted into rows: they are wider than those beside particles.
+_PLOT = 0.5
+# Of plots that would show nothing in any frame.
+_NONE = {
+    "energy_error": "no error of the energy in any frame",
+    "link_error": "no error of a link's length in any frame",
+    "penetration": "nobody was outside a wall in any frame",
+}
 
 
 def draw_sheet(playback: Playback, target: Path, times: list[float] | None, with_viewer: bool | None) -> str:
@@ -69,14 +80,33 @@ def _pictures(
 
 
 def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: str) -> Any:
-    plots = series.plots_of({path: (playback.names[path], *values) for path, values in playback.series.items()})
-    above, below = -(-len(frames) // _COLUMNS), -(-len(plots) // _COLUMNS)
-    picture = style.picture(5.4 * _COLUMNS, 5.0 * above + 2.7 * below)
-    top, bottom = picture.subfigures(2, 1, height_ratios=[5.0 * above, 2.7 * below], squeeze=False).ravel()
+    plane = playback.about.get("plane") or None
+    every = series.plots_of({path: (playback.names[path], *values) for path, values in playback.series.items()})
+    plots = {group: curves for group, curves in every.items() if not series.says_nothing(group, curves)}
+    wide = _CELL * _COLUMNS
+    told = sentences.in_lines(_told(playback, every), wide)
+    rows, text = graphs.rows_of(len(plots), _PLOT * wide), sentences.height_of_lines(told) if told else 0.0
+    heights = [_HIGH * -(-len(frames) // _COLUMNS), max(2.7 * len(rows), 0.1), max(text, 0.1)]
+    picture = style.picture(wide, sum(heights))
+    top, middle, bottom = picture.subfigures(3, 1, height_ratios=heights, squeeze=False).ravel()
+    _frames(top, playback, frames, found)
+    picture.suptitle(title_of_sheet(playback), fontsize=12)
+    picture.text(0.995, 0.005, f"drawn by {by.split(',')[0]}", ha="right", va="bottom", fontsize=7, color=drawing.LIGHT)
+    cells: list[Any] = []
+    for part, number in zip(middle.subfigures(len(rows), 1, squeeze=False).ravel(), rows, strict=True):
+        cells += list(part.subplots(1, number, squeeze=False).ravel()) if number else []
+    for axes, (group, curves) in zip(cells, plots.items(), strict=True):
+        graphs.lines(axes, *series.title_of(group, plane), curves)
+    sentences.write_below(bottom, told, heights[-1])
+    return picture
+
+
+def _frames(top: Any, playback: Playback, frames: list[int], found: list[Any] | None) -> None:
+    """The frames: pictures of them that were found, or drawn here."""
     about = playback.about
     across, cells, packed = across_of(about.get("plane") or None), [], []
     for place, k in enumerate(frames):
-        at = above, min(_COLUMNS, len(frames)), place + 1
+        at = -(-len(frames) // _COLUMNS), min(_COLUMNS, len(frames)), place + 1
         cells.append(top.add_subplot(*at) if found else drawing.view(top, across, *at))
         cells[-1].set_title(
             f"t = {playback.times[k]:.6g} s  (frame {playback.numbers[k]})", fontsize=10, color=drawing.LIGHT
@@ -90,12 +120,21 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
             drawing.frame(cells[-1], *points, playback.shapes_at(number), *ties, across, playback.radius)
             packed.append(points[1])
     drawing.colour_bar(top, cells, about["quantity"], about["low"], about["high"], packed or None)
-    count = "1 frame" if len(playback.times) == 1 else f"{len(playback.times)} frames"
-    title = f"{playback.path.name}: {about['shown']} of {about['particles']} {about['noun']}, {count}"
-    top.suptitle(title, fontsize=11)
-    top.text(0.995, 0.005, f"drawn by {by.split(',')[0]}", ha="right", va="bottom", fontsize=7, color=drawing.LIGHT)
-    for place, (group, curves) in enumerate(plots.items()):
-        graphs.lines(
-            bottom.add_subplot(below, _COLUMNS, place + 1), *series.title_of(group, about.get("plane") or None), curves
-        )
-    return picture
+
+
+def title_of_sheet(playback: Playback) -> str:
+    """The run in words, as far as the recording says it, and how many are drawn where that is not all."""
+    about, frames = playback.about, len(playback.times)
+    shown, every, noun = about["shown"], about["particles"], about["noun"]
+    noun = {"particles": "particle", "bodies": "body"}.get(noun, noun) if every == 1 else noun
+    if title := about.get("title"):
+        return title if shown == every else f"{title}\n{many(shown)} of {many(every)} {noun} are drawn"
+    of = "" if shown == every else f" of {many(every)}"
+    return f"{playback.path.name}: {many(shown)}{of} {noun}, {frames} frame{'s' * (frames > 1)}"
+
+
+def _told(playback: Playback, every: dict[str, graphs.Curves]) -> list[str]:
+    """Whether the run went well, or, where the recording does not say so, what would be empty plots."""
+    if playback.verdicts is not None:
+        return playback.verdicts
+    return [text for group, text in _NONE.items() if group in every and series.says_nothing(group, every[group])]

@@ -28,13 +28,20 @@ class Verdict(NamedTuple):
 
 
 def judged(content: Any) -> list[Verdict]:
-    """The verdicts on a run, of what plots show of it (`plots.Content`)."""
+    """The verdicts on a run, of what plots show of it (`Content`)."""
     found = _numbers(content)
     if any(verdict.holds is False for verdict in found):
         return found  # whatever else is said of numbers that are none
     for judge in (_energy, _balance, _penetration, _momentum, _multipliers, _links, _books):
         found[-1:-1] = judge(content)
     return found
+
+
+def marked(content: Any) -> list[str]:
+    """The verdicts as lines of a picture, "✓ energy: kept to round-off: ..."; of numbers only that they are none."""
+    marks = {True: "✓", False: "✗", None: "·"}
+    found = [one for one in judged(content) if one.about != "numbers" or not one.holds]
+    return [f"{marks[one.holds]} {one.about}: {one.text}" for one in found]
 
 
 def energy_limit(content: Any) -> float:

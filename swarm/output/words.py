@@ -119,7 +119,7 @@ def _laws(scene: Scene) -> str:
 def of_particles(content: Any) -> str:
     """What runs: so many particles, balls or bodies.
 
-    `content` is the `plots.Content` of a run.
+    `content` is the `Content` of a run.
     """
     count, body, radius = content.count, content.body, _radius(content)
     if body is not None:

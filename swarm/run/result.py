@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from ..output.content import Content
     from ..output.page.html import Page
-    from ..output.plots import Content
     from ..output.sequence import Frames
     from ..output.shown_film import Film
 
@@ -240,7 +240,7 @@ class Result:
 
     def _content(self, what: str) -> "Content":
         """What a picture shows of the run."""
-        from ..output import plots
+        from ..output.content import Content
         from ..output.gone import gone_of
 
         if self.scene is None or self.method is None:
@@ -255,4 +255,4 @@ class Result:
                 frames = {"start": written.frame(0)} if written.has_particles() else {}
         frames["end"] = self.particles
         left = {"end": gone_of((self.escape_time, self.absorbed_time))} if body is None else {}
-        return plots.Content(name, self.scene, self.method, body, len(self.particles), self.observables, frames, left)
+        return Content(name, self.scene, self.method, body, len(self.particles), self.observables, frames, left)

@@ -46,7 +46,7 @@ def everything(path):
     summary.of_trajectory(path)
     with swarm.load(path) as trajectory:
         seen = trajectory.observables
-        parts = [trajectory.times, *seen.values()]
+        parts = [trajectory.times, trajectory.wall_times, *seen.values()]
         told = [*trajectory.descriptions, type(trajectory.scene), type(trajectory.method), trajectory.count]
         if "none" not in trajectory.descriptions["storage"].split("\n")[0]:
             for k in range(len(trajectory)):

@@ -264,7 +264,9 @@ def test_a_vessel_of_several_surfaces_is_closed_and_outward(tmp_path):
         trajectory.export(tmp_path / "walls.obj")
     found = objects(tmp_path / "walls.obj")
     cap = np.pi * 0.6**2 * (1.5 - 0.6) / 3.0
-    volume = sum(mesh.volume for name, mesh in found.items() if "box" not in name)
+    # Of a part alone, which is not closed, trimesh knows no volume.
+    corners = np.concatenate([mesh.triangles for name, mesh in found.items() if "box" not in name])
+    volume = np.linalg.det(corners).sum() / 6.0
     assert volume == pytest.approx(cap, rel=0.03)
     # The box stands through the plane: what of it is no wall is not there.
     assert found["2_box"].area == pytest.approx(0.2**2 + 4.0 * 0.2 * 0.2, rel=0.03)

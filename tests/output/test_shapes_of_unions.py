@@ -187,10 +187,10 @@ def test_parts_in_files_and_pictures(run, tmp_path):
         assert set(cells["surface"][()]) == {0, 1}
         assert set(cells["part"][()]) == {-1, 0, 1, 2}
         assert ((cells["part"][()] == -1) == (cells["surface"][()] == 1)).all()
-    pressure = next(axes for axes in figure.axes if axes.get_title().startswith("pressure"))
-    assert [line.get_label() for line in pressure.get_lines()] == [*names, "1_sphere"]
-    heat = next(axes for axes in figure.axes if axes.get_title().startswith("heat"))
-    assert [line.get_label() for line in heat.get_lines()] == [names[0], names[2]]
+    pressure = next(axes for axes in figure.axes if axes.get_title() == "Pressure on the walls")
+    assert [line.get_label() for line in pressure.get_lines()] == ["box 1", "cylinder", "box 2", "ball"]
+    heat = next(axes for axes in figure.axes if axes.get_title() == "Heat from walls")
+    assert [line.get_label() for line in heat.get_lines()] == ["box 1", "box 2"]
 
 
 L = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)]

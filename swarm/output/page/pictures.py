@@ -13,6 +13,7 @@ from matplotlib.text import Text
 
 from .. import plots, style
 from ..amounts import amount
+from ..content import Content
 from ..shape import Shape
 from ..shapes import shapes_of
 
@@ -32,7 +33,7 @@ class Drawn(NamedTuple):
     wide: bool = False
 
 
-def of_places(content: plots.Content) -> list[Drawn]:
+def of_places(content: Content) -> list[Drawn]:
     """The particles, or bodies, among their walls, at the start and at the end, as far as they are kept."""
     times, found = content.seen["time"], []
     for name, k in (("start", 0), ("end", -1)):
@@ -43,7 +44,7 @@ def of_places(content: plots.Content) -> list[Drawn]:
     return found
 
 
-def _placed(content: plots.Content, name: str, k: int, dark: bool) -> Any:
+def _placed(content: Content, name: str, k: int, dark: bool) -> Any:
     """A figure of the particles of a frame."""
     figure = plots.picture_of_places(content, name, _shapes(content, k), _PLACES, _SHOWN)
     for text in figure.findobj(Text) if dark else ():
@@ -51,7 +52,7 @@ def _placed(content: plots.Content, name: str, k: int, dark: bool) -> Any:
     return figure
 
 
-def _shapes(content: plots.Content, k: int) -> list[Shape]:
+def _shapes(content: Content, k: int) -> list[Shape]:
     """The walls as they are at a frame."""
     still, seen = content.scene, content.seen
     if still.reacts():
@@ -60,7 +61,7 @@ def _shapes(content: plots.Content, k: int) -> list[Shape]:
     return shapes_of(still, np.zeros((3, 1)) if frame is None else frame.position, float(seen["time"][k]))
 
 
-def of_series(content: plots.Content) -> list[Drawn]:
+def of_series(content: Content) -> list[Drawn]:
     """The time series that say something, a graph each, and the speeds."""
     found = []
     for title, draw in plots.graphs_of(content, _shapes(content, -1)):

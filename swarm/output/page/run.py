@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from ...errors import SceneError
 from .. import facts, paths, plots, verdicts, words
 from ..amounts import amount, many
+from ..content import Content
 from . import pictures, reproduce
 from .html import Page, filled
 
@@ -48,7 +49,7 @@ def of_trajectory(trajectory: Any) -> Page:
     return Page(words.title(content), page, (trajectory.path,))
 
 
-def of_content(content: plots.Content, wall_time: float) -> Page:
+def of_content(content: Content, wall_time: float) -> Page:
     """The report of a run that has written no trajectory, which took so many seconds."""
     from ..provenance import makers
 
@@ -124,7 +125,7 @@ def is_written(path: Path) -> bool:
         return True
 
 
-def _speed(content: plots.Content, spent: float | None, threads: int | None) -> list[tuple[str, str]]:
+def _speed(content: Content, spent: float | None, threads: int | None) -> list[tuple[str, str]]:
     """What the run took, as far as is known."""
     if spent is None:
         return [("wall time", "not kept: an older version of swarm, or a cluster, has written the file")]

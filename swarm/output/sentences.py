@@ -1,0 +1,29 @@
+"""Sentences below the plots of a picture."""
+
+import textwrap
+from typing import Any
+
+from . import style
+
+# [inches] of a line; and letters of one in an inch.
+_LINE, _LETTERS = 0.17, 14.0
+
+
+def in_lines(texts: list[str], width: float) -> list[str]:
+    """Sentences in lines of this width [inches]."""
+    letters = max(30, round(width * _LETTERS))
+    return [textwrap.fill(text, letters, subsequent_indent="    ") for text in texts]
+
+
+def height_of_lines(told: list[str]) -> float:
+    """The height of these lines [inches]."""
+    return _LINE * (1.0 + sum(text.count("\n") + 1 for text in told))
+
+
+def write_below(figure: Any, told: list[str], high: float) -> None:
+    """Sentences, one below the other, in a figure of this height [inches]; what does not hold is red."""
+    line = 0.3
+    for text in told:
+        figure.text(0.02, 1.0 - line * _LINE / high, text, va="top", fontsize=8.5,
+                    color=style.RED if text.startswith("✗") else style.ink())  # fmt: skip
+        line += text.count("\n") + 1
