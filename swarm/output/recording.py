@@ -8,7 +8,8 @@
                               fields of more than 2000 solids have bodies: Points3D with radii, Boxes3D, ... for mesh
 /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
 /time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
-/about                        meaning of the colours, as text and as values, and the origin; static
+/about                        meaning of the colours, as text and as values, the origin, and of a run that has ended
+                              `title` and `verdicts`, the run in words and whether it went well; static
 
 Rerun's positions are float32. Those of a scene that is far from the origin are less its centre, `center` of /about.
 """
