@@ -38,8 +38,8 @@ class Presented(Stored):
        time  impacts  momentum_x
     0   0.0        0         1.0
     1   1.0        1        -1.0
-    >>> figure.get_suptitle()[:16], film.name
-    ('run.h5: 2 frames', 'run.gif')
+    >>> film.name
+    'run.gif'
     >>> dict(dataset.position.sizes), float(dataset.velocity.sel(axis="x", particle=0)[-1])
     ({'time': 2, 'particle': 1, 'axis': 3}, -1.0)
     >>> last
