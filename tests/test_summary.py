@@ -83,14 +83,14 @@ def test_pictures_show_sliding_where_there_is_some(path, monkeypatch):
     drawn = {}
     monkeypatch.setattr(series, "VIEWS", {name: (name, log) for name, (_title, log) in series.VIEWS.items()})
     monkeypatch.setattr(graphs, "lines", lambda axes, view, logarithm, curves, limit=0: drawn.update({view: curves}))
-    recorded = path.with_suffix(".rrd")
+    made = path.with_suffix(".rrd")
     for values in ({}, LASTING):
         observed(path, **values)
         with swarm.load(path) as trajectory:
-            recording.record(trajectory, recorded, recording.Settings(), overwrite=True)
+            recorded.record(trajectory, made, recording.Settings(), overwrite=True)
             plots.draw_plot(trajectory, path.with_suffix(".png"))
         by_plot, _ = dict(drawn), drawn.clear()
-        sheet.draw_sheet(playback.Playback(recorded), path.with_suffix(".png"), None, False)
+        sheet.draw_sheet(playback.Playback(made), path.with_suffix(".png"), None, False)
         for found in (by_plot, dict(drawn)):
             assert ("sliding" in found) == bool(values)
             assert ("heat" in found) == bool(values)

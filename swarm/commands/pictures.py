@@ -23,14 +23,14 @@ def record(
     from ..extras import needed_by
 
     with needed_by("a recording", "record"):
-        from ..output import recording
+        from ..output import recorded, recording
     from ..output import paths
     from ..output.trajectory import load
 
     target = paths.target_of("recording", output or file.with_suffix(".rrd"))
     paths.check_distinct({"recording": target}, {"trajectory": file})
     with load(file) as trajectory:
-        recording.record(trajectory, target, recording.Settings(particles, color, megabytes), overwrite)
+        recorded.record(trajectory, target, recording.Settings(particles, color, megabytes), overwrite)
     written(target)
 
 

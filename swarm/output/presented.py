@@ -228,8 +228,8 @@ class Presented(Stored):
                 from . import widget
 
                 widget.bring_widget()
-            from . import recording
-        recording.show(self, recording.Settings(particles, color, megabytes, live=not in_notebook))
+            from . import recorded, recording
+        recorded.show(self, recording.Settings(particles, color, megabytes, live=not in_notebook))
 
     def export(
         self: Any,

@@ -147,7 +147,8 @@ def test_pictures(path, tmp_path):
 def test_recordings(path, tmp_path):
     pytest.importorskip("rerun")
     from swarm.output.playback import Playback
-    from swarm.output.recording import Settings, record
+    from swarm.output.recorded import record
+    from swarm.output.recording import Settings
 
     n = given(path)
     with swarm.load(path) as trajectory:

@@ -12,7 +12,19 @@ from matplotlib.collections import LineCollection
 import swarm
 from swarm import observables, scene_file, summary
 from swarm.bodies.elastic import block
-from swarm.output import checkpoint, colours, drawing, graphs, playback, plots, recording, series, sheet, writer
+from swarm.output import (
+    checkpoint,
+    colours,
+    drawing,
+    graphs,
+    playback,
+    plots,
+    recorded,
+    recording,
+    series,
+    sheet,
+    writer,
+)
 from swarm.output.drawn import Drawn
 from swarm.output.storage import Storage
 from swarm.state import State
@@ -217,7 +229,7 @@ def test_a_run_writes_its_bodies(tmp_path):
         np.testing.assert_array_equal(trajectory.bodies(-1).position, result.bodies.position)
         np.testing.assert_array_equal(trajectory.bodies(-1).velocity, result.bodies.velocity)
         np.testing.assert_array_equal(trajectory.observables["link_error"], result.observables["link_error"])
-        recording.record(trajectory, tmp_path / "later.rrd", recording.Settings())
+        recorded.record(trajectory, tmp_path / "later.rrd", recording.Settings())
     one, other = (playback.Playback(tmp_path / name) for name in ("run.rrd", "later.rrd"))
     assert one.about == other.about
     for number in (0, 1, 2):
@@ -249,7 +261,7 @@ def test_whole_bodies_are_recorded(run, tmp_path):
     body = frames[0].body
     most = 9 * len(body.contacts)  # of 30 bodies every 4th, which are 8
     with swarm.load(path) as trajectory:
-        recording.record(trajectory, tmp_path / "run.rrd", recording.Settings(particles=most))
+        recorded.record(trajectory, tmp_path / "run.rrd", recording.Settings(particles=most))
     held = playback.Playback(tmp_path / "run.rrd")
     assert playback.is_whole(held.path)
     assert (held.about["noun"], held.about["particles"], held.about["shown"]) == ("bodies", COPIES, 8)
@@ -316,7 +328,7 @@ def test_the_size_is_bounded(run, tmp_path, megabytes):
 
 def test_energy_errors_of_points_are_no_colours(run, tmp_path):
     with swarm.load(run[0]) as trajectory, pytest.raises(swarm.SceneError, match="must be 'speed' for bodies, got 'en"):
-        recording.record(trajectory, tmp_path / "run.rrd", recording.Settings(color="energy-error"))
+        recorded.record(trajectory, tmp_path / "run.rrd", recording.Settings(color="energy-error"))
 
 
 def test_pictures_show_bodies_and_the_error_of_links(run, tmp_path, monkeypatch):
@@ -328,7 +340,7 @@ def test_pictures_show_bodies_and_the_error_of_links(run, tmp_path, monkeypatch)
     monkeypatch.setattr(drawing, "frame", lambda *given: ties.append(given[4:6]) or draw(*given))
     monkeypatch.setattr(drawing, "colour_bar", lambda picture, axes, *meaning: cells.append(axes))
     with swarm.load(path) as trajectory:
-        recording.record(trajectory, tmp_path / "run.rrd", recording.Settings())
+        recorded.record(trajectory, tmp_path / "run.rrd", recording.Settings())
         plots.draw_plot(trajectory, tmp_path / "plot.png")
     by_plot, _ = dict(drawn), drawn.clear()
     sheet.draw_sheet(playback.Playback(tmp_path / "run.rrd"), tmp_path / "sheet.png", [float(FRAMES - 1)], False)
@@ -364,7 +376,7 @@ def test_the_summary_says_what_they_are(run, tmp_path):
     assert "work" not in rows
     assert (told["bodies"], told["link_error"], told["work"]) == (COPIES, 9e-16, 0.0)
     with swarm.load(path) as trajectory:
-        recording.record(trajectory, tmp_path / "run.rrd", recording.Settings())
+        recorded.record(trajectory, tmp_path / "run.rrd", recording.Settings())
     assert summary.of_recording(tmp_path / "run.rrd", False)["bodies"] == f"{COPIES} of {COPIES}"
 
 

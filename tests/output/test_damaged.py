@@ -13,7 +13,7 @@ import pytest
 import swarm
 from swarm import scene_file, summary
 from swarm.commands import pictures
-from swarm.output import checkpoint, paths, playback, plots, recording, superblock
+from swarm.output import checkpoint, paths, playback, plots, recorded, recording, superblock
 
 SCENE = swarm.Scene([swarm.Sphere(0.5)])
 METHOD = swarm.Impact()
@@ -272,7 +272,7 @@ def test_one_frame_is_drawn_recorded_and_told(whole):
     assert summary.of_trajectory(whole)["frames"] == "1, 0 s to 0 s"
     with swarm.load(whole) as trajectory:
         plots.draw_plot(trajectory, whole.with_suffix(".png"))
-        recording.record(trajectory, whole.with_suffix(".rrd"), recording.Settings())
+        recorded.record(trajectory, whole.with_suffix(".rrd"), recording.Settings())
     assert whole.with_suffix(".png").stat().st_size > 20_000
     pictures.view(whole.with_suffix(".rrd"), whole.with_suffix(".pdf"), None, False)
 
@@ -286,7 +286,7 @@ def test_no_frame_is_a_sentence(whole):
             lambda: trajectory.frame(0),
             lambda: trajectory.frame(-1),
             lambda: plots.draw_plot(trajectory, whole.with_suffix(".png")),
-            lambda: recording.record(trajectory, whole.with_suffix(".rrd"), recording.Settings()),
+            lambda: recorded.record(trajectory, whole.with_suffix(".rrd"), recording.Settings()),
         ):
             with pytest.raises(swarm.SceneError, match=r"run\.h5 holds no frame: its run ended before the first one"):
                 read()
@@ -297,7 +297,7 @@ def test_of_a_damaged_trajectory_there_is_no_half_recording(whole):
     with h5py.File(whole, "r+") as file:
         file["particles/all/position/value"][3, 0, 0] = np.nan
     with swarm.load(whole) as trajectory, pytest.raises(swarm.SceneError, match=r"run\.h5 is damaged: frame 3"):
-        recording.record(trajectory, whole.with_suffix(".rrd"), recording.Settings())
+        recorded.record(trajectory, whole.with_suffix(".rrd"), recording.Settings())
     assert [path.name for path in whole.parent.iterdir()] == ["run.h5"]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output import playback, recording, sheet
+from swarm.output import playback, recorded, recording, sheet
 
 WALL = swarm.Sphere(0.5)
 FLOOR = swarm.Plane((0.0, 0.0, -1.0))
@@ -56,7 +56,7 @@ def test_a_picture_a_film_and_tables_of_nothing_in_particular(run, tmp_path):
 
 def test_a_recording_and_its_sheet(run, tmp_path):
     _result, trajectory = run
-    recording.record(trajectory, tmp_path / "run.rrd", recording.Settings())
+    recorded.record(trajectory, tmp_path / "run.rrd", recording.Settings())
     sheet.draw_sheet(playback.Playback(tmp_path / "run.rrd"), tmp_path / "sheet.png", None, False)
     assert (tmp_path / "sheet.png").stat().st_size
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output import origin, playback, recording, sheet
+from swarm.output import origin, playback, recorded, recording, sheet
 
 # East and north of a map [m], and a height.
 PLACE = (7e5, 5.2e6, 120.0)
@@ -41,7 +41,7 @@ def test_a_recording_keeps_the_centre(tmp_path, name):
     held = playback.Playback(tmp_path / "run.rrd")
     np.testing.assert_array_equal(held.center, PLACE)
     with swarm.load(tmp_path / "run.h5") as trajectory:
-        recording.record(trajectory, tmp_path / "later.rrd", recording.Settings())
+        recorded.record(trajectory, tmp_path / "later.rrd", recording.Settings())
         later = playback.Playback(tmp_path / "later.rrd")
         for k in range(FRAMES):
             for one in (held, later):

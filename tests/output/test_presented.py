@@ -14,7 +14,7 @@ from PIL import Image
 import swarm
 from swarm import columns, notebook
 from swarm.errors import FileError, SceneError
-from swarm.output import film, framed, labelled, playback, recording, widget
+from swarm.output import film, framed, labelled, playback, recorded, recording, widget
 from swarm.output.shapes import shapes_of
 
 RATE, FRAMES = 1.5, 5
@@ -327,6 +327,6 @@ def test_a_notebook_shows_the_recording(run, tmp_path, monkeypatch):
 
 def test_elsewhere_the_viewer_is_a_window(run, monkeypatch):
     settings = []
-    monkeypatch.setattr(recording, "show", lambda _trajectory, chosen: settings.append(chosen))
+    monkeypatch.setattr(recorded, "show", lambda _trajectory, chosen: settings.append(chosen))
     run[1].show(color="speed")
     assert settings == [recording.Settings(5000, "speed", 100.0, live=True)]

@@ -10,7 +10,7 @@ import rerun as rr
 from children import python
 
 import swarm
-from swarm.output import colours, graphs, playback, plots, recording, sheet, viewer
+from swarm.output import colours, graphs, playback, plots, recorded, recording, sheet, viewer
 
 SCENE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 METHOD = swarm.Impact()
@@ -128,7 +128,7 @@ def test_the_blueprint_is_in_it_and_pauses_at_the_start(run):
 def test_a_recording_of_the_trajectory_is_the_same(run, tmp_path):
     folder, _ = run
     with swarm.load(folder / "run.h5") as trajectory:
-        recording.record(trajectory, tmp_path / "later.rrd", recording.Settings(particles=100))
+        recorded.record(trajectory, tmp_path / "later.rrd", recording.Settings(particles=100))
     one, other = playback.Playback(folder / "run.rrd"), playback.Playback(tmp_path / "later.rrd")
     assert one.numbers == other.numbers
     assert one.about == other.about

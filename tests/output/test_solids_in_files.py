@@ -9,7 +9,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import swarm
-from swarm.output import playback, recording, solids
+from swarm.output import playback, recorded, recording, solids
 
 RANDOM = np.random.default_rng(3)
 N = 12
@@ -86,7 +86,7 @@ def test_vtk_reads_solids_as_points(tmp_path, kind):
 @pytest.mark.parametrize("kind", FIELDS)
 def test_a_recording_has_no_triangle_of_them_and_its_sheet_shows_them(tmp_path, kind):
     with swarm.load(run(tmp_path, kind)) as trajectory:
-        recording.record(trajectory, tmp_path / "run.rrd", recording.Settings())
+        recorded.record(trajectory, tmp_path / "run.rrd", recording.Settings())
     name = "boxes" if kind == "moving" else kind
     columns = {}
     with warnings.catch_warnings():

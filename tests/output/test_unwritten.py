@@ -7,7 +7,7 @@ import pytest
 from children import python
 
 import swarm
-from swarm.output import plots, recording
+from swarm.output import plots, recorded, recording
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def test_a_picture_or_an_export_that_cannot_be_written_is_a_sentence(run, tmp_pa
 def test_a_recording_where_nothing_may_be_written_is_a_sentence(run, tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     with pytest.raises(swarm.FileError, match=r"cannot write the recording .*run\.rrd: no permission"):
-        recording.record(run, tmp_path / "run.rrd", recording.Settings())
+        recorded.record(run, tmp_path / "run.rrd", recording.Settings())
     assert capfd.readouterr() == ("", "")
 
 

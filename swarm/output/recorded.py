@@ -1,0 +1,53 @@
+"""A trajectory as a recording, made after its run."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import SceneError
+from .recording import RecordingWriter, Settings
+
+_AT_ONCE = 10  # frames of the trajectory
+
+
+def show(trajectory: Any, settings: Settings) -> None:
+    """Show a trajectory in the viewer that is `live`, or else in the notebook that is running."""
+    stream = record(trajectory, None, settings)
+    if not settings.live:
+        from . import widget
+
+        widget.display_below(stream)
+
+
+def record(trajectory: Any, path: Path | None, settings: Settings, overwrite: bool = False) -> Any:
+    """Make the recording of a `Trajectory`; returns its stream.
+
+    Raises:
+        SceneError: the target exists, or the trajectory is damaged, or holds no frame.
+        FileError: the recording cannot be written.
+    """
+    frames, start, times = len(trajectory), trajectory.frame(0), trajectory.times
+    seen = trajectory.observed()
+    scene, method, body = trajectory.scene, trajectory.method, trajectory.body
+    writer = RecordingWriter(path, overwrite, scene, method, start, frames, settings, body)
+    writer.count = trajectory.count
+    if np.isnan(start.position[0]).all():
+        # All come during the run.
+        writer.colour_by(trajectory.frame(frames - 1))
+    try:
+        with writer as write:
+            for first in range(0, frames, _AT_ONCE):
+                numbers = range(first, min(first + _AT_ONCE, frames))
+                write(
+                    [
+                        (k, times[k], trajectory.frame(k), {name: values[k] for name, values in seen.items()})  # type: ignore[misc]
+                        for k in numbers
+                    ]
+                )
+    except SceneError:
+        # A part of the recording of a damaged trajectory would look like a complete one.
+        if path is not None:
+            path.unlink(missing_ok=True)
+        raise
+    return writer.stream
