@@ -6,7 +6,7 @@ import pytest
 
 import swarm
 from swarm import summary
-from swarm.output import graphs, playback, plots, recording, series, sheet
+from swarm.output import graphs, playback, plots, recorded, recording, series, sheet
 
 HOT = swarm.Scene([swarm.Sphere(0.5, temperature=300.0), swarm.Sphere(0.2, side="outside")])
 FRAMES = 3
