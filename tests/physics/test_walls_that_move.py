@@ -512,7 +512,7 @@ WRONG = {
             swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.1, side="outside", motion=swarm.Translation(UP))]),
             swarm.Particles([0.0, 0.0, 0.05], [0.0, 0.0, 0.0]), swarm.Impact(), until=1.0, compile="never",
         ),
-        r"phi = -0\.05 of surfaces\[1\] \(Sphere\), as it is at 0 s",
+        r"0\.05 m inside surfaces\[1\] \(Sphere\), as it is at 0 s",
     ),
 }  # fmt: skip
 
