@@ -1,6 +1,5 @@
 """Logs of impacts, read on demand. impacts.py describes the file and writes it."""
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ from ..columns import flattened
 from ..errors import SceneError
 from ..extras import needed_by
 from . import layout
-from .stored import Stored, finite, times_of, whole
+from .stored import Stored, finite, parsed, times_of, whole
 
 if TYPE_CHECKING:
     import pandas
@@ -100,7 +99,7 @@ class ImpactLog(Stored):
     def kept(self) -> int | list[int]:
         """The particles whose impacts are kept: k is every k-th one, or their numbers."""
         with self._reading("which particles it keeps"):
-            kept = tomllib.loads(self._text("kept"))["particles"]
+            kept = parsed(self._text("kept"))["particles"]
             if kept == "all":
                 return 1
             return int(kept) if isinstance(kept, int) else sorted({whole("particle", i) for i in kept})

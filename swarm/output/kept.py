@@ -1,7 +1,6 @@
 """What a trajectory keeps once, not of each frame: of its particles, and of the run."""
 
 import functools
-import tomllib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from . import layout, provenance
 from .presented import Presented
-from .stored import finite
+from .stored import finite, parsed
 
 if TYPE_CHECKING:
     from ..bodies.body import Body
@@ -89,7 +88,7 @@ class Kept(Presented):
         from ..bodies.table import body_of
 
         with self._reading("its body"):
-            body = body_of(tomllib.loads(self._text("body")))
+            body = body_of(parsed(self._text("body")))
             if len(body) * self.copies != self.count:
                 raise ValueError(f"{self.copies} of {len(body)} points are not {self.count}")
         return body

@@ -1,6 +1,7 @@
 """HDF5 files of runs, read on demand, also while they are written or after their writer was killed."""
 
 import contextlib
+import gc
 import operator
 import tomllib
 from collections.abc import Iterator
@@ -80,13 +81,13 @@ class Stored:
     def counters(self) -> tuple[Counter, ...]:
         """The counters of the run."""
         with self._reading("its counters"):
-            return run_tables.counters_of(self.counters_text)
+            return run_tables.counters_of(parsed(self.counters_text).get("counter", []))
 
     @property
     def scene(self) -> Scene:
         """The scene that was run."""
         with self._reading("its scene") as file:
-            table, arrays = tomllib.loads(self._text("scene")), file["parameters"].get(layout.ARRAYS, {})
+            table, arrays = parsed(self._text("scene")), file["parameters"].get(layout.ARRAYS, {})
             surfaces = [tables.with_arrays(surface, arrays) for surface in table["surface"]]
             every = [one for surface in surfaces for one in (surface, *surface.get("openings", ()))]
             own = any(surface["kind"] == "own" or plugins.is_named(surface["kind"]) for surface in every)
@@ -98,7 +99,7 @@ class Stored:
     def method(self) -> Method:
         """The method that was run."""
         with self._reading("its method"):
-            return tables.method_of(tomllib.loads(self._text("method")))
+            return tables.method_of(parsed(self._text("method")))
 
     def _has(self, name: str) -> bool:
         with self._reading(f"its {name}") as file:
@@ -107,6 +108,21 @@ class Stored:
     def _text(self, name: str) -> str:
         with self._reading(f"its {name.replace('_', ' ')}") as file:
             return layout.text(file[f"parameters/{name}"], self.path)
+
+
+def parsed(text: str) -> dict[str, Any]:
+    """The table of a TOML text of a file.
+
+    A text that is too deep takes the recursion to its limit. Objects of h5py that were collected there could not give
+    back its lock, and the next thread that wants it would wait for ever; so nothing is collected meanwhile.
+    """
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        return tomllib.loads(text)
+    finally:
+        if collects:
+            gc.enable()
 
 
 def open_stored(path: Path) -> h5py.File:

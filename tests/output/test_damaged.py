@@ -1,9 +1,11 @@
 """What is damaged, foreign, empty or not there is one sentence: no traceback, no absurd array and no endless wait."""
 
+import gc
 import json
 import random
 import shutil
 import signal
+import threading
 import zipfile
 
 import h5py
@@ -196,6 +198,40 @@ def test_values_that_no_run_writes_are_reported(whole, name):
         everything(whole)
     assert str(told.value).startswith(f"{whole} is damaged: ")
     assert message in str(told.value)
+
+
+class Cycle:
+    """An object of h5py that only the collector of cycles frees."""
+
+    def __init__(self, held):
+        self.me, self.held = self, held
+
+
+def test_a_text_that_is_too_deep_leaves_no_lock_behind(whole):
+    """Objects of h5py that are collected at the limit of the recursion cannot give back its lock to other threads."""
+    with h5py.File(whole, "r+") as file:
+        STRANGE["scene is too deep"][0](file)
+    before = gc.get_threshold()
+    gc.freeze()  # what there is now is not looked at
+    try:
+        with swarm.load(whole) as trajectory, h5py.File(whole, "r", locking=False) as other:
+            # After how many objects the collector runs: somewhere among these it is at the limit.
+            for allocated in range(20, 2000):
+                gc.collect()
+                gc.set_threshold(10**6)
+                for _ in range(4):
+                    Cycle((other["parameters"], other["parameters"].id))
+                gc.set_threshold(allocated)
+                with pytest.raises(swarm.SceneError, match="its scene"):
+                    _ = trajectory.scene
+    finally:
+        gc.set_threshold(*before)
+        gc.unfreeze()
+    found = []
+    thread = threading.Thread(target=lambda: found.append(h5py.File(whole, "r", locking=False).close()), daemon=True)
+    thread.start()
+    thread.join(60.0)
+    assert len(found) == 1
 
 
 @pytest.mark.parametrize(
