@@ -24,6 +24,8 @@ _PARTICLE = 500
 _SIGMAS = 6.0
 # A birth this part of the scene's extent outside of a wall that moves is none.
 _OUTSIDE = 1e-9
+# A birth at so many roundings before the stop is at it.
+_ROUND_OFF = 4.0
 # Of the numbers of a Poisson process that are drawn at a time.
 _BATCH = 4096
 
@@ -129,26 +131,37 @@ def _drawn(scene: Scene, source: Source, name: str, k: int, seed: int, until: fl
 
 
 def times_of(source: Source, random: Random, until: float) -> Floats:
-    """The times of the births of a source in a run, in order [s]."""
+    """The times of the births of a source in a run, in order [s]: all up to its end, and that included.
+
+    A longer run has the same ones first: the frame at a time has the births up to then, whenever the run ends.
+    """
     if source.times is not None:
         times = np.array(source.times)
-        return times[times <= until]
-    end = _end(source, until)
-    if source.rate is None:
-        stop = until if source.stop is None else source.stop
-        times = source.start + (stop - source.start) * np.sort(random.random(source.count or 0))
-        return np.asarray(times[times <= until])
-    if source.even:
-        number = math.floor(max(0.0, end - source.start) * source.rate) + 1
-        times = source.start + np.arange(number) / source.rate
+    elif source.rate is None:
+        assert source.stop is not None
+        times = source.start + (source.stop - source.start) * np.sort(random.random(source.count or 0))
+        times = np.minimum(times, max(source.start, float(np.nextafter(source.stop, -math.inf))))
+    elif source.even:
+        number = math.floor(max(0.0, _end(source, until) - source.start) * source.rate) + 2
+        times = source.start + np.arange(min(number, _evenly_before_stop(source))) / source.rate
     else:
         parts, last = [np.empty(0)], source.start
-        while last < end:
+        while last <= _end(source, until):
             parts.append(last + np.cumsum(random.standard_exponential(_BATCH)) / source.rate)
             last = float(parts[-1][-1])
         times = np.concatenate(parts)
-    times = times[times < end]
+        times = times if source.stop is None else times[times < source.stop]
+    times = times[times <= until]
     return np.asarray(times if source.count is None else times[: source.count])
+
+
+def _evenly_before_stop(source: Source) -> float:
+    """The number of evenly spaced births before the stop: one that is at it to round-off is not."""
+    if source.stop is None:
+        return math.inf
+    rate = source.rate or 0.0
+    slack = _ROUND_OFF * float(np.spacing(source.stop)) * rate
+    return max(0.0, math.ceil((source.stop - source.start) * rate - slack))
 
 
 def _require_free(scene: Scene, name: str, times: Floats, position: Floats) -> None:

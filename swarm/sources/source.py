@@ -20,6 +20,10 @@ class Source:
     All births are drawn before the run, from its seed, each source by itself: the same bits for any threads, blocks,
     resumes and shards. The particles that come are numbered behind those of the start, in the order in which they come.
 
+    Births are in the half-open interval from `start`, included, to `stop`, excluded, as walls are `present`: of two
+    sources of which one begins when the other stops, no birth is of both. The end of a run is no end of a source: a
+    frame has all births up to its time, and at it, so it is the same whenever the run ends.
+
     Args:
         where: a surface of the scene, or its number: births on it, uniform in its area, into the vessel. Or one of the
             openings of a surface: births on that surface where it is open. Or any other surface: births on it as far as
@@ -27,11 +31,13 @@ class Source:
         volume: True: births uniform in the part of the vessel on the admissible side of `where`.
         within: a surface on whose admissible side births are, so that a part of a wall is a source; None: everywhere.
         rate: births a second, a Poisson process from `start` to `stop`. Or
-        times: the times of all births [s], from 0 s on, in any order; those after the end of the run do not come. Or
+        times: the times of all births [s], from 0 s on, in any order. Or
         count: alone so many births, at independent times uniform from `start` to `stop`; with `rate` the most of them.
-        even: True: births of a `rate` are evenly spaced, the first one at `start`.
+        even: True: births of a `rate` are evenly spaced, the first one at `start`; one that would be at `stop` to
+            round-off does not come.
         start: when births of a rate or a count begin [s].
-        stop: when they end [s], not before `start`; None: at the end of the run.
+        stop: when they end [s], not before `start`, and where both are the same a count comes then; None: a rate does
+            not end. A count without a rate needs it.
         temperature: k_B T [J] of the gas that comes. From a surface it is effusive: the velocities are those of what
             passes a hole in the wall of a vessel with that gas; from a volume they are Maxwellian. Or
         speed: |v| of all [m/s]; from a surface in the directions of the cosine law, from a volume in any. Or
@@ -113,6 +119,11 @@ class Source:
             checks.assign(self, stop=checks.number("stop", self.stop))
             if not self.stop >= self.start:
                 raise SceneError(f"stop must be at start = {self.start:g} s or later, got {self.stop:g}")
+        elif self.count is not None and self.rate is None:
+            raise SceneError(
+                "stop must be given with a count alone, got None: births are spread from start to stop, and the end of "
+                "the run must not change them; give stop=, such as until"
+            )
 
     def _check_list(self) -> None:
         if self.start != 0.0 or self.stop is not None:

@@ -1,4 +1,8 @@
-"""The velocities of births."""
+"""The velocities of births.
+
+Every function draws one row of numbers after the other, and two laws from two streams: the first births of a longer
+run are those of a shorter one.
+"""
 
 import math
 
@@ -14,7 +18,7 @@ def from_volume(source: Source, random: Random, n: int, across: int | None) -> F
     """Velocities (3, n) of particles that are born in a volume."""
     if source.beam is not None:
         return _beam(source, random, n, across)
-    normal = random.standard_normal((3, n))
+    normal = np.ascontiguousarray(random.standard_normal((n, 3)).T)
     if across is not None:
         normal[across] = 0.0
     if source.temperature is not None:
@@ -32,13 +36,14 @@ def from_surface(source: Source, random: Random, normals: Floats, across: int | 
         scale = math.sqrt(source.temperature / source.mass)
         # The normal speed of what passes a plane in a gas at rest: w exp(-w^2/2).
         away = np.sqrt(2.0 * random.standard_exponential(n))
-        u, w = random.standard_normal((2, n))
+        u, w = random.spawn(1)[0].standard_normal((n, 2)).T
         return np.asarray(scale * (u * first + w * second - away * normals))
     if across is not None:
         sine = 2.0 * random.random(n) - 1.0
         direction = sine * first
     else:
-        sine, angle = np.sqrt(random.random(n)), 2.0 * math.pi * random.random(n)
+        part, turn = random.random((n, 2)).T
+        sine, angle = np.sqrt(part), 2.0 * math.pi * turn
         direction = sine * (np.cos(angle) * first + np.sin(angle) * second)
     return np.asarray((source.speed or 0.0) * (direction - np.sqrt(1.0 - sine * sine) * normals))
 
@@ -67,19 +72,22 @@ def _beam(source: Source, random: Random, n: int, across: int | None) -> Floats:
     if across is not None:
         angle = source.divergence * (2.0 * random.random(n) - 1.0)
         return np.asarray(speed * (np.sin(angle) * first - np.cos(angle) * axes))
-    cosine = 1.0 - (1.0 - math.cos(source.divergence)) * random.random(n)
-    sine, angle = np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0)), 2.0 * math.pi * random.random(n)
+    part, turn = random.random((n, 2)).T
+    cosine = 1.0 - (1.0 - math.cos(source.divergence)) * part
+    sine, angle = np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0)), 2.0 * math.pi * turn
     return np.asarray(speed * (sine * (np.cos(angle) * first + np.sin(angle) * second) - cosine * axes))
 
 
 def _into(source: Source, random: Random, normals: Floats, across: int | None) -> Floats:
     """Velocities of a beam that are not into the wall, which the axis of the beam is not."""
-    velocity = _beam(source, random, normals.shape[1], across)
+    n = normals.shape[1]
+    velocity = _beam(source, random, n, across)
     while source.divergence > 0.0:
         wrong = np.flatnonzero((velocity * normals).sum(axis=0) >= 0.0)
         if not wrong.size:
             break
-        velocity[:, wrong] = _beam(source, random, len(wrong), across)
+        # Each try has a stream with a row for every birth, so that no birth takes what is another's.
+        velocity[:, wrong] = _beam(source, random.spawn(1)[0], n, across)[:, wrong]
     return velocity
 
 

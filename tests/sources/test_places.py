@@ -30,7 +30,7 @@ def as_likely(counts, parts):
 
 def on(surface, n=N, **more):
     """Births on a surface that is the only one of a scene, from a count."""
-    return births(swarm.Scene([surface], **more), swarm.Source(0, count=n, speed=1.0))
+    return births(swarm.Scene([surface], **more), swarm.Source(0, count=n, stop=1.0, speed=1.0))
 
 
 def test_on_a_sphere_each_coordinate_is_uniform():
@@ -81,10 +81,10 @@ def test_on_a_capped_cylinder_by_the_areas_of_wall_and_caps(side):
 
 def test_on_a_cone_and_a_paraboloid_by_the_area_of_rings():
     lid = swarm.Plane((0, 0, 1), 1.0)
-    cone = births(swarm.Scene([swarm.Cone(0.5), lid]), swarm.Source(0, count=N, speed=1.0)).position
+    cone = births(swarm.Scene([swarm.Cone(0.5), lid]), swarm.Source(0, count=N, stop=1.0, speed=1.0)).position
     assert uniform(cone[2] ** 2, 0.0, 1.0) > 1e-3
     f = 0.25
-    bowl = births(swarm.Scene([swarm.Paraboloid(f), lid]), swarm.Source(0, count=N, speed=1.0)).position
+    bowl = births(swarm.Scene([swarm.Paraboloid(f), lid]), swarm.Source(0, count=N, stop=1.0, speed=1.0)).position
     area = (1.0 + bowl[2] / f) ** 1.5 - 1.0
     assert uniform(area, 0.0, (1.0 + 1.0 / f) ** 1.5 - 1.0) > 1e-3
 
@@ -110,7 +110,7 @@ def test_on_a_mesh_by_the_areas_of_triangles():
 def test_on_an_outline_by_the_length_of_its_sides_and_on_lids_by_their_area():
     table = swarm.Stadium(radius=0.5, length=1.0)
     scene = swarm.Scene([table], plane="z")
-    r = births(scene, swarm.Source(0, count=N, speed=1.0)).position
+    r = births(scene, swarm.Source(0, count=N, stop=1.0, speed=1.0)).position
     straight = np.abs(r[0]) < 0.5 - 1e-12
     assert as_likely([straight.sum(), (~straight).sum()], [2.0, math.pi]) > 1e-3
     np.testing.assert_array_equal(r[2], 0.0)
@@ -121,7 +121,7 @@ def test_on_an_outline_by_the_length_of_its_sides_and_on_lids_by_their_area():
 
 
 def test_on_circles_in_a_plane_by_their_length():
-    r = births(swarm.Scene([swarm.Sphere(0.5)], plane="y"), swarm.Source(0, count=N, speed=1.0)).position
+    r = births(swarm.Scene([swarm.Sphere(0.5)], plane="y"), swarm.Source(0, count=N, stop=1.0, speed=1.0)).position
     assert uniform(np.arctan2(r[2], r[0]), -math.pi, math.pi) > 1e-3
 
 
@@ -140,7 +140,7 @@ def test_on_a_union_each_wall_once():
 def test_on_many_bodies_by_their_areas():
     spheres = swarm.Spheres([(-0.5, 0, 0), (0.5, 0, 0)], [0.1, 0.2])
     scene = swarm.Scene([swarm.Box((1, 1, 1)), spheres])
-    r = births(scene, swarm.Source(1, count=N, speed=1.0)).position
+    r = births(scene, swarm.Source(1, count=N, stop=1.0, speed=1.0)).position
     assert as_likely([(r[0] < 0).sum(), (r[0] > 0).sum()], [1.0, 4.0]) > 1e-3
 
 
@@ -148,30 +148,30 @@ def test_in_a_part_of_a_wall_at_an_opening_and_around_it():
     opening = swarm.Sphere(0.3, center=(0.0, 0.0, 0.5))
     box = swarm.Box((0.5, 0.5, 0.5), openings=[opening])
     scene = swarm.Scene([box])
-    inside = births(scene, swarm.Source(opening, count=N, speed=1.0))
+    inside = births(scene, swarm.Source(opening, count=N, stop=1.0, speed=1.0))
     r = inside.position
     assert uniform(r[0] ** 2 + r[1] ** 2, 0.0, 0.09) > 1e-3
     assert np.ptp(r[2]) == 0.0
     assert (inside.velocity[2] < 0.0).all()
-    around = births(scene, swarm.Source(0, count=N, speed=1.0)).position
+    around = births(scene, swarm.Source(0, count=N, stop=1.0, speed=1.0)).position
     top = np.abs(around[2] - 0.5) < 1e-12
     assert (around[0][top] ** 2 + around[1][top] ** 2 >= 0.09).all()
     assert as_likely([top.sum(), (~top).sum()], [1.0 - 0.09 * math.pi, 5.0]) > 1e-3
-    patch = births(scene, swarm.Source(0, within=swarm.Sphere(0.2, (0.5, 0, 0)), count=N, speed=1.0)).position
+    patch = births(scene, swarm.Source(0, within=swarm.Sphere(0.2, (0.5, 0, 0)), count=N, stop=1.0, speed=1.0)).position
     assert uniform(patch[1] ** 2 + patch[2] ** 2, 0.0, 0.04) > 1e-3
 
 
 def test_only_what_of_a_wall_is_in_the_vessel():
     scene = swarm.Scene([swarm.Sphere(1.0), swarm.Plane((0, 0, -1), 0.5)])
-    r = births(scene, swarm.Source(1, count=N, speed=1.0)).position
+    r = births(scene, swarm.Source(1, count=N, stop=1.0, speed=1.0)).position
     assert uniform(r[0] ** 2 + r[1] ** 2, 0.0, 0.75) > 1e-3
-    r = births(scene, swarm.Source(0, count=N, speed=1.0)).position
+    r = births(scene, swarm.Source(0, count=N, stop=1.0, speed=1.0)).position
     assert uniform(r[2], -0.5, 1.0) > 1e-3
 
 
 def test_in_a_cell_that_repeats():
     scene = swarm.Scene([swarm.Sphere(0.3, center=(0.0, 0.5, 0.5), side="outside")], period=(1.0, 1.0, 1.0))
-    made = births(scene, swarm.Source(0, count=N, speed=1.0))
+    made = births(scene, swarm.Source(0, count=N, stop=1.0, speed=1.0))
     r = made.position
     assert ((r >= 0.0) & (r < 1.0)).all()
     x = np.where(r[0] > 0.5, r[0] - 1.0, r[0])
@@ -181,9 +181,9 @@ def test_in_a_cell_that_repeats():
 
 def test_in_a_volume():
     scene = swarm.Scene([swarm.Box((1, 1, 1))])
-    r = births(scene, swarm.Source(swarm.Sphere(0.5), volume=True, count=N, temperature=1.0)).position
+    r = births(scene, swarm.Source(swarm.Sphere(0.5), volume=True, count=N, stop=1.0, temperature=1.0)).position
     assert uniform((r**2).sum(axis=0) ** 1.5, 0.0, 0.125) > 1e-3
-    r = births(scene, swarm.Source(0, volume=True, count=N, temperature=1.0)).position
+    r = births(scene, swarm.Source(0, volume=True, count=N, stop=1.0, temperature=1.0)).position
     assert all(uniform(r[k], -1.0, 1.0) > 1e-3 for k in range(3))
 
 
@@ -194,9 +194,9 @@ def test_effusive_velocities():
     """Flux-weighted: the square of the normal speed is exponential, the others are normal."""
     scene, mass, heat = swarm.Scene([swarm.Box((1, 1, 1))]), 2.0, 3.0
     floor = swarm.Box((1.0, 1.0, 0.1), center=(0.0, 0.0, -1.0))
-    v = births(scene, swarm.Source(0, within=floor, count=N, temperature=heat, mass=mass)).velocity
+    v = births(scene, swarm.Source(0, within=floor, count=N, stop=1.0, temperature=heat, mass=mass)).velocity
     sides = swarm.Box((0.99, 0.99, 0.1), center=(0.0, 0.0, -1.0))
-    v = births(scene, swarm.Source(0, within=sides, count=N, temperature=heat, mass=mass)).velocity
+    v = births(scene, swarm.Source(0, within=sides, count=N, stop=1.0, temperature=heat, mass=mass)).velocity
     assert (v[2] > 0.0).all()
     assert stats.kstest(v[2] ** 2 * mass / (2.0 * heat), "expon").pvalue > 1e-3
     assert all(stats.kstest(v[k] * math.sqrt(mass / heat), "norm").pvalue > 1e-3 for k in (0, 1))
@@ -213,33 +213,33 @@ def test_one_speed_from_a_wall_has_the_cosine_law():
 
 def test_in_a_plane_the_cosine_law_and_effusion_are_of_two_dimensions():
     scene = swarm.Scene([swarm.Sphere(0.5)], plane="z")
-    made = births(scene, swarm.Source(0, count=N, speed=1.0))
+    made = births(scene, swarm.Source(0, count=N, stop=1.0, speed=1.0))
     n = made.position / 0.5
     along = n[0] * made.velocity[1] - n[1] * made.velocity[0]
     assert uniform(along, -1.0, 1.0) > 1e-3
     assert (made.velocity[2] == 0.0).all()
-    hot = births(scene, swarm.Source(0, count=N, temperature=1.0))
+    hot = births(scene, swarm.Source(0, count=N, stop=1.0, temperature=1.0))
     away = -(hot.position / 0.5 * hot.velocity).sum(axis=0)
     assert stats.kstest(away**2 / 2.0, "expon").pvalue > 1e-3
 
 
 def test_from_a_volume_velocities_are_isotropic_or_maxwellian():
     scene = swarm.Scene([swarm.Sphere(0.5)])
-    v = births(scene, swarm.Source(0, volume=True, count=N, speed=2.0)).velocity
+    v = births(scene, swarm.Source(0, volume=True, count=N, stop=1.0, speed=2.0)).velocity
     assert all(uniform(v[k], -2.0, 2.0) > 1e-3 for k in range(3))
-    v = births(scene, swarm.Source(0, volume=True, count=N, temperature=4.0)).velocity
+    v = births(scene, swarm.Source(0, volume=True, count=N, stop=1.0, temperature=4.0)).velocity
     assert all(stats.kstest(v[k] / 2.0, "norm").pvalue > 1e-3 for k in range(3))
 
 
 def test_beams():
     scene = swarm.Scene([swarm.Sphere(0.5)])
     beam = np.array([0.0, 3.0, 4.0])
-    v = births(scene, swarm.Source(0, volume=True, count=N, beam=beam)).velocity
+    v = births(scene, swarm.Source(0, volume=True, count=N, stop=1.0, beam=beam)).velocity
     np.testing.assert_array_equal(v, np.broadcast_to(beam[:, None], v.shape))
-    v = births(scene, swarm.Source(0, volume=True, count=N, beam=beam, divergence=0.3)).velocity
+    v = births(scene, swarm.Source(0, volume=True, count=N, stop=1.0, beam=beam, divergence=0.3)).velocity
     assert uniform(beam @ v / 25.0, math.cos(0.3), 1.0) > 1e-3
     half = swarm.Sphere(0.4, (0.0, 0.0, -0.5))
-    v = births(scene, swarm.Source(0, within=half, count=N, beam=(0, 0, 1.0), divergence=1.5)).velocity
+    v = births(scene, swarm.Source(0, within=half, count=N, stop=1.0, beam=(0, 0, 1.0), divergence=1.5)).velocity
     np.testing.assert_allclose((v**2).sum(axis=0), 1.0, rtol=1e-13)
 
 
@@ -260,7 +260,9 @@ def test_a_rate_is_a_poisson_process():
 
 def test_other_times():
     even = swarm.Source(0, rate=4.0, even=True, speed=1.0, start=1.0)
-    np.testing.assert_array_equal(times_of(even, RANDOM(1), 2.0), [1.0, 1.25, 1.5, 1.75])
+    np.testing.assert_array_equal(times_of(even, RANDOM(1), 2.0), [1.0, 1.25, 1.5, 1.75, 2.0])
+    ends = swarm.Source(0, rate=4.0, even=True, speed=1.0, start=1.0, stop=2.0)
+    np.testing.assert_array_equal(times_of(ends, RANDOM(1), 2.0), [1.0, 1.25, 1.5, 1.75])
     np.testing.assert_array_equal(times_of(swarm.Source(0, times=[3, 1, 2], speed=1.0), RANDOM(1), 2.0), [1.0, 2.0])
     pulse = times_of(swarm.Source(0, count=N, start=1.0, stop=2.0, speed=1.0), RANDOM(1), 5.0)
     assert len(pulse) == N
@@ -269,6 +271,25 @@ def test_other_times():
     assert len(most) == 5
     at_once = times_of(swarm.Source(0, count=7, start=0.5, stop=0.5, speed=1.0), RANDOM(1), 5.0)
     np.testing.assert_array_equal(at_once, np.full(7, 0.5))
+
+
+def test_evenly_spaced_births_fill_a_half_open_interval():
+    """As many as rate times its length, however its ends are rounded; and none is of two intervals that meet."""
+    for begin in range(30):
+        for end in range(begin, 30):
+            source = swarm.Source(0, rate=10.0, even=True, speed=1.0, start=begin / 10.0, stop=end / 10.0)
+            assert len(times_of(source, RANDOM(1), 5.0)) == end - begin
+    whole = swarm.Source(0, rate=300.0, even=True, speed=1.0, start=0.25)
+    parts = [swarm.Source(0, rate=300.0, even=True, speed=1.0, start=a, stop=a + 0.25) for a in (0.25, 0.5, 0.75)]
+    times = [times_of(one, RANDOM(1), 1.0) for one in parts]
+    assert len(times_of(whole, RANDOM(1), 1.0)) == sum(map(len, times)) + 1 == 226
+
+
+@pytest.mark.parametrize("start", [0.0, 1.0, 1e9])
+def test_a_count_comes_before_its_stop(start):
+    source = swarm.Source(0, count=10_000, start=start, stop=start + 1e-6, speed=1.0)
+    times = times_of(source, RANDOM(1), 2e9)
+    assert start <= times[0] <= times[-1] < source.stop
 
 
 def test_each_source_has_streams_of_its_own_and_the_seed_decides():

@@ -30,6 +30,7 @@ def without(*names, **more):
         (without(count=2.5), "count must be"),
         (without(start=-1.0), "start must be 0 or more, got -1"),
         (without(start=2.0, stop=1.0), "stop must be at start = 2 s or later, got 1"),
+        (without("rate", count=3), "stop must be given with a count alone, got None: .* give stop="),
         (without("rate", times=[]), "times must be a list of at least one"),
         (without("rate", times=[0.1, -1.0]), r"times\[1\] must be a finite time of 0 s or later, got -1"),
         (without("rate", times=[0.1, math.inf]), r"times\[1\] must be"),
