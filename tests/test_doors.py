@@ -207,6 +207,16 @@ SHUTTERS = {
     "a formula": swarm.Formula(
         "x**2 + 2*y**2 + z**2 - 0.09", side="outside", bounds=((-0.4,) * 3, (0.4,) * 3), present=[(0.0, 0.45)]
     ),
+    "a prism in which they are": swarm.Prism([(-0.5, -0.4), (0.5, -0.4), (0.0, 0.5)], 0.8, present=[(0.0, 0.45)]),
+    "a pillar": swarm.Polygon([(-0.2, -0.2), (0.2, -0.2), (0, 0.3)], side="outside", present=[(0.0, 0.45)]),
+    "many sides": swarm.Polygon(
+        [(0.5 * np.cos(a), 0.4 * np.sin(a)) for a in np.linspace(0.0, 6.1, 26)], present=[(0.0, 0.45)]
+    ),
+    "a mesh": swarm.Mesh(
+        [(-0.5, -0.5, -0.5), (0.5, -0.5, -0.5), (-0.5, 0.5, -0.5), (-0.5, -0.5, 0.5)],
+        [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)], present=[(0.0, 0.45)],
+    ),
+    "a union": swarm.Union([swarm.Sphere(0.4), swarm.Cylinder(0.2, length=1.1)], present=[(0.0, 0.45)]),
 }  # fmt: skip
 
 
@@ -226,6 +236,27 @@ def test_until_a_wall_goes_all_is_as_with_it_and_then_as_without(name, gravity):
     pushed = found.observables["impulse"][-1, 1]
     assert before.observables["impulse"][-1, 1] == pytest.approx(pushed, rel=1e-9)
     assert pushed > 0.0
+    # What has gone is nothing that particles are outside of.
+    assert found.observables["max_penetration"].max() < 1e-15
+
+
+@pytest.mark.parametrize("gravity", [None, DOWN])
+@pytest.mark.parametrize("law", [{}, {"restitution": 0.5, "friction": 0.3}])
+def test_a_foam_that_goes_lets_all_fly(gravity, law):
+    """It is alone in its scene, so they fly freely; and it comes back where nobody is only."""
+    foam = swarm.Spheres([(0.0, 0.0, 0.0), (0.7, 0.0, 0.0)], [0.5, 0.4], side="inside", **law)
+    start = swarm.fill(swarm.Scene([foam], gravity), 20, speed=0.5, seed=1)
+
+    def gone(*times):
+        return run(swarm.Scene([dataclasses.replace(foam, present=times)], gravity), start, until=2.0, frames=4)
+
+    found, before = gone((0.0, 1.0)), run(swarm.Scene([foam], gravity), start, until=1.0, frames=2).particles
+    fall = np.zeros((3, 1)) if gravity is None else np.array(gravity)[:, None]
+    assert found.particles.position == pytest.approx(before.position + before.velocity + 0.5 * fall, abs=1e-13)
+    assert found.observables["impacts"][2:].tolist() == [found.observables["impacts"][2]] * 3
+    assert found.observables["max_penetration"].max() < 1e-15
+    with pytest.raises(swarm.RunError, match=r"surfaces\[0\] \(Spheres\) must come where nobody is: at 1\.9 s"):
+        gone((0.0, 0.5), (1.9, 3.0))
 
 
 def test_where_a_scene_repeats_a_wall_goes_in_every_cell():

@@ -11,8 +11,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ..errors import SceneError
 from ..kernel.gravity import as_vector
 from ..kernel.jit import select
@@ -211,7 +209,5 @@ def walls_then(surface: Any, moment: float, largest: float | None = None) -> tup
         return walls
     there = was_there(surface.present, moment)
     if hasattr(walls[0], "grid"):
-        # Of many bodies none is in any cell.
-        grid = walls[0].grid
-        return walls if there else (walls[0]._replace(grid=grid._replace(first=np.zeros_like(grid.first))),)
+        return (walls[0].in_cells() if there else walls[0].gone(),)
     return tuple(Present(wall, float(there)) for wall in walls)

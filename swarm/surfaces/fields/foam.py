@@ -35,11 +35,13 @@ class Foam(Members, Patched):
     # What is near a point is the wall of the cavity that it is deepest in.
 
     def count_in_cell(self, r):
-        return 1
+        return 1 - int(self.is_gone())
 
     def list_in_cell(self, k, before, r, into):
-        into[k] = before + _nearest(self, r)[0]
-        return 1
+        count = self.count_in_cell(r)
+        for i in range(count):
+            into[k + i] = before + _nearest(self, r)[0]
+        return count
 
     def one_in_cell(self, k, r):
         return _nearest(self, r)[0]
@@ -51,6 +53,8 @@ class Foam(Members, Patched):
 @outlined
 def _nearest(foam, r):
     """The cavity that a point is deepest in, or nearest to, of those of its cell, and the distance outside of it."""
+    if foam.is_gone():
+        return 0.0, -math.inf
     first, stop = entries_at(foam.grid, r)
     which, least = 0.0, math.inf
     for k in range(first, stop):

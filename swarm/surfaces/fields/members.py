@@ -70,6 +70,19 @@ class Members(Record):
     # Whether each lane looks at all of them on a straight flight.
     few = False
 
+    def in_cells(self):
+        """The field whose bodies a flight meets in the cells that it passes, and nowhere else."""
+        return self
+
+    def gone(self):
+        """The field while none of the bodies is there: no cell has any, nor does the grid."""
+        grid = self.in_cells().grid
+        return self.in_cells()._replace(grid=grid._replace(first=np.zeros_like(grid.first), entries=grid.entries[:0]))
+
+    def is_gone(self):
+        """Whether none of the bodies is there."""
+        return self.grid.entries.shape[0] == 0
+
     def count(self):
         """Their number."""
         return float(self.table.shape[0])
@@ -119,6 +132,9 @@ class Few(Members):
     """So few bodies that each lane looks at all of them on a straight flight, faster than from cell to cell."""
 
     few = True
+
+    def in_cells(self):
+        return Members(*self)
 
 
 def entries_at(grid, r):

@@ -174,6 +174,9 @@ class FewSides(Sides):
 
     few = True
 
+    def in_cells(self):
+        return Sides(*self)
+
 
 @outlined
 def _first_fall(side, r, v, pull):
@@ -236,6 +239,8 @@ def _within(x, u, g, room):
 @outlined
 def _nearest(sides, r):
     """The signed distance outside of the outline, and the number of the side that is nearest to a point."""
+    if sides.is_gone():
+        return -math.inf, -1.0
     least, found, which = math.inf, -math.inf, -1.0
     # All of them: that of the cell that is nearest may be the back of a thin wall.
     for m in range(sides.table.shape[0]):
