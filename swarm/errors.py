@@ -24,7 +24,16 @@ class FileError(SwarmError, OSError):
 
 
 class WallTimeError(SwarmError):
-    """A run that stopped at its wall time limit; if it makes checkpoints, it can be resumed."""
+    """A run that stopped at its wall time limit; if it makes checkpoints, it can be resumed.
+
+    Attributes:
+        compiled: seconds after the limit that a compilation which was under way took to end.
+    """
+
+    def __init__(self, message: str, compiled: float = 0.0) -> None:
+        late = f": a compilation was under way, which ended first, {compiled:.2g} s after it" if compiled else ""
+        super().__init__(message + late)
+        self.compiled = compiled
 
 
 class RunError(SwarmError, RuntimeError):

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import sys
+import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +12,9 @@ import typer
 from .. import interrupt
 from ..errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
+
+# Behind the reason why a run has stopped.
+_COMPILED = ", after a compilation that was under way"
 
 
 def run(  # noqa: PLR0913  one argument an option
@@ -53,6 +57,7 @@ def run(  # noqa: PLR0913  one argument an option
     ] = False,
 ) -> None:
     """Simulate a scene file and write its trajectory."""
+    began = time.monotonic()
     # An exception in the middle of an import may be lost; nothing is open yet.
     with interrupt.at_once():
         from .. import scene_file as files
@@ -96,7 +101,7 @@ def run(  # noqa: PLR0913  one argument an option
             before, start = paths.identity(target), job.start()
             resumes = resume and paths.checkpoint_of(target).exists()
         try:
-            result = carry_out(job.scene, start, job.method, options)
+            result = carry_out(job.scene, start, job.method, options, began)
         except SceneError as error:
             raise job.located(error) from None
     except (KeyboardInterrupt, WallTimeError) as stop:
@@ -104,7 +109,8 @@ def run(  # noqa: PLR0913  one argument an option
         # The files are closed: a second signal may end the process here.
         with interrupt.at_once():
             has_frames = target.exists() and (resumes or paths.identity(target) != before)
-            again = _stopped(status, target, has_frames, cluster is not None)
+            reason = REASONS[status] + (_COMPILED * bool(getattr(stop, "compiled", 0.0)))
+            again = _stopped(reason, target, has_frames, cluster is not None)
             report(status, target if has_frames else None, **({} if has_frames else {"frames": 0}), resume=again)
         raise typer.Exit(EXIT_CODES[status]) from None
     except CompleteError as error:
@@ -119,11 +125,10 @@ def run(  # noqa: PLR0913  one argument an option
         table(of_result(result, getattr(start, "volume", None)))
 
 
-def _stopped(status: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:
+def _stopped(reason: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:
     """Print how to resume a run that was stopped; the command, or None if there is nothing to resume from."""
     from ..output import paths
 
-    reason = REASONS[status]
     if not (has_frames or (on_cluster and paths.checkpoint_of(target).exists())):
         print(f"{reason}: no frame was finished, and nothing was written", file=sys.stderr)
         return None

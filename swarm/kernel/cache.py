@@ -5,6 +5,7 @@ import functools
 import hashlib
 import inspect
 import logging
+import math
 import os
 import sys
 import threading
@@ -223,10 +224,12 @@ class Spent:
 
     Attributes:
         seconds: of wall time.
+        latest: when the latest of them began and ended [s of time.monotonic].
     """
 
     def __init__(self) -> None:
         self.seconds = 0.0
+        self.latest = -math.inf, -math.inf
 
 
 @contextlib.contextmanager
@@ -246,7 +249,9 @@ def kernels_compiled(tell: Callable[[str], None], sentence: Callable[[Any], str]
         def on_end(self, compiled: Any) -> None:
             first = begun.pop()
             # One that is compiled within another is counted there.
-            spent.seconds += 0.0 if begun else time.monotonic() - first
+            if not begun:
+                spent.latest = first, time.monotonic()
+                spent.seconds += spent.latest[1] - first
 
     with event.install_listener("numba:compile", Listener()):
         yield spent

@@ -101,7 +101,7 @@ class Background:
         self._at_once = half if half < _CHUNK_FRAMES else half - half % _CHUNK_FRAMES
         self._problem: BaseException | None = None
         self.seconds = 0.0  # to write a frame of the latest batch
-        self.written = 0  # frames
+        self.written = self._queued = 0  # frames
         self._thread = threading.Thread(target=self._work, name="swarm-writer", daemon=True)
 
     def __enter__(self) -> WriteFrame:
@@ -117,7 +117,12 @@ class Background:
         if problem is not None:
             raise problem
 
+    def backlog(self) -> float:
+        """Seconds that the frames in the queue take, each as long as one of the latest batch."""
+        return self.seconds * max(0, self._queued - self.written)
+
     def _put(self, number: int, moment: float, state: State, seen: dict[str, Any]) -> None:
+        self._queued = number + 1
         copy = self._copies.get()
         if self._problem is not None:
             raise self._problem

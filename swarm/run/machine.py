@@ -242,7 +242,7 @@ def warn_open() -> None:
 
 def _meanwhile(session: Session, writer: "Background | None", show: Display) -> tuple[float, float]:
     """For `Run.advance`: the time to write a frame [s], and when to return at the latest."""
-    return writer.seconds if writer else 0.0, min(session.latest, time.monotonic() + show.every)
+    return writer.seconds if writer else 0.0, min(session.latest(writer), time.monotonic() + show.every)
 
 
 def _require_room(task: Task, session: Session, more: int) -> None:

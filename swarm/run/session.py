@@ -29,13 +29,19 @@ class Session:
     """From a start or a checkpoint to the end, a signal or the wall time limit; it locks the trajectory.
 
     Without a trajectory nothing can be saved.
+
+    Args:
+        options: of the run.
+        counted_from: when the wall time began [s of time.monotonic]; None: now.
     """
 
-    def __init__(self, options: RunOptions) -> None:
+    def __init__(self, options: RunOptions, counted_from: float | None = None) -> None:
         self._began = time.monotonic()
+        counted_from = self._began if counted_from is None else counted_from
         self._saves, self._resumes = options.checkpoint is not None, options.resume
         self._every = math.inf if options.checkpoint is None else options.checkpoint
-        self._end = math.inf if options.walltime is None else self._began + options.walltime
+        self._end = math.inf if options.walltime is None else counted_from + options.walltime
+        self._took = 0.0  # seconds of the last checkpoint
         self._due = self._began + self._every
         self._stops = False
         # Of a run without a trajectory they are None, and so is its `Job`.
@@ -203,10 +209,13 @@ class Session:
             if number >= self.first:
                 yield number, before, moment
 
-    @property
-    def latest(self) -> float:
+    def latest(self, writer: "Background | None") -> float:
         """When `look` is due [s of time.monotonic]."""
-        return min(self._due, self._end)
+        return min(self._due, self._last_call(writer))
+
+    def _last_call(self, writer: "Background | None") -> float:
+        """When to stop so that frames in the queue, and a checkpoint, are written at the limit [s of time.monotonic]."""
+        return self._end - self._took - (0.0 if writer is None else writer.backlog())
 
     def stop(self) -> None:
         """End the session at the next `look`."""
@@ -228,14 +237,17 @@ class Session:
             FileError: the checkpoint cannot be written.
         """
         now = time.monotonic()
-        stops = self._stops or now >= self._end
+        stops = self._stops or now >= self._last_call(writer)
         if self._saves and (stops or now >= self._due):
             self._save(run, writer, frame, moment, following)
-            self._due = time.monotonic() + self._every
+            saved = time.monotonic()
+            self._due, self._took = saved + self._every, saved - now
         if self._stops:
             raise KeyboardInterrupt
         if stops:
-            raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
+            began, ended = self.compiled.latest
+            late = ended - self._end if began < self._end < ended else 0.0
+            raise WallTimeError(f"the wall time of this run is over at {moment:g} s", late)
 
     def _save(self, run: BaseRun, writer: Any, frame: int, moment: float, following: float | None) -> None:
         # A checkpoint is never ahead of the frames.

@@ -102,7 +102,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             file TRAJECTORY.checkpoint, until the run is complete.
         resume: continue from that checkpoint, with the same bits as if the run had never stopped; start a new run if
             there is neither a checkpoint nor a trajectory.
-        walltime: seconds of wall time after which the run stops.
+        walltime: seconds of wall time after which the run stops: it stops computing early enough to write the frames
+            in its queue, and a checkpoint if it makes any. A compilation under way ends first.
         compile: "auto": kernels that an earlier run compiled are used; others run in plain Python, with the same bits,
             and once this and earlier runs of the process have taken about a second in it, the rest is compiled.
             "always": compiled from the start. "never": plain Python only.
@@ -137,16 +138,22 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     return carry_out(scene, particles, method, RunOptions(**keywords))
 
 
-def carry_out(scene: Scene, particles: Particles | Bodies | None, method: Method, options: RunOptions) -> Result:
-    """`simulate` with its keywords as `RunOptions`."""
+def carry_out(
+    scene: Scene,
+    particles: Particles | Bodies | None,
+    method: Method,
+    options: RunOptions,
+    counted_from: float | None = None,
+) -> Result:
+    """`simulate` with its keywords as `RunOptions`; the wall time counts from a time [s of time.monotonic], or now."""
     carried: Callable[[Task, Any], machine.End] = machine.carry_out_task
     session: Session
     if options.cluster is None:
-        session = Session(options)
+        session = Session(options, counted_from)
     else:
         from . import cluster  # `distributed` takes half a second to import
 
-        session, carried = cluster.Sharded(options), cluster.carry_out
+        session, carried = cluster.Sharded(options, counted_from), cluster.carry_out
     task = task_of(scene, particles, method, options)
     end = carried(task, session)
     bodies = None if task.bodies is None else task.bodies.moved(end.particles)
