@@ -41,8 +41,10 @@ class Session:
         self._saves, self._resumes = options.checkpoint is not None, options.resume
         self._every = math.inf if options.checkpoint is None else options.checkpoint
         self._end = math.inf if options.walltime is None else counted_from + options.walltime
+        self._end = math.inf if options.walltime is None else counted_from + options.walltime
         self._took = 0.0  # seconds of the last checkpoint
-        self._due = self._began + self._every
+        # One half way to the limit says how long they take.
+        self._due = self._began + min(self._every, 0.5 * (self._end - self._began) if self._saves else math.inf)
         self._stops = False
         # Of a run without a trajectory they are None, and so is its `Job`.
         self._trajectory: Any = options.trajectory
@@ -214,7 +216,7 @@ class Session:
         return min(self._due, self._last_call(writer))
 
     def _last_call(self, writer: "Background | None") -> float:
-        """When to stop so that frames in the queue, and a checkpoint, are written at the limit [s of time.monotonic]."""
+        """When to stop so that the queue, and a checkpoint, are written at the limit [s of time.monotonic]."""
         return self._end - self._took - (0.0 if writer is None else writer.backlog())
 
     def stop(self) -> None:
