@@ -19,7 +19,7 @@ from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, corners_of
 from .surfaces.openings import Doorway, Opened, openings_in, reaches, volumes_of
 from .surfaces.surface import Surface, volume_of
-from .surfaces.union import Joined, Place
+from .surfaces.union import Joined, Place, nodes_of, surfaces_of
 from .volume import Volume
 
 # The law of a wall without temperature.
@@ -51,12 +51,12 @@ class Pieces(Volume):
     @cached_property
     def pieces(self) -> tuple[Surface, ...]:
         """The surfaces, those of which unions are made, and the images of those that reach over a face of the cell."""
-        return tuple(piece for images in self._images for image in images for piece in _pieces_of(image))
+        return tuple(piece for images in self._images for image in images for piece in surfaces_of(image))
 
     @cached_property
     def owners_of_pieces(self) -> list[int]:
         """The surface that each of these is an image or a part of."""
-        return [i for i, images in enumerate(self._images) for image in images for _piece in _pieces_of(image)]
+        return [i for i, images in enumerate(self._images) for image in images for _piece in surfaces_of(image)]
 
     @cached_property
     def order(self) -> Order:
@@ -66,7 +66,7 @@ class Pieces(Volume):
             if isinstance(image, Joined) and len(image.rooms) > 1:
                 ends = np.cumsum([first, *map(len, image.rooms)]).tolist()
                 unions.append(tuple(tuple(range(*ends)) for ends in itertools.pairwise(ends)))
-            first += len(_pieces_of(image))
+            first += len(surfaces_of(image))
         return order_of(self.pieces, unions=unions)
 
     @cached_property
@@ -199,10 +199,6 @@ class Pieces(Volume):
         return [self.owners_of_pieces[rooms[0][0]] for rooms in self.order.unions]
 
 
-def _pieces_of(image: Surface) -> tuple[Surface, ...]:
-    return image.surfaces() if isinstance(image, Joined) else (image,)
-
-
 def _places_of(image: Surface) -> tuple[Place, ...]:
     return image.places() if isinstance(image, Joined) else ((),)
 
@@ -236,16 +232,21 @@ def volumes_of_pieces(
 
 def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> list[tuple[Surface, ...]]:
     """Those of the surfaces of a union: what is open of the whole is open where it reaches each of them."""
-    pieces = union.surfaces()
-    for k, opening in enumerate(union.openings):
-        if not any(reaches(piece, volume_of(opening)) for piece in pieces):
-            raise SceneError(
-                f"{name}.openings[{k}] must reach the wall that it opens, got {opening}, in which no point of {name} "
-                f"({type(union).__name__}) is; move it, or make it larger"
-            )
+    pieces, places = union.surfaces(), union.places()
+    for place, part in nodes_of(union):
+        # Of the whole by its number alone, as a surface without parts.
+        where = f"{name}{''.join(f'.parts[{k}]' for k in place)}"
+        mine = [piece for piece, at in zip(pieces, places, strict=True) if at[: len(place)] == place]
+        for k, opening in enumerate(part.openings):
+            # Of parts that leave no room there is no wall.
+            if mine and not any(reaches(piece, volume_of(opening)) for piece in mine):
+                raise SceneError(
+                    f"{where}.openings[{k}] must reach the wall that it opens, got {opening}, in which no point of "
+                    f"{where} ({type(part).__name__}) is; move it, or make it larger"
+                )
     found = []
     for piece in pieces:
-        open_there = [one for one in piece.openings if one not in union.openings or reaches(piece, volume_of(one))]
+        open_there = [one for one in piece.openings if reaches(piece, volume_of(one))]
         found.append(volumes_of(replace(piece, openings=open_there), period, f"{name}.parts"))
     return found
 

@@ -7,6 +7,7 @@ that of the whole the least gap of its rooms.
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -244,6 +245,19 @@ class Intersection(Joined):
 
 def _moves(part: Surface) -> bool:
     return part.motion is not None or (isinstance(part, Joined) and any(map(_moves, part.parts)))
+
+
+def nodes_of(surface: Surface) -> Iterator[tuple[Place, Surface]]:
+    """A surface, at no place, and all parts of it and of its parts, each as given, with its place."""
+    yield (), surface
+    for k, part in enumerate(surface.parts if isinstance(surface, Joined) else ()):
+        for place, one in nodes_of(part):
+            yield (k, *place), one
+
+
+def surfaces_of(surface: Surface) -> tuple[Surface, ...]:
+    """The surfaces of which a surface is made, with what is given to the whole; itself alone where it has no parts."""
+    return surface.surfaces() if isinstance(surface, Joined) else (surface,)
 
 
 def part_at(surface: Surface, place: Place) -> Surface:
