@@ -17,7 +17,7 @@ from .surfaces.fields.grouped import Order, order_of
 from .surfaces.fields.many import members_of
 from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, corners_of
-from .surfaces.openings import Doorway, Opened, openings_in, reaches, volumes_of
+from .surfaces.openings import Opened, openings_in, reaches, volumes_of
 from .surfaces.surface import Surface, volume_of
 from .surfaces.union import Joined, Place, nodes_of, surfaces_of
 from .volume import Volume
@@ -106,8 +106,7 @@ class Pieces(Volume):
     def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
         """The openings of every wall as kernels take them in the frame that ends at a moment [s]; None: none."""
         spans = self.order.spans(self.pieces)
-        ways = openings_in(spans, self._volumes, moment), openings_in(spans, self._doorways, moment, Doorway)
-        return None if ways == ((), ()) else (*ways[0], *ways[1])
+        return openings_in(spans, (self._volumes, self._doorways), moment) or None
 
     def has_doors(self) -> bool:
         """Whether some walls are present, or some openings open, for some times only."""

@@ -101,7 +101,7 @@ class Scene(Pieces):
         volumes = volumes_of_pieces(surfaces, images, lengths)
         checks.assign(self, _volumes=volumes, _doorways=doorways_of_pieces(images, volumes))
         self._require_few_walls("")
-        require_few((*self._volumes, *self._doorways))
+        require_few(self.openings() or ())
         for i in (*self._fields(), *self._unions()) if self.reacts() else ():
             raise SceneError(
                 f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where impacts move a surface, got "
