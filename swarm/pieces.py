@@ -22,6 +22,9 @@ from .surfaces.surface import Surface, volume_of
 from .surfaces.union import Joined, Place, nodes_of, surfaces_of
 from .volume import Volume
 
+# Of the extent of what kernels take as unions, how far rooms with a face in common overlap: more than what counts as
+# touching a wall.
+_REACH = 1e-9
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
 
@@ -164,6 +167,11 @@ class Pieces(Volume):
         of_pieces = [number.get(part, len(number)) for part in self._parts_of_pieces]
         return PartsOfRows(tuple(of_pieces[i] for i in self.order.owners(self.pieces)), len(number))
 
+    def common_faces(self) -> list[tuple[int, Place, Place]]:
+        """The parts of unions that have a face in common, which is no wall: the surface, and the place of each."""
+        unions = ((i, images[0]) for i, images in enumerate(self._images) if isinstance(images[0], Joined))
+        return [(i, *pair) for i, union in unions for pair in union.common_places()]
+
     def doorways_of_parts(self) -> dict[tuple[int, Place], list[Surface]]:
         """The volumes in which walls of a part are open where another room is on their other side."""
         found: dict[tuple[int, Place], list[Surface]] = {}
@@ -215,6 +223,15 @@ def _thermal(surface: Surface) -> Thermal:
     return Thermal(surface.temperature, surface.accommodation)
 
 
+def with_reach(images: Sequence[tuple[Surface, ...]]) -> tuple[tuple[Surface, ...], ...]:
+    """The surfaces of a scene with their images, whose rooms overlap where they have a face in common."""
+    several = [one for some in images for one in some if isinstance(one, Joined) and len(one.rooms) > 1]
+    reach = _REACH * max((piece.extent() for one in several for piece in one.surfaces()), default=0.0)
+    return tuple(
+        tuple(one.reaching(reach) if isinstance(one, Joined) else one for one in some) for some in images
+    )  # fmt: skip
+
+
 def volumes_of_pieces(
     surfaces: Sequence[Surface], images: Sequence[Sequence[Surface]], period: Lengths | None
 ) -> tuple[tuple[Surface, ...], ...]:
@@ -223,14 +240,15 @@ def volumes_of_pieces(
     for i, (surface, some) in enumerate(zip(surfaces, images, strict=True)):
         name = f"surfaces[{i}]"
         if isinstance(surface, Joined):
-            found += _volumes_of_parts(surface, period, name) * len(some)
+            of_parts = _volumes_of_parts(surface, period, name)
+            found += [of_parts[place] for image in some for place in _places_of(image)]
         else:
             found += [volumes_of(surface, period, name)] * len(some)
     return tuple(found)
 
 
-def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> list[tuple[Surface, ...]]:
-    """Those of the surfaces of a union: what is open of the whole is open where it reaches each of them."""
+def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> dict[Place, tuple[Surface, ...]]:
+    """Those of the parts of a union: what is open of the whole is open where it reaches each of them."""
     pieces, places = union.surfaces(), union.places()
     for place, part in nodes_of(union):
         # Of the whole by its number alone, as a surface without parts.
@@ -243,10 +261,10 @@ def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> list[
                     f"{where}.openings[{k}] must reach the wall that it opens, got {opening}, in which no point of "
                     f"{where} ({type(part).__name__}) is; move it, or make it larger"
                 )
-    found = []
-    for piece in pieces:
+    found: dict[Place, tuple[Surface, ...]] = {}
+    for piece, at in zip(pieces, places, strict=True):
         open_there = [one for one in piece.openings if reaches(piece, volume_of(one))]
-        found.append(volumes_of(replace(piece, openings=open_there), period, f"{name}.parts"))
+        found[at] = volumes_of(replace(piece, openings=open_there), period, f"{name}.parts")
     return found
 
 
