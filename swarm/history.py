@@ -87,7 +87,7 @@ def contact_history(
     for name, value, kind in (("scene", scene, Scene), ("method", method, Method)):
         if not isinstance(value, kind):
             raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
-    for i, surface in enumerate(scene.surfaces):
+    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
         if surface.motion is not None or surface.reacts():
             raise SceneError(
                 f"surfaces[{i}] must be at rest, without motion, mass and inertia, for a single contact step, got "

@@ -18,6 +18,7 @@ from .run.growing import grow
 from .scene import Scene
 from .state import Floats
 from .surfaces.surface import Surface
+from .surfaces.union import Joined, surfaces_of
 
 # The largest packings that are grown, of random balls, of discs; and those that are known to end it.
 _MOST = {3: 0.6, 2: 0.8}
@@ -168,17 +169,26 @@ def _at_rest(scene: Scene) -> Scene:
     """The scene without gravity, whose walls are smooth and stay as they are at 0 s."""
     surfaces = []
     for i, one in enumerate(scene.surfaces):
-        if one.motion is not None and not _stays(one):
-            raise SceneError(
-                f"surfaces[{i}].motion must leave the wall at 0 s where it is given, got {one.motion!r:.200}; pack a "
-                "scene without the motion, with the wall where it is then"
-            )
+        for piece in surfaces_of(one):
+            if piece.motion is not None and not _stays(piece):
+                raise SceneError(
+                    f"surfaces[{i}].motion must leave the wall at 0 s where it is given, got {piece.motion!r:.200}; "
+                    "pack a scene without the motion, with the wall where it is then"
+                )
         if one.is_there(0.0):
-            surfaces.append(replace(
-                one, motion=None, mass=None, inertia=None, restitution=1.0, friction=0.0, temperature=None,
-                accommodation=1.0, laws=(), openings=(), present=None,
-            ))  # fmt: skip
+            surfaces.append(_smooth(one))
     return Scene(surfaces, None, scene.period, scene.plane)
+
+
+def _smooth(surface: Surface) -> Surface:
+    """A surface as a wall without laws that stays, and so its parts."""
+    parts = {}
+    if isinstance(surface, Joined):
+        parts["parts"] = tuple(replace(_smooth(part), present=part.present) for part in surface.parts)
+    return replace(
+        surface, motion=None, mass=None, inertia=None, restitution=1.0, friction=0.0, temperature=None,
+        accommodation=1.0, laws=(), openings=(), present=None, **parts,
+    )  # fmt: skip
 
 
 def _stays(surface: Surface) -> bool:

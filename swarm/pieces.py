@@ -17,11 +17,14 @@ from .surfaces.fields.grouped import Order, order_of
 from .surfaces.fields.many import members_of
 from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, corners_of
-from .surfaces.openings import Doorway, Opened, openings_in, reaches, volumes_of
+from .surfaces.openings import Opened, openings_in, reaches, volumes_of
 from .surfaces.surface import Surface, volume_of
-from .surfaces.union import Joined, Place
+from .surfaces.union import Joined, Place, nodes_of, surfaces_of
 from .volume import Volume
 
+# Of the extent of what kernels take as unions, how far rooms with a face in common overlap: more than what counts as
+# touching a wall.
+_REACH = 1e-9
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
 
@@ -51,12 +54,12 @@ class Pieces(Volume):
     @cached_property
     def pieces(self) -> tuple[Surface, ...]:
         """The surfaces, those of which unions are made, and the images of those that reach over a face of the cell."""
-        return tuple(piece for images in self._images for image in images for piece in _pieces_of(image))
+        return tuple(piece for images in self._images for image in images for piece in surfaces_of(image))
 
     @cached_property
     def owners_of_pieces(self) -> list[int]:
         """The surface that each of these is an image or a part of."""
-        return [i for i, images in enumerate(self._images) for image in images for _piece in _pieces_of(image)]
+        return [i for i, images in enumerate(self._images) for image in images for _piece in surfaces_of(image)]
 
     @cached_property
     def order(self) -> Order:
@@ -66,7 +69,7 @@ class Pieces(Volume):
             if isinstance(image, Joined) and len(image.rooms) > 1:
                 ends = np.cumsum([first, *map(len, image.rooms)]).tolist()
                 unions.append(tuple(tuple(range(*ends)) for ends in itertools.pairwise(ends)))
-            first += len(_pieces_of(image))
+            first += len(surfaces_of(image))
         return order_of(self.pieces, unions=unions)
 
     @cached_property
@@ -106,8 +109,7 @@ class Pieces(Volume):
     def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
         """The openings of every wall as kernels take them in the frame that ends at a moment [s]; None: none."""
         spans = self.order.spans(self.pieces)
-        ways = openings_in(spans, self._volumes, moment), openings_in(spans, self._doorways, moment, Doorway)
-        return None if ways == ((), ()) else (*ways[0], *ways[1])
+        return openings_in(spans, (self._volumes, self._doorways), moment) or None
 
     def has_doors(self) -> bool:
         """Whether some walls are present, or some openings open, for some times only."""
@@ -165,6 +167,11 @@ class Pieces(Volume):
         of_pieces = [number.get(part, len(number)) for part in self._parts_of_pieces]
         return PartsOfRows(tuple(of_pieces[i] for i in self.order.owners(self.pieces)), len(number))
 
+    def common_faces(self) -> list[tuple[int, Place, Place]]:
+        """The parts of unions that have a face in common, which is no wall: the surface, and the place of each."""
+        unions = ((i, images[0]) for i, images in enumerate(self._images) if isinstance(images[0], Joined))
+        return [(i, *pair) for i, union in unions for pair in union.common_places()]
+
     def doorways_of_parts(self) -> dict[tuple[int, Place], list[Surface]]:
         """The volumes in which walls of a part are open where another room is on their other side."""
         found: dict[tuple[int, Place], list[Surface]] = {}
@@ -199,10 +206,6 @@ class Pieces(Volume):
         return [self.owners_of_pieces[rooms[0][0]] for rooms in self.order.unions]
 
 
-def _pieces_of(image: Surface) -> tuple[Surface, ...]:
-    return image.surfaces() if isinstance(image, Joined) else (image,)
-
-
 def _places_of(image: Surface) -> tuple[Place, ...]:
     return image.places() if isinstance(image, Joined) else ((),)
 
@@ -220,6 +223,15 @@ def _thermal(surface: Surface) -> Thermal:
     return Thermal(surface.temperature, surface.accommodation)
 
 
+def with_reach(images: Sequence[tuple[Surface, ...]]) -> tuple[tuple[Surface, ...], ...]:
+    """The surfaces of a scene with their images, whose rooms overlap where they have a face in common."""
+    several = [one for some in images for one in some if isinstance(one, Joined) and len(one.rooms) > 1]
+    reach = _REACH * max((piece.extent() for one in several for piece in one.surfaces()), default=0.0)
+    return tuple(
+        tuple(one.reaching(reach) if isinstance(one, Joined) else one for one in some) for some in images
+    )  # fmt: skip
+
+
 def volumes_of_pieces(
     surfaces: Sequence[Surface], images: Sequence[Sequence[Surface]], period: Lengths | None
 ) -> tuple[tuple[Surface, ...], ...]:
@@ -228,25 +240,31 @@ def volumes_of_pieces(
     for i, (surface, some) in enumerate(zip(surfaces, images, strict=True)):
         name = f"surfaces[{i}]"
         if isinstance(surface, Joined):
-            found += _volumes_of_parts(surface, period, name) * len(some)
+            of_parts = _volumes_of_parts(surface, period, name)
+            found += [of_parts[place] for image in some for place in _places_of(image)]
         else:
             found += [volumes_of(surface, period, name)] * len(some)
     return tuple(found)
 
 
-def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> list[tuple[Surface, ...]]:
-    """Those of the surfaces of a union: what is open of the whole is open where it reaches each of them."""
-    pieces = union.surfaces()
-    for k, opening in enumerate(union.openings):
-        if not any(reaches(piece, volume_of(opening)) for piece in pieces):
-            raise SceneError(
-                f"{name}.openings[{k}] must reach the wall that it opens, got {opening}, in which no point of {name} "
-                f"({type(union).__name__}) is; move it, or make it larger"
-            )
-    found = []
-    for piece in pieces:
-        open_there = [one for one in piece.openings if one not in union.openings or reaches(piece, volume_of(one))]
-        found.append(volumes_of(replace(piece, openings=open_there), period, f"{name}.parts"))
+def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> dict[Place, tuple[Surface, ...]]:
+    """Those of the parts of a union: what is open of the whole is open where it reaches each of them."""
+    pieces, places = union.surfaces(), union.places()
+    for place, part in nodes_of(union):
+        # Of the whole by its number alone, as a surface without parts.
+        where = f"{name}{''.join(f'.parts[{k}]' for k in place)}"
+        mine = [piece for piece, at in zip(pieces, places, strict=True) if at[: len(place)] == place]
+        for k, opening in enumerate(part.openings):
+            # Of parts that leave no room there is no wall.
+            if mine and not any(reaches(piece, volume_of(opening)) for piece in mine):
+                raise SceneError(
+                    f"{where}.openings[{k}] must reach the wall that it opens, got {opening}, in which no point of "
+                    f"{where} ({type(part).__name__}) is; move it, or make it larger"
+                )
+    found: dict[Place, tuple[Surface, ...]] = {}
+    for piece, at in zip(pieces, places, strict=True):
+        open_there = [one for one in piece.openings if reaches(piece, volume_of(one))]
+        found[at] = volumes_of(replace(piece, openings=open_there), period, f"{name}.parts")
     return found
 
 

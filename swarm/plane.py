@@ -21,6 +21,7 @@ from .surfaces.fields.many import Many
 from .surfaces.outlines.outlined import Outlined
 from .surfaces.shapes.slab import AXES
 from .surfaces.surface import Surface
+from .surfaces.union import surfaces_of
 from .surfaces.upright import upright
 from .surfaces.wall_law import leave_of, tries_of
 
@@ -106,8 +107,9 @@ def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> Non
     """
     across = PLANES[plane]
     for i, surface in enumerate(surfaces):
-        _require_motion(plane, f"surfaces[{i}].motion", surface)
-        _require_laws(plane, f"surfaces[{i}].laws", surface)
+        for piece in surfaces_of(surface):
+            _require_motion(plane, f"surfaces[{i}].motion", piece)
+            _require_laws(plane, f"surfaces[{i}].laws", piece)
         if isinstance(surface, Mesh):
             raise SceneError(
                 f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got a Mesh, of '

@@ -12,6 +12,7 @@ from .errors import SceneError
 from .scene import Scene
 from .sources.source import Source
 from .surfaces.counter import Counter
+from .surfaces.union import nodes_of
 from .tables import convert, opening_of, surface_of, table_of, table_of_opening
 
 
@@ -50,7 +51,7 @@ def _counter_of(table: Any, where: str) -> Counter:
 
 
 def source_table(source: Source, scene: Scene) -> dict[str, Any]:
-    """The table of a source: a surface of the scene by its number, one of its openings by its own too."""
+    """The table of a source: a surface of the scene by its number, an opening by that, the part and its own number."""
     table = {name: value for name, value in vars(source).items() if value is not None and value != _DEFAULTS.get(name)}
     for name in ("where", "within"):
         if name in table and not isinstance(table[name], int):
@@ -62,8 +63,11 @@ def _place_table(place: Any, scene: Scene, name: str) -> Any:
     for i, surface in enumerate(scene.surfaces):
         if place is surface and name == "where":
             return i
-        if any(place is one for one in surface.openings):
-            return {"surface": i, "opening": [place is one for one in surface.openings].index(True)}
+        for at, one in nodes_of(surface):
+            for k, opening in enumerate(one.openings):
+                if place is opening:
+                    part = {"part": at[0] if len(at) == 1 else list(at)} if at else {}
+                    return {"surface": i, **part, "opening": k}
     return table_of_opening(place, None)
 
 
@@ -80,12 +84,21 @@ def _source_of(table: Any, where: str, scene: Scene) -> Source:
 
 
 def _place_of(given: Any, where: str, scene: Scene) -> Any:
-    """A surface, from its table or from its number in a scene, or one of the openings of one by both numbers."""
+    """A surface, from its table or its number in a scene, or an opening of a surface or of a part by their numbers."""
     if not isinstance(given, Mapping):
         return given
-    if set(given) != {"surface", "opening"}:
+    if "opening" not in given or "kind" in given:
         return opening_of(given, where)
+    keys = "surface", "part", "opening"
+    for key in given:
+        if key not in keys:
+            raise SceneError(f"{where}.{key}: unknown key, expected {listed(keys)}{closest(key, keys)}")
+    if "surface" not in given:
+        raise SceneError(f"{where}.surface: expected the number of a surface of the scene, got nothing")
     surface = _numbered(f"{where}.surface", given["surface"], scene.surfaces)
+    places = given.get("part", [])
+    for k in places if isinstance(places, list) else [places]:
+        surface = _numbered(f"{where}.part", k, getattr(surface, "parts", ()))
     return _numbered(f"{where}.opening", given["opening"], surface.openings)
 
 

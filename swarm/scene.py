@@ -16,7 +16,7 @@ from .errors import SceneError
 from .kernel.gravity import Gravity
 from .kernel.vector import Vec
 from .pairs import Pairs, checked_pairs
-from .pieces import Pieces, doorways_of_pieces, volumes_of_pieces
+from .pieces import Pieces, doorways_of_pieces, volumes_of_pieces, with_reach
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.doors import was_there
@@ -97,11 +97,12 @@ class Scene(Pieces):
             )
         named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
         images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
+        images = with_reach(images)
         checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, pairs=checked_pairs(pairs), _images=images)
         volumes = volumes_of_pieces(surfaces, images, lengths)
         checks.assign(self, _volumes=volumes, _doorways=doorways_of_pieces(images, volumes))
         self._require_few_walls("")
-        require_few((*self._volumes, *self._doorways))
+        require_few(self.openings() or ())
         for i in (*self._fields(), *self._unions()) if self.reacts() else ():
             raise SceneError(
                 f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where impacts move a surface, got "

@@ -105,7 +105,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
 
     def _require_rest(self, scene: Scene) -> None:
         """Raise a `SceneError` where a wall moves: steps that are cut at impacts, and exact ones, know none."""
-        for i, surface in enumerate(scene.surfaces):
+        for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
             if surface.motion is not None:
                 name, value = ("adaptive", True) if self.adaptive else ("on_unconverged", '"impact"')
                 raise SceneError(

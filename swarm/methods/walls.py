@@ -7,7 +7,7 @@ from ..surfaces.wall_law import lets_wait
 
 def require_no_waiting(scene: Scene) -> None:
     """Raise a `SceneError` where a law lets particles wait on its wall, and walls move."""
-    for i, surface in enumerate(scene.surfaces if scene.moves() else ()):
+    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True) if scene.moves() else ():
         for k, law in enumerate(surface.laws):
             if not isinstance(law, str) and lets_wait(law):
                 raise SceneError(
@@ -18,7 +18,7 @@ def require_no_waiting(scene: Scene) -> None:
 
 def require_reacting(scene: Scene) -> None:
     """Raise a `SceneError` where a law of a wall is none for scenes in which impacts move walls."""
-    for i, surface in enumerate(scene.surfaces):
+    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
         if surface.temperature is not None:
             raise SceneError(
                 f"surfaces[{i}].temperature must be None where a wall has a mass, got {surface.temperature:g}; heat "

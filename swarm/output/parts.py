@@ -29,6 +29,7 @@ class Cover:
         time: [s].
         is_room: whether it is a part beside the wall's in a union.
         first: whether it has what lies in both, so that two walls in one place are drawn once.
+        opens: whether it has a face in common with the wall's part, which is no wall.
         turn: +1 or -1, whether a way out of the wall is one of what the surface is to cover.
         side: +1 or -1, the sign of phi that is its gap.
     """
@@ -39,6 +40,7 @@ class Cover:
     time: float
     first: bool = False
     is_room: bool = False
+    opens: bool = False
     turn: float = 1.0
 
     def level(self, points: Floats, outwards: Floats, size: float) -> Floats:
@@ -49,7 +51,8 @@ class Cover:
         way = self.turn * _BESIDE * size * outwards
         # Of walls in one place one is drawn; none that two rooms without a volume in common would be between.
         if self.sign < 0.0:
-            return self._level(points - way if self.first else points, size)
+            here = self._level(points - way if self.first else points, size)
+            return np.maximum(here, self._level(points + way, size)) if self.opens else here
         before = self._level(points - way, size)
         return np.maximum(before, self._level(points + way, size)) if self.first else before
 
@@ -107,23 +110,31 @@ class Part:
 
 def parts_of(scene: Scene, time: float) -> list[Part]:
     """The parts of all surfaces at a time [s], in their order."""
-    found = _Found(time, scene.doorways_of_parts(), [])
+    found = _Found(time, scene.doorways_of_parts(), scene.common_faces(), [])
     for i, surface in enumerate(scene.surfaces):
         found.add(Part(i, (), surface, False, found.beside(scene.surfaces, i, 1.0)))
     return found.parts
 
 
 class _Found(NamedTuple):
-    """The parts that are found, and the volumes of doorways of each."""
+    """The parts that are found, the volumes of doorways of each, and which two have a face in common."""
 
     time: float
     doorways: dict[tuple[int, Place], list[Surface]]
+    common: list[tuple[int, Place, Place]]
     parts: list[Part]
 
-    def beside(self, surfaces: Sequence[Surface], k: int, sign: float) -> tuple[Cover, ...]:
-        """The covers of one of several surfaces, by the others."""
+    def _have_a_face(self, owner: int, one: Place, other: Place) -> bool:
+        """Whether a part of a surface, and another one, have a face in common that is no wall."""
+        return any(
+            i == owner and {pair[0][: len(one)], pair[1][: len(other)]} == {one, other} for i, *pair in self.common
+        )
+
+    def beside(self, surfaces: Sequence[Surface], k: int, sign: float, opened: Sequence[int] = ()) -> tuple[Cover, ...]:
+        """The covers of one of several surfaces, by the others, of which some have a face in common with it."""
         return tuple(
-            Cover(one, sign, side_of(one), self.time, first=j < k and not isinstance(one, Many), is_room=sign < 0.0)
+            Cover(one, sign, side_of(one), self.time, first=j < k and not isinstance(one, Many), is_room=sign < 0.0,
+                  opens=sign < 0.0 and j in opened)
             for j, one in enumerate(surfaces) if j != k and (sign < 0.0 or one.is_there(self.time))
         )  # fmt: skip
 
@@ -142,5 +153,7 @@ class _Found(NamedTuple):
         parts = [handed_down(whole, one) for one in whole.parts]
         turned = tuple(replace(one, turn=one.turn * side_of(whole)) for one in part.covers)
         for k, one in enumerate(parts):
-            covers = (*turned, *self.beside(parts, k, -1.0 if isinstance(whole, Union) else 1.0))
-            self.add(Part(part.owner, (*part.place, k), one, solid, covers))
+            place = (*part.place, k)
+            opened = [j for j in range(len(parts)) if self._have_a_face(part.owner, place, (*part.place, j))]
+            covers = (*turned, *self.beside(parts, k, -1.0 if isinstance(whole, Union) else 1.0, opened))
+            self.add(Part(part.owner, place, one, solid, covers))

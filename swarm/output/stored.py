@@ -89,7 +89,7 @@ class Stored:
         with self._reading("its scene") as file:
             table, arrays = parsed(self._text("scene")), file["parameters"].get(layout.ARRAYS, {})
             surfaces = [tables.with_arrays(surface, arrays) for surface in table["surface"]]
-            every = [one for surface in surfaces for one in (surface, *surface.get("openings", ()))]
+            every = [one for surface in surfaces for one in _nested(surface)]
             own = any(surface["kind"] == "own" or plugins.is_named(surface["kind"]) for surface in every)
         # An OwnSurface is not damage: the error says that no file holds it.
         with contextlib.nullcontext() if own else self._reading("its scene"):
@@ -167,6 +167,14 @@ def is_log(path: Path) -> bool:
 def _joins(file: h5py.File) -> bool:
     """Whether it has virtual datasets."""
     return bool(file.visititems(lambda _name, found: getattr(found, "is_virtual", False) or None))
+
+
+def _nested(table: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The table of a surface, and those of its openings, its parts and theirs."""
+    yield table
+    for key in tables.NESTED:
+        for one in table.get(key, ()):
+            yield from _nested(one)
 
 
 def times_of(file: Any, name: str, frames: int) -> NDArray[np.float64]:

@@ -69,7 +69,7 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
     scene = scene.of_balls(None if start is None else start.radius)
     if options.compile != "never":
         counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
-        walls = [one for surface in scene.surfaces for one in (surface, *surface.open_volumes())]
+        walls = [*scene.surfaces, *scene.open_volumes()]
         require_compiled([*walls, *counters])
     times = options.times
     _require_motions(scene, times.until)

@@ -8,6 +8,7 @@ import numpy as np
 from ..methods import Impact
 from ..methods.verlet import Verlet
 from ..scene import Scene
+from ..surfaces.union import Joined
 from . import workload
 from .options import Task
 from .overlaps import warn_of_overlap
@@ -26,6 +27,7 @@ _LOOKED_AT = 1000
 def give(task: Task) -> None:
     """Warn of what the run will do that may not be meant. Nothing of it is wrong."""
     warn_of_overlap(task.scene)
+    _warn_of_faces(task.scene)
     _warn_of_fall(task.scene)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
         # About the fastest: of some.
@@ -62,6 +64,17 @@ def _warn_of_fall(scene: Scene) -> None:
                 k, pull, k, length, abs(pull) * length,
             )  # fmt: skip
             return
+
+
+def _warn_of_faces(scene: Scene) -> None:
+    """Warn where parts of a union touch at the start and do not move as one: a face is open where both have it."""
+    for i, surface in enumerate(scene.surfaces):
+        for one, other in surface.moving_apart() if isinstance(surface, Joined) and len(surface.rooms) > 1 else ():
+            _LOG.warning(
+                "surfaces[%d] has parts with a face in common at the start that do not move as one, %.100r and %.100r: "
+                "there is a wall between them while they only touch; let them overlap where they are to be one room",
+                i, one, other,
+            )  # fmt: skip
 
 
 def _warn_of_rest(task: Task) -> None:

@@ -16,7 +16,7 @@ from .options import RunOptions
 
 def require_walls_of_bodies(scene: Scene) -> None:
     """Raise a `SceneError` where a wall is none for bodies."""
-    for i, surface in enumerate(scene.surfaces):
+    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
         if surface.temperature is not None:
             raise SceneError(f"surfaces[{i}].temperature must be None with bodies, got {surface.temperature:g}")
         if surface.laws:

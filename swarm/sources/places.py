@@ -11,7 +11,7 @@ from ..surfaces.doors import Opening
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.instant import gaps_of, side_of
 from ..surfaces.surface import Surface, volume_of
-from ..surfaces.union import Joined
+from ..surfaces.union import Joined, surfaces_of
 from .pieces import NEAR, Floats, Piece, Random, distances, pieces_of, points_of
 from .source import Source
 
@@ -35,14 +35,15 @@ class Place(NamedTuple):
         number: of the surface of the scene that it is, None where it is none of them.
         volume: whether they are born in its volume.
         only: the surfaces on whose admissible sides births are.
-        holes: in which they are not.
+        walls: the surfaces of which it is made that births are on, each with the volumes in which they are not; none:
+            on all of it.
     """
 
     surface: Surface
     number: int | None
     volume: bool
     only: tuple[Surface, ...]
-    holes: tuple[Surface, ...]
+    walls: tuple[tuple[Surface, tuple[Surface, ...]], ...]
 
 
 def place_of(scene: Scene, source: Source, name: str) -> Place:
@@ -63,9 +64,13 @@ def place_of(scene: Scene, source: Source, name: str) -> Place:
     for i, surface in enumerate(scene.surfaces):
         if _is_same(surface, where):
             return _of_wall(scene, i, source.volume, only, name)
-        if not source.volume and any(_is_same(opening, where) for opening in surface.openings):
+        if source.volume:
+            continue
+        # What is given to a whole, or to a part of it, its surfaces have too.
+        opened = [one for one in surfaces_of(surface) if any(_is_opening(opening, where) for opening in one.openings)]
+        if opened:
             found = _of_wall(scene, i, False, (*only, _volume(where)), name)
-            return found._replace(holes=())
+            return found._replace(walls=tuple((one, ()) for one in opened))
     if isinstance(where, Opening):
         raise SceneError(f"{name}.where must be one of the openings of the scene's surfaces, got {where!r:.200}")
     _require_at_rest(where, name)
@@ -85,11 +90,22 @@ def _is_same(one: Any, other: Any) -> bool:
         return False
 
 
+def _is_opening(opening: Surface | Opening, where: Any) -> bool:
+    """Whether this opening, or the volume of this one through which particles escape, is the place of a source."""
+    volume = opening.surface if isinstance(opening, Opening) and not opening.between else None
+    return _is_same(opening, where) or (volume is not None and _is_same(volume, where))
+
+
 def _of_wall(scene: Scene, i: int, volume: bool, only: tuple[Surface, ...], name: str) -> Place:
     surface = scene.surfaces[i]
     _require_at_rest(surface, f"{name}.where = surfaces[{i}]")
-    holes = () if volume else tuple(volume_of(one) for one in surface.openings if not getattr(one, "between", False))
-    return Place(surface, i, volume, only, holes)
+    walls = tuple((one, _holes(one)) for one in surfaces_of(surface))
+    return Place(surface, i, volume, only, () if volume or not any(holes for _one, holes in walls) else walls)
+
+
+def _holes(surface: Surface) -> tuple[Surface, ...]:
+    """The volumes in which a surface is open, but for those that open walls between rooms alone."""
+    return tuple(volume_of(one) for one in surface.openings if not getattr(one, "between", False))
 
 
 def changes(surface: Surface) -> bool:
@@ -202,9 +218,7 @@ class Points:
             points = self._on(surface, points)
             points = points[:, np.abs(distances(surface, points)) <= _ROUND_OFF * self._extent]
         points = points[:, self._is_wanted(points)]
-        if self._place.holes:
-            shut = [self._gap(hole, points) > 0.0 for hole in self._place.holes]
-            points = points[:, np.logical_and.reduce(shut)]
+        points = points[:, self._is_on_walls(points)]
         normals = self._normals(surface, points)
         if isinstance(surface, Joined):
             once = self._is_wall_once(surface, points, normals, random)
@@ -212,6 +226,19 @@ class Points:
         if self._scene.period is not None:
             points, _image = self._scene.wrapped(points)
         return np.concatenate([points, normals])[:, self._admits(points, _ROUND_OFF * self._extent)]
+
+    def _is_on_walls(self, points: Floats) -> NDArray[np.bool_]:
+        """Which points of the surface are on one of its walls that is not open there."""
+        walls = self._place.walls
+        found = np.full(points.shape[1], not walls)
+        for surface, holes in walls:
+            here = np.ones(points.shape[1], np.bool_)
+            if isinstance(self._place.surface, Joined):
+                here = np.abs(distances(surface, points)) <= _ROUND_OFF * self._extent
+            for hole in holes:
+                here &= self._gap(hole, points) > 0.0
+            found |= here
+        return found
 
     def _is_wall_once(self, surface: Joined, points: Floats, normals: Floats, random: Random) -> NDArray[np.bool_]:
         """Which points of a union are on its walls, not where two parts touch, and each as often as if by one part."""

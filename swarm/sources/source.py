@@ -26,8 +26,8 @@ class Source:
 
     Args:
         where: a surface of the scene, or its number: births on it, uniform in its area, into the vessel. Or one of the
-            openings of a surface: births on that surface where it is open. Or any other surface: births on it as far as
-            it is in the vessel, to its admissible side.
+            openings of a surface, or of a part of it: births on the surface to which it was given, where that is open.
+            Or any other surface: births on it as far as it is in the vessel, to its admissible side.
         volume: True: births uniform in the part of the vessel on the admissible side of `where`.
         within: a surface on whose admissible side births are, so that a part of a wall is a source; None: everywhere.
         rate: births a second, a Poisson process from `start` to `stop`. Or

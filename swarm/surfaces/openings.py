@@ -6,6 +6,7 @@ and the like) it is the inside of each.
 
 import itertools
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -17,13 +18,15 @@ from ..errors import SceneError
 from ..kernel.jit import select
 from ..kernel.record import Record
 from . import required
-from .doors import Timed, is_there, was_there
+from .doors import Spans, Timed, is_there, was_there
 from .fields.grouped import by_kind
-from .fields.many import Many
+from .fields.many import Many, members_of
+from .fields.members import Members, can_be_member, kind_of
 from .images import Lengths, images_of
 from .instant import has_room, side_of
 from .outlines.outlined import Outlined
 from .surface import Surface
+from .union import Joined
 from .walls import Field, Walls, all_walls
 
 # Most walls that all openings of a scene may be compiled for.
@@ -52,28 +55,73 @@ class Doorway(Opened):
 
 
 def openings_in(
-    spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]], moment: float, kind: type[Opened] = Opened
+    spans: Sequence[tuple[int, int]], given: Sequence[Sequence[Sequence[Surface]]], moment: float
 ) -> tuple[Opened, ...]:
     """The openings of the walls of a scene as kernels take them.
 
-    `spans` are (piece, walls in a row that are of it), `volumes` what is open in each piece; they are those of the
-    frame, or the piece of one, that ends at a moment [s].
+    `spans` are (piece, walls in a row that are of it), `given` the volumes in which each piece is open, and those in
+    which it is open where another room is behind it; they are those of the frame, or the piece of one, that ends at a
+    moment [s].
     """
+    made = _runs_of(spans, given, moment, False)
+    return made if compiled(made) <= _MOST else _runs_of(spans, given, moment, True)
+
+
+def compiled(openings: Sequence[Opened]) -> int:
+    """The number of walls of volumes that kernels are compiled for: one for a field, and once for walls in a row."""
+    volumes = (one.volume if isinstance(one, Timed) else one for opened in openings for one in opened.volumes)
+    return sum(1 if isinstance(one, Field) else len(one.each) for one in volumes)
+
+
+def _runs_of(
+    spans: Sequence[tuple[int, int]], given: Sequence[Sequence[Sequence[Surface]]], moment: float, together: bool
+) -> tuple[Opened, ...]:
+    exits, doorways = given
+    return (
+        *_opened(spans, exits, moment, Opened, together),
+        *_opened(spans, doorways, moment, Doorway, together),
+    )
+
+
+def _opened(
+    spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]], moment: float, kind: type[Opened],
+    together: bool,
+) -> tuple[Opened, ...]:  # fmt: skip
+    """The openings of one kind; volumes of one kind are one field if they are taken `together`."""
     runs, number = [], 0
     for given, some in itertools.groupby(spans, lambda span: volumes[span[0]]):
         first, number = number, number + sum(walls for _piece, walls in some)
-        runs += [kind(_taken(given, moment), float(first), float(number))] if given else []
+        runs += [kind(_taken(given, moment, together), float(first), float(number))] if given else []
     return tuple(reversed(by_kind(runs, lambda run: run.volumes)))
 
 
-def _taken(volumes: Sequence[Surface], moment: float) -> tuple[Any, ...]:
-    ordered = reversed(by_kind(volumes, lambda volume: (volume.walls(), volume.present is None)))
-    return tuple(_volume(one, moment) for one in ordered)
+def _taken(volumes: Sequence[Surface], moment: float, together: bool = False) -> tuple[Any, ...]:
+    fields, rest = _fields_of(volumes) if together else ([], volumes)
+    ordered = reversed(by_kind(rest, lambda volume: (volume.walls(), volume.present is None)))
+    alone = tuple(_timed(Field(one.members) if isinstance(one, Many) else all_walls([one]), one.present, moment)
+                  for one in ordered)  # fmt: skip
+    return (*(_timed(Field(members), present, moment) for members, present in fields), *alone)
 
 
-def _volume(surface: Surface, moment: float) -> Any:
-    volume = Field(surface.members) if isinstance(surface, Many) else all_walls([surface])
-    return volume if surface.present is None else Timed(volume, float(was_there(surface.present, moment)))
+def _timed(volume: Any, present: Spans, moment: float) -> Any:
+    return volume if present is None else Timed(volume, float(was_there(present, moment)))
+
+
+def _fields_of(volumes: Sequence[Surface]) -> tuple[list[tuple[Members, Spans]], list[Surface]]:
+    """Several volumes of one kind, which are open at the same times, as the insides of the solids of a field each.
+
+    And the others.
+    """
+    found: dict[Any, list[Surface]] = defaultdict(list)
+    rest = []
+    for one in volumes:
+        solid = replace(one, side="outside") if getattr(one, "side", None) == "inside" else None  # type: ignore[call-arg]
+        walls = () if solid is None or isinstance(one, (Many, Joined)) else solid.walls()
+        if solid is not None and len(walls) == 1 and can_be_member(walls[0]):
+            found[kind_of(walls[0]), one.present].append(solid)
+        else:
+            rest.append(one)
+    return [(members_of(solids, None), present) for (_kind, present), solids in found.items()], rest
 
 
 def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
@@ -135,13 +183,15 @@ def _images(opening: Surface, period: Lengths, name: str) -> list[Surface]:
     return [replace(image, side="inside") for image in images_of(solid, period, name)]  # type: ignore[call-arg]
 
 
-def require_few(volumes: Sequence[Sequence[Surface]]) -> None:
+def require_few(openings: Sequence[Opened]) -> None:
     """Raise a `SceneError` where there are more openings than kernels can be compiled for."""
-    walls = sum(len(volume.walls()) for given in volumes for volume in given)
+    walls = compiled(openings)
     if walls > _MOST:
+        volumes = sum(len(opened.volumes) for opened in openings)
         raise SceneError(
-            f"openings must have at most {_MOST} walls in all, got {walls}: each is compiled into the kernels; of many "
-            "openings of one kind make one of many bodies, such as swarm.Spheres, in each of which the wall is open"
+            f"openings must have at most {_MOST} walls in all, got {walls}, of {volumes} volumes of {len(openings)} "
+            "rows of walls: each is compiled into the kernels, once for every row of walls that has it; use volumes of "
+            "fewer kinds, such as spheres alone, or give the same openings to all parts"
         )
 
 

@@ -40,6 +40,7 @@ from .flights import Hit
 from .gaps import Beside, Gap, Gaps, longer, over_faces
 from .images import Lengths, body_of, is_same_along
 from .surface import Surface
+from .union import surfaces_of
 
 Floats = NDArray[np.float64]
 
@@ -182,7 +183,7 @@ def cell_in(
         largest: the largest radius of a ball [m], 0 of points.
     """
     # The places of openings are known in the cell alone.
-    if any(one.openings for one in surfaces):
+    if any(piece.openings for one in surfaces for piece in surfaces_of(one)):
         return Period(*period, fall)
     free = [not fields and length is not None and _are_same(surfaces, [k], period) for k, length in enumerate(period)]
     x, y, z = (Free(length) if is_free and length else length for length, is_free in zip(period, free, strict=True))

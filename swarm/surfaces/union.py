@@ -5,8 +5,10 @@ surfaces. The *gap* of a part is its phi with the sign of its side, that of a ro
 that of the whole the least gap of its rooms.
 """
 
+import copy
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -22,6 +24,7 @@ from .fields.many import Many
 from .instant import side_of
 from .part import checked_parts, handed_down, other_side
 from .room import Floats, Room, has_volume, lasting, may_have_volume, room_bounds
+from .seams import Seam, joined, seams_of
 from .surface import UNBOUNDED, Box, Surface
 
 # The number of a part, and of a part of this.
@@ -40,6 +43,8 @@ class Joined(Surface):
 
     # The operation of the gaps of parts.
     _of_gaps: ClassVar[Any] = None
+    # In a scene, by how much its rooms overlap where they have a face in common [m]; None: they touch.
+    reach: ClassVar[float | None] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -95,7 +100,40 @@ class Joined(Surface):
             for surface, place in room:
                 rooms[-1].setdefault(surface, place)
         # What parts have in common may be nothing.
-        return tuple(room for room in rooms if may_have_volume(tuple(room))) if len(rooms) > 1 else tuple(rooms)
+        rooms = [room for room in rooms if may_have_volume(tuple(room))] if len(rooms) > 1 else rooms
+        return tuple(rooms if self.reach is None else joined(rooms, self.seams, self.reach))
+
+    @cached_property
+    def seams(self) -> list[Seam]:
+        """The faces that its rooms have in common, and that are no walls."""
+        return [seam for seam in self._touching if seam.together]
+
+    @cached_property
+    def _touching(self) -> list[Seam]:
+        return seams_of(self.rooms)
+
+    def moving_apart(self) -> list[tuple[Surface, Surface]]:
+        """The surfaces of its rooms that have a face in common at the start, of which each has a motion of its own."""
+        ends = [zip(seam.rooms, seam.surfaces, strict=True) for seam in self._touching if not seam.together]
+        return [(self.rooms[i][a], self.rooms[k][b]) for (i, a), (k, b) in ends]
+
+    def common_places(self) -> list[tuple[Place, Place]]:
+        """The places of the parts that have a face in common, two by two."""
+        if self.reach is None:
+            return []
+        places = [tuple(room.values()) for room in self._places_in_rooms]
+        pairs = (zip(seam.rooms, seam.surfaces, strict=True) for seam in self.seams)
+        return [(places[i][a], places[k][b]) for (i, a), (k, b) in pairs]
+
+    def reaching(self, reach: float) -> "Joined":
+        """The same whose rooms overlap by so much [m] where they have a face in common; itself where none have."""
+        if len(self.rooms) < 2 or not self.seams:
+            return self
+        made = copy.copy(self)
+        for name in ("rooms", "_places_in_rooms"):
+            made.__dict__.pop(name, None)
+        object.__setattr__(made, "reach", reach)
+        return made
 
     def _rooms(self, turned: bool) -> list[tuple[tuple[Surface, Place], ...]]:
         """The surfaces and places of rooms, or of those of what is not admissible."""
@@ -193,9 +231,10 @@ class Joined(Surface):
 class Union(Joined):
     """A vessel of several parts, which may overlap: who is in one of them is in the vessel.
 
-    A wall is there where it is in no other part. Parts that do not touch are separate rooms, and so are parts that
-    touch without overlapping: between them is a wall of no thickness. Each part has its laws, temperature, motion and
-    openings; what is given to the union holds for the parts that leave it out.
+    A wall is there where it is in no other part. Parts that have a flat or a round face in common, to 4 roundings of
+    the size, are one room, and parts that do not touch separate ones. An `Opening` in a common face is a door: the rest
+    of the face is a wall of no thickness then. Each part has its laws, temperature, motion and openings; what is given
+    to the union holds for the parts that leave it out.
 
     In a scene file: kind = "union" and [[surface.part]] tables.
 
@@ -244,6 +283,19 @@ class Intersection(Joined):
 
 def _moves(part: Surface) -> bool:
     return part.motion is not None or (isinstance(part, Joined) and any(map(_moves, part.parts)))
+
+
+def nodes_of(surface: Surface) -> Iterator[tuple[Place, Surface]]:
+    """A surface, at no place, and all parts of it and of its parts, each as given, with its place."""
+    yield (), surface
+    for k, part in enumerate(surface.parts if isinstance(surface, Joined) else ()):
+        for place, one in nodes_of(part):
+            yield (k, *place), one
+
+
+def surfaces_of(surface: Surface) -> tuple[Surface, ...]:
+    """The surfaces of which a surface is made, with what is given to the whole; itself alone where it has no parts."""
+    return surface.surfaces() if isinstance(surface, Joined) else (surface,)
 
 
 def part_at(surface: Surface, place: Place) -> Surface:

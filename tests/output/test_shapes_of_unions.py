@@ -36,9 +36,17 @@ SCENES = {
         [swarm.Union([BOX, swarm.Box((0.5, 0.5, 0.5), (0.7, 0.0, 0.0))])],
         {"0_union_0_box": 5.0, "0_union_1_box": 3.8},
     ),
-    "boxes that touch, which are separate": (
+    "boxes with a common face, which are one room": (
         [swarm.Union([BOX, swarm.Box((0.5, 0.5, 0.5), (1.0, 0.0, 0.0))])],
-        {"0_union_0_box": 6.0, "0_union_1_box": 6.0},
+        {"0_union_0_box": 5.0, "0_union_1_box": 5.0},
+    ),
+    "boxes with a part of a face in common": (
+        [swarm.Union([BOX, swarm.Intersection([swarm.Box((0.5, 0.5, 0.5), (1.0, 0.5, 0.0))])])],
+        {"0_union_0_box": 5.5, "0_union_1_0_box": 5.5},
+    ),
+    "a ball in a box around it, which it fills": (
+        [swarm.Union([BALL, swarm.Intersection([swarm.Box((1.0, 1.0, 1.0)), swarm.Sphere(0.5, side="outside")])])],
+        {"0_union_0_sphere": 0.0, "0_union_1_0_box": 24.0, "0_union_1_1_sphere": 0.0},
     ),
     "a slanted tube of 2 %": (
         [swarm.Union([BOX, swarm.Cylinder(0.01, (1.0, 1.0, 1.0), 4.0), swarm.Box((0.2, 0.2, 0.2), (1.0, 1.0, 1.0))])],

@@ -174,6 +174,7 @@ def frames_of(surfaces, position, velocity, until, every, folder, gravity=(0.0, 
     """(scene, result, positions, velocities) of a run, the last two (frames, 3, N)."""
     scene = swarm.Scene(surfaces, gravity)
     start = swarm.Particles(np.array(position, float).T, np.array(velocity, float).T)
+    folder.mkdir(exist_ok=True)
     path = folder / "run.h5"
     result = swarm.simulate(scene, start, swarm.Impact(), until=until, every=every, trajectory=path, threads=1)
     with swarm.load(path) as run:
@@ -223,12 +224,21 @@ def test_what_slides_against_the_wall_of_its_room_stops_there(tmp_path):
     assert result.observables["impacts"][-1] == 1
 
 
-def test_rooms_that_touch_are_separate(tmp_path):
-    """Between two boxes that share a face is a wall of no thickness, for what flies and for what slides."""
+def test_rooms_with_a_common_face_are_one(tmp_path):
+    """For what flies and for what slides; a door in the face, here one that is shut, keeps them apart."""
     next_one = swarm.Box((1.0, 0.5, 0.5), (2.0, 0.0, 0.0))
     rows = [[0.5, 0.0, -0.5], [0.5, 0.1, 0.1], [1.5, 0.1, 0.1], [1.5, 0.0, -0.5]]
     pace = [[1.0, 0.0, 0.0], [1.0, 0.1, 0.2], [-1.0, 0.1, 0.2], [-1.0, 0.0, 0.0]]
-    _scene, _result, x, v = frames_of([swarm.Union([FLOOR, next_one])], rows, pace, 5.0, 0.1, tmp_path)
+    _scene, _result, x, _v = frames_of([swarm.Union([FLOOR, next_one])], rows, pace, 5.0, 0.1, tmp_path)
+    _scene, _result, whole, _v = frames_of(
+        [swarm.Box((2.0, 0.5, 0.5), (1.0, 0.0, 0.0))], rows, pace, 5.0, 0.1, tmp_path / "whole"
+    )
+    assert x[..., [0, 3]] == pytest.approx(whole[..., [0, 3]], abs=1e-9)
+    assert x[:20] == pytest.approx(whole[:20], abs=1e-9)
+    door = swarm.Opening(swarm.Box((0.1, 0.1, 0.1), (1.0, 0.0, 0.0)), times=[(9.0, 10.0)], between=True)
+    _scene, _result, x, v = frames_of(
+        [swarm.Union([FLOOR, next_one], openings=[door])], rows, pace, 5.0, 0.1, tmp_path / "apart"
+    )
     assert (x[:, 0, :2] <= 1.0 + 1e-12).all()
     assert (x[:, 0, 2:] >= 1.0 - 1e-12).all()
     assert (v[:, 0, 0] < 0.0).any()

@@ -7,7 +7,7 @@ import pytest
 import tomli_w
 
 import swarm
-from swarm import tables
+from swarm import packing, run_tables, tables
 from swarm.surfaces.instant import side_of
 
 TUBE = swarm.Cylinder(0.2, (1.0, 0.0, 0.0), 1.0, (0.8, 0.0, 0.0))
@@ -164,3 +164,103 @@ def test_a_table_names_the_part_that_is_wrong():
         tables.scene_of([table], None)
     with pytest.raises(swarm.SceneError, match=r"surface\[0\].part: expected \[\[surface.part\]\] tables"):
         tables.scene_of([{"kind": "union", "part": 3}], None)
+
+
+# --- What is given to a part is found in it ----------------------------------------------------------------
+
+HOLE = swarm.Sphere(0.2, (0.0, 0.0, 0.5))
+OPEN_ROOM = swarm.Intersection([swarm.Box((0.5, 0.5, 0.5), openings=[HOLE])])
+
+
+def _with_bodies():
+    bodies = swarm.place(swarm.Scene([swarm.Box((0.5, 0.5, 0.5))]), swarm.dumbbell(0.1, 1.0), 2, seed=1)
+    swarm.simulate(swarm.Scene([OPEN_ROOM]), bodies, swarm.Impact(dt=1e-2), until=0.01, compile="never")
+
+
+def _one_contact_step():
+    ball = swarm.Intersection([swarm.Sphere(0.5, motion=swarm.Translation((1.0, 0.0, 0.0)))])
+    method = swarm.AugmentedLagrangian(dt=0.025, penalty=1e4)
+    swarm.contact_history(swarm.Scene([ball]), (0.4, 0.3, 0.0), (0.3, 0.4, 0.0), 1.0, method)
+
+
+def _cut_steps():
+    ball = swarm.Intersection([swarm.Sphere(0.5, motion=swarm.Translation((1.0, 0.0, 0.0)))])
+    method = swarm.AugmentedLagrangian(dt=0.025, penalty=1e4, adaptive=True)
+    swarm.simulate(swarm.Scene([ball]), swarm.Particles([[0.0]] * 3, [[1.0]] * 3), method, until=0.1, compile="never")
+
+
+def _out_of_the_plane():
+    tube = swarm.Cylinder(0.5, motion=swarm.Translation((0.0, 0.0, 1.0)))
+    swarm.Scene([swarm.Union([tube, swarm.Cylinder(0.5, center=(0.6, 0.0, 0.0))])], plane="z")
+
+
+def _beside_a_wall_with_a_mass():
+    piston = swarm.Plane((1.0, 0.0, 0.0), 0.2, mass=1.0)
+    start = swarm.Particles([[0.0]] * 3, [[1.0]] * 3)
+    swarm.simulate(swarm.Scene([OPEN_ROOM, piston]), start, swarm.Impact(), until=0.1, compile="never")
+
+
+@pytest.mark.parametrize(
+    ("run", "said"),
+    [
+        (_with_bodies, r"surfaces\[0\].openings must be left out with bodies"),
+        (_one_contact_step, r"surfaces\[0\] must be at rest, without motion"),
+        (_cut_steps, r"surfaces\[0\].motion must be None with adaptive = True"),
+        (_out_of_the_plane, r"surfaces\[0\].motion must stay in the plane"),
+        (_beside_a_wall_with_a_mass, r"surfaces\[0\].openings must be left out where a wall has a mass"),
+    ],
+)
+def test_what_does_not_go_with_a_run_is_found_in_a_part(run, said):
+    with pytest.raises(swarm.SceneError, match=said):
+        run()
+
+
+def test_with_an_opening_of_a_part_a_flight_ends_in_its_cell():
+    """Where every cell has its image of the opening."""
+    for whole in (lambda one: one, lambda one: swarm.Intersection([one])):
+        tube = whole(
+            swarm.Cylinder(0.4, (1, 0, 0), center=(0, 0.5, 0.5), openings=[swarm.Sphere(0.1, (0.5, 0.9, 0.5))])
+        )
+        start = swarm.Particles([[0.1], [0.5], [0.5]], [[1.4], [0.4], [0.0]])
+        scene = swarm.Scene([tube], period=(1.0, None, None))
+        seen = swarm.simulate(scene, start, swarm.Impact(), until=2.0, compile="never")
+        assert seen.escape_time[0] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_balls_are_packed_within_the_openings_of_parts():
+    scene = packing._at_rest(swarm.Scene([OPEN_ROOM]))
+    assert scene.openings() is None
+
+
+def test_an_opening_of_a_nested_part_opens_that_part_alone():
+    """Other parts of the same union need not reach it; one that reaches none of them is an error that names it."""
+    room = swarm.Union(
+        [swarm.Union([OPEN_ROOM, swarm.Sphere(0.2, (0.0, 0.0, -0.5))]), swarm.Sphere(0.3, (0.6, 0.0, 0.0))]
+    )
+    scene = swarm.Scene([room])
+    assert [bool(volumes) for volumes in scene._volumes] == [True, False, False]
+    inner = swarm.Union(
+        [swarm.Sphere(0.5), swarm.Sphere(0.3, (0.5, 0.0, 0.0))], openings=[swarm.Sphere(0.1, (3.0, 0.0, 0.0))]
+    )
+    with pytest.raises(
+        swarm.SceneError, match=r"surfaces\[0\].parts\[1\].openings\[0\] must reach the wall that it opens"
+    ):
+        swarm.Scene([swarm.Union([swarm.Sphere(0.5), inner])])
+
+
+def test_a_scene_file_names_the_opening_of_a_part():
+    room = swarm.Scene([swarm.Union([swarm.Sphere(0.5), swarm.Union([OPEN_ROOM])])])
+    source = {"count": 1, "speed": 1.0}
+    place = {"surface": 0, "part": [1, 0, 0], "opening": 0}
+    (made,) = run_tables.sources_of([{**source, "where": place}], room)
+    assert made.where is HOLE
+    assert run_tables.source_table(made, room)["where"] == place
+    for wrong, said in (
+        ({**place, "part": 2}, r"source\[0\].where.part: expected a number from 0 to 1, got 2"),
+        ({**place, "part": [1, 0, 0, 0]}, r"source\[0\].where.part: expected none, as there are none, got 0"),
+        ({**place, "part": 1}, r"source\[0\].where.opening: expected none, as there are none, got 0"),
+        ({**place, "prat": 1}, r"source\[0\].where.prat: unknown key"),
+        ({"opening": 0}, r"source\[0\].where.surface: expected the number of a surface"),
+    ):
+        with pytest.raises(swarm.SceneError, match=said):
+            run_tables.sources_of([{**source, "where": wrong}], room)
