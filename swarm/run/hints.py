@@ -8,7 +8,7 @@ import numpy as np
 from ..methods import Impact
 from ..methods.verlet import Verlet
 from ..scene import Scene
-from . import workload
+from . import sinking, workload
 from .options import Task
 from .overlaps import warn_of_overlap
 
@@ -27,6 +27,7 @@ def give(task: Task) -> None:
     """Warn of what the run will do that may not be meant. Nothing of it is wrong."""
     warn_of_overlap(task.scene)
     _warn_of_fall(task.scene)
+    sinking.warn_of_depths(task)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
         # About the fastest: of some.
         some = task.particles.velocity[:, _some(len(task.particles))]
