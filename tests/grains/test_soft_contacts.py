@@ -9,6 +9,7 @@ from grains_runs import ran
 import swarm
 from swarm import RunError, SceneError
 from swarm.output.content import Content
+from swarm.output.series import lines_of
 from swarm.output.verdicts import judged
 from swarm.run import sinking
 from swarm.summary import numbers, of_trajectory
@@ -225,6 +226,8 @@ def test_an_overlap_is_in_files_and_in_verdicts(tmp_path):
         assert trajectory.to_xarray().largest_overlap.attrs["units"] == "m"
         assert "largest_overlap" in trajectory.table()
     assert numbers(path)["largest_overlap"] == deepest
+    drawn = {line.path: line.observable for line in lines_of(scene, SOFT, [], None, result.observables)}
+    assert drawn["/overlap"] == "largest_overlap"
     percent = f"{100.0 * deepest / RADIUS:.2g} %"
     assert of_trajectory(path)["largest overlap"] == f"{deepest:.1e} m, {percent} of the smallest radius"
     content = Content("", scene, SOFT, None, 2, dict(result.observables), {"end": result.particles})
@@ -234,3 +237,41 @@ def test_an_overlap_is_in_files_and_in_verdicts(tmp_path):
     content.seen["largest_overlap"] = 0.4 * content.seen["largest_overlap"]
     (told,) = [one for one in judged(content) if one.about == "contacts"]
     assert told.holds is True
+
+
+# --- Everywhere -------------------------------------------------------------------------------------------
+
+MOVING = swarm.Box((0.1, 0.1, 0.1), side="outside", motion=swarm.Translation((-5.0, 0.0, 0.0)))
+INSIDE = swarm.Mesh(2.0 * CORNERS / HALF, SIDES)
+SOFT_WALLS = {
+    "a wall that moves": (swarm.Scene([ROOM, MOVING]), (-0.2, 0.0, 0.0), (0.0, 0.0, 0.0), r"surfaces\[1\] \(Box\)"),
+    "a vessel from a mesh": (swarm.Scene([INSIDE]), (-1.9, 0.3, 0.2), (-5.0, 0.0, 0.0), r"surfaces\[0\] \(Mesh\)"),
+    "a plane": (
+        swarm.Scene([ROOM, swarm.Box((1.0, 1.0, 1.0))], plane="z"), (0.95, 0.0, 0.0), (5.0, 0.0, 0.0), r"surfaces\[1\]"
+    ),
+    "a cell that repeats": (
+        swarm.Scene([swarm.Slab((1.0, 0.0, 0.0), 1.0)], period=(None, 1.0, 1.0)), (0.95, 0.5, 0.5), (5.0, 0.0, 0.0),
+        r"surfaces\[0\] \(Slab\)",
+    ),
+    "a floor under gravity": (
+        swarm.Scene([swarm.Plane((0.0, 0.0, -1.0))], (0.0, 0.0, -1000.0)), (0.0, 0.0, 0.05), (0.0, 0.0, 0.0),
+        r"surfaces\[0\] \(Plane\)",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SOFT_WALLS)
+def test_no_wall_is_passed(name):
+    scene, place, velocity, wall = SOFT_WALLS[name]
+    start = swarm.Particles(np.array([place]).T, np.array([velocity]).T, MASS, radius=RADIUS)
+    with pytest.raises(RunError, match=rf"it overlaps {wall}.* m, more than its radius, 0\.01 m"):
+        ran(scene, start, SOFT, 0.05, every=1e-3)
+
+
+def test_balls_meet_across_the_faces_of_a_cell():
+    scene = swarm.Scene([], period=(1.0, 1.0, 1.0))
+    start = swarm.Particles(
+        [[0.02, 0.98], [0.5, 0.5], [0.5, 0.5]], [[-10.0, 10.0], [0.0] * 2, [0.0] * 2], MASS, radius=RADIUS
+    )
+    with pytest.raises(RunError, match="it overlaps particle"):
+        ran(scene, start, SOFT, 0.01)
