@@ -6,6 +6,9 @@ from typing import Any
 from . import checks
 from .errors import SceneError
 
+# Of soft contacts: the largest overlap that a start may have, as a part of the radius of the smaller ball.
+MOST_PRESSED = 0.2
+
 
 @dataclass(frozen=True)
 class Pairs:

@@ -27,6 +27,7 @@ def numbers(trajectory: Path) -> dict[str, Any]:
         "energy_drift": drift(seen),
         "energy_error": float(seen["energy_error"].max()),
         "max_penetration": float(seen["max_penetration"].max()),
+        **({"largest_overlap": float(seen["largest_overlap"].max())} if "largest_overlap" in seen else {}),
         "dissipated_energy": float(seen["dissipated_energy"][-1]),
         # Files of older versions have none of these, or only those of bodies.
         "link_error": float(np.max(seen.get("link_error", 0.0))),
@@ -97,7 +98,7 @@ def of_result(result: Result, volume: float | None) -> dict[str, str]:
     return {
         **({} if volume is None else {"volume": f"{volume:.4g} m^3"}),
         **facts.of_meshes(result.scene),
-        **facts.of_run(seen),
+        **facts.of_run(seen, result.particles.radius),
         "wall time": f"{result.wall_time:.2f} s{compiled}, {rate:.3g} impacts/s",
         "trajectory": f"{result.trajectory} ({len(seen['time'])} frames)",
     }

@@ -17,7 +17,7 @@ _MAIN = {
     "kinetic_energy": "J", "total_energy": "J", "dissipated_energy": "J", "pressure": "Pa", "impacts": "",
     "collisions": "", "escaped": "", "absorbed": "", "born": "", "crossings": "", "wall_heat": "J", "wall_work": "J",
     "work": "J", "source_energy": "J", "potential_energy": "J", "sliding": "", "impulse": "N s", "energy_error": "",
-    "max_penetration": "m",
+    "max_penetration": "m", "largest_overlap": "m",
 }  # fmt: skip
 # Numbers that differ by less, as a part of the largest, are one; errors below are those of round-off.
 _SAME, _ROUND_OFF, _ERRORS = 1e-9, 1e-12, ("energy_error", "max_penetration")

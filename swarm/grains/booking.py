@@ -22,6 +22,8 @@ class Books(NamedTuple):
     virial: Array  # (1,) [J s]
     sweeps: Array  # (1,) int64
     lagging: Array  # (1,) int64, steps whose friction, or a damper, was not solved to its tolerance
+    overlap: Array  # (1,) the largest overlap since the frame before [m]
+    failed: Array  # (4,) what a step was refused for, see overlaps.py
 
 
 def _lost(matter, work, gap, change):
@@ -33,8 +35,8 @@ def _lost(matter, work, gap, change):
 
 @outlined
 def book_pairs(matter, grains, touches, books):
-    """Book the contacts of pairs."""
-    rows, speed, half = touches.rows, grains.speed, 0.5 * matter.h
+    """Book the contacts of pairs; their largest overlap [m]."""
+    rows, speed, half, deepest = touches.rows, grains.speed, 0.5 * matter.h, 0.0
     for k in range(touches.used[0]):
         c = index(k)
         i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
@@ -43,19 +45,23 @@ def book_pairs(matter, grains, touches, books):
         move = vector_at(rows, c, COAST) + half * (vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
         way = closing(s0, rows[c, SIZE], move)
         books.virial[0] += dot(s0 + 0.5 * move, impulse)
-        begins = (rows[c, GAP] <= 0.0) & (rows[c, GAP] + way.change > 0.0)
+        end = rows[c, GAP] + way.change
+        deepest = max(deepest, max(rows[c, GAP], end))
+        begins = (rows[c, GAP] <= 0.0) & (end > 0.0)
         books.collisions[one] += begins
         books.collisions[other] += begins
         if matter.pairs.damping is not None:
             lost = 0.5 * _lost(matter, dot(impulse, move), rows[c, GAP], way.change)
             books.dissipated[one] += lost
             books.dissipated[other] += lost
+    return deepest
 
 
 @outlined
 def book_wall(matter, law, wall, grains, touches, books, number):
-    """Book the contacts with a wall."""
+    """Book the contacts with a wall; their largest overlap [m]."""
     rows, speed, half, begin = touches.wall_rows, grains.speed, 0.5 * matter.h, touches.wall_spans[0, number]
+    deepest = 0.0
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
@@ -63,6 +69,7 @@ def book_wall(matter, law, wall, grains, touches, books, number):
         move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
         own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
         way = rising(own, vector_at(rows, c, START), rows[c, SIZE], move)
+        deepest = max(deepest, max(gap, gap + way.change))
         books.impacts[one] += (gap <= 0.0) & (gap + way.change > 0.0)
         impulse = vector_at(rows, c, IMPULSE)
         books.impulse[index(number), one] += norm(impulse)
@@ -74,3 +81,4 @@ def book_wall(matter, law, wall, grains, touches, books, number):
             work = work - given
         if law.damping is not None:
             books.dissipated[one] += _lost(matter, work, gap, way.change)
+    return deepest

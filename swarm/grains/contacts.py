@@ -59,6 +59,7 @@ class Matter(Record):
     pairs: Any  # their `Losses`
     walls: Any  # of each wall the same
     period: Any  # `Lengths`, or None
+    limits: Any  # `Limits` of overlaps.py
 
     @property
     def rubs(self):

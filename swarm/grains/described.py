@@ -2,13 +2,18 @@
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..methods.base import Method
+from ..methods.fixed_step import longest_step
 from ..pairs import Pairs
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.surface import Surface
 from .cell import Lengths
 from .contacts import Losses, Matter
+from .overlaps import Limits
 
 # The least restitution whose damper steps can follow.
 MOST_DAMPED = 0.01
@@ -16,18 +21,26 @@ MOST_DAMPED = 0.01
 _HALVINGS = 200
 
 
-def matter_of(scene: Scene, method: Method) -> Matter:
-    """What is the same for all balls of a scene and all steps of a method."""
-    pairs, law = scene.pairs or Pairs(), method.law()
+def matter_of(scene: Scene, method: Method, radius: NDArray[np.float64]) -> Matter:
+    """What is the same for all balls of a scene, with these radii, and all steps of a method."""
+    pairs, law, dt = scene.pairs or Pairs(), method.law(), float(method.dt)  # type: ignore[attr-defined]
     surfaces = [scene.surfaces[i] for i in scene.owners()]
     return Matter(
         law,
         scene.pull(),
-        float(method.dt),  # type: ignore[attr-defined]
+        dt,
         _losses(law.alpha, pairs),
         tuple(_losses(law.alpha, surface) for surface in surfaces),
         None if scene.period is None else Lengths(*scene.period),
+        _limits(float(radius.min()), longest_step(scene, dt)),
     )
+
+
+def _limits(least: float, longest: float | None) -> Limits:
+    """The `Limits` of balls with radii from the least one on [m]."""
+    # In a move of no more than the least radius no ball passes another's surface, or a triangle, with less than half of
+    # that overlap at both ends.
+    return Limits(0.5 * least, least if longest is None else min(least, longest), longest)
 
 
 def _losses(alpha: float, given: Pairs | Surface) -> Losses:

@@ -10,27 +10,32 @@ from .vessel import met
 
 @outlined
 def _stored_at_wall(matter, wall, grains, near, number):
-    place, stored = grains.place, 0.0
+    place, stored, deepest = grains.place, 0.0, 0.0
     for k in range(near.wall_first[number], near.wall_first[number + 1]):
         i = index(near.slot[index(k)])
         own = met(wall, near.listed, near.spans, index(k), place[i, RADIUS])
-        stored += matter.law.stored_energy(own.gap_of(own.inner(vector_at(place, i, X))))
-    return stored
+        gap = own.gap_of(own.inner(vector_at(place, i, X)))
+        stored += matter.law.stored_energy(gap)
+        deepest = max(deepest, gap)
+    return stored, deepest
 
 
 @long_kernel
 def stored(matter, walls, grains, near):
-    """The energy that all contacts store now [J]."""
-    place, total = grains.place, 0.0
+    """The energy that all contacts store now [J], and the largest overlap [m]."""
+    place, total, deepest = grains.place, 0.0, 0.0
     for a in range(place.shape[0]):
         i = index(a)
         for k in range(near.first[i], near.first[i + 1]):
             j = index(near.mate[index(k)])
             gap = place[i, RADIUS] + place[j, RADIUS] - norm(apart(matter, place, i, j))
             total += matter.law.stored_energy(gap)
+            deepest = max(deepest, gap)
     for k, wall in enumerate(walls.at(0.0).each):
-        total += _stored_at_wall(matter, wall, grains, near, k)
-    return total
+        at_wall, overlap = _stored_at_wall(matter, wall, grains, near, k)
+        total += at_wall
+        deepest = max(deepest, overlap)
+    return total, deepest
 
 
 @long_kernel

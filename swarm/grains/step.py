@@ -18,6 +18,7 @@ from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall
 from .contacts import gather_pairs, push_pairs, sweep_pairs, worse
 from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
+from .overlaps import look_at_pairs, look_at_wall
 
 # A sweep that changes no impulse by more than this part is the last one; also one that gains no more than half of the
 # one before, if that is round-off of what many large impulses leave of one another.
@@ -177,14 +178,17 @@ def _forget(walls, world):
 
 
 @outlined
-def _stays(matter, grains, skin):
-    """Whether all are at the end of a step within the lists."""
-    place, speed, listed, farthest, half = grains.place, grains.speed, grains.listed, 0.0, 0.5 * matter.h
+def _moved(matter, grains):
+    """The squares of how far a ball is at the end of a step from where it was listed, and of its move, at most."""
+    place, speed, listed, half, farthest, longest = (
+        grains.place, grains.speed, grains.listed, 0.5 * matter.h, 0.0, 0.0
+    )  # fmt: skip
     for k in range(place.shape[0]):
         i = index(k)
         move = (vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)) * half
         farthest = worse(square(vector_at(place, i, X) + move - vector_at(listed, i, X)), farthest)
-    return farthest <= 0.25 * skin * skin
+        longest = worse(square(move), longest)
+    return farthest, longest
 
 
 @outlined
@@ -204,15 +208,27 @@ def _arrive(matter, grains):
 
 
 def _book(matter, walls, world):
-    """Book what the contacts of the step did."""
+    """Book what the contacts of the step did; the largest overlap [m]."""
     grains, near, touches, books = world
-    book_pairs(matter, grains, touches, books)
+    deepest = book_pairs(matter, grains, touches, books)
     if matter.pairs.friction is not None:
         book_rubbing_pairs(matter, grains, near, touches, books)
     for k, wall in enumerate(walls.each):
-        book_wall(matter, matter.walls[k], wall, grains, touches, books, k)
+        deepest = max(book_wall(matter, matter.walls[k], wall, grains, touches, books, k), deepest)
         if matter.walls[k].friction is not None:
             book_rubbing(matter, wall, grains, near, touches, books, k)
+    books.overlap[0] = max(deepest, books.overlap[0])
+    return deepest
+
+
+def _look(matter, walls, world):
+    """The `Status` of a step by its overlaps; `failed` says of which one."""
+    grains, near, _touches, books = world
+    status = look_at_pairs(matter, grains, near, books.failed)
+    for k, wall in enumerate(walls.each):
+        if status == Status.DONE.value:
+            status = look_at_wall(matter, wall, grains, near, books.failed, k)
+    return status
 
 
 def _step(matter, walls, world, skin):
@@ -229,9 +245,14 @@ def _step(matter, walls, world, skin):
             return Status.UNSOLVED.value
         _push(matter, walls, world)
         more = _gather(matter, walls, world)
-    if not _stays(matter, grains, skin):
+    farthest, longest = _moved(matter, grains)
+    if not farthest <= 0.25 * skin * skin:
         return Status.LEASE_ENDED.value
-    _book(matter, walls, world)
+    deepest, limits = _book(matter, walls, world), matter.limits
+    if deepest > limits.overlap or longest > limits.move * limits.move:
+        status = _look(matter, walls, world)
+        if status != Status.DONE.value:
+            return status
     _arrive(matter, grains)
     return Status.DONE.value
 

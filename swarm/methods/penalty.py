@@ -49,6 +49,11 @@ class Penalty(fixed_step.SoftWalls):
     inertia is 2/5 m R^2, in a plane too. A contact should take 12 steps or more. Energy and momentum are those of the
     impulses that were used; a step in which the limit of friction, or a damper, is met to fewer digits than others is
     counted in "unconverged". Balls that roll or spin lose nothing by it: there is no friction of rolling.
+    Two balls that meet at the relative speed v overlap by up to v sqrt(m/alpha), for a = 1, with their reduced mass m,
+    and a ball and a wall with its own; "largest_overlap" is the largest since the frame before. It should be small
+    against the radii, up to a fifth. An overlap of more than the radius of the smaller ball, whose centre then has
+    passed a surface, ends the run with an error, and so does a step in which a ball jumps over another one or over a
+    solid.
     They meet fields, outlines and meshes too, where nothing moves: each body once, and each face once, which are the
     triangles of a plane or of a convex body, or sides that join smoothly or at an edge towards the balls. In a corner
     around them they touch both faces. Within a contact's width of where the faces of one surface join, as on the

@@ -24,7 +24,7 @@ def of_trajectory(trajectory: Any) -> dict[str, str]:
         "size": f"{trajectory.path.stat().st_size / 1e6:.1f} MB",
     }
     if len(times):
-        rows |= of_run(seen)
+        rows |= of_run(seen, trajectory.radius)
     return rows
 
 
@@ -84,14 +84,15 @@ def of_meshes(scene: Any) -> dict[str, str]:
     return found | ({"mesh": "\n".join(exact)} if exact else {})
 
 
-def of_run(seen: dict[str, Any]) -> dict[str, str]:
-    """The figures that show whether a run went well."""
+def of_run(seen: dict[str, Any], radius: Any = None) -> dict[str, str]:
+    """The figures that show whether a run went well; `radius` has those of the particles, None of points."""
     counts = [name for name in ("impacts", "collisions") if name in seen]
     rows: dict[str, str] = {name: f"{int(seen[name][-1]):,}".replace(",", " ") for name in counts}
     if slid := seen.get("sliding_time", [0.0])[-1]:
         rows["sliding"] = f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"
     rows["energy drift"] = f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle"
     rows["largest penetration"] = f"{seen['max_penetration'].max():.1e} m"
+    rows |= _overlap(seen, radius)
     if np.any(seen.get("link_error", 0.0)):
         rows["link error"] = f"{seen['link_error'].max():.1e} of its length"
     if np.any(seen.get("work", 0.0)):
@@ -112,6 +113,15 @@ def of_run(seen: dict[str, Any]) -> dict[str, str]:
         of_each = enumerate(seen["crossings"][-1].tolist())
         rows["crossings"] = "\n".join(f"counters[{k}]: {out} out, {back} back" for k, (out, back) in of_each)
     return rows | _escaped(seen)
+
+
+def _overlap(seen: dict[str, Any], radius: Any) -> dict[str, str]:
+    """How deep soft balls were in one another and in walls."""
+    if "largest_overlap" not in seen:
+        return {}
+    deepest = float(seen["largest_overlap"].max())
+    part = "" if radius is None else f", {100.0 * deepest / float(np.min(radius)):.2g} % of the smallest radius"
+    return {"largest overlap": f"{deepest:.1e} m{part}"}
 
 
 def _escaped(seen: dict[str, Any]) -> dict[str, str]:

@@ -22,6 +22,7 @@ _TITLES = {
     "worst relative energy error": "energy error, worst particle",
     "worst relative error of a link's length": "length error, worst link",
     "largest penetration": "depth in the walls",
+    "largest overlap": "overlap of balls",
     "particles": "who is there",
     "impacts": "impacts per second",
     "force": "force on the walls",
@@ -36,6 +37,7 @@ _LABELS = {
     "worst relative energy error": "relative error",
     "worst relative error of a link's length": "relative error",
     "largest penetration": "depth",
+    "largest overlap": "overlap",
     "particles that slide or rest": "particles",
     "heat from walls": "heat",
 }

@@ -26,7 +26,7 @@ _PARTICLES = {
 _UNITS = {
     "angular_momentum": "kg m2 s-1", "momentum": "kg m s-1", "impulse": "N s", "energy_error": "1", "energy": "J",
     "penetration": "m", "heat": "J", "work": "J", "time": "s", "position": "m", "velocity": "m s-1", "spin": "rad s-1",
-    "residence": "s",
+    "overlap": "m", "residence": "s",
     "slowness": "s m-1", "pressure": "Pa", "collision_rate": "s-1",
 }  # fmt: skip
 _AXES = ("x", "y", "z")

@@ -41,7 +41,7 @@ _OBSERVABLES: dict[str, tuple[int | None, ...]] = {
     "impulse": (None,),
 }
 # Of balls.
-_OF_BALLS = ("collisions", "collision_rate", "pressure", "rotational_energy")
+_OF_BALLS = ("collisions", "collision_rate", "pressure", "rotational_energy", "largest_overlap")
 # Of each part of the unions of a scene.
 _OF_PARTS = ("part_impulse", "part_heat")
 # Of each counter.

@@ -17,7 +17,18 @@ _CAVITY, _SOLID = (*rgb(style.CAVITY), 60), (*rgb(style.SOLID), 255)
 _CAVITY_WIRE, _SOLID_WIRE = (*rgb(style.CAVITY_LINE), 255), (*rgb(style.SOLID_LINE), 255)
 # Plots that are seen at once, and which these are: those of other groups come after them.
 _SEEN = 4
-_FIRST = ("energy", "number", "impacts", "pressure", "force", "crossings", "heat", "energy_error", "penetration")
+_FIRST = (
+    "energy",
+    "number",
+    "impacts",
+    "pressure",
+    "force",
+    "crossings",
+    "heat",
+    "energy_error",
+    "penetration",
+    "overlap",
+)
 # Between the faces of bodies, which have no shading.
 _EDGE = (10, 10, 12, 255)
 SOLID_LOOKS = _SOLID, _SOLID_WIRE

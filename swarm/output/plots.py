@@ -122,7 +122,7 @@ def _shown(content: Content, shapes: list[Shape]) -> dict[str, graphs.Curves]:
 def _series(cells: list[Any], content: Content, plots: dict[str, graphs.Curves], last: int) -> None:
     """The time series; the `last` of them say what the axes of times are."""
     soft = content.method.law() is not None and not content.method.has_multipliers()
-    limits = {"penetration": None if soft else verdicts.penetration_limit(content)}
+    limits = {"penetration": None if soft else verdicts.penetration_limit(content), "overlap": None}
     errors = verdicts.energy_limit(content)
     for k, (group, curves) in enumerate(plots.items()):
         view = series.title_of(group, content.scene.plane)

@@ -7,6 +7,7 @@
                               are doors not static, but from each frame on in which others are there
                               fields of more than 2000 solids have bodies: Points3D with radii, Boxes3D, ... for mesh
 /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
+/overlap                      Scalars: of soft balls
 /time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
 /about                        meaning of the colours, as text and as values, the origin, and of a run that has ended
                               `title` and `verdicts`, the run in words and whether it went well; static
@@ -103,6 +104,7 @@ class RecordingWriter:
         self._fed = start.births is not None or bool(np.isnan(start.position).any())
         self._drawn = drawn = Drawn(len(start), body, settings.particles, start.radius)
         some = {"collisions": start.radius is not None, "rotational_energy": start.spin is not None}
+        some["largest_overlap"] = start.radius is not None and method.law() is not None
         self._more = [name for name, there in {"source_energy": self._fed, **some}.items() if there]
         self._at_start, self._center = drawn.points(start.position), origin_of(scene, start)
         if body is not None and settings.color != "speed":

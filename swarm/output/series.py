@@ -26,6 +26,7 @@ VIEWS = {
     "energy_error": ("worst relative energy error", True),
     "link_error": ("worst relative error of a link's length", True),
     "penetration": ("largest penetration [m]", True),
+    "overlap": ("largest overlap [m]", True),
     "number": ("particles", False),
     "impacts": ("impacts [1/s]", False),
     "pressure": ("pressure [Pa]", False),
@@ -88,8 +89,8 @@ def lines_of(
 ) -> list[Line]:
     """The time series of a scene with particles or bodies, without those that are always zero in it.
 
-    `more` has the observables that only some runs have: of sources "source_energy", of balls "collisions", and of those
-    that turn "rotational_energy".
+    `more` has the observables that only some runs have: of sources "source_energy", of balls "collisions", of those
+    that turn "rotational_energy", and of soft ones "largest_overlap".
     """
     named, one = scene.names_laws(), "particle" if body is None else "body"
     laws = None if named else scene.laws()
@@ -106,6 +107,7 @@ def lines_of(
         Line("/energy_error", f"of a {one}", "energy_error", logarithm=True),
         Line("/penetration", f"of a {one}", "max_penetration", logarithm=True),
     ]
+    lines += [Line("/overlap", "of a contact", "largest_overlap", logarithm=True)] * ("largest_overlap" in more)
     if scene.surfaces:
         lines.append(Line("/impacts", every if "collisions" not in more else "walls", "impacts", per=1.0))
     if "collisions" in more:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..columns import MAY_BE_NAN, NAMES
+from ..pairs import MOST_PRESSED
 from ..state import Floats
 from .amounts import amount, counted_in_words, listed, many, plain
 
@@ -32,7 +33,7 @@ def judged(content: Any) -> list[Verdict]:
     found = _numbers(content)
     if any(verdict.holds is False for verdict in found):
         return found  # whatever else is said of numbers that are none
-    for judge in (_energy, _balance, _penetration, _momentum, _multipliers, _links, _books):
+    for judge in (_energy, _balance, _penetration, _overlap, _momentum, _multipliers, _links, _books):
         found[-1:-1] = judge(content)
     return found
 
@@ -162,6 +163,24 @@ def _penetration(content: Any) -> list[Verdict]:
         return [Verdict("walls", True, f"{outside}, round-off of {amount(size, 'm', 2)}")]
     why = "the tolerance of the loop" if content.method.has_multipliers() else "round-off"
     return [Verdict("walls", False, f"{outside}, where {why} explains {amount(limit, 'm', 1)}")]
+
+
+def _overlap(content: Any) -> list[Verdict]:
+    """How deep soft balls pressed on one another and on walls, at any step."""
+    radius = next((frame.radius for frame in content.frames.values() if frame.radius is not None), None)
+    if "largest_overlap" not in content.seen or radius is None:
+        return []
+    deepest, least, most = (
+        float(f(x)) for f, x in ((np.max, content.seen["largest_overlap"]), (np.min, radius), (np.max, radius))
+    )
+    if deepest == 0.0:
+        return [Verdict("contacts", True, "no ball pressed on another one or on a wall")]
+    found = f"balls overlapped by at most {amount(deepest, 'm', 2)}, {plain(100.0 * deepest / least, 2)} % of "
+    found += "their radius" if least == most else "the smallest radius"
+    if deepest <= MOST_PRESSED * least:
+        return [Verdict("contacts", True, found)]
+    wanted = f"{found}; up to {100.0 * MOST_PRESSED:g} % of a radius they are small: use a larger penalty"
+    return [Verdict("contacts", False if deepest > MOST_PRESSED * most else None, wanted)]
 
 
 def penetration_limit(content: Any) -> float:

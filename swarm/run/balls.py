@@ -5,6 +5,7 @@ import numpy as np
 from ..errors import SceneError
 from ..methods import Impact, Penalty
 from ..methods.base import Method
+from ..pairs import MOST_PRESSED
 from ..particles import Particles
 from ..placing.cells import overlaps_of
 from ..placing.sequential import require_size
@@ -17,8 +18,6 @@ from .starts import error_of
 
 # Balls overlap by round-off of their places at the start: this many times that of the largest coordinate.
 _ROUND_OFF = 64.0 * np.finfo(np.float64).eps
-# Soft balls may press on one another and on walls at the start: by so much of the radius of the smaller one.
-_PRESSED = 0.2
 
 
 def require_balls(scene: Scene, particles: Particles | None, method: Method, options: RunOptions) -> None:
@@ -118,9 +117,9 @@ def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
         return
     i, k = found.pair
     smaller = min(radius[i], radius[k])
-    if found.depth <= (_ROUND_OFF * magnitude if method.is_rigid() else _PRESSED * smaller):
+    if found.depth <= (_ROUND_OFF * magnitude if method.is_rigid() else MOST_PRESSED * smaller):
         return
-    pressed = "" if method.is_rigid() else f" (soft balls may by {_PRESSED:g} of the smaller radius)"
+    pressed = "" if method.is_rigid() else f" (soft balls may by {MOST_PRESSED:g} of the smaller radius)"
     raise SceneError(
         f"particles must not overlap at the start{pressed}, got {found.number} pairs that do, most particles {i} and "
         f"{k}, by {found.depth:.6g} m: their centres are {radius[i] + radius[k] - found.depth:.6g} m apart, their "
@@ -131,7 +130,7 @@ def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
 def _require_within(scene: Scene, particles: Particles, radius: np.ndarray, close: float, is_rigid: bool) -> None:
     distances = scene.distances_outside(particles.position, 0.0, radius)
     # Where phi is not a number a ball is outside.
-    wrong = ~(distances <= (close if is_rigid else close + _PRESSED * radius))
+    wrong = ~(distances <= (close if is_rigid else close + MOST_PRESSED * radius))
     outside = np.flatnonzero(wrong.any(axis=0))
     if not outside.size:
         return

@@ -16,12 +16,15 @@ from ..grains.arrays import DONE, LOST, SINCE, SKIN, TAKEN, X
 from ..grains.booking import Books
 from ..grains.described import matter_of
 from ..grains.drags import kept_drags, set_drags
+from ..grains.overlaps import COLUMNS
 from ..grains.step import Rule, World, march
+from ..methods import Penalty
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
 from ..state import Balls, State
 from ..status import Status
+from . import refused
 from .base import Arrays, BaseRun
 from .faces import Fields
 from .observed import poses_of
@@ -47,7 +50,7 @@ class GrainsRun(BaseRun):
         n, walls = len(particles), len(scene.owners())
         radius = particles.radius
         assert radius is not None
-        self._matter = matter_of(scene, method)
+        self._matter = matter_of(scene, method, radius)
         rubs, spin = self._matter.rubs, particles.spin
         if spin is None and rubs:
             spin = np.zeros((3, n))
@@ -66,7 +69,15 @@ class GrainsRun(BaseRun):
         super().__init__(scene, method, n, pool, tier)
         state = self.state
         books = Books(
-            balls.collisions, state.impacts, state.impulse, state.dissipated, balls.virial, *np.zeros((2, 1), np.int64)
+            balls.collisions,
+            state.impacts,
+            state.impulse,
+            state.dissipated,
+            balls.virial,
+            np.zeros(1, np.int64),
+            np.zeros(1, np.int64),
+            np.zeros(1),
+            np.zeros(COLUMNS),
         )
         self._world = World(
             arrays.grains_of(state.position, state.velocity, radius, state.mass, spin if rubs else None),
@@ -164,17 +175,8 @@ class GrainsRun(BaseRun):
             self._clock[SKIN] *= 2.0
             largest = self.state.balls.radius.max()  # type: ignore[union-attr]
             if not self._clock[SKIN] <= _WIDEST * largest:
-                raise RunError(self._too_far(float(largest)))
+                raise RunError(refused.too_far(self._world.grains, 0.5 * _WIDEST, float(largest), self._matter.h))
         self._list()
-
-    def _too_far(self, largest: float) -> str:
-        speed = self._world.grains.speed
-        squares = (speed[:, :3] ** 2 + speed[:, 3:6] ** 2).sum(axis=1)
-        k = int(np.argmax(np.where(np.isnan(squares), np.inf, squares)))
-        return (
-            f"a step failed at particle {self._world.grains.number[k]}: it moves by more than {0.5 * _WIDEST:g} radii "
-            f"of the largest ball, {largest:g} m, in a step of {self._matter.h:g} s; use a smaller dt"
-        )
 
     # --- A frame -------------------------------------------------------------------------------------------
 
@@ -183,6 +185,7 @@ class GrainsRun(BaseRun):
         self._walls = self._fields.walls(self._moment, float(self._clock[SKIN]))
         if not self._cut_short:
             self._clock[DONE] = 0.0
+            self._world.books.overlap[0] = 0.0
         self._clock[TAKEN] = 0.0
         latest = self._limit(latest)
         status, rule = Status.LEASE_ENDED.value, Rule(span, self._watch.passes)
@@ -194,17 +197,18 @@ class GrainsRun(BaseRun):
         self._tier.spend(time.perf_counter() - began)
         self._watch.end()
         self._cut_short = status == Status.INTERRUPTED
-        if status == Status.UNSOLVED:
-            raise RunError(self._unsolved(moment - (span - self._clock[DONE]) * self._matter.h))
+        if status not in (Status.DONE, Status.INTERRUPTED):
+            raise RunError(self._refused(status, moment - (span - self._clock[DONE]) * self._matter.h))
         if not self._cut_short:
             self._observe(moment)
         return not self._cut_short
 
-    def _unsolved(self, moment: float) -> str:
-        return (
-            f"the step at {moment:.9g} s failed: the impulses of its contacts did not converge; a smaller dt than "
-            f"{self._matter.h:g} s, or a softer penalty, helps"
-        )
+    def _refused(self, status: int, moment: float) -> str:
+        """The sentence about the step at a moment [s]."""
+        if status == Status.UNSOLVED:
+            return refused.unsolved(moment, self._matter.h)
+        assert isinstance(self._method, Penalty)
+        return refused.passed(self._scene, self._method, self._matter, self._world, status, moment)
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         world, matter = self._world, self._matter
@@ -228,13 +232,17 @@ class GrainsRun(BaseRun):
     def _observe(self, moment: float) -> None:
         world, kernel = self._world, self._tier.kernel
         self._show()
-        self._stored = kernel(energy.stored)(self._matter, self._walls, world.grains, world.near)
+        stored, overlap = kernel(energy.stored)(self._matter, self._walls, world.grains, world.near)
+        # At the start, where no step was before.
+        self._stored, world.books.overlap[0] = stored, max(overlap, world.books.overlap[0])
         kernel(observables.observe)(*self._observing())
         self._numbers.frame(self.state, moment, self._summary()["kinetic_energy"])
 
     def _summary(self) -> dict[str, Any]:
         seen = observables.summary(self._partial, self.state, self._owners, lasts=False, parts=self._parts)
-        seen["contact_energy"], seen["unconverged"] = self._stored, int(self._world.books.lagging[0])
+        books = self._world.books
+        seen["contact_energy"], seen["unconverged"] = self._stored, int(books.lagging[0])
+        seen["largest_overlap"] = float(books.overlap[0])
         seen["total_energy"] += self._stored
         return self._numbers.added(seen, self.state)
 

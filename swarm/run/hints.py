@@ -9,7 +9,7 @@ from ..methods import Impact
 from ..methods.verlet import Verlet
 from ..scene import Scene
 from ..surfaces.union import Joined
-from . import workload
+from . import sinking, workload
 from .options import Task
 from .overlaps import warn_of_overlap
 
@@ -29,6 +29,7 @@ def give(task: Task) -> None:
     warn_of_overlap(task.scene)
     _warn_of_faces(task.scene)
     _warn_of_fall(task.scene)
+    sinking.warn_of_depths(task)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
         # About the fastest: of some.
         some = task.particles.velocity[:, _some(len(task.particles))]

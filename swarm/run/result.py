@@ -55,7 +55,8 @@ class Result:
             "collision_rate", pairs that met a second [1/s], and "pressure" [Pa, in a plane N/m], by the virial,
             (2 K + sum r_ij . J_ij/dt)/(d V), NaN at the start and where no volume is known: V is `particles.volume`, or
             the cell of a scene without surfaces; where they have a spin "rotational_energy" [J], which "total_energy"
-            includes as "angular_momentum" does the spins.
+            includes as "angular_momentum" does the spins. Of those with Penalty also "largest_overlap" [m], by how much
+            two balls, or a ball and a wall, have overlapped at most, at any end of a step since the frame before.
             With sources "born" (frames, sources), how many have come, and "source_energy" [J], what they have brought;
             who comes later is in no observable.
         wall_time: seconds the run took in all its sessions, compilation included.
@@ -104,7 +105,7 @@ class Result:
         what = {"particles": f"{len(self.particles)}"} if self.bodies is None else {"bodies": repr(self.bodies)}
         times = self.observables["time"]
         rows = what | {"frames": f"{len(times)}, {times[0]:g} s to {times[-1]:g} s"}
-        rows |= facts.of_meshes(self.scene) | facts.of_run(self.observables)
+        rows |= facts.of_meshes(self.scene) | facts.of_run(self.observables, self.particles.radius)
         rows |= {"wall time": f"{self.wall_time:.2f} s", "trajectory": str(self.trajectory or "none")}
         return notebook.table("Result", rows.items())
 

@@ -2,6 +2,8 @@
 
 import logging
 
+import numpy as np
+
 from ..errors import SceneError
 from ..grains.described import MOST_DAMPED, contact_time
 from ..methods import Penalty
@@ -20,6 +22,7 @@ def require_soft_balls(scene: Scene, particles: Particles, method: Method) -> No
     if not isinstance(method, Penalty):
         return
     _require_laws(scene)
+    _require_steps(particles, method)
     _warn_of_steps(scene, particles, method)
 
 
@@ -60,6 +63,24 @@ def _require_laws(scene: Scene) -> None:
                 f"{name}.restitution must be {MOST_DAMPED:g} or more with Penalty, whose dampers grow as it "
                 f"becomes less, got {value:g}"
             )
+
+
+def _require_steps(particles: Particles, method: Penalty) -> None:
+    """Raise a `SceneError` where a step is so long that the fastest ball can jump over another one."""
+    radius, velocity = particles.radius, particles.velocity
+    assert radius is not None
+    if not len(particles):
+        return
+    fastest = int(np.argmax((velocity**2).sum(axis=0)))
+    moves = method.dt * np.sqrt(((velocity - velocity[:, [fastest]]) ** 2).sum(axis=0))
+    reach = radius + radius[fastest]
+    k = int(np.argmax(moves / reach))
+    if moves[k] > reach[k]:
+        raise SceneError(
+            f"dt must be so small that no particle jumps over another one in a step, got dt = {method.dt:g} s, in "
+            f"which particle {k} moves by {moves[k]:.3g} m against particle {fastest}, and their radii are "
+            f"{reach[k]:.3g} m in all; use dt < {method.dt * reach[k] / moves[k]:.2g} s, or Impact"
+        )
 
 
 def _warn_of_steps(scene: Scene, particles: Particles, method: Penalty) -> None:

@@ -62,6 +62,7 @@ def test_a_run_that_is_restored_goes_on_with_the_same_bits(tmp_path):
         assert bits(whole) == bits(first) == bits(second)
         for name in ("position", "velocity", "dissipated", "impulse"):
             assert (getattr(whole.state, name) == getattr(second.state, name)).all()
+        assert whole.seen()["largest_overlap"] == second.seen()["largest_overlap"] > 0.0
         assert whole.seen()["pressure"] == second.seen()["pressure"] or not whole.seen()["pressure"] > 0.0
 
 

@@ -1,0 +1,122 @@
+"""Overlaps that no contact may have: a ball whose centre has passed the surface of what it meets.
+
+From there a contact pushes the wrong way, or pulls the ball through: the step is refused. Most steps are known to be
+far from it by their largest overlap and their longest move; the others are looked at here, every pair and every ball at
+a wall along the straight way of the step. There too a step is refused in which a ball jumps over what it would have
+met, for contacts are looked for at the ends of steps alone.
+"""
+
+import math
+from typing import Any
+
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
+from ..kernel.record import Record
+from ..kernel.vector import cross, dot, norm, square
+from ..status import Status
+from ..surfaces.balls.facet import RoundTriangle
+from ..surfaces.balls.rounded import part_within
+from ..surfaces.fields.members import GrownLike, member
+from ..surfaces.posed import Posed
+from ..surfaces.rotation import Rotated
+from ..surfaces.walls import Field
+from .arrays import AFTER, BEFORE, BEGIN, END, RADIUS, X, vector_at
+from .contacts import apart
+from .vessel import met
+
+# Columns of the failure of a step: the place of a ball in the order of cells, that of the other one or -1, the wall or
+# -1, and the overlap [m], or the length of the move if the step is too long.
+BALL, OTHER, WALL, SIZE, COLUMNS = 0, 1, 2, 3, 4
+# A flight through the edge between two triangles is through one of them: by this part a triangle is larger here.
+_SEAM = 1e-9
+
+
+class Limits(Record):
+    """Steps that need no look: overlaps and moves below these."""
+
+    overlap: float  # [m]
+    move: float  # [m]
+    longest: Any  # the longest move that jumps over no solid [m], None where there is none
+
+
+def _move(matter, grains, i):
+    """The move of a ball in the step."""
+    return 0.5 * matter.h * (vector_at(grains.speed, i, BEFORE) + vector_at(grains.speed, i, AFTER))
+
+
+def _note(failed, ball, other, wall, size):
+    failed[BALL], failed[OTHER], failed[WALL], failed[SIZE] = ball, other, wall, size
+
+
+@outlined
+def look_at_pairs(matter, grains, near, failed):
+    """The `Status` of a step by its pairs: TOO_FAST, TOO_DEEP or DONE; of the deepest one `failed` says which it is."""
+    place, status, deepest = grains.place, Status.DONE.value, 0.0
+    for a in range(place.shape[0]):
+        i = index(a)
+        mine = _move(matter, grains, i)
+        for k in range(near.first[i], near.first[i + 1]):
+            j = index(near.mate[index(k)])
+            s, move = apart(matter, place, i, j), mine - _move(matter, grains, j)
+            reach, least = place[i, RADIUS] + place[j, RADIUS], min(place[i, RADIUS], place[j, RADIUS])
+            overlap = reach - norm(s + part_within(-1.0 * s, move) * move)
+            if overlap > deepest:
+                is_long = square(move) > reach * reach
+                if is_long or overlap > least:
+                    deepest, status = overlap, Status.TOO_FAST.value if is_long else Status.TOO_DEEP.value
+                    _note(failed, i, j, -1.0, norm(move) if is_long else overlap)
+    return status
+
+
+def _is_of_triangles(like):
+    """Whether the members of a field are triangles, which do not tell their sides: a constant for the compiler."""
+    return _is_of_triangles(like.body) if isinstance(like, (GrownLike, Rotated)) else isinstance(like, RoundTriangle)
+
+
+def _beyond(triangle, r, move):
+    """How far a move that leads through a triangle ends behind its plane [m], -1 where it does not."""
+    d, a, b = r - triangle.corner, triangle.first, triangle.second
+    n = cross(a, b)
+    before, after = dot(d, n), dot(d + move, n)
+    changes = ((before > 0.0) & (after <= 0.0)) | ((before <= 0.0) & (after > 0.0))
+    p = d + (before / (before - after) if changes else 0.0) * move
+    least = -_SEAM * square(n)
+    u, v = dot(cross(p, b), n), dot(cross(a, p), n)
+    is_through = changes & (u >= least) & (v >= least) & (square(n) - u - v >= least)
+    return abs(after) / norm(n) if is_through else -1.0
+
+
+@outlined
+def _beyond_any(wall, near, k, r, move):
+    """The same of the triangles that are listed in row k."""
+    most = -1.0
+    for m in range(near.spans[k, BEGIN], near.spans[k, END]):
+        most = max(most, _beyond(member(wall.members, index(near.listed[index(m)])), r, move))
+    return most
+
+
+@outlined
+def look_at_wall(matter, wall, grains, near, failed, number):
+    """The same of a step by the balls at a wall."""
+    place, status, deepest, longest = grains.place, Status.DONE.value, -math.inf, matter.limits.longest
+    for k in range(near.wall_first[number], near.wall_first[number + 1]):
+        c = index(k)
+        i = index(near.slot[c])
+        r, move, radius = vector_at(place, i, X), _move(matter, grains, i), place[i, RADIUS]
+        own = met(wall, near.listed, near.spans, c, radius)
+        overlap = max(own.gap_of(own.inner(r)), own.gap_of(own.end_inner(r + move)))
+        if not isinstance(wall, Posed):
+            # A step over an edge
+            overlap = max(overlap, own.gap_of(own.inner(r + 0.5 * move)))
+        is_through = overlap > radius
+        if isinstance(wall, Field) and _is_of_triangles(wall.members.like):
+            depth = _beyond_any(wall, near, c, r, move)
+            is_through = depth >= 0.0
+            overlap = radius + depth if is_through else overlap
+        is_long = False
+        if longest is not None:
+            is_long = (norm(move) > longest) & (overlap > -norm(move))
+        if (is_through or is_long) and overlap > deepest:
+            deepest, status = overlap, Status.TOO_FAST.value if is_long else Status.TOO_DEEP.value
+            _note(failed, i, -1.0, number, norm(move) if is_long else overlap)
+    return status

@@ -1,0 +1,148 @@
+"""How deep soft contacts are at the speeds that are known before a run: said where they are too soft for these."""
+
+import logging
+import math
+
+import numpy as np
+
+from ..grains.described import damping_of
+from ..methods.base import Method
+from ..pairs import MOST_PRESSED, Pairs
+from ..particles import Particles
+from ..scene import Scene
+from ..state import Floats
+from ..surfaces.drive import drive_of
+from ..surfaces.surface import Surface
+from .options import Task
+
+_LOG = logging.getLogger("swarm")
+
+
+def warn_of_depths(task: Task) -> None:
+    """Warn where a particle sinks too deep into a wall, or into another particle."""
+    method, particles = task.method, task.particles
+    if task.bodies is not None or method.law() is None or method.is_rigid() or method.has_multipliers():
+        return
+    with np.errstate(all="ignore"):
+        if particles.radius is None:
+            _warn_of_solids(task)
+        elif len(particles):
+            _warn_of_walls(task.scene, particles, particles.radius, method)
+            _warn_of_pairs(task.scene, particles, particles.radius, method)
+
+
+# --- Depths ----------------------------------------------------------------------------------------------
+
+
+def depths_of(method: Method, mass: Floats, speed: Floats, restitution: float = 1.0) -> Floats:
+    """The largest overlaps [m] of contacts that begin at these speeds [m/s], of masses that move alone [kg].
+
+    Without losses that of the energy, alpha d^(a + 1)/(a + 1) = m v^2/2. Phi(d) then is the amplitude of an oscillator
+    (`damping_of` of grains/described.py), which with the part z of critical damping is smaller by
+        exp(-z acos(z)/sqrt(1 - z^2)).
+    """
+    a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
+    damping = damping_of(1.0, restitution)
+    z = 0.0 if damping is None else 0.5 * damping
+    slowed = math.exp(-_turned(z)) ** (2.0 / (a + 1.0))
+    return np.asarray(slowed * (0.5 * mass * speed * speed * (a + 1.0) / alpha) ** (1.0 / (a + 1.0)))
+
+
+def _turned(z: float) -> float:
+    """z acos(z)/sqrt(1 - z^2), beyond 1 with its hyperbolic functions."""
+    if abs(z - 1.0) < 1e-9:
+        return 1.0
+    root = math.sqrt(abs(1.0 - z * z))
+    return z * (math.acos(z) if z < 1.0 else math.acosh(z)) / root
+
+
+def _penalty(method: Method, depth: float, allowed: float) -> float:
+    """The penalty with which a depth is what is allowed [m]."""
+    a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
+    return float(alpha * math.pow(depth / allowed, a + 1.0))
+
+
+# --- Speeds ----------------------------------------------------------------------------------------------
+
+
+def _falls(scene: Scene, position: Floats) -> Floats:
+    """The squares of the speeds that gravity may add to particles at these places [m^2/s^2]."""
+    added = np.zeros(position.shape[1])
+    low, high = scene.bounds()
+    for axis, pull in enumerate(scene.gravity or ()):
+        ways = np.abs((high if pull > 0.0 else low)[axis] - position[axis])
+        added += 2.0 * abs(pull) * np.where(np.isfinite(ways), ways, scene.finite_size() if pull else 0.0)
+    return added
+
+
+def _pace(surface: Surface) -> float:
+    """A bound of the speed of a surface that moves by itself [m/s]."""
+    if surface.motion is None:
+        return 0.0
+    drive = drive_of(surface, 0.0)
+    turns = 0.0 if drive.turn is None else math.hypot(*drive.spin) * (surface.extent() + math.hypot(*drive.center))
+    return drive.fastest + turns
+
+
+def _speeds(scene: Scene, particles: Particles) -> Floats:
+    """The speeds of particles at walls that are known before the run [m/s]: of the start, of a fall, of the walls."""
+    own = np.sqrt((particles.velocity**2).sum(axis=0) + _falls(scene, particles.position))
+    return np.asarray(own + max((_pace(surface) for surface in scene.surfaces), default=0.0))
+
+
+# --- What is said ----------------------------------------------------------------------------------------
+
+
+def _warn_of_walls(scene: Scene, particles: Particles, radius: Floats, method: Method) -> None:
+    """Warn of the ball that sinks deepest into a wall, as a part of its radius."""
+    if not scene.surfaces:
+        return
+    speeds = _speeds(scene, particles)
+    depths = depths_of(method, particles.mass, speeds, max(surface.restitution for surface in scene.surfaces))
+    k = int(np.nanargmax(depths / radius))
+    _warn(method, f"particle {k}, with {speeds[k]:.3g} m/s,", "a wall", float(depths[k]), float(radius[k]))
+
+
+def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: Method) -> None:
+    """Warn of the ball that sinks deepest into the fastest one, as a part of the smaller radius."""
+    fastest = int(np.nanargmax((particles.velocity**2).sum(axis=0)))
+    speeds = np.sqrt(((particles.velocity - particles.velocity[:, [fastest]]) ** 2).sum(axis=0))
+    mass = particles.mass * particles.mass[fastest] / (particles.mass + particles.mass[fastest])
+    depths = depths_of(method, mass, speeds, (scene.pairs or Pairs()).restitution)
+    least = np.minimum(radius, radius[fastest])
+    k = int(np.nanargmax(depths / least))
+    who = f"particle {k}, whose velocity differs from that of particle {fastest} by {speeds[k]:.3g} m/s,"
+    _warn(method, who, "it", float(depths[k]), float(least[k]))
+
+
+def _warn(method: Method, who: str, what: str, depth: float, radius: float) -> None:
+    if depth > MOST_PRESSED * radius:
+        _LOG.warning(
+            "contacts are soft for the speed: %s sinks up to %.2g m into %s, %.2g radii, where %g is small and 1 ends "
+            "the run; use a penalty of %.1e or more (%g here) with a dt that fits it, or Impact",
+            who, depth, what, depth / radius, MOST_PRESSED, _penalty(method, depth, MOST_PRESSED * radius),
+            method.penalty,  # type: ignore[attr-defined]
+        )  # fmt: skip
+
+
+def _warn_of_solids(task: Task) -> None:
+    """Warn of a point that sinks deep into a solid, which it leaves on the other side from the middle on."""
+    scene, particles, method = task.scene, task.particles, task.method
+    solids = [(i, one) for i, one in enumerate(scene.surfaces) if one.is_solid() and math.isfinite(one.size())]
+    if not solids or not len(particles):
+        return
+    i, thinnest = min(solids, key=lambda one: one[1].size())
+    speeds = _speeds(scene, particles)
+    k = int(np.nanargmax(particles.mass * speeds * speeds))
+    # Of phi, which is a length where its slope is 1.
+    slope = float(np.median(np.sqrt((thinnest.gradient(particles.position[:, k : k + 1]) ** 2).sum(axis=0))))
+    depth = float(depths_of(method, particles.mass[k], speeds[k])) / slope if slope > 0.0 else 0.0
+    thickness = 2.0 * thinnest.size()
+    if depth > MOST_PRESSED * thickness:
+        _LOG.warning(
+            "contacts are soft for the speed: particle %d, with %.3g m/s, sinks up to %.2g m into a wall, and "
+            "surfaces[%d] (%s) is %.2g m thick: beyond its middle a particle leaves on the other side; use a penalty "
+            "of %.1e or more (%g here) with a dt that fits it, or Impact",
+            k, speeds[k], depth, i, type(thinnest).__name__, thickness,
+            _penalty(method, depth, MOST_PRESSED * thickness), method.penalty,  # type: ignore[attr-defined]
+        )  # fmt: skip

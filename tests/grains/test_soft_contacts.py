@@ -1,0 +1,277 @@
+"""Contacts that are soft for the speed: how deep they are, what is said before the run, and what ends it."""
+
+import math
+
+import numpy as np
+import pytest
+from grains_runs import ran
+
+import swarm
+from swarm import RunError, SceneError
+from swarm.output.content import Content
+from swarm.output.series import lines_of
+from swarm.output.verdicts import judged
+from swarm.run import sinking
+from swarm.summary import numbers, of_trajectory
+
+ROOM = swarm.Box((50.0, 50.0, 50.0))
+# A plate of 5 mm, as a box and as a mesh.
+HALF = np.array([0.0025, 0.25, 0.25])
+CORNERS = HALF * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+SIDES = [
+    (0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 4, 5), (0, 5, 1),
+    (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
+]  # fmt: skip
+RADIUS, MASS, SOFT = 0.01, 0.01, swarm.Penalty(dt=1e-4, penalty=1e3)
+
+
+def plates(**laws):
+    return {"Box": swarm.Box(HALF, side="outside", **laws), "Mesh": swarm.Mesh(CORNERS, SIDES, side="outside", **laws)}
+
+
+def thrown(speed, gap=0.0175):
+    """A ball that flies at the plate."""
+    x = -0.0025 - RADIUS - gap
+    return swarm.Particles([[x], [0.01], [0.02]], [[speed], [0.0], [0.0]], MASS, radius=RADIUS)
+
+
+def two(speeds, masses=(MASS, MASS), offset=0.0, gap=1e-3):
+    """Two balls that fly at one another."""
+    x = [-RADIUS - 0.5 * gap, RADIUS + 0.5 * gap]
+    return swarm.Particles([x, [0.0, offset], [0.0, 0.0]], [speeds, [0.0] * 2, [0.0] * 2], masses, radius=RADIUS)
+
+
+def depth_of(law, mass, speed):
+    """The overlap at which the energy of the approach is stored, by the definition of the law."""
+    return (0.5 * mass * speed**2 * (law.exponent + 1.0) / law.penalty) ** (1.0 / (law.exponent + 1.0))
+
+
+# --- How deep ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+@pytest.mark.parametrize("masses", [(MASS, MASS), (MASS, 3.0 * MASS)])
+def test_two_balls_overlap_by_what_their_energy_says(exponent, masses):
+    """v sqrt(m/k) for the linear spring, with the reduced mass."""
+    method, speeds = swarm.Penalty(1e-5, 1e4 if exponent == 1.0 else 2e5, exponent), (0.5, -0.3)
+    start = two(speeds, masses, gap=1e-6)
+    start = swarm.Particles(start.position + 0.5, start.velocity, start.mass, radius=RADIUS)
+    seen = ran(swarm.Scene([], period=(1.0, 1.0, 1.0)), start, method, 0.005).observables
+    reduced = masses[0] * masses[1] / sum(masses)
+    wanted = depth_of(method, reduced, 0.8)
+    if exponent == 1.0:
+        assert wanted == pytest.approx(0.8 * math.sqrt(reduced / 1e4), rel=1e-15)
+    # At the ends of steps, of which the nearest is up to half a step away from the turning point.
+    assert seen["largest_overlap"].max() == pytest.approx(wanted, rel=1e-4)
+    assert seen["largest_overlap"].max() <= wanted * (1.0 + 1e-12)
+    assert seen["energy_error"].max() < 1e-13
+    # Neither frame has a contact.
+    assert seen["contact_energy"].tolist() == [0.0, 0.0]
+    assert seen["collisions"].tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("kind", ["Box", "Mesh", "Plane", "Sphere"])
+def test_a_wall_gives_way_by_what_the_energy_says(kind):
+    other = {"Plane": swarm.Plane((1.0, 0.0, 0.0)), "Sphere": swarm.Sphere(0.2, (0.2, 0.01, 0.02), side="outside")}
+    wall = {**plates(), **other}[kind]
+    seen = ran(swarm.Scene([ROOM, wall]), thrown(1.0, 1e-3), swarm.Penalty(2e-5, 1e4), 0.008).observables
+    assert seen["largest_overlap"][-1] == pytest.approx(1.0 * math.sqrt(MASS / 1e4), rel=1e-4)
+    assert seen["energy_error"].max() < 1e-13
+    assert seen["max_penetration"].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("restitution", [0.8, 0.3, math.exp(-2.0), 0.05])
+def test_a_damper_takes_of_the_depth_what_is_said(restitution):
+    wall = swarm.Plane((1.0, 0.0, 0.0), restitution=restitution)
+    method = swarm.Penalty(1e-5, 1e4)
+    seen = ran(swarm.Scene([ROOM, wall]), thrown(1.0, 0.0), method, 0.006).observables
+    wanted = float(sinking.depths_of(method, np.array(MASS), np.array(1.0), restitution))
+    assert seen["largest_overlap"][-1] == pytest.approx(wanted, rel=0.01)
+
+
+def test_an_overlap_is_that_since_the_frame_before():
+    method = swarm.Penalty(1e-4, 1e4)
+    start = two((0.5, -0.5), gap=-1.5e-3)
+    seen = ran(swarm.Scene([ROOM]), start, method, 0.01, every=5e-4).observables
+    found, start_overlap = seen["largest_overlap"], 1.5e-3
+    assert found[0] == pytest.approx(start_overlap, rel=1e-12)
+    assert found.max() == pytest.approx(found[1:4].max())
+    assert (found[8:] == 0.0).all()
+    whole = ran(swarm.Scene([ROOM]), start, method, 0.01).observables["largest_overlap"]
+    assert whole.tolist() == [found[0], found[1:].max()]
+
+
+# --- What ends a run --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_balls_that_pass_one_another_end_the_run(exponent):
+    with pytest.raises(
+        RunError, match=r"at 0\.\d+ s failed at particle 0, at \(.*overlaps particle 1 by 0\.01.* m, more"
+    ):
+        ran(swarm.Scene([ROOM]), two((10.0, -10.0)), swarm.Penalty(1e-4, 1e3, exponent), 0.01)
+
+
+@pytest.mark.parametrize("speed", [3.3, 5.0, 20.0])
+@pytest.mark.parametrize("restitution", [1.0, 0.5])
+def test_a_box_and_its_mesh_hold_or_fail_alike(speed, restitution):
+    """They end the run at the same step and the same place, or leave the ball in the same place."""
+    told = []
+    for wall in plates(restitution=restitution).values():
+        try:
+            end = ran(swarm.Scene([ROOM, wall]), thrown(speed), SOFT, 0.05, every=1e-2).particles
+            told.append(tuple(end.position[:, 0].round(12)))
+        except RunError as error:
+            told.append(str(error).partition(" by ")[0].replace("Mesh", "Box"))
+    assert told[0] == told[1]
+    holds = depth_of(SOFT, MASS, speed) < RADIUS or (restitution < 1.0 and speed < 5.0)
+    assert isinstance(told[0], tuple) == holds
+    assert holds or "overlaps surfaces[1] (Box)" in told[0]
+
+
+def test_a_penalty_that_is_named_is_enough():
+    """Of a pair and of a wall, with the step that it needs."""
+    for scene, start in (
+        (swarm.Scene([ROOM]), two((10.0, -10.0))),
+        (swarm.Scene([ROOM, plates()["Mesh"]]), thrown(20.0)),
+    ):
+        with pytest.raises(RunError) as failed:
+            ran(scene, start, SOFT, 0.01)
+        named = float(str(failed.value).split("use a penalty of ")[1].split()[0])
+        seen = ran(scene, start, swarm.Penalty(2e-5, named), 0.004).observables
+        assert 0.1 * RADIUS < seen["largest_overlap"].max() <= 0.21 * RADIUS
+
+
+def test_a_ball_that_gets_fast_does_not_jump_over_a_solid():
+    """At the start its steps are short."""
+    scene = swarm.Scene([swarm.Box((5.0, 5.0, 50.0)), swarm.Box((1.0, 1.0, 0.005), side="outside")], (0.0, 0.0, -1e5))
+    start = swarm.Particles([[0.0], [0.0], [0.5]], [[0.0], [0.0], [0.0]], MASS, radius=RADIUS)
+    with pytest.raises(RunError, match=r"moves by 0\.0\d+ m against surfaces\[1\] \(Box\) in one step.*0\.01 m thick"):
+        ran(scene, start, swarm.Penalty(1e-4, 1e6), 0.01)
+
+
+def test_balls_that_jump_over_one_another_are_refused():
+    with pytest.raises(
+        SceneError, match=r"no particle jumps over another one in a step, got dt = 0\.0001 s.*dt < 2e-05"
+    ):
+        ran(swarm.Scene([ROOM]), two((500.0, -500.0), gap=0.04), SOFT, 0.05)
+    # Those that get so fast end the run where they meet.
+    scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0))], (0.0, 0.0, -1e5))
+    start = swarm.Particles([[0.0] * 2, [0.0] * 2, [RADIUS, 0.5]], np.zeros((3, 2)), MASS, radius=RADIUS)
+    with pytest.raises(RunError, match=r"against particle \d in one step, and their radii are 0\.02 m in all"):
+        ran(scene, start, swarm.Penalty(1e-4, 1e6), 0.01)
+
+
+def test_a_grazing_ball_goes_by():
+    """Fast, over a solid and past a ball, which it does not touch: nothing is refused."""
+    scene = swarm.Scene([ROOM, plates()["Box"]])
+    start = swarm.Particles(
+        [[-0.2, 0.0], [0.261, 0.2711], [0.0, 0.0805]], [[45.0, 0.0], [0.0] * 2, [0.0] * 2], MASS, radius=RADIUS
+    )
+    end = ran(scene, start, swarm.Penalty(1e-4, 1e7), 0.01).particles
+    assert end.position[0, 0] == pytest.approx(-0.2 + 0.45)
+
+
+# --- What is said -----------------------------------------------------------------------------------------
+
+
+def said(caplog, scene, start, method):
+    caplog.clear()
+    try:
+        ran(scene, start, method, method.dt)
+    finally:
+        told = [record.getMessage() for record in caplog.records]
+    return [one for one in told if one.startswith("contacts are soft")]
+
+
+def test_it_is_said_before_the_run(caplog):
+    (pair,) = said(caplog, swarm.Scene([], period=(1.0, 1.0, 1.0)), two((10.0, -10.0)), SOFT)
+    depth = depth_of(SOFT, 0.5 * MASS, 20.0)
+    assert f"by 20 m/s, sinks up to {depth:.2g} m into it, {depth / RADIUS:.2g} radii" in pair
+    (wall,) = said(caplog, swarm.Scene([ROOM]), thrown(5.0), SOFT)
+    assert "with 5 m/s, sinks up to 0.016 m into a wall, 1.6 radii" in wall
+    assert "use a penalty of 6.2e+04 or more (1000 here)" in wall
+    assert said(caplog, swarm.Scene([ROOM]), thrown(5.0), swarm.Penalty(1e-5, 6.3e4)) == []
+
+
+def test_what_a_fall_and_a_wall_that_moves_add_is_known(caplog):
+    floor = swarm.Plane((0.0, 0.0, -1.0), 50.0)
+    rest = swarm.Particles([[0.0], [0.0], [1.25 - 49.0]], [[0.0]] * 3, MASS, radius=RADIUS)
+    (told,) = said(caplog, swarm.Scene([floor], (0.0, 0.0, -10.0)), rest, SOFT)
+    assert f"with {math.sqrt(2.0 * 10.0 * 2.25):.3g} m/s" in told
+    shaken = swarm.Box((1.0, 1.0, 50.0), motion=swarm.Oscillation((0.0, 0.0, 0.1), 10.0))
+    (told,) = said(caplog, swarm.Scene([shaken]), rest, SOFT)
+    assert f"with {0.1 * 2.0 * math.pi * 10.0:.3g} m/s" in told
+    assert said(caplog, swarm.Scene([floor]), rest, SOFT) == []
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_points_and_thin_solids(exponent, caplog):
+    scene = swarm.Scene([swarm.Box((1.0, 1.0, 1.0)), swarm.Slab((1.0, 0.0, 0.0), 0.005, side="outside")])
+    start = swarm.Particles([-0.1, 0.0, 0.0], [1.0, 0.0, 0.0], MASS)
+    needed = (exponent + 1.0) * 0.5 * MASS / 0.002 ** (exponent + 1.0)
+    (told,) = said(caplog, scene, start, swarm.Penalty(1e-4, 0.9 * needed, exponent))
+    assert "surfaces[1] (Slab) is 0.01 m thick" in told
+    assert said(caplog, scene, start, swarm.Penalty(1e-4, 1.1 * needed, exponent)) == []
+
+
+def test_an_overlap_is_in_files_and_in_verdicts(tmp_path):
+    scene, start = swarm.Scene([ROOM]), two((1.0, -1.0))
+    path = tmp_path / "run.h5"
+    result = ran(scene, start, SOFT, 0.02, every=1e-3, trajectory=path)
+    deepest = float(result.observables["largest_overlap"].max())
+    assert 0.2 * RADIUS < deepest < RADIUS
+    with swarm.load(path) as trajectory:
+        assert (trajectory.observables["largest_overlap"] == result.observables["largest_overlap"]).all()
+        assert trajectory.to_xarray().largest_overlap.attrs["units"] == "m"
+        assert "largest_overlap" in trajectory.table()
+    assert numbers(path)["largest_overlap"] == deepest
+    drawn = {line.path: line.observable for line in lines_of(scene, SOFT, [], None, result.observables)}
+    assert drawn["/overlap"] == "largest_overlap"
+    percent = f"{100.0 * deepest / RADIUS:.2g} %"
+    assert of_trajectory(path)["largest overlap"] == f"{deepest:.1e} m, {percent} of the smallest radius"
+    content = Content("", scene, SOFT, None, 2, dict(result.observables), {"end": result.particles})
+    (told,) = [one for one in judged(content) if one.about == "contacts"]
+    assert told.holds is False
+    assert f"balls overlapped by at most {1e3 * deepest:.2g} mm, {percent} of their radius" in told.text
+    content.seen["largest_overlap"] = 0.4 * content.seen["largest_overlap"]
+    (told,) = [one for one in judged(content) if one.about == "contacts"]
+    assert told.holds is True
+
+
+# --- Everywhere -------------------------------------------------------------------------------------------
+
+MOVING = swarm.Box((0.1, 0.1, 0.1), side="outside", motion=swarm.Translation((-5.0, 0.0, 0.0)))
+INSIDE = swarm.Mesh(2.0 * CORNERS / HALF, SIDES)
+SOFT_WALLS = {
+    "a wall that moves": (swarm.Scene([ROOM, MOVING]), (-0.2, 0.0, 0.0), (0.0, 0.0, 0.0), r"surfaces\[1\] \(Box\)"),
+    "a vessel from a mesh": (swarm.Scene([INSIDE]), (-1.9, 0.3, 0.2), (-5.0, 0.0, 0.0), r"surfaces\[0\] \(Mesh\)"),
+    "a plane": (
+        swarm.Scene([ROOM, swarm.Box((1.0, 1.0, 1.0))], plane="z"), (0.95, 0.0, 0.0), (5.0, 0.0, 0.0), r"surfaces\[1\]"
+    ),
+    "a cell that repeats": (
+        swarm.Scene([swarm.Slab((1.0, 0.0, 0.0), 1.0)], period=(None, 1.0, 1.0)), (0.95, 0.5, 0.5), (5.0, 0.0, 0.0),
+        r"surfaces\[0\] \(Slab\)",
+    ),
+    "a floor under gravity": (
+        swarm.Scene([swarm.Plane((0.0, 0.0, -1.0))], (0.0, 0.0, -1000.0)), (0.0, 0.0, 0.05), (0.0, 0.0, 0.0),
+        r"surfaces\[0\] \(Plane\)",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SOFT_WALLS)
+def test_no_wall_is_passed(name):
+    scene, place, velocity, wall = SOFT_WALLS[name]
+    start = swarm.Particles(np.array([place]).T, np.array([velocity]).T, MASS, radius=RADIUS)
+    with pytest.raises(RunError, match=rf"it overlaps {wall}.* m, more than its radius, 0\.01 m"):
+        ran(scene, start, SOFT, 0.05, every=1e-3)
+
+
+def test_balls_meet_across_the_faces_of_a_cell():
+    scene = swarm.Scene([], period=(1.0, 1.0, 1.0))
+    start = swarm.Particles(
+        [[0.02, 0.98], [0.5, 0.5], [0.5, 0.5]], [[-10.0, 10.0], [0.0] * 2, [0.0] * 2], MASS, radius=RADIUS
+    )
+    with pytest.raises(RunError, match="it overlaps particle"):
+        ran(scene, start, SOFT, 0.01)
