@@ -108,11 +108,13 @@ def _turned(box, flock, books, walls, wall, ball):
     turned = Turned(v1, hit.impulse, twice - (hit.twice_energy - hit.work), 0.0, hit.work, 0.0, hit.twice_energy)
     if box.laws.send_off:
         random = Stream(box.source.seed, box.source.first + i, books.impacts[index(i)], 0, box.laws.across)
-        sent = send(box.laws, walls, wall, Arriving(r, v, square(v), 0.0, box.kinds.mass_of(i)), random)
+        sent = send(box.laws, walls, wall, Arriving(r, v, twice - fall, 0.0, box.kinds.mass_of(i)), random)
         if sent.happens:
-            heat = select(sent.keeps, 0.0, square(sent.v) + fall - sent.work - twice)
-            left = square(sent.v) + fall
-            turned = Turned(sent.v, sent.impulse, *_shares(box.laws, heat, sent.lost), sent.work, sent.wait, left)
+            # The energy decides the speed, as of a mirror: the square of a velocity that is drawn has a bias.
+            left = select(sent.keeps, twice + sent.work, square(sent.v) + fall)
+            heat = select(sent.keeps, 0.0, left - sent.work - twice)
+            v1 = either(sent.keeps, squared(sent.v, left - fall), sent.v)
+            turned = Turned(v1, sent.impulse, *_shares(box.laws, heat, sent.lost), sent.work, sent.wait, left)
     return _lifted(box, walls, wall, r, turned)
 
 
