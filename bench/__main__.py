@@ -18,6 +18,7 @@ from . import (
     laws,
     meshes,
     motion,
+    order,
     plane,
     report,
     scenes,
@@ -44,6 +45,9 @@ def main() -> None:
     commands.add_parser("accuracy", help="work-precision diagrams of every method, a picture a scene")
     commands.add_parser(
         "stability", help="maps of where methods fail: stiffness, Uzawa's loop, thin solids, grazing, round-off"
+    )
+    commands.add_parser(
+        "order", help="the order of contact steps, begun at the impact or centred, in every kind of wall"
     )
     commands.add_parser("bars", help="speed, memory, start-up and accuracy against their bars")
     commands.add_parser("peers", help="the same job by other programs, those that are installed")
@@ -90,6 +94,7 @@ def main() -> None:
         "throughput": throughput,
         "accuracy": accuracy,
         "stability": stability,
+        "order": order,
         "bars": bars,
         "peers": race,
         "scenes": scenes,

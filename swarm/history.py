@@ -1,5 +1,6 @@
 """The iteration of a single contact step of one particle, sweep by sweep: to study a method, not to run it."""
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from .particles import Particles
 from .scene import Scene
 from .status import Status
 from .surfaces import flights
+from .surfaces.lowered import lowered
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +70,8 @@ def contact_history(
         velocity: v0, three numbers [m/s].
         mass: m > 0 [kg].
         method: AugmentedLagrangian; or Penalty, or Impact with a contact_step, whose one solve is one sweep. With
-            adaptive=True, and for Impact, the particle first flies to its next impact.
+            adaptive=True, and for Impact, the particle first flies to its next impact; or to half a step before it with
+            contact_start = "centred", where Phi is that of the gap less the one there.
 
     Returns:
         A `ContactHistory` with a sweep at least, and at most max_sweeps of them.
@@ -104,20 +107,23 @@ def contact_history(
     with np.errstate(all="ignore"):
         if isinstance(method, AugmentedLagrangian):
             if method.adaptive:
-                start = _at_the_wall(scene, start)
+                start = _at_the_wall(scene, start, method.dt, method.contact_start)
             return _uzawa(scene, start, mass, method)
         if isinstance(method, Penalty):
             return _penalty(scene, start, mass, method)
         if isinstance(method, Impact):
-            return _impact(scene, _at_the_wall(scene, start), mass, method)
+            start = _at_the_wall(scene, start, method.contact_step, method.contact_start)
+            return _impact(scene, start, mass, method)
     raise SceneError(f"method must be AugmentedLagrangian, Penalty or Impact, got {type(method).__name__}")
 
 
 class Start(NamedTuple):
-    """Position and velocity before the step."""
+    """Position and velocity before the step, and where it is cut at an impact its length [s] and the wall."""
 
     r: Vec
     v: Vec
+    h: float = math.nan
+    wall: float = -1.0
 
 
 class _Rows:
@@ -148,23 +154,34 @@ class _Rows:
         return ContactHistory(*columns, *[converged])
 
 
-def _at_the_wall(scene: Scene, start: Start) -> Start:
-    """Position and velocity at the next impact."""
+def _at_the_wall(scene: Scene, start: Start, h: float, begins: str) -> Start:
+    """The start of the contact step at the next impact, of length h if the flight to it is long enough."""
     walls = scene.walls()
     hit = flights.first_hit(walls, None, start.r, start.v)
     if not np.isfinite(hit.time):
         raise SceneError(f"velocity must lead to a surface, got {tuple(start.v)}, which never does")
-    return Start(walls.project(hit.wall, start.r + hit.time * start.v), start.v)
+    r = walls.project(hit.wall, start.r + hit.time * start.v)
+    if begins == "impact":
+        return Start(r, start.v, h, hit.wall)
+    half = min(0.5 * h, hit.time)
+    if not half > 0.0:
+        raise SceneError(
+            f"position must be off the wall that is met, for a step that begins before the impact, got {tuple(start.r)}"
+        )
+    return Start(r - half * start.v, start.v, 2.0 * half, hit.wall)
 
 
 def _uzawa(scene: Scene, start: Start, mass: float, method: AugmentedLagrangian) -> ContactHistory:
     numbers, walls, count = method.numbers(scene), scene.walls(), len(scene.owners())
-    rows = _Rows(scene, start, mass, method.dt)
+    law = numbers.law
+    rows = _Rows(scene, start, mass, start.h if method.adaptive else method.dt)
+    if method.contact_start == "centred":
+        walls, law = lowered(walls, start.wall, start.r), law.stiffened((method.dt / start.h) ** 2)
     multipliers, reactions = np.zeros(count), np.zeros((count, 4))
     before = uzawa.Before(np.zeros(count), np.zeros(count))
-    uzawa.start(numbers, numbers.law, walls, rows.step, multipliers)
+    uzawa.start(numbers, law, walls, rows.step, multipliers)
     for sweep in range(method.max_sweeps):
-        end = uzawa.sweep_all(numbers, numbers.law, walls, rows.step, multipliers, before, sweep, reactions)
+        end = uzawa.sweep_all(numbers, law, walls, rows.step, multipliers, before, sweep, reactions)
         _require(end.solved, sweep)
         rows.add(before.multipliers.copy(), before.misses.copy(), reactions, float(end.stored))
         if end.stored <= method.tolerance:
@@ -187,8 +204,9 @@ def _impact(scene: Scene, start: Start, mass: float, method: Impact) -> ContactH
     if method.contact_step == 0.0:
         raise SceneError("contact_step must be above 0 for a history, got 0: an exact reflection takes no step")
     walls, count = scene.walls(), len(scene.owners())
-    rows, r0 = _Rows(scene, start, mass, method.contact_step), start.r
-    wall = flights.first_hit(walls, None, r0, start.v).wall
+    rows, r0, wall = _Rows(scene, start, mass, start.h), start.r, start.wall
+    if method.contact_start == "centred":
+        walls = lowered(walls, wall, r0)
     kappa = reflection.chord(walls, wall, r0, rows.step.p)
     r1 = walls.push(wall, r0, rows.step.p, kappa)
     reactions, multiplier = np.zeros((count, 4)), np.zeros(count)

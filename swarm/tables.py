@@ -89,7 +89,7 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
         return _with_nested(described.table(), described, arrays)
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
     given = {field.metadata.get("key", field.name): getattr(described, field.name) for field in _kept(type(described))}
-    table = {key: value for key, value in given.items() if value is not None}
+    table = {key: value for key, value in given.items() if value is not None and not _is_left_out(described, key)}
     table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
     if table.get("motion") is not None:
         table["motion"] = motion_table(described.motion)  # type: ignore[union-attr]
@@ -155,6 +155,12 @@ def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str,
     given = {} if scene.pairs is None else {key: one for key, one in vars(scene.pairs).items() if one is not None}
     pairs = {} if scene.pairs is None else {"pairs": given}
     return {**gravity, **period, **plane, **pairs, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
+
+
+def _is_left_out(described: Surface | Method, key: str) -> bool:
+    """Whether an argument is at the default that it has in files that are older than it."""
+    field = next((one for one in dataclasses.fields(described) if one.name == key), None)
+    return field is not None and field.metadata.get("younger", False) and getattr(described, key) == field.default
 
 
 def _kept(cls: type[Any]) -> list[dataclasses.Field[Any]]:

@@ -49,6 +49,7 @@ class Lanes(NamedTuple):
     record: Array  # (RECORDS, stride) the loop of its multiplier
     course: Array  # (walls COURSE, stride) the safe steps of a fall
     turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
+    flown: Array  # the time of the flight before the contact, where the method asks for it
     particle: Array  # int64, the particle in the lane
     marked: Array  # bool, from one loop to the next: of a fall that it needs more steps, then that it has arrived
     eights: Array  # int64, `marked` of eight lanes in one number: the same memory
@@ -66,7 +67,8 @@ class Lanes(NamedTuple):
     def given(self, method, i):
         """A lane as methods are given it."""
         lane = self.lane(i)
-        return methods.Lane(lane.r, lane.v, lane.remaining, lane.hits, method.own(*lane.own))
+        flown = self.flown[i] if method.asks_flown else None
+        return methods.Lane(lane.r, lane.v, lane.remaining, lane.hits, method.own(*lane.own), flown)
 
     def load(self, method, walls, share, i, k):
         """Particle i into lane k, as it starts the frame, or as a halt left it."""
@@ -175,6 +177,7 @@ def empty(walls: int, given: int, period: Any = None, rows: int = Flying.ALL) ->
         record=table(RECORDS),
         course=table(walls * flights.COURSE),
         turned=table(4),
+        flown=table(1)[0],
         particle=np.zeros(STRIDE, np.int64),
         marked=eights.view(np.bool_),
         eights=eights,

@@ -128,5 +128,7 @@ def _flight(method, walls, gravity, lanes, i, hit):
             end = end._replace(r=inside_of(walls.at(end.remaining), end.wall, end.r))
     else:
         end = method.flight(walls, gravity, lane)
+    if method.asks_flown:
+        lanes.flown[i] = lane.remaining - end.remaining
     lanes.lane(i).put_end(end)
     lanes.wall[i] = end.wall

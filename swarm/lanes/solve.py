@@ -92,7 +92,7 @@ def _update_multipliers(method, lanes, live):
     remaining = 0
     for i in range(live):
         old = kept(record[MULTIPLIER, i])
-        new, miss, more = method.next_multiplier(lanes.lane(i).remaining, record[ACCELERATION, i], old,
+        new, miss, more = method.next_multiplier(lanes.given(method, i), record[ACCELERATION, i], old,
             LoopRecord(record[MEAN, i], record[STORED, i], record[GAIN, i]),
             methods.Sweep(record[BEFORE, i], record[MISS, i]),
         )  # fmt: skip

@@ -13,6 +13,8 @@ from ..particles import Particles
 from ..scene import Scene
 from . import base, fixed_step, steps
 
+# alpha h^2/m at which a sweep halves the gap: V falls by 1e-10 in 17 sweeps.
+_GOOD = 4.0
 _POLICIES = {"raise": steps.RAISE, "count": steps.COUNT, "impact": steps.IMPACT}
 _ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uzawa.REFLECTION}
 
@@ -35,6 +37,17 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     The converged step is a reflection about D: `Impact(contact_step=dt)` takes it without the loop, at a twentieth of
     the cost and to round-off. This method is for the paper's results, and for studies of multipliers.
 
+    What does it converge to? With dt -> 0 to the rigid wall, `Impact()`, of first order in dt, on every surface: the
+    step begins at the impact, and at its end the particle is (dt/2)(v0 - v1) from where it would be. A sweep divides
+    the gap by about 1 + alpha dt^2/(4 m), so the penalty must grow as 1/dt^2, or the sweeps as 1/dt^2.
+
+    With contact_start="centred" the step begins dt/2 before the impact, inside, where the loop of the paper has no
+    limit. The gap is that from the level of its start, g - g0, in Phi and in V: the step is in State I of the surface
+    phi = phi(r0), as it would be in a cavity that much smaller, and D is the discrete gradient of that gap. The limit
+    is the reflection about D(r0, r1) with g1 = g0, so energy is kept as from the wall. It is the step of
+    `Impact(contact_step=dt, contact_start="centred")`, whose docstring says where it is exact; also first order in
+    general, with an error that is several times smaller. A step without length is the exact reflection.
+
     Of bodies the multipliers hold walls and links together, with exponent 1 and adaptive=True: V is the sum of
     alpha g^2/2 of contacts and alpha c^2/2 of links, c = (|y|^2 - l^2)/(2 l). A step shorter than dt, cut at an impact,
     has the penalty alpha (dt/h)^2, since a sweep shrinks errors by alpha h^2/m. The converged one is Impact(dt=...).
@@ -55,13 +68,16 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         on_unconverged: what a contact does whose loop ends above the tolerance. "raise" ends the run and names step,
             particle, sweeps and V; "count" accepts the step and counts it in the observable "unconverged"; "impact"
             counts it too, and replaces the contact by the exact one (without gravity only).
+        contact_start: where contact steps begin: "impact", at the impact, as the paper recommends, or "centred", dt/2
+            before it, with adaptive=True and exponent 1.
 
     Raises:
         SceneError: an argument is out of its range; a frame time is not a whole number of steps.
 
     Conserves: m v^2/2 - m G.r up to the tolerance where the loop converges; to round-off that does not grow for a
-    tolerance at round-off, such as 1e-28. A gap below the round-off of the coordinates counts as 0. Order: 2 in dt away
-    from impacts. Cost: sweeps times a scalar solve; the sweeps are in the observable "sweeps".
+    tolerance at round-off, such as 1e-28. A gap below the round-off of the coordinates counts as 0. Order: 1 in dt, at
+    impacts; flights are exact (`python -m bench order`). Cost: sweeps times a scalar solve; the sweeps are in the
+    observable "sweeps".
     Walls may move without turning in fixed steps, which are those of the frame of each wall; steps that are cut at
     impacts, and exact impacts in their place, know walls at rest only.
     Source: García Orden & Ortega 2007, eqs. (6)-(9), and the composite form of contact/discrete_gradient.py.
@@ -77,6 +93,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     adaptive: bool = False
     acceleration: str = "none"
     on_unconverged: str = "raise"
+    contact_start: str = base.younger("impact")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -86,6 +103,22 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         object.__setattr__(self, "adaptive", checks.flag("adaptive", self.adaptive))
         checks.one_of("acceleration", self.acceleration, _ACCELERATIONS)
         checks.one_of("on_unconverged", self.on_unconverged, _POLICIES)
+        checks.one_of("contact_start", self.contact_start, base.CONTACT_STARTS)
+        if self.contact_start == "centred":
+            self._require_centred()
+
+    def _require_centred(self) -> None:
+        """Raise a `SceneError` where the other arguments leave no step that is centred about an impact."""
+        if not self.adaptive:
+            raise SceneError(
+                'adaptive must be True with contact_start = "centred", got False: steps of fixed length begin at any '
+                "time; give adaptive=True, or leave contact_start out"
+            )
+        if self.exponent != 1.0:
+            raise SceneError(
+                f'exponent must be 1 with contact_start = "centred", got {self.exponent:g}: the loop ends on the level '
+                "on which the step begins for no other; leave exponent out, or contact_start"
+            )
 
     def check(self, scene: Scene, particles: Particles) -> None:
         base.check_laws("AugmentedLagrangian", scene)
@@ -120,6 +153,8 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
 
     def numbers(self, scene: Scene) -> steps.StepNumbers:
         kind = steps.CutSteps if self.adaptive else steps.FixedSteps
+        if self.contact_start == "centred":
+            kind = steps.CentredSteps
         return kind(
             self.dt,
             self.law(),
@@ -134,7 +169,8 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         )
 
     def time_of_impact(self) -> float | None:
-        return self.dt if self.adaptive else None
+        # A centred step is a part of the flights before and after it.
+        return (0.0 if self.contact_start == "centred" else self.dt) if self.adaptive else None
 
     def span(self, name: str, duration: float) -> float:
         return duration if self.adaptive else super().span(name, duration)
@@ -148,11 +184,24 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     def has_multipliers(self) -> bool:
         return True
 
-    def failure(self, moment: float, remaining: float, sweeps: int, stored: float) -> str:
+    def failure(self, moment: float, remaining: float, sweeps: int, stored: float, mass: float) -> str:
         now = moment - (remaining if self.adaptive else remaining * self.dt)
-        hint = "more max_sweeps" if self.adaptive and self.exponent == 1.0 else "exponent = 1 and adaptive=True"
-        return (
+        told = (
             f"in the step from {now:.9g} s (step {round(now / self.dt) + 1} of dt): {sweeps} sweeps left V = "
-            f"{stored:.3g} J, above tolerance = {self.tolerance:g} J. The loop converges for exponent = 1 from the "
-            f'surface: use {hint}, or on_unconverged="count" or "impact"'
+            f"{stored:.3g} J, above tolerance = {self.tolerance:g} J. "
         )
+        if not self.adaptive or self.exponent != 1.0:
+            return told + (
+                "The loop converges for exponent = 1 from the surface: use exponent = 1 and adaptive=True, or "
+                'on_unconverged="count" or "impact"'
+            )
+        stiffness = self.penalty * self.dt * self.dt / mass
+        told += (
+            "A sweep divides the gap by about 1 + alpha h^2/(4 m), with alpha = penalty and h = dt, and alpha h^2/m = "
+            f"{stiffness:.3g} here: use "
+        )
+        if stiffness < _GOOD:
+            quicker = "" if self.acceleration == "reflection" else 'acceleration="reflection", '
+            larger = _GOOD / stiffness * self.penalty
+            told += f"{quicker}a penalty that grows as 1/dt^2 ({larger:.2g} makes alpha h^2/m = {_GOOD:g}), "
+        return told + 'more max_sweeps, or on_unconverged="count" or "impact"'

@@ -1,16 +1,19 @@
 """The description of a method for users, checked. Methods as kernels take them are in contract.py."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import SceneError
+from ..kernel.jit import select
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import required
 from ..surfaces.drive import drive_of
 from ..surfaces.moving import lacks_bend
 
+# Where a contact step begins: at the impact, or half of it before.
+CONTACT_STARTS = ("impact", "centred")
 # Default shortest flight as a part of the crossing time size/|v|.
 SHORTEST = 1e-4
 # The laws of a surface, and their values where there is none.
@@ -24,6 +27,11 @@ _WITHOUT_LAWS = {
     "openings": (),
     "present": None,
 }
+
+
+def younger(default: Any) -> Any:
+    """An argument that methods of older files lack: tables leave it out at its default, so that they are the same."""
+    return field(default=default, metadata={"younger": True})
 
 
 @dataclass(frozen=True)
@@ -73,7 +81,7 @@ class Method:
         """Whether most runs meet no contact for `hard_pass`: then the slow-path kernel is compiled at the first one."""
         return False
 
-    def failure(self, moment: float, remaining: float, sweeps: int, stored: float) -> str:
+    def failure(self, moment: float, remaining: float, sweeps: int, stored: float, mass: float) -> str:
         """The end of the sentence about a loop that did not converge in the frame that ends at `moment`."""
         raise NotImplementedError
 
@@ -139,3 +147,13 @@ def check_crossing(name: str, step: float | None, scene: Scene, particles: Parti
         raise SceneError(
             f"{name} must be at most the crossing time size/|v| of the fastest particle, {crossing:.3g} s, got {step:g}"
         )
+
+
+def centred_half(longest, lane):
+    """Half the length of a contact step of at most this length whose middle is the end of the flight of a lane.
+
+    It begins no sooner than that flight, which is where the frame begins or the contact before ends, and ends within
+    the frame.
+    """
+    half = select(0.5 * longest < lane.flown, 0.5 * longest, lane.flown)
+    return select(half < lane.remaining, half, lane.remaining)

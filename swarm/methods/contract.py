@@ -30,13 +30,17 @@ NOT_TURNED = Turned(ZERO, 0.0)
 
 
 class Lane(NamedTuple):
-    """One particle under way: what is left of its frame in the method's unit, its impacts in it, what it keeps."""
+    """One particle under way: what is left of its frame in the method's unit, its impacts in it, what it keeps.
+
+    `flown` is how long the flight was that ended at the contact, of a method that `asks_flown`.
+    """
 
     r: Vec
     v: Vec
     remaining: float
     hits: float
     own: Any
+    flown: Any = None
 
 
 class Flight(NamedTuple):
@@ -144,6 +148,9 @@ class MethodNumbers(Record):
 
     # --- Flight ---
 
+    # Whether contacts ask how long the flight before them was: a constant for the compiler.
+    asks_flown = False
+
     def flight(self, walls, gravity, lane):
         """The `Flight` to the next contact, or to the end, of a method that finds its contacts by itself."""
         return Flight(lane.r, lane.v, lane.remaining, -1.0)
@@ -195,7 +202,7 @@ class MethodNumbers(Record):
         """The multiplier that the loop starts from, kappa for it, and the acceleration of the loop."""
         return 0.0, kappa, 0.0
 
-    def next_multiplier(self, remaining, acceleration, multiplier, record, before):
+    def next_multiplier(self, lane, acceleration, multiplier, record, before):
         """The multiplier after a sweep, its miss, and whether to go on; `before` is the last `Sweep`."""
         return 0.0, 0.0, False
 

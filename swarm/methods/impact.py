@@ -9,7 +9,7 @@ import numpy as np
 from .. import checks
 from ..contact import sliding, touching
 from ..contact.laws import NONE, Laws
-from ..contact.reflection import CHORD_NEEDS, Energy, chord_end, chord_step, chord_turn, exact
+from ..contact.reflection import CHORD_NEEDS, Energy, chord_end, chord_step, chord_turn, exact, restore, speed2_at
 from ..errors import SceneError
 from ..kernel.arrays import kept
 from ..kernel.gravity import accelerated, displacement
@@ -48,6 +48,17 @@ class Impact(base.Method):
             particle follow from it: some 150 a crossing, and 1/4 power of it more or fewer.
         dt: the step of bodies [s], above 0, which is cut at impacts and frames; None for particles, which need none.
         order: of bodies between impacts: 2, or 4 by Suzuki's composition of five steps.
+        contact_start: where the contact step begins, which must be above 0 for "centred". "impact": at the impact, as
+            in the paper. "centred": h/2 before it.
+
+    A centred step takes the particle from r* - (h/2) v0 to r* + (h/2) v1, with r* where it meets the wall, and v1 is
+    the same reflection about D(r0, r1) of these two ends. As n.(r1 - r0) = 0, it ends at the gap at which it begins.
+    It is the reflection at r* with the normal of a point (h/2) v0.n inside. So it is exact on planes, and without
+    gravity on spheres and cylinders; of second order in h where |grad phi| is the same all over the wall (a distance:
+    torus, capsule); elsewhere of first order, with an error some times smaller than that of a step from the wall. It
+    begins at the earliest where the frame begins or the contact before ends, and ends at the latest with the frame;
+    then both of its halves are as much shorter. A step on whose way from r* a wall stands is replaced by the exact
+    reflection.
 
     A particle slides along one wall, or the edge of two, by the contact step of the scheme in Suzuki's composition of
     fourth order, and leaves where the wall no longer presses on it, or meets another. Chattering (restitution e < 1)
@@ -68,8 +79,8 @@ class Impact(base.Method):
     Conserves: the energy to round-off that does not grow (each particle knows its energy); never leaves the walls by
     more than round-off. With restitution, friction and thermal walls the energy with what was dissipated and less the
     heat of the walls.
-    Order: exact for contact_step = 0, otherwise first order in h at an impact; sliding is of fourth order, and where
-    three walls or a cusp hold a particle of second, without friction.
+    Order: exact for contact_step = 0, otherwise first order in h at an impact (`python -m bench order`); sliding is of
+    fourth order, and where three walls or a cusp hold a particle of second, without friction.
     Cost: one square root and one division a flight of a sphere; see `python -m bench throughput` and `bench contacts`.
     Source: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0; Suzuki, Phys. Lett. A 146 (1990) 319.
 
@@ -83,6 +94,7 @@ class Impact(base.Method):
     sliding_tolerance: float = 1e-9
     dt: float | None = None
     order: int = 2
+    contact_start: str = base.younger("impact")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "contact_step", checks.at_least("contact_step", self.contact_step, 0.0))
@@ -96,6 +108,12 @@ class Impact(base.Method):
             object.__setattr__(self, "dt", checks.positive("dt", self.dt))
         if self.order not in (2, 4):
             raise SceneError(f"order must be 2 or 4, got {self.order}")
+        checks.one_of("contact_start", self.contact_start, base.CONTACT_STARTS)
+        if self.contact_start == "centred" and self.contact_step == 0.0:
+            raise SceneError(
+                'contact_step must be above 0 with contact_start = "centred", got 0: an exact reflection takes no '
+                "step; give contact_step, or leave contact_start out"
+            )
 
     def check(self, scene: Scene, particles: Particles) -> None:
         base.check_crossing("contact_step", self.contact_step, scene, particles)
@@ -123,12 +141,15 @@ class Impact(base.Method):
         size = scene.finite_size()
         length = base.SHORTEST * size if self.shortest_flight is None else 0.0
         pull = 0.0 if scene.gravity is None else math.hypot(*scene.gravity)
-        kind = Chord if self.contact_step > 0.0 else Reflection
+        kind = Reflection
+        if self.contact_step > 0.0:
+            kind = Centred if self.contact_start == "centred" else Chord
         lasting = size, _bend(scene), pull * size, self.shortest_flight or 0.0, length, self.sliding_tolerance
         return kind(*lasting, scene.laws() or NONE, self.contact_step or None)
 
     def time_of_impact(self) -> float:
-        return self.contact_step
+        # A centred step is a part of the flights before and after it.
+        return 0.0 if self.contact_start == "centred" else self.contact_step
 
     def is_rigid(self) -> bool:
         return True
@@ -279,4 +300,56 @@ class Chord(Reflection):
             select(chord, 1.0, 0.0),
             lane.own.energy.twice,
             hit & (not chord),
+        )
+
+
+class Centred(Chord):
+    """The method with a contact step whose middle is the impact; the lane is there, on the wall."""
+
+    asks_flown = True
+
+    def half(self, lane):
+        """Half the length of the contact step, which the flight before it and the end of the frame cut."""
+        return base.centred_half(self.contact_step, lane)
+
+    def start(self, gravity, lane):
+        """The start r0 of the step."""
+        return lane.r + displacement(gravity, lane.v, -self.half(lane))
+
+    def way(self, lane):
+        """Its free displacement p = h v0 + h^2 G/2: the velocity at its middle is that of the impact."""
+        return 2.0 * self.half(lane) * lane.v
+
+    # --- The unknown of a contact ---
+
+    def guess(self, walls, gravity, lane, wall):
+        kappa = walls.chord_guess(wall, self.start(gravity, lane), self.way(lane))
+        return kappa, (wall >= 0.0) & (self.half(lane) > 0.0)
+
+    def improve(self, walls, gravity, lane, wall, solution, multiplier):
+        better, more = chord_step(walls, wall, self.start(gravity, lane), self.way(lane), solution.kappa)
+        return select(solution.unsolved, better, solution.kappa), solution.unsolved & more, contract.NO_RECORD
+
+    def turn(self, walls, gravity, lane, wall, kappa):
+        # Gravity turns the velocities at the ends into those at the impact, which are reflected.
+        return chord_turn(walls, None, wall, self.start(gravity, lane), lane.v, 2.0 * self.half(lane), kappa)
+
+    # --- Contact ---
+
+    def contact(self, walls, gravity, lane, wall, solution):
+        half, turned = self.half(lane), solution.turned
+        speed2, half_inverse = speed2_at(gravity, lane.r, lane.own.energy)
+        w = restore(gravity, turned.v, speed2, half_inverse)
+        free = flights.first_hit(walls, None, lane.r, accelerated(gravity, w, 0.5 * half)).time > half
+        hit = wall >= 0.0
+        step = hit & free & (turned.impulse > lane.own.slow) & (not solution.unsolved)
+        return contract.Contact(
+            select(step, lane.r + displacement(gravity, w, half), kept(lane.r)),
+            select(step, accelerated(gravity, w, half), kept(lane.v)),
+            lane.remaining - select(step, half, 0.0),
+            wall,
+            select(step, turned.impulse, 0.0),
+            select(step, 1.0, 0.0),
+            lane.own.energy.twice,
+            hit & (not step),
         )

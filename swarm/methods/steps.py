@@ -1,6 +1,6 @@
-"""The steps of `AugmentedLagrangian`: of fixed length, or cut at the instant of impact.
+"""The steps of `AugmentedLagrangian`: of fixed length, or cut at the instant of impact, or centred about it.
 
-Each of the two says how a flight ends, how long its contact step is, whether another wall has a part in it, and which
+Each says how a flight ends, how long its contact step is, whether another wall has a part in it, and which
 exact impacts replace it.
 """
 
@@ -21,7 +21,8 @@ from ..kernel.jit import outlined, select
 from ..kernel.vector import square
 from ..status import Status
 from ..surfaces import flights
-from . import contract, penalty
+from ..surfaces.lowered import lowered
+from . import base, contract, penalty
 
 RAISE, COUNT, IMPACT = 0, 1, 2
 # A second wall nearer than this part of the shortest flight is met in the same instant.
@@ -53,19 +54,40 @@ class StepNumbers(penalty.GradientSteps):
         """Whether a contact step starts with an impact."""
         raise NotImplementedError
 
-    def is_alone(self, walls, wall, r0, r1, kappa):
+    def is_alone(self, walls, wall, start, r1, kappa):
         """Whether no other wall, of those at the end of the step, has a part in it: then one lane can do it alone."""
         raise NotImplementedError
 
-    def is_blocked(self, walls, wall, r, p):
+    def is_blocked(self, walls, wall, start, h):
         """Whether the chord on a wall meets another one later in the step, or passes a solid by."""
         return False
+
+    def start(self, lane):
+        """The lane at the start of its contact step."""
+        return lane
+
+    def held(self, walls, start, wall):
+        """The walls as the step takes them whose lane is this at its start."""
+        return walls
+
+    def ended(self, lane, contact):
+        """The contact, with what remains of the frame of the lane."""
+        return contact
 
     def as_impacts(self, walls, lane, cut, wall, lanes, i):
         """The contact as exact impacts: the result of `hard_pass`."""
         raise NotImplementedError
 
     # --- The unknown of a contact ---
+
+    def guess(self, walls, gravity, lane, wall):
+        start = self.start(lane)
+        return penalty.GradientSteps.guess(self, self.held(walls, start, wall), gravity, start, wall)
+
+    def improve(self, walls, gravity, lane, wall, solution, multiplier):
+        start = self.start(lane)
+        held = self.held(walls, start, wall)
+        return penalty.GradientSteps.improve(self, held, gravity, start, wall, solution, multiplier)
 
     def free(self, gravity, lane, h):
         return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
@@ -80,23 +102,30 @@ class StepNumbers(penalty.GradientSteps):
         return self.max_sweeps
 
     def first_multiplier(self, walls, gravity, lane, wall, kappa):
+        lane = self.start(lane)
+        walls = self.held(walls, lane, wall)
         cut, over = self.cut(lane.remaining), self.over(walls, lane.remaining)
         better, multiplier = uzawa.reflection(over, wall, cut.law, self.free(gravity, lane, cut.h))
         use = (self.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
         limited = over.of(wall, False, uzawa.has_limit, cut.law, lane.r)
         return select(use, multiplier, 0.0), select(use, better, kappa), select(limited, self.acceleration, uzawa.PLAIN)
 
-    def next_multiplier(self, remaining, acceleration, multiplier, record, before):
-        miss = self.cut(remaining).law.alpha * record.mean
+    def next_multiplier(self, lane, acceleration, multiplier, record, before):
+        miss = self.cut(self.start(lane).remaining).law.alpha * record.mean
         following = uzawa.next_multiplier(acceleration, multiplier, miss, before.multiplier, before.miss)
         return following, miss, not (record.stored <= self.tolerance)
 
     # --- Contact ---
 
     def contact(self, walls, gravity, lane, wall, solution):
+        start = self.start(lane)
+        return self.ended(lane, self._step(self.held(walls, start, wall), gravity, start, wall, solution))
+
+    def _step(self, walls, gravity, lane, wall, solution):
+        """The `Contact` of a lane at the start of its step."""
         cut, kappa = self.cut(lane.remaining), solution.kappa
         end = self.pushed(walls, gravity, lane, wall, cut.h, kappa)
-        alone = self.is_alone(end.after, wall, lane.r, end.r, kappa)
+        alone = self.is_alone(end.after, wall, lane, end.r, kappa)
         solved = alone & (not solution.unsolved) & end.over.pushes(wall, kappa)
         touching = wall >= 0.0
         step = (lane.remaining > 0.0) & touching & solved
@@ -118,12 +147,14 @@ class StepNumbers(penalty.GradientSteps):
 
     @outlined
     def hard_pass(self, walls, gravity, lane, wall, lanes, i):
-        cut, record = self.cut(lane.remaining), lanes.record
-        h, over = cut.h, self.over(walls, lane.remaining)
-        if self.is_blocked(walls, wall, lane.r, h * lane.v):
+        start = self.start(lane)
+        held = self.held(walls, start, wall)
+        cut, record = self.cut(start.remaining), lanes.record
+        h, over = cut.h, self.over(held, start.remaining)
+        if self.is_blocked(held, wall, start, h):
             record[uzawa.SWEEPS, i] = 0.0
             return self.as_impacts(walls, lane, cut, wall, lanes, i)
-        free = self.free(gravity, lane, h)
+        free = self.free(gravity, start, h)
         if self.is_too_fast(free.p):
             return contract.refused(lane, Status.TOO_FAST.value)
         reactions = scratch((walls.length(), 4), np.float64)
@@ -134,10 +165,11 @@ class StepNumbers(penalty.GradientSteps):
             return self.as_impacts(walls, lane, cut, wall, lanes, i)
         if not end.converged and (self.policy == RAISE or not end.solved):
             return contract.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
-        new = 1.0 if self.is_new(over, lane.r) else 0.0
-        pushed = self.reacted(walls, gravity, lane, h, end.r, reactions, lanes.impulse, i)
-        remaining, twice_energy = lane.remaining - cut.used, lane.own.twice_energy + 2.0 * pushed.work
-        return contract.Contact(pushed.r, pushed.v, remaining, wall, 0.0, new, twice_energy, False), Status.DONE.value
+        new = 1.0 if self.is_new(over, start.r) else 0.0
+        pushed = self.reacted(held, gravity, start, h, end.r, reactions, lanes.impulse, i)
+        remaining, twice_energy = start.remaining - cut.used, start.own.twice_energy + 2.0 * pushed.work
+        contact = contract.Contact(pushed.r, pushed.v, remaining, wall, 0.0, new, twice_energy, False)
+        return self.ended(lane, contact), Status.DONE.value
 
 
 @outlined
@@ -159,7 +191,7 @@ class FixedSteps(StepNumbers):
     def is_new(self, walls, r):
         return not walls.outside(-1.0, r)
 
-    def is_alone(self, walls, wall, r0, r1, kappa):
+    def is_alone(self, walls, wall, start, r1, kappa):
         return not walls.outside(wall, r1)
 
     @outlined
@@ -197,12 +229,13 @@ class CutSteps(StepNumbers):
     def is_new(self, walls, r):
         return True
 
-    def is_alone(self, walls, wall, r0, r1, kappa):
+    def is_alone(self, walls, wall, start, r1, kappa):
         # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free
         # flight ends outside it again) was hit all the same.
-        return (flights.other_hit(walls, wall, r0, r1 - r0).time > 1.0) & (kappa != 0.0)
+        return (flights.other_hit(walls, wall, start.r, r1 - start.r).time > 1.0) & (kappa != 0.0)
 
-    def is_blocked(self, walls, wall, r, p):
+    def is_blocked(self, walls, wall, start, h):
+        r, p = start.r, h * start.v
         kappa = chord(walls, wall, r, p)
         r1 = walls.push(wall, r, p, kappa)
         other = flights.other_hit(walls, wall, r, r1 - r)
@@ -228,3 +261,52 @@ class CutSteps(StepNumbers):
         met = met & (hit.wall >= 0.0) & (remaining > 0.0)
         wall = select(isinstance(self.form, MeanValue), contract.HARD - hit.wall, hit.wall)
         return contract.Flight(select(met, walls.project(hit.wall, r), r), lane.v, remaining, select(met, wall, -1.0))
+
+
+class CentredSteps(CutSteps):
+    """The method with steps whose middle is the impact, where a lane is; in State I of the level that they begin on."""
+
+    asks_flown = True
+
+    def half(self, lane):
+        """Half the length of the contact step."""
+        return base.centred_half(self.dt, lane)
+
+    def start(self, lane):
+        half = self.half(lane)
+        return lane._replace(r=lane.r - half * lane.v, remaining=2.0 * half)
+
+    def held(self, walls, start, wall):
+        return lowered(walls, wall, start.r)
+
+    def ended(self, lane, contact):
+        half = self.half(lane)
+        step = contact.remaining < 2.0 * half
+        return contact._replace(
+            r=select(step, contact.r, kept(lane.r)), v=select(step, contact.v, kept(lane.v)),
+            remaining=lane.remaining - select(step, half, 0.0),
+        )  # fmt: skip
+
+    def guess(self, walls, gravity, lane, wall):
+        kappa, touching = CutSteps.guess(self, walls, gravity, lane, wall)
+        # A step without length is for the exact impact.
+        there = touching & (self.half(lane) > 0.0)
+        return select(there, kappa, 0.0), there
+
+    def is_alone(self, walls, wall, start, r1, kappa):
+        return (start.remaining > 0.0) & _is_free(walls, start, r1) & (kappa != 0.0)
+
+    def is_blocked(self, walls, wall, start, h):
+        if not h > 0.0:
+            return True
+        p = h * start.v
+        kappa = chord(walls, wall, start.r, p)
+        free = _is_free(walls, start, walls.push(wall, start.r, p, kappa))
+        later = uzawa.meets_later(walls, wall, self.law, start.r, p)
+        return not walls.pushes(wall, kappa) or kappa == 0.0 or not free or later
+
+
+def _is_free(walls, start, r1):
+    """Whether no wall is between the impact, the middle of the step that starts there, and its end r1."""
+    middle = start.r + 0.5 * start.remaining * start.v
+    return flights.first_hit(walls, None, middle, r1 - middle).time > 1.0

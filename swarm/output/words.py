@@ -261,4 +261,4 @@ def _numbers(method: Method) -> list[str]:
     return [
         f"{name.replace('_', ' ')} {plain(value)}" for name, value in vars(method).items()
         if name in shown and isinstance(value, (int, float)) and value
-    ]  # fmt: skip
+    ] + ["contact start centred"] * (getattr(method, "contact_start", "") == "centred")  # fmt: skip

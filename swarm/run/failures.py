@@ -35,7 +35,8 @@ def of_frame(
     multipliers = state.multipliers
     if status == Status.UNCONVERGED and multipliers is not None:
         remaining, stored = multipliers.remaining[particle], multipliers.stored_energy[particle]
-        sentence += f" {method.failure(moment, remaining, multipliers.sweeps[particle], stored)}"
+        sweeps, mass = multipliers.sweeps[particle], state.mass[particle]
+        sentence += f" {method.failure(moment, remaining, sweeps, stored, mass)}"
     return sentence
 
 

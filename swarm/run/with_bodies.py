@@ -73,7 +73,7 @@ def require_method_of_bodies(scene: Scene, bodies: Bodies, method: Method, optio
 def _require_of_soft(scene: Scene, bodies: Bodies, method: Penalty | AugmentedLagrangian) -> None:
     """Raise a `SceneError` where an argument of the method, or a wall, is none for bodies."""
     name = type(method).__name__
-    for argument, value in (("gradient", "composite"), ("acceleration", "none")):
+    for argument, value in (("gradient", "composite"), ("acceleration", "none"), ("contact_start", "impact")):
         given = getattr(method, argument, value)
         if given != value:
             raise SceneError(f'{argument} of {name} must be "{value}" with bodies, got "{given}"')

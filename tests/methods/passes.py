@@ -52,7 +52,8 @@ def one_pass(method, scene, position, velocity, remaining, mass=1.0, energy=None
         end = call(numbers.land, walls, gravity, lane, call(flights.first_hit, walls, gravity, *lane[:2]))
     else:
         end = call(numbers.flight, walls, gravity, lane)
-    lane = contract.Lane(end.r, end.v, end.remaining, 1.0, own)
+    flown = lane.remaining - end.remaining
+    lane = contract.Lane(end.r, end.v, end.remaining, 1.0, own, flown)
     kappa, unsolved = 0.0, False
     if numbers.most_sweeps(walls) > 0:
         kappa, unsolved = call(numbers.guess, walls, gravity, lane, end.wall)
@@ -71,7 +72,7 @@ def one_pass(method, scene, position, velocity, remaining, mass=1.0, energy=None
         impulse[int(wall), 0] += contact.impulse
     elif hard:
         wall, lanes = contract.HARD - wall, _Lanes(impulse, np.zeros((uzawa.RECORDS, 1)))
-        lane = contract.Lane(contact.r, contact.v, contact.remaining, 1.0, own)
+        lane = contract.Lane(contact.r, contact.v, contact.remaining, 1.0, own, flown)
         with np.errstate(all="ignore"):
             contact, status = numbers.hard_pass(walls, gravity, lane, wall, lanes, 0)
         assert status == Status.DONE, Status(status).name

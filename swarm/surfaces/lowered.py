@@ -1,0 +1,41 @@
+"""Walls as a centred contact step takes them: the gap of the wall that is met is 0 where the step begins.
+
+The step then begins in State I, on the level surface of phi through its start, and ends on it.
+"""
+
+from typing import Any
+
+from ..kernel.jit import select
+from .contract import Smooth
+from .frames import Framed
+
+
+def _same(self, given):
+    """The way into the frame of a wall, and out of it: there is none."""
+    return given
+
+
+class Lowered(Framed):
+    """A wall whose gap is less by `level`; flights meet the wall itself."""
+
+    body: Any
+    level: float
+
+    place_in = end_in = velocity_in = vector_in = way_in = gravity_in = _same
+    place_out = end_out = vector_out = normal_out = _same
+    # A chord from the wall may have a closed form that one from a level does not have.
+    chord_guess, chord_improve, chord_sweeps = Smooth.chord_guess, Smooth.chord_improve, Smooth.chord_sweeps
+
+    def gap_of(self, q):
+        return self.body.gap_of(q) - self.level
+
+    def level_of(self, q):
+        return self.gap_of(q)
+
+
+def lowered(walls, number, r):
+    """All walls, that with this number lowered to the point r."""
+    each: Any = ()
+    for k, wall in enumerate(walls.each):
+        each = (*each, Lowered(wall, select(number == k, wall.gap_of(wall.inner(r)), 0.0)))
+    return walls._replace(each=each)
