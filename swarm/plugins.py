@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
+from pathlib import Path
 from typing import Any
 
 from .checks import closest, shown
@@ -75,6 +76,12 @@ def _imported(name: str) -> Any:
     finally:
         if added:
             sys.path.remove(here)
+
+
+def files() -> dict[str, Path]:
+    """The files of the modules that were imported, by their names."""
+    found = {name: getattr(sys.modules.get(name), "__file__", None) for name in sorted(imported)}
+    return {name: Path(file) for name, file in found.items() if file is not None}
 
 
 def is_named(text: Any) -> bool:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from .columns import read_columns, row_of
 from .errors import SceneError
 from .filling import fill
 from .methods import Method
+from .output import paths
 from .particles import Particles
 from .plugins import allowed
 from .run.options import RunOptions
@@ -30,6 +31,8 @@ _SCENE = ("gravity", "period", "plane", "pairs")
 _TABLES = (*_SCENE, "particles", "body", "source", "counter", "surface", "method", "run")
 SWEEP = "sweep"
 _SAVED = {"checkpoint": 60.0}
+# Keys of [run] that name a file to write, and the options of swarm run that do.
+OUTPUTS = {"trajectory": "-o", "recording": "--record", "impacts": "--impacts"}
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ class BodiesFile:
 
 @dataclass(frozen=True)
 class Job:
-    """The run that a scene file describes, checked; `text` is the file itself."""
+    """The run that a scene file describes, checked; `text` is the file itself, `named` the files that it names."""
 
     scene: Scene
     method: Method
@@ -93,6 +96,27 @@ class Job:
     text: str
     source: "ParticlesTable | BodiesFile | Made | None"
     path: Path
+    named: tuple[Path, ...] = ()
+
+    def inputs(self) -> dict[str, Path | None]:
+        """The files that are read, by what they are: none of them can be an output."""
+        files: dict[str, Path | None] = {"scene file": self.path, "file of the start": self.start_file()}
+        files |= {f"file that the scene reads, {one.name}": one for one in self.named}
+        return files | {f"module {name} of --plugins": file for name, file in plugins.files().items()}
+
+    def require_within(self, names: Iterable[str]) -> None:
+        """Raise a SceneError if one of these outputs of [run] is not in the folder of the file, links followed.
+
+        A scene file may come from others: what it names alone is written beside it, and nowhere else.
+        """
+        folder = self.path.parent.resolve()
+        for name in names:
+            file = getattr(self.run, name)
+            if file is not None and not file.resolve().is_relative_to(folder):
+                raise SceneError(
+                    f"{self.path}: run.{name}: expected a file in the folder of the scene file, {folder}, got "
+                    f"{file.resolve()}; to write there, name it on the command line: {OUTPUTS[name]} {file}"
+                )
 
     def start_file(self) -> Path | None:
         """The file that holds the particles or bodies, or None."""
@@ -218,10 +242,11 @@ def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None 
     return Job(
         scene=scene,
         method=tables.method_of(document["method"]),
-        run=dataclasses.replace(_run(document["run"]), sources=sources, counters=counters),
+        run=dataclasses.replace(_run(document["run"], path), sources=sources, counters=counters),
         text=text,
         source=_start_of(document),
         path=path,
+        named=tuple(_named_files(document, path)),
     )
 
 
@@ -267,11 +292,26 @@ def _bodies_of(table: Any, where: str, path: Path) -> Any:
     return {**{key: value for key, value in table.items() if key != "from"}, **given}
 
 
-def _run(table: Any) -> RunOptions:
-    """[run]; a run from a file saves checkpoints even where it does not say so."""
+def _named_files(document: dict[str, Any], path: Path) -> Iterator[Path]:
+    """The files that texts of the document name, but those to write; of a trajectory also its shards."""
+    run = document.get("run")
+    read = {key: value for key, value in run.items() if key not in OUTPUTS} if isinstance(run, dict) else {}
+    places: list[Any] = [{**document, "run": read}]
+    while places:
+        place = places.pop()
+        if isinstance(place, (dict, list)):
+            places += place.values() if isinstance(place, dict) else place
+        elif isinstance(place, str) and paths.is_file(file := path.parent / place):
+            yield file
+            yield from paths.shards_of(file).glob("*.h5")
+
+
+def _run(table: Any, path: Path) -> RunOptions:
+    """[run]; a run from a file saves checkpoints even where it does not say so. Its files are beside the scene file."""
     if not isinstance(table, dict):
         return tables.convert(table, RunOptions, "run")
     table, own = {**_SAVED, **table}, table.get("observables")
+    table |= {key: str(path.parent / table[key]) for key in OUTPUTS if isinstance(table.get(key), str) and table[key]}
     table.pop("observables", None)
     options = tables.convert(table, RunOptions, "run")
     if own is None:

@@ -332,8 +332,12 @@ def test_existing_output_asks_for_overwrite(folder):
     done = command("run", "scene.toml", cwd=folder)
     assert done.returncode == 2
     assert "--overwrite" in done.stderr
+    done = command("run", "scene.toml", "--overwrite", cwd=folder)
+    assert (done.returncode, "scene.h5 is not a trajectory of swarm" in done.stderr) == (2, True)
     assert (folder / "scene.h5").read_text() == "mine"
-    assert command("run", "scene.toml", "--overwrite", cwd=folder).returncode == 0
+    (folder / "scene.h5").unlink()
+    for options in ([], ["--overwrite"]):
+        assert command("run", "scene.toml", *options, cwd=folder).returncode == 0
 
 
 def test_version_and_help(folder):

@@ -199,7 +199,7 @@ def test_the_settings_of_a_run_are_taken(tmp_path, line):
     (tmp_path / "scene.toml").write_text(SCENE.replace("[run]\n", f"[run]\n{line}\n"))
     key, value = tomllib.loads(line).popitem()
     taken = getattr(scene_file.read(tmp_path / "scene.toml").run, key)
-    assert taken == (Path(value) if key in ("trajectory", "recording") else value)
+    assert taken == (tmp_path / value if key in ("trajectory", "recording") else value)
 
 
 def test_the_settings_are_found():

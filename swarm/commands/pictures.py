@@ -55,8 +55,7 @@ def view(
     with needed_by("a contact sheet", "plot"):
         from ..output import sheet
 
-    target = output or file.with_suffix(".png")
-    _check_picture(target, file)
+    target = _picture(output or file.with_suffix(".png"), file)
     by = sheet.draw_sheet(Playback(file), target, None if times is None else _numbers("--times", times), viewer)
     print(f"written to {target}; drawn by {by}")
 
@@ -69,8 +68,7 @@ def plot(file: TrajectoryFile, output: Picture = None) -> None:
         from ..output import plots
     from ..output.trajectory import load
 
-    target = output or file.with_suffix(".png")
-    _check_picture(target, file)
+    target = _picture(output or file.with_suffix(".png"), file)
     with load(file) as trajectory:
         plots.draw_plot(trajectory, target)
     print(f"written to {target}")
@@ -95,14 +93,19 @@ def animate(
     written(film)
 
 
-def _check_picture(target: Path, source: Path) -> None:
-    """Raise a SceneError if the picture cannot be written; an old one is cheap to redraw, so overwritten."""
-    from ..output.paths import check_distinct, check_target
+def _picture(output: Path, source: Path) -> Path:
+    """The file that a picture becomes; a SceneError if it cannot.
 
-    check_distinct({"picture": target}, {"file that it is drawn from": source})
-    check_target(target, overwrite=True, what="picture")
+    A picture of swarm is cheap to draw again, so it is replaced without an option.
+    """
+    from ..output.paths import check_distinct, check_target, target_of
+
+    target = target_of("picture", output)
     if target.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise SceneError(f"picture: expected a file name that ends in .png, .pdf or .svg, got {target}")
+    check_distinct({"picture": target}, {"file that it is drawn from": source})
+    check_target(target, overwrite=True, what="picture")
+    return target
 
 
 def _numbers(name: str, text: str) -> list[float]:

@@ -5,13 +5,17 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .. import interrupt
 from ..errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
+
+if TYPE_CHECKING:
+    from ..run.options import RunOptions
+    from ..scene_file import Job
 
 # Behind the reason why a run has stopped.
 _COMPILED = ", after a compilation that was under way"
@@ -73,6 +77,7 @@ def run(  # noqa: PLR0913  one argument an option
     try:
         with interrupt.at_once():
             job = files.read(scene_file, plugins or ())
+            alone = _named_alone(job, trajectory=output, recording=recording, impacts=impacts)
             stored = scene_file.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
             target = paths.target_of("trajectory", output or stored)
             options = dataclasses.replace(
@@ -92,12 +97,7 @@ def run(  # noqa: PLR0913  one argument an option
                 shards=shards,
             )
             # Before particles are made and kernels compiled.
-            inputs = {"scene file": scene_file, "file of the start": job.start_file()}
-            paths.check_distinct({**options.files(), "recording": options.recording}, inputs)
-            replaces = {"trajectory": overwrite or resume, "impacts": overwrite or resume, "recording": overwrite}
-            for name, replaced in replaces.items():
-                if (file := getattr(options, name)) is not None:
-                    paths.check_target(file, replaced, name)
+            _check_outputs(job, options, alone)
             before, start = paths.identity(target), job.start()
             resumes = resume and paths.checkpoint_of(target).exists()
         try:
@@ -123,6 +123,36 @@ def run(  # noqa: PLR0913  one argument an option
     report("complete", target, wall_time=result.wall_time, compile_time=result.compile_time)
     if not (quiet or as_json):
         table(of_result(result, getattr(start, "volume", None)))
+
+
+def _named_alone(job: "Job", **given: Path | None) -> list[str]:
+    """The outputs that the scene file names and the command line does not, in the folder of the file."""
+    alone = [name for name, file in given.items() if file is None and getattr(job.run, name) is not None]
+    job.require_within(alone)
+    return alone
+
+
+def _check_outputs(job: "Job", options: "RunOptions", alone: list[str]) -> None:
+    """Raise a SceneError if an output cannot be written, or may not be replaced.
+
+    What the scene file names alone is not overwritten: --overwrite is meant for files of the command line.
+    """
+    from ..output import paths
+    from ..scene_file import OUTPUTS
+
+    paths.check_distinct({**options.files(), "recording": options.recording}, job.inputs())
+    begins = not options.resume or (options.overwrite and not paths.checkpoint_of(options.trajectory).exists())
+    for name, option in OUTPUTS.items():
+        file = getattr(options, name)
+        if file is None:
+            continue
+        if not begins and name != "recording":
+            paths.check_place(file, name)  # the session reads what is there
+        elif name in alone:
+            allow = f"overwrite it by naming it on the command line: {option} {file} --overwrite"
+            paths.check_target(file, False, name, allow)
+        else:
+            paths.check_target(file, options.overwrite, name)
 
 
 def _stopped(reason: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:

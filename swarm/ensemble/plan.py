@@ -216,6 +216,7 @@ def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> list
                     f"run.{name}: the files of the runs of a sweep are named by it, got {str(value)!r}; remove the key"
                     + ("; swarm record makes a recording of a trajectory" if name == "recording" else "")
                 )
+        job.require_within(["impacts"])
         stem = _digest(own, path, contents)
         kind = _digest_of(_unnumbered(own))
         made = Variant(len(variants), parameters, stem, kind, job.run.impacts is not None)

@@ -11,7 +11,7 @@ from typing import Any
 from ..columns import flattened
 from ..errors import SceneError
 from ..extras import needed_by
-from ..output import paths
+from ..output import marks, paths
 from ..output.replaced import replaced
 from .plan import STEM, Plan, Variant
 
@@ -76,6 +76,35 @@ class Results:
                 continue  # none, or none that is whole: the trajectory says what there is
             self._statuses[variant.stem] = known
 
+    def require_own(self) -> None:
+        """Raise a SceneError if a file that the sweep is to replace is none of a sweep."""
+        for path, what in ((self.path, "table"), (self.folder / KEPT, "sweep file")):
+            if path.exists() and not (what == "sweep file" and self._is_kept(path)):
+                paths.require_own(path, what)
+        for variant in self.plan.variants:
+            for file, what in ((self.trajectory(variant), "trajectory"), (self.impacts(variant), "impacts")):
+                if file is not None and file.exists():
+                    paths.require_own(file, what)
+            if (file := self.status_file(variant)).exists() and not _is_status(file):
+                paths.require_own(file, "status")
+
+    def _is_kept(self, path: Path) -> bool:
+        """Whether a sweep file in the folder is that of the plan, or one that a sweep in this folder has left."""
+        try:
+            same = path.read_bytes() == self.plan.path.read_bytes()
+        except OSError:
+            return False
+        there = (self.folder / f"results.{kind}" for kind in TABLES)
+        return (
+            same
+            or bool(self.others())
+            or any(file.exists() and marks.is_table(file) for file in there)
+            or any(
+                self.trajectory(variant).exists() or self.status_file(variant).exists()
+                for variant in self.plan.variants
+            )
+        )
+
     def remove(self) -> None:
         """Remove the files of the plan's runs, which begin anew."""
         self._statuses.clear()
@@ -138,6 +167,15 @@ class Results:
                 file.write(text.getvalue().encode())
             else:
                 self.frame().to_parquet(file, engine="pyarrow", index=False)
+
+
+def _is_status(path: Path) -> bool:
+    """Whether a file notes the end of a run; one that was cut off is taken for one."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        return path.read_bytes()[:1] in (b"", b"{")
+    return isinstance(found, dict) and "state" in found and "parameters" in found
 
 
 def require_written(table: str) -> None:

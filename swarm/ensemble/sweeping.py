@@ -152,7 +152,10 @@ def _require_free(results: Results, options: SweepOptions) -> None:
     folder = results.folder
     if folder.exists() and not folder.is_dir():
         raise SceneError(f"folder: expected the name of a folder, got the file {folder}")
-    if options.resume or options.overwrite or not folder.exists():
+    if not folder.exists():
+        return
+    if options.resume or options.overwrite:
+        results.require_own()
         return
     files = (file(run) for run in results.plan.variants for file in (results.trajectory, results.status_file))
     if results.path.exists() or results.others() or any(file.exists() for file in files):
@@ -160,6 +163,7 @@ def _require_free(results: Results, options: SweepOptions) -> None:
             f"folder: {folder} holds the runs of a sweep; go on with them (--resume, resume=True), replace them "
             "(--overwrite, overwrite=True), or choose another folder"
         )
+    results.require_own()
 
 
 def _run(plan: Plan, results: Results, options: SweepOptions, began: float) -> str:

@@ -45,7 +45,7 @@ class ImpactLog(Stored):
         super().__init__(path, "a log of impacts (.h5)", "swarm.load_impacts")
         try:
             with self._reading("its structure") as file:
-                foreign = next((name for name in _NEEDED if name not in file), None)
+                foreign = missing(file)
                 if foreign is None:
                     self._check(file)
             if foreign is not None:
@@ -250,6 +250,11 @@ class ImpactLog(Stored):
                 for name in (name for name in table.dtype.names[4:] if name in self._columns):
                     table[name] = finite(self._columns[name][within], "row")[k - k[0]]
         return table
+
+
+def missing(file: Any) -> str | None:
+    """The first part of a log of impacts that this file lacks, or None."""
+    return next((name for name in _NEEDED if name not in file), None)
 
 
 def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_]:

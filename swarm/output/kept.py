@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from . import layout, provenance
+from . import layout
 from .presented import Presented
 from .stored import finite, parsed
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 class Kept(Presented):
     """The part of a `Trajectory` that is the same in all frames."""
+
+    # What made the file, checked when it is opened.
+    _makers: dict[str, str]
 
     @staticmethod
     def _comes(file: Any) -> bool:
@@ -132,5 +135,5 @@ class Kept(Presented):
     @property
     def makers(self) -> dict[str, str]:
         """What made the file, and when: "name", "version", "python", "numpy", "numba", "hdf5", "machine", "date"."""
-        with self._reading("what made it") as file:
-            return provenance.creator_of(file)
+        with self._reading("what made it"):
+            return dict(self._makers)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import h5py
 from numpy.typing import NDArray
@@ -32,7 +32,9 @@ _REQUIRED = ("h5md", *(f"parameters/{name}" for name in (*_TEXTS, "particles", "
 # The highest compression of any HDF5 filter: deflate, 1032 to 1.
 _DENSEST = 1032
 # Bytes of the header of a heap of texts, and of each object in it; the signature of a heap.
-_HEADER, _HEAP = 16, int.from_bytes(b"GCOL", "little")
+_HEADER, _HEAP = 16, b"GCOL"
+# The version of a heap, which follows its signature; and the bytes in which a writer puts the texts of attributes.
+_VERSION, _BEGINNING = b"\1\0\0\0", 1 << 20
 
 # The shape of an entry of the observables of every run; None stands for one of each surface, or of each part.
 _OBSERVABLES: dict[str, tuple[int | None, ...]] = {
@@ -155,23 +157,35 @@ def text(dataset: Any, path: Path) -> str:
     """
     place = dataset.id.get_offset()
     with open(path, "rb") as file:
-
-        def integer(at: int, size: int) -> int:
-            file.seek(at)
-            return int.from_bytes(file.read(size), "little")
-
-        begin = at = -1 if place is None else integer(place + 4, 8)
-        if not 0 <= begin < path.stat().st_size or integer(begin, 4) != _HEAP:
+        begin = -1 if place is None else _integer(file, place + 4, 8)
+        if not 0 <= begin < path.stat().st_size or _integer(file, begin, 4) != int.from_bytes(_HEAP, "little"):
             raise ValueError("its heap is not where it should be")
-        end = begin + integer(begin + 8, 8)
-        at += _HEADER
-        while at + _HEADER <= end:
-            number, size = integer(at, 2), integer(at + 8, 8)
-            step = _HEADER + -(-size // 8) * 8 if number else size
-            if step < _HEADER or at + step > end:
-                raise ValueError("its heap is damaged")
-            at += step
+        _require_heap(file, begin)
     return str(dataset.asstr()[()])
+
+
+def require_heaps(path: Path) -> None:
+    """Raise a ValueError if a heap of texts at the beginning of a file is damaged, where those of attributes are."""
+    with open(path, "rb") as file:
+        head, begin = file.read(_BEGINNING), -1
+        while (begin := head.find(_HEAP + _VERSION, begin + 1)) >= 0:
+            _require_heap(file, begin)
+
+
+def _integer(file: IO[bytes], at: int, size: int) -> int:
+    file.seek(at)
+    return int.from_bytes(file.read(size), "little")
+
+
+def _require_heap(file: IO[bytes], begin: int) -> None:
+    """Raise a ValueError if the objects of a heap do not follow one another to its end."""
+    end, at = begin + _integer(file, begin + 8, 8), begin + _HEADER
+    while at + _HEADER <= end:
+        number, size = _integer(file, at, 2), _integer(file, at + 8, 8)
+        step = _HEADER + -(-size // 8) * 8 if number else size
+        if step < _HEADER or at + step > end:
+            raise ValueError("its heap is damaged")
+        at += step
 
 
 def require_observables(seen: dict[str, NDArray[Any]], surfaces: int, parts: int, counters: int) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .. import checks
 from ..errors import SceneError
-from . import colours, drawing, graphs, sentences, series, speeds, style, verdicts, words
+from . import colours, drawing, graphs, marks, sentences, series, speeds, style, verdicts, words
 from .amounts import amount, many
 from .content import Content
 from .drawn import Drawn
@@ -41,7 +41,7 @@ def draw_plot(trajectory: Any, target: Path) -> None:
     """
     figure = figure_of(content_of(trajectory), None, SHOWN)
     with named_when_whole(target) as part, style.applied():
-        figure.savefig(part)
+        figure.savefig(part, metadata=marks.of_picture(part))
 
 
 def content_of(trajectory: Any) -> Content:

@@ -7,8 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..checks import shown
 from ..version import VERSION
 
+_NAME = "swarm"
+_CREATOR = "h5md/creator"
 _CPUS = Path("/proc/cpuinfo")
 
 
@@ -27,7 +30,7 @@ def makers() -> dict[str, str]:
     import numpy
 
     return {
-        "name": "swarm",
+        "name": _NAME,
         "version": VERSION,
         "python": platform.python_version(),
         "numpy": numpy.__version__,
@@ -47,6 +50,24 @@ def _processor() -> str:
     return told[0] if told else platform.machine()
 
 
+def is_own(file: Any) -> bool:
+    """Whether a file says that swarm made it."""
+    return _CREATOR in file and file[_CREATOR].attrs.get("name") == _NAME
+
+
 def creator_of(file: Any) -> dict[str, str]:
-    """The attributes of h5md/creator that are texts; fewer of older versions."""
-    return {name: value for name, value in file["h5md/creator"].attrs.items() if isinstance(value, str)}
+    """The attributes of h5md/creator, which are texts; fewer of older versions.
+
+    Raises:
+        ValueError: one is not a text in one line, or the date is no date.
+    """
+    found = dict(file[_CREATOR].attrs) if _CREATOR in file else {}
+    for name, value in found.items():
+        if not isinstance(value, str) or not value.isprintable():
+            raise ValueError(f"{name} of {_CREATOR} must be a text in one line, got {shown(value)}")
+    if "date" in found:
+        try:
+            datetime.datetime.fromisoformat(found["date"])
+        except ValueError:
+            raise ValueError(f"date of {_CREATOR} must be a date of ISO 8601, got {shown(found['date'])}") from None
+    return found

@@ -9,7 +9,7 @@ from matplotlib.image import imread
 
 from ..errors import RunError, SceneError
 from ..plane import across_of
-from . import drawing, graphs, sentences, series, style, viewer
+from . import drawing, graphs, marks, sentences, series, style, viewer
 from .amounts import many
 from .playback import Playback
 from .replaced import named_when_whole
@@ -47,7 +47,7 @@ def draw_sheet(playback: Playback, target: Path, times: list[float] | None, with
         found, by = _pictures(playback, numbers, Path(folder), with_viewer)
         picture = _sheet(playback, numbers, found, by)
     with named_when_whole(target) as part, style.applied():
-        picture.savefig(part)
+        picture.savefig(part, metadata=marks.of_picture(part))
     return by
 
 

@@ -17,7 +17,7 @@ from ..errors import SceneError
 from ..methods import Method
 from ..scene import Scene
 from ..surfaces.counter import Counter
-from . import driver, layout, paths, superblock
+from . import driver, layout, links, paths, superblock
 from .sources import DAMAGE, DamagedError, reason, require_file
 
 _STILL_WRITTEN = "already open"
@@ -129,8 +129,23 @@ def open_stored(path: Path) -> h5py.File:
     """The file, open for reading.
 
     Raises:
-        SceneError: it cannot be read.
+        SceneError: it cannot be read, or a part of it is in another file that is no shard of it.
     """
+    file, what = _opened(path), "its texts"
+    try:
+        layout.require_heaps(path)
+        what = "its structure"
+        links.require_none(file, path, shards=True)
+    except SceneError:
+        file.close()
+        raise
+    except DAMAGE as error:
+        file.close()
+        raise DamagedError(f"{path} is damaged: {what}: {reason(error)}") from error
+    return file
+
+
+def _opened(path: Path) -> h5py.File:
     # Without a chunk cache only the requested rows of a chunk are read: for one particle's path a thousandth.
     # Without locking, a file that is still being written can be read.
     options: dict[str, Any] = {"rdcc_nbytes": 0, "locking": False}

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ..columns import MAY_BE_NAN
 from ..errors import SceneError
 from ..particles import Particles
-from . import layout
+from . import layout, provenance
 from .kept import Kept
 from .stored import finite, open_stored, times_of, whole
 
@@ -54,6 +54,7 @@ class Trajectory(Kept):
                 foreign = layout.missing(file)
                 self._frames = 0 if foreign else layout.frames(file, self.path)
                 layout.require_shards(file, self._frames, self.path, open_stored)
+                self._makers = provenance.creator_of(file)
             if foreign:
                 raise SceneError(f"{self.path} is an HDF5 file, but not a trajectory of swarm: it has no {foreign}")
         except SceneError:

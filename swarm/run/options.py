@@ -13,12 +13,14 @@ from ..errors import SceneError
 from ..frames import FrameTimes
 from ..methods.base import Method
 from ..output import paths
+from ..output.colours import BY as COLOURS
 from ..output.storage import Storage
 from ..particles import Particles
 from ..scene import Scene
 from ..sources.source import checked_sources
 from ..surfaces.counter import checked_counters
 from . import measures
+from .progress import Display
 from .tiers import CHOICES
 
 # At shorter intervals [s] a run would do little but save checkpoints.
@@ -73,7 +75,7 @@ class RunOptions:
     def __post_init__(self) -> None:
         for name in ("trajectory", "recording", "impacts"):
             value = getattr(self, name)
-            object.__setattr__(self, name, None if value is None else paths.target_of(name, value))
+            object.__setattr__(self, name, None if value is None else paths.target_of_run(name, value))
         paths.check_distinct({**self.files(), "recording": self.recording}, {})
         if self.checkpoint is not None:
             checks.at_least("checkpoint", self.checkpoint, _OFTEN)
@@ -87,13 +89,27 @@ class RunOptions:
         if self.shards is not None and self.cluster is None:
             raise SceneError(f"shards must be None without a cluster, got {self.shards}; give cluster=")
         checks.one_of("compile", self.compile, CHOICES)
-        checks.flag("member_impacts", self.member_impacts)
+        for name in ("member_impacts", "overwrite", "resume"):
+            object.__setattr__(self, name, checks.flag(name, getattr(self, name)))
+        self._check_recording()
         object.__setattr__(self, "observables", measures.checked(self.observables))
         object.__setattr__(self, "counters", checked_counters(self.counters))
         self._check_impacts()
         object.__setattr__(self, "seed", checks.seed("seed", self.seed))
         object.__setattr__(self, "sources", checked_sources(self.sources))
         _ = self.storage
+
+    def _check_recording(self) -> None:
+        """Raise a SceneError unless what a recording and a display are given is known, also where there is none."""
+        checks.count("record_particles", self.record_particles)
+        checks.one_of("record_color", self.record_color, COLOURS)
+        checks.positive("record_megabytes", self.record_megabytes)
+        if not isinstance(self.live, str):
+            checks.flag("live", self.live)
+        if not callable(self.progress) and not isinstance(self.progress, Display):
+            checks.flag("progress", self.progress)
+        if self.scene_text is not None and not isinstance(self.scene_text, str):
+            raise SceneError(f"scene_text must be a text, or None, got {checks.shown(self.scene_text)}")
 
     def _check_impacts(self) -> None:
         """Raise a SceneError unless impact_particles is "all", k, or numbers of particles; make these a tuple."""

@@ -107,11 +107,11 @@ class Session:
             self.identity["counters"] = run_tables.counters_text(task.options.counters)
         self._log = log
         if log is not None:
-            paths.check_target(impacts, overwrite or self._resumes, "impacts")
+            self._check(impacts, overwrite, "impacts")
             self._held.enter_context(only_writer(impacts, "log of impacts"))
         if self._trajectory is None:
             return
-        paths.check_target(self._trajectory, overwrite or self._resumes)
+        self._check(self._trajectory, overwrite, "trajectory")
         self._held.enter_context(only_writer(self._trajectory))
         if not self._resumes and os.path.lexists(self._path) and not checkpoint.is_one(self._path):
             raise SceneError(
@@ -121,6 +121,13 @@ class Session:
         texts: dict[str, Any] = {**descriptions(task.scene, task.method, task.options.storage)}
         texts["kept"], texts["member_impacts"] = "" if log is None else log.kept, task.options.member_impacts
         self._job = checkpoint.Job(VERSION, **texts, particles=len(task.particles), **self.identity)
+
+    def _check(self, path: Path, overwrite: bool, what: str) -> None:
+        """Raise a SceneError if the session cannot write this file, or may not replace it."""
+        if self._resumes and (not overwrite or self._path.exists()):
+            paths.check_place(path, what)  # it goes on in the file, which it reads first
+        else:
+            paths.check_target(path, overwrite, what)
 
     def _find_log(self, path: Path, overwrite: bool) -> None:
         """Raise a SceneError if the log of impacts is none to go on with, or to begin anew."""

@@ -124,21 +124,23 @@ def test_a_run_replaces_a_file_that_is_open(tmp_path, name):
 @pytest.mark.parametrize("name", READERS)
 def test_virtual_datasets_are_read_beside_their_sources(tmp_path, name):
     """As of a joined trajectory: the sources are opened by the driver of the file that names them."""
-    path, joined = tmp_path / "run.h5", tmp_path / "joined.h5"
+    path, joined = tmp_path / "x.shards" / "0000.h5", tmp_path / "joined.h5"
+    path.parent.mkdir()
     result = run(path)
+    value = "particles/all/position/value"
     layout = h5py.VirtualLayout((6, 4, 3), "f8")
-    layout[:] = h5py.VirtualSource("run.h5", "particles/all/position/value", shape=(6, 4, 3))
+    layout[:] = h5py.VirtualSource("x.shards/0000.h5", value, shape=(6, 4, 3))
     with h5py.File(joined, "w", libver="latest") as file:
-        file.create_virtual_dataset("position", layout, fillvalue=np.nan)
+        file.create_virtual_dataset(value, layout, fillvalue=np.nan)
     options = {"driver": driver.NAME, "locking": False, "rdcc_nbytes": 0}
     before = READERS[name](path)
     with h5py.File(joined, "r", **options) as file:
-        np.testing.assert_array_equal(file["position"][-1].T, result.particles.position)
+        np.testing.assert_array_equal(file[value][-1].T, result.particles.position)
         after = READERS[name](path)
-        np.testing.assert_array_equal(file["position"][-1].T, result.particles.position)
+        np.testing.assert_array_equal(file[value][-1].T, result.particles.position)
         # What joins files is not opened as a Python object, of which HDF5 makes no path.
         with stored.open_stored(joined) as again:
-            np.testing.assert_array_equal(again["position"][-1].T, result.particles.position)
+            np.testing.assert_array_equal(again[value][-1].T, result.particles.position)
     assert frames_of(before) == frames_of(after) == 6
     before.close()
     after.close()

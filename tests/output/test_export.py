@@ -249,7 +249,9 @@ def test_missing_libraries_are_named_before_anything_is_written(stored, tmp_path
 
 def test_what_cannot_be_finished_leaves_the_old_file(stored, tmp_path):
     """The source is damaged in the middle, or the disk is full."""
-    (tmp_path / "out.xyz").write_text("mine")
+    with swarm.load(stored["cavity"]) as trajectory:
+        trajectory.export(tmp_path / "out.xyz", frames=0)
+    older = (tmp_path / "out.xyz").read_text()
     broken = tmp_path / "broken.h5"
     broken.write_bytes(stored["cavity"].read_bytes())
     with h5py.File(broken, "r+") as file:
@@ -259,7 +261,7 @@ def test_what_cannot_be_finished_leaves_the_old_file(stored, tmp_path):
             with pytest.raises(swarm.SceneError, match=r"broken\.h5 is damaged: frame 3: expected finite numbers"):
                 trajectory.export(tmp_path / name, overwrite=True)
         assert sorted(path.name for path in tmp_path.iterdir()) == ["broken.h5", "out.xyz"]
-        assert (tmp_path / "out.xyz").read_text() == "mine"
+        assert (tmp_path / "out.xyz").read_text() == older
 
         def full(_done, _total):
             raise OSError(28, "No space left on device")

@@ -23,7 +23,7 @@ from ...bodies.state import Bodies
 from ...errors import SceneError
 from ...methods.base import Method
 from ...observables import CHUNK
-from ...output import paths
+from ...output import marks, paths
 from ...particles import Births, Particles
 from ...scene import Scene
 from ...state import Absorbed, Multipliers
@@ -31,7 +31,6 @@ from ..machine import End, birth_times
 from ..options import RunOptions, Task
 from ..tally import scales_of
 
-_SUFFIX = ".shards"
 _ARRAYS = ("position", "velocity", "mass", "image")
 _BIRTHS = ("birth_time", "birth_source")
 
@@ -50,7 +49,7 @@ class Whole(NamedTuple):
 
 def folder_of(trajectory: Path) -> Path:
     """The folder of the shards of a trajectory."""
-    return trajectory.with_suffix(_SUFFIX)
+    return paths.shards_of(trajectory)
 
 
 def file_of(folder: Path, k: int) -> Path:
@@ -118,7 +117,7 @@ def clear(folder: Path) -> None:
         SceneError: it holds something else.
     """
     folder.mkdir(exist_ok=True)
-    ours = [path for path in folder.iterdir() if path.is_file() and path.name.partition(".")[0] in _names(path.name)]
+    ours = [path for path in folder.iterdir() if path.is_file() and _is_ours(path)]
     if len(ours) < len(list(folder.iterdir())):
         raise SceneError(
             f"{folder} must hold the shards of a run or not be there, got a folder with other files, which a run would "
@@ -128,10 +127,14 @@ def clear(folder: Path) -> None:
         path.unlink()
 
 
-def _names(name: str) -> set[str]:
-    """The first words of our files; those of locks and of parts begin with a point."""
-    word = name.partition(".")[0]
-    return {"", "whole", *_ARRAYS, *_BIRTHS, *([word] if word.isdigit() else [])}
+def _is_ours(path: Path) -> bool:
+    """Whether a file of the folder is one of a run; what has the name of a trajectory must be one."""
+    word, suffix = path.stem.partition(".")[0], path.suffix
+    if paths.is_temporary(path.name):
+        return True
+    if word.isdecimal():
+        return suffix in (".end", ".checkpoint") or (suffix == ".h5" and marks.why_not(path, "trajectory") is None)
+    return path.name in ("whole.pickle", *(f"{name}.npy" for name in (*_ARRAYS, *_BIRTHS)))
 
 
 def tidy(folder: Path, count: int) -> None:

@@ -58,7 +58,10 @@ def _of_npy(path: Path) -> Floats:
 def _of_hdf5(path: Path) -> Floats:
     import h5py
 
+    from ...output import links
+
     with h5py.File(path, "r") as file:
+        links.require_none(file, path)
         found: list[Any] = []
         file.visititems(lambda _name, one: found.append(one) if getattr(one, "ndim", 0) == 3 else None)
         if len(found) != 1:
@@ -67,7 +70,7 @@ def _of_hdf5(path: Path) -> Floats:
         (dataset,) = found
         size = _require(path, dataset.shape, dataset.dtype)
         active = path.stat().st_size * (_DENSEST if dataset.id.get_create_plist().get_nfilters() > 0 else 1)
-        if size > active and not dataset.is_virtual and dataset.external is None:
+        if size > active:
             raise SceneError(
                 f"{path} must hold all samples, got {dataset.name} of shape {dataset.shape}, which takes "
                 f"{checks.in_bytes(size)}, in a file of {checks.in_bytes(path.stat().st_size)}; write all of them"
