@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from conftest import edited
 
 import swarm
 from swarm.output import facts
@@ -61,11 +62,10 @@ def test_frames(path):
 
 
 def test_damage_is_still_found(path, tmp_path):
-    import h5py
 
     copy = tmp_path / "copy.h5"
     copy.write_bytes(path.read_bytes())
-    with h5py.File(copy, "r+") as file:
+    with edited(copy) as file:
         file["particles/all/position/value"][4, -1, 1] = np.nan
     with swarm.load(copy) as trajectory:
         trajectory.frame(3)

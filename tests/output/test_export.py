@@ -4,9 +4,9 @@ import sys
 
 import ase.io
 import gsd.hoomd
-import h5py
 import numpy as np
 import pytest
+from conftest import edited
 from test_cli import command
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -252,7 +252,7 @@ def test_what_cannot_be_finished_leaves_the_old_file(stored, tmp_path):
     (tmp_path / "out.xyz").write_text("mine")
     broken = tmp_path / "broken.h5"
     broken.write_bytes(stored["cavity"].read_bytes())
-    with h5py.File(broken, "r+") as file:
+    with edited(broken) as file:
         file["particles/all/position/value"][3, 2, 1] = np.nan
     with swarm.load(broken) as trajectory:
         for name in ("out.xyz", "out.gsd", "out.vtkhdf"):
