@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 
 import swarm
-from swarm.output import checkpoint
+from swarm.output import checkpoint, checksums
+from swarm.output.storage import Storage
+from swarm.output.writer import TrajectoryWriter
 from swarm.run.engine import Run
+from swarm.state import State
 
 from .bars import SPEED, SPHERE
 from .report import Row, repeated, show, write
@@ -93,12 +96,50 @@ def reading(n: int, frames: int, folder: Path, repeats: int) -> list[Row]:
     ]
 
 
+def writing(n: int, frames: int, folder: Path, repeats: int) -> list[Row]:
+    """Processor time of a frame in batches of ten, of that its checksums, and of holding all values against them."""
+    particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
+    nothing, counts = np.zeros(n), np.zeros(n, np.int64)
+    state = State(particles.position, particles.velocity, nothing, nothing, nothing, counts, nothing, nothing, None)
+    path = folder / "written.h5"
+
+    def written() -> float:
+        path.unlink(missing_ok=True)
+        start = time.process_time()
+        with TrajectoryWriter(path, Storage(), SPHERE, swarm.Impact(), particles, None, {}) as write:
+            for first in range(0, frames, 10):
+                write([(k, float(k), state, {"time": float(k), "impacts": k}) for k in range(first, first + 10)])
+        return 1e3 * (time.process_time() - start) / frames
+
+    rows = np.ascontiguousarray(particles.position.T)[None]
+
+    def sums() -> float:
+        start = time.process_time()
+        for _ in range(frames):
+            for one in (rows, rows, counts[None]):
+                checksums.row_sums(one, checksums.BLOCK)
+        return 1e3 * (time.process_time() - start) / frames
+
+    def read() -> float:
+        start = time.process_time()
+        with swarm.load(path) as trajectory:
+            trajectory.require_intact()
+        return 1e3 * (time.process_time() - start) / frames
+
+    figures = [("a frame written", repeated(written, repeats)), ("  of that checksums", repeated(sums, repeats))]
+    figures.append(("  read and held against its checksums", repeated(read, repeats)))
+    size = path.stat().st_size / frames / 1e6
+    found = [Row(f"{what}, {n} particles, {size:.2g} MB", *of, "ms") for what, of in figures]
+    return [*found, Row("  a frame written, that is", *(size / ms * 1e3 for ms in figures[0][1]), "MB/s")]
+
+
 def main(quick: bool) -> None:
     """Measure, print and, unless quick, write endurance-MACHINE.csv."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         rows = checkpoints(1_000 if quick else 100_000, 3 if quick else 21, folder)
         rows += growth(200 if quick else 40_000, folder)
+        rows += writing(1_000 if quick else 10_000, 20 if quick else 500, folder, 3 if quick else 21)
         rows += reading(100 if quick else 10_000, 20 if quick else 20_000, folder, 3 if quick else 21)
     show(rows)
     if not quick:

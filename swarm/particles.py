@@ -75,6 +75,8 @@ class Particles:
         return f"Particles({len(self)})"
 
     def _repr_html_(self) -> str:
+        if not len(self):
+            return notebook.table("0 particles", [])
         speeds = np.sqrt((self.velocity**2).sum(axis=0))
         held = dict(zip("xyz", self.position, strict=True)) | {"speed": speeds, "mass": self.mass}
         held |= {} if self.radius is None else {"radius": self.radius}
@@ -89,14 +91,16 @@ class Particles:
     def born(self) -> "Particles":
         """Those that are there: without those of a frame of a run with sources that come later, whose rows are NaN.
 
-        Raises:
-            SceneError: nobody is there.
+        There may be none.
         """
         there = ~np.isnan(self.position[0])
-        image = None if self.image is None else self.image[:, there]
-        radius = None if self.radius is None else self.radius[there]
-        spin = None if self.spin is None else self.spin[:, there]
-        return Particles(self.position[:, there], self.velocity[:, there], self.mass[there], image, radius, spin)
+        held = {name: getattr(self, name) for name in ("position", "velocity", "mass", "image", "radius", "spin")}
+        some = {name: None if rows is None else rows[..., there] for name, rows in held.items()}
+        if there.any():
+            return Particles(**some)
+        made = object.__new__(Particles)
+        made.__dict__.update(some)
+        return made
 
     @classmethod
     def of_frame(

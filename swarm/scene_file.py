@@ -163,7 +163,12 @@ def _read(file: Path, table: ParticlesTable | BodiesFile) -> "Particles | Bodies
             return trajectory.bodies(frame)
         if trajectory.body is not None:
             raise SceneError(f"from: {file} holds bodies, which are not particles; write [body] in place of it")
-        return trajectory.frame(frame).born() if trajectory.has_births() else trajectory.frame(frame)
+        if not trajectory.has_births():
+            return trajectory.frame(frame)
+        born = trajectory.frame(frame).born()
+        if not len(born):
+            raise SceneError(f"from: no particle is there at frame {frame} of {file}; choose a later one by frame =")
+        return born
 
 
 def read(path: str | Path, plugins: Iterable[str] = ()) -> Job:

@@ -48,14 +48,16 @@ def numbers(trajectory: Path) -> dict[str, Any]:
 
 
 def of_file(file: Path) -> dict[str, str]:
-    """The content of an HDF5 file, a trajectory or a log of impacts."""
+    """The content of an HDF5 file, a trajectory or a log of impacts, and whether all values match their checksums."""
     from .output.impact_log import load_impacts
     from .output.stored import is_log
+    from .output.trajectory import load
 
     if not is_log(file):
-        return of_trajectory(file)
+        with load(file) as trajectory:
+            return facts.of_trajectory(trajectory) | facts.of_checksums(trajectory)
     with load_impacts(file) as log:
-        return facts.of_log(log)
+        return facts.of_log(log) | facts.of_checksums(log)
 
 
 def of_trajectory(file: Path) -> dict[str, str]:

@@ -3,11 +3,10 @@
 import sys
 import textwrap
 
-import h5py
 import numpy as np
 import pytest
 from children import python
-from conftest import files_limited_to
+from conftest import edited, files_limited_to
 from test_sessions import halted_after, stopped_at
 from typer.testing import CliRunner
 
@@ -401,7 +400,7 @@ def test_a_log_of_another_run_is_not_gone_on_with(tmp_path):
     run(tmp_path / "other.h5", SPHERE, 20, seed=2)
     with pytest.raises(swarm.SceneError, match=r"other\.h5 is of another run: its particles at the start"):
         resume(impacts=tmp_path / "other.h5")
-    with h5py.File(tmp_path / "i.h5", "r+") as file:
+    with edited(tmp_path / "i.h5") as file:
         file["frames/complete"][0] = 1
     with pytest.raises(swarm.SceneError, match=r"i\.h5 must hold 3 frames and .* impacts, as .*, got 1 and"):
         resume()
@@ -432,7 +431,7 @@ DAMAGES = {
 def test_a_damaged_log_is_refused(tmp_path, name):
     run(tmp_path / "i.h5", SPHERE)
     damage, message = DAMAGES[name]
-    with h5py.File(tmp_path / "i.h5", "r+") as file:
+    with edited(tmp_path / "i.h5") as file:
         damage(file)
     with pytest.raises(swarm.SceneError, match=message):
         table_of(tmp_path / "i.h5")

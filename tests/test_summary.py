@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import pytest
+from conftest import edited
 
 import swarm
 from swarm import summary
@@ -23,7 +24,7 @@ def path(tmp_path):
 
 def observed(path, **values):
     """Put these observables, each with one entry a frame, into a trajectory."""
-    with h5py.File(path, "r+") as file:
+    with edited(path) as file:
         for name, entries in values.items():
             file[f"observables/{name}/value"][:] = entries
 

@@ -146,8 +146,11 @@ class AppendedFile:
         os.close(null)
 
 
-def put(dataset: Any, first: int, values: Any) -> None:
-    """Write entries from row `first` on. h5py's indexing takes four times as long, for twenty datasets a frame."""
+def put(dataset: Any, first: int, values: Any) -> Any:
+    """Write entries from row `first` on; return them as they are written.
+
+    h5py's indexing takes four times as long, for twenty datasets a frame.
+    """
     handle = dataset.id
     count, *shape = handle.shape
     entries = np.ascontiguousarray(values, dtype=dataset.dtype)
@@ -156,6 +159,7 @@ def put(dataset: Any, first: int, values: Any) -> None:
     space = handle.get_space()
     space.select_hyperslab((first, *(0 for _ in shape)), entries.shape)
     handle.write(h5py.h5s.create_simple(entries.shape), space, entries)
+    return entries
 
 
 def _descriptor_of(file: h5py.File) -> int:

@@ -62,22 +62,29 @@ class Exported:
         self.periods = np.array([length or 0.0 for length in trajectory.scene.period or (None,) * 3])
 
     def __len__(self) -> int:
-        """Number of particles of a frame."""
+        """Number of particles of the frame with the most."""
         return len(self.ids)
 
-    def moments(self, absent: bool = False) -> Iterator[Moment]:
+    @property
+    def counts(self) -> list[int]:
+        """The number of particles of each frame: those that come during the run are the last, in this order."""
+        if not self.trajectory.has_births():
+            return [len(self)] * len(self.numbers)
+        born = self.trajectory.birth_time[self._rows]
+        return [int((born <= time).sum()) for time in self.times.tolist()]
+
+    def moments(self) -> Iterator[Moment]:
         """The frames one after the other, each of which is written when the next is asked for.
 
-        Those that come later in a run with sources are left out, or with `absent` at NaN.
+        Those that come later in a run with sources are left out.
         """
         for done, (number, time) in enumerate(zip(self.numbers, self.times.tolist(), strict=True)):
             held = {name: column[self._rows] for name, column in self.trajectory.columns(number).items()}
             there = ~np.isnan(held["position"][:, 0])
-            if not absent and not there.all():
+            if not there.all():
                 held = {name: column[there] for name, column in held.items()}
-            rows = slice(None) if absent else there
             position, velocity = held.pop("position"), held.pop("velocity")
-            yield Moment(number, time, position, velocity, held, self.ids[rows], self.mass[rows])
+            yield Moment(number, time, position, velocity, held, self.ids[there], self.mass[there])
             if self._progress is not None:
                 self._progress(done + 1, len(self.numbers))
 

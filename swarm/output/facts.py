@@ -8,6 +8,7 @@ from ..ball_numbers import balls_volume
 from ..notebook import shortened
 from ..observables import drift
 from ..surfaces.facets.mesh import Mesh
+from .sources import DamagedError
 
 
 def of_trajectory(trajectory: Any) -> dict[str, str]:
@@ -45,6 +46,17 @@ def of_log(log: Any) -> dict[str, str]:
         "columns": ", ".join(log.dtype.names or ()),
         "size": f"{log.path.stat().st_size / 1e6:.1f} MB",
     }
+
+
+def of_checksums(stored: Any) -> dict[str, str]:
+    """Whether all values of a file match their checksums, or the first that does not."""
+    if not stored.has_checksums():
+        return {"checksums": "none: an older version wrote it"}
+    try:
+        stored.require_intact()
+    except DamagedError as error:
+        return {"checksums": f"{error}; what else there is can be read"}
+    return {"checksums": "all values match theirs"}
 
 
 def of_counters(counters: Any, crossings: Any = None) -> dict[str, str]:

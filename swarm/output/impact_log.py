@@ -13,7 +13,8 @@ from ..columns import flattened
 from ..errors import SceneError
 from ..extras import needed_by
 from . import layout
-from .stored import Stored, finite, parsed, times_of, whole
+from .checksums import checksum_of
+from .stored import Stored, finite, in_order, parsed, whole
 
 if TYPE_CHECKING:
     import pandas
@@ -59,12 +60,16 @@ class ImpactLog(Stored):
         for name in _TEXTS:
             if h5py.check_string_dtype(layout.dataset(file, f"parameters/{name}").dtype) is None:
                 raise ValueError(f"parameters/{name} must be a text")
-        frames = int(layout.dataset(file, "frames/complete", "iu", (1,))[0])
+        frames, *known = layout.dataset(file, "frames/complete", "iu", (None,))[()].tolist()
         if frames < 0:
             raise ValueError(f"frames/complete must be 0 or more, got {frames}")
+        # Files of older versions have no checksum of it.
+        if known and known[0] != checksum_of(np.int64(frames)):
+            raise ValueError(f"frames/complete does not match its checksum, got {frames}")
         layout.require_fits(layout.dataset(file, "frames/time", "f", (frames,)), frames, self.path)
-        self.times = times_of(file, "frames/time", frames)
-        self.ends = np.array(layout.dataset(file, "frames/rows", "iu", (frames,))[:frames], np.int64)
+        self.times = in_order(self._checked.rows("frames/time", 0, frames))
+        layout.dataset(file, "frames/rows", "iu", (frames,))
+        self.ends = np.array(self._checked.rows("frames/rows", 0, frames), np.int64)
         if (np.diff(self.ends, prepend=0) < 0).any():
             raise ValueError(f"frame {int((np.diff(self.ends, prepend=0) < 0).argmax())} has fewer impacts than none")
         self._rows = int(self.ends[-1]) if frames else 0
@@ -77,9 +82,9 @@ class ImpactLog(Stored):
         for name in ("time", "particle", "wall", *_VECTORS, "impulse"):
             if name not in self._columns:
                 raise ValueError(f"it has no impacts/{name}")
-        surface = layout.dataset(file, "walls/surface", "iu", (None,))
-        member = layout.dataset(file, "walls/member", "iu", surface.shape)
-        self._surface, self._member = surface[()].astype(np.int32), member[()].astype(np.int32)
+        layout.dataset(file, "walls/member", "iu", layout.dataset(file, "walls/surface", "iu", (None,)).shape)
+        walls = (self._checked.constant(f"walls/{name}").astype(np.int32) for name in ("surface", "member"))
+        self._surface, self._member = walls
         # How many, whose rows have walls below 0.
         self._counters = len(self.counters)
 
@@ -113,6 +118,7 @@ class ImpactLog(Stored):
         return self._counted()[1]
 
     def _counted(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        self._require_sums(0, self._rows)
         counts, crossings = np.zeros(self._surfaces(), np.int64), np.zeros(2 * self._counters, np.int64)
         for k in range(0, self._rows, _AT_ONCE):
             with self._reading(f"its rows from {k} on"):
@@ -205,6 +211,7 @@ class ImpactLog(Stored):
         begins = np.append(0, self.ends)
         first = int(begins[np.searchsorted(self.times, low)])
         last = int(begins[min(int(np.searchsorted(self.times, high)) + 1, len(self.ends))])
+        self._require_sums(first, last)
         parts = [
             self._part(slice(k, min(k + _AT_ONCE, last)), wanted, (low, high)) for k in range(first, last, _AT_ONCE)
         ]
@@ -217,6 +224,24 @@ class ImpactLog(Stored):
             import pandas
         table = self.table(**chosen)
         return pandas.DataFrame(flattened({name: table[name] for name in self.dtype.names or ()}))
+
+    def require_intact(self) -> None:
+        """Raise a SceneError that names what does not match its checksum."""
+        with self._reading("its values"):
+            self._checked.require_constants()
+        self._require_sums(0, self._rows)
+
+    def _require_sums(self, first: int, last: int) -> None:
+        """Raise a SceneError if rows of whole frames do not match their checksums."""
+        begins = np.append(0, self.ends)
+        if not self._checked.has_any():
+            return
+        for k in range(int(np.searchsorted(begins, first, side="right")) - 1, len(self.ends)):
+            if begins[k] >= last:
+                return
+            with self._reading(f"its rows {begins[k]} to {begins[k + 1] - 1}"):
+                for name, column in self._columns.items():
+                    self._checked.compare_rows(f"impacts/{name}", column, k, (int(begins[k]), int(begins[k + 1])))
 
     def _surfaces(self) -> int:
         return int(self._surface.max()) + 1 if len(self._surface) else 0

@@ -1,7 +1,7 @@
 """Writing logs of impacts: rows are appended, and the number of frames that are complete is written last.
 
 impacts/{time,particle,wall,position,velocity_before,velocity_after,impulse}, one entry an impact, with friction also
-impacts/slip, impacts/image where the scene repeats, and impacts/partner of balls; frames/complete (1,), how many frames
+impacts/slip, impacts/image where the scene repeats, and impacts/partner of balls; frames/complete (2,), how many frames
 are, and for these frames/{time,rows}, their times and how many rows there are at the end of each: what comes after them
 is of no use yet.
 walls/{surface,member} are what each number in impacts/wall stands for. parameters/{scene,method,kept} as TOML text,
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..methods import Method
 from ..scene import Scene
+from . import checksums
 from .appended import AppendedFile, put
 from .layout import ARRAYS
 from .storage import Storage
@@ -62,6 +63,10 @@ class ImpactWriter(AppendedFile):
         self._columns, self._ends, self._about = columns, ends, about
         self._frames, self._rows = start or (0, 0)
         self._few: list[Rows] = []
+        # Of the rows of the frame under way, by columns; of frames whose rows are all there; None in an older file.
+        self._sums: checksums.RowSums | None = None
+        self._running = dict.fromkeys(columns, 0)
+        self._whole: list[dict[str, int]] = []
 
     def __enter__(self) -> WriteFrames:
         self._open()
@@ -69,6 +74,8 @@ class ImpactWriter(AppendedFile):
             if not self._following:
                 self._create()
             self._find()
+            if self._sums is not None:
+                self._go_on_from_rows()
             # Rows of frames that are to be computed again are not cut off, which a kill may spoil, but written over;
             # by several threads in another order, so that these frames are not complete from now on.
             self._complete(self._frames)
@@ -87,16 +94,28 @@ class ImpactWriter(AppendedFile):
             )  # fmt: skip
         for name, dtype in (("time", np.float64), ("rows", np.int64)):
             file.create_dataset(f"frames/{name}", (0,), dtype, maxshape=(None,), chunks=(1024,))
-        file["frames/complete"] = np.zeros(1, np.int64)
+        file["frames/complete"] = _counted(0)
+        names = [*(f"impacts/{name}" for name in self._columns), "frames/time", "frames/rows"]
+        checksums.RowSums.create(file, dict.fromkeys(names, (1, 0)), ["frames/complete"])
+
+    def _go_on_from_rows(self) -> None:
+        """Begin with the rows of the frame under way that the file has."""
+        first = int(self._counts[self._frames - 1]) if self._frames else 0
+        for begin in range(first, self._rows, _LARGEST):
+            some = slice(begin, min(begin + _LARGEST, self._rows))
+            for name, dataset in self._data.items():
+                self._running[name] = checksums.checksum_of(dataset[some], self._running[name])
 
     def _find(self) -> None:
+        self._sums = checksums.RowSums.of(self._file)
         self._data: dict[str, h5py.Dataset] = {name: self._file[f"impacts/{name}"] for name in self._columns}
         self._time, self._counts = self._file["frames/time"], self._file["frames/rows"]
         self._begin()
 
     def _complete(self, frames: int) -> None:
         """Say how many frames are complete, after these are on file."""
-        put(self._file["frames/complete"], 0, [frames])
+        dataset = self._file["frames/complete"]
+        put(dataset, 0, _counted(frames)[: len(dataset)])
         self._flush()
 
     def add(self, rows: Rows) -> None:
@@ -114,15 +133,44 @@ class ImpactWriter(AppendedFile):
             self._few = []
 
     def _put(self, rows: Rows) -> None:
+        self._sum(rows)
         for name, dataset in self._data.items():
             put(dataset, self._rows, rows[name])
         self._rows += len(rows["time"])
 
+    def _sum(self, rows: Rows) -> None:
+        """Go on with the checksums by rows that come next, up to the ends of frames that are among them."""
+        if self._sums is None:
+            return
+        place, count = 0, len(rows["time"])
+        for end in [end for _frame, end in sorted(self._ends.items())[len(self._whole) :]]:
+            if end > self._rows + count:
+                break
+            self._add_sums(rows, place, end - self._rows)
+            place = end - self._rows
+            self._whole.append(self._running)
+            self._running = dict.fromkeys(self._columns, 0)
+        self._add_sums(rows, place, count)
+
+    def _add_sums(self, rows: Rows, begin: int, end: int) -> None:
+        if end > begin:
+            for name, before in self._running.items():
+                self._running[name] = checksums.checksum_of(rows[name][begin:end], before)
+
     def _write(self, frames: list[Written]) -> None:
         with self._writing(f"the impacts of frame {frames[0][0]}"):
             self._add_few()
-            put(self._counts, frames[0][0], [self._ends.pop(number) for number, *_ in frames])
-            put(self._time, frames[0][0], [moment for _number, moment, *_ in frames])
+            self._sum({name: column[:0] for name, column in self._columns.items()})
+            first, times = frames[0][0], np.array([moment for _number, moment, *_ in frames])
+            counts = np.array([self._ends.pop(number) for number, *_ in frames])
+            if self._sums is not None:
+                some, self._whole = self._whole[: len(frames)], self._whole[len(frames) :]
+                self._sums.take({f"impacts/{name}": [one[name] or 1 for one in some] for name in self._columns})
+                self._sums.add("frames/time", times)
+                self._sums.add("frames/rows", counts)
+                self._sums.write(first)
+            put(self._counts, first, counts)
+            put(self._time, first, times)
             self._file.flush()
             self._complete(frames[-1][0] + 1)
             if self._is_new():
@@ -134,3 +182,8 @@ class ImpactWriter(AppendedFile):
             self._add_few()
             self._flush()
         super().sync()
+
+
+def _counted(frames: int) -> NDArray[np.int64]:
+    """How many frames are complete, and the checksum of that: they are written at once."""
+    return np.array([frames, checksums.checksum_of(np.int64(frames))])

@@ -25,6 +25,9 @@ class Kept(Presented):
     def _comes(file: Any) -> bool:
         return f"particles/all/{layout.BIRTHS[0]}" in file
 
+    def _births(self) -> NDArray[np.float64]:
+        return np.asarray(self._checked.constant(f"particles/all/{layout.BIRTHS[0]}"))
+
     def has_births(self) -> bool:
         """Whether particles come during the run."""
         with self._reading("the births of its particles") as file:
@@ -35,8 +38,8 @@ class Kept(Presented):
         """The radii of the particles that the file keeps [m], (N,); None of points."""
         if not self._has(f"particles/all/{layout.RADII}"):
             return None
-        with self._reading("the radii of its particles") as file:
-            return finite(file[f"particles/all/{layout.RADII}"][()], "particle")
+        with self._reading("the radii of its particles"):
+            return finite(self._checked.constant(f"particles/all/{layout.RADII}"), "particle")
 
     @property
     def birth_time(self) -> NDArray[np.float64]:
@@ -44,7 +47,7 @@ class Kept(Presented):
         with self._reading("the births of its particles") as file:
             if not self._comes(file):
                 return np.zeros(len(file["particles/all/mass"]))
-            return finite(file[f"particles/all/{layout.BIRTHS[0]}"][()], "particle")
+            return finite(self._births(), "particle")
 
     @property
     def birth_source(self) -> NDArray[np.int64]:
@@ -52,14 +55,14 @@ class Kept(Presented):
         with self._reading("the sources of its particles") as file:
             if not self._comes(file):
                 return np.full(len(file["particles/all/mass"]), -1)
-            return np.asarray(file[f"particles/all/{layout.BIRTHS[1]}"][()].astype(np.int64))
+            return np.asarray(self._checked.constant(f"particles/all/{layout.BIRTHS[1]}").astype(np.int64))
 
     @property
     def ids(self) -> NDArray[np.int64]:
         """The numbers of the particles that the file keeps, (N,)."""
         self._require_particles()
-        with self._reading("the numbers of its particles") as file:
-            ids = file["particles/all/id"][()].astype(np.int64)
+        with self._reading("the numbers of its particles"):
+            ids = self._checked.constant("particles/all/id").astype(np.int64)
             if (np.diff(ids) <= 0).any() or ids[0] < 0 or ids[-1] >= self.count:
                 raise ValueError(f"expected some of 0 to {self.count - 1}, each once and in order")
         return np.asarray(ids)
@@ -70,7 +73,8 @@ class Kept(Presented):
         with self._reading("its bonds") as file:
             if "connectivity/bonds" not in file:
                 return np.zeros((0, 2), np.int64)
-            bonds = layout.dataset(file, "connectivity/bonds", "iu", (None, 2))[()].astype(np.int64)
+            layout.dataset(file, "connectivity/bonds", "iu", (None, 2))
+            bonds = self._checked.constant("connectivity/bonds").astype(np.int64)
             if len(bonds) and not (bonds.min() >= 0 and bonds.max() < self.count):
                 raise ValueError(f"expected numbers from 0 to {self.count - 1}, got {bonds.min()} to {bonds.max()}")
         return np.asarray(bonds)
@@ -100,7 +104,7 @@ class Kept(Presented):
     def copies(self) -> int:
         """Number of bodies that were run; 0 for particles."""
         with self._reading("its number of bodies") as file:
-            return int(file["parameters/copies"][()]) if "parameters/body" in file else 0
+            return int(self._checked.constant("parameters/copies")) if "parameters/body" in file else 0
 
     @property
     def descriptions(self) -> dict[str, str]:
@@ -116,13 +120,13 @@ class Kept(Presented):
     def until(self) -> float | None:
         """The end that the run was to reach [s]; None in files of older versions, and of runs on clusters."""
         with self._reading("its end") as file:
-            return float(finite(file["parameters/until"][()])) if "parameters/until" in file else None
+            return float(finite(self._checked.constant("parameters/until"))) if "parameters/until" in file else None
 
     @property
     def threads(self) -> int | None:
         """The threads of the last session of the run; None as for `until`."""
         with self._reading("its threads") as file:
-            return int(file["parameters/threads"][()]) if "parameters/threads" in file else None
+            return int(self._checked.constant("parameters/threads")) if "parameters/threads" in file else None
 
     @property
     def wall_times(self) -> NDArray[np.float64] | None:
@@ -130,10 +134,11 @@ class Kept(Presented):
         with self._reading("its wall times") as file:
             if "parameters/wall_time" not in file:
                 return None
-            return finite(file["parameters/wall_time"][: len(file["parameters/time"])])
+            return finite(self._checked.rows("parameters/wall_time", 0, len(file["parameters/time"])))
 
     @property
     def makers(self) -> dict[str, str]:
         """What made the file, and when: "name", "version", "python", "numpy", "numba", "hdf5", "machine", "date"."""
         with self._reading("what made it"):
+            self._checked.require_attributes("h5md/creator")
             return dict(self._makers)

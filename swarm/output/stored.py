@@ -1,6 +1,7 @@
 """HDF5 files of runs, read on demand, also while they are written or after their writer was killed."""
 
 import contextlib
+import functools
 import gc
 import operator
 import tomllib
@@ -18,6 +19,7 @@ from ..methods import Method
 from ..scene import Scene
 from ..surfaces.counter import Counter
 from . import driver, layout, links, paths, superblock
+from .checksums import Checked
 from .sources import DAMAGE, DamagedError, reason, require_file
 
 _STILL_WRITTEN = "already open"
@@ -39,7 +41,20 @@ class Stored:
 
     def close(self) -> None:
         """Close the file."""
+        if "_checked" in self.__dict__:
+            self._checked.close()
         self._file.close()
+
+    @functools.cached_property
+    def _checked(self) -> Checked:
+        """What reads values and holds them against their checksums."""
+        with self._reading("its checksums") as file:
+            return Checked(file, self.path, open_stored)
+
+    def has_checksums(self) -> bool:
+        """Whether its values have checksums; those of older versions have none."""
+        with self._reading("its checksums"):
+            return self._checked.has_any()
 
     @contextlib.contextmanager
     def _reading(self, what: str) -> Iterator[Any]:
@@ -58,8 +73,8 @@ class Stored:
     @property
     def count(self) -> int:
         """Number of particles, or of points of bodies, that were run; a file may keep fewer."""
-        with self._reading("its number of particles") as file:
-            return int(file["parameters/particles"][()])
+        with self._reading("its number of particles"):
+            return int(self._checked.constant("parameters/particles"))
 
     @property
     def start(self) -> str:
@@ -70,7 +85,7 @@ class Stored:
     def seed(self) -> int:
         """The seed of thermal walls; 0 if the file has none, as those of runs before there were such walls."""
         with self._reading("its seed") as file:
-            return int(file["parameters/seed"][()]) if "parameters/seed" in file else 0
+            return int(self._checked.constant("parameters/seed")) if "parameters/seed" in file else 0
 
     @property
     def counters_text(self) -> str:
@@ -88,6 +103,8 @@ class Stored:
         """The scene that was run."""
         with self._reading("its scene") as file:
             table, arrays = parsed(self._text("scene")), file["parameters"].get(layout.ARRAYS, {})
+            for name in arrays:
+                self._checked.constant(f"parameters/{layout.ARRAYS}/{name}")
             surfaces = [tables.with_arrays(surface, arrays) for surface in table["surface"]]
             every = [one for surface in surfaces for one in _nested(surface)]
             own = any(surface["kind"] == "own" or plugins.is_named(surface["kind"]) for surface in every)
@@ -106,8 +123,8 @@ class Stored:
             return name in file
 
     def _text(self, name: str) -> str:
-        with self._reading(f"its {name.replace('_', ' ')}") as file:
-            return layout.text(file[f"parameters/{name}"], self.path)
+        with self._reading(f"its {name.replace('_', ' ')}"):
+            return str(self._checked.constant(f"parameters/{name}"))
 
 
 def parsed(text: str) -> dict[str, Any]:
@@ -192,9 +209,9 @@ def _nested(table: dict[str, Any]) -> Iterator[dict[str, Any]]:
             yield from _nested(one)
 
 
-def times_of(file: Any, name: str, frames: int) -> NDArray[np.float64]:
-    """The times of frames, each after the one before it."""
-    times = finite(file[name][:frames])
+def in_order(times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The times of frames, if each is after the one before it."""
+    finite(times)
     if (np.diff(times) <= 0.0).any():
         raise ValueError(f"frame {int((np.diff(times) <= 0.0).argmax()) + 1} is not after the one before it")
     return times

@@ -27,7 +27,7 @@ from ..errors import SceneError
 from ..particles import Particles
 from . import layout, provenance
 from .kept import Kept
-from .stored import finite, open_stored, times_of, whole
+from .stored import finite, in_order, open_stored, whole
 
 if TYPE_CHECKING:
     from ..bodies.state import Bodies
@@ -69,8 +69,8 @@ class Trajectory(Kept):
     @property
     def times(self) -> NDArray[np.float64]:
         """Times of the frames [s]."""
-        with self._reading("its times") as file:
-            return times_of(file, "parameters/time", self._frames)
+        with self._reading("its times"):
+            return in_order(self._checked.rows("parameters/time", 0, self._frames))
 
     @property
     def observables(self) -> dict[str, NDArray[Any]]:
@@ -84,7 +84,7 @@ class Trajectory(Kept):
             group = file.get("observables", {})
             for name in group:
                 with self._reading(f"its observable {name}"):
-                    read = group[name]["value"][some]
+                    read = self._checked.rows(f"observables/{name}/value", *some.indices(self._frames)[:2])
                     seen[name] = read if name in own or name in MAY_BE_NAN else finite(read)
         return seen
 
@@ -102,7 +102,7 @@ class Trajectory(Kept):
         k = self._number_of(k)
         with self._reading("its members") as file:
             names = [name for name in file.get("observables", {}) if name.startswith("member_")]
-            seen = {name: file[f"observables/{name}/value"][k] for name in names}
+            seen = {name: self._checked.row(f"observables/{name}/value", k) for name in names}
         return {name.removeprefix("member_"): self.scene.split_by_members(values) for name, values in seen.items()}
 
     def observed(self) -> dict[str, NDArray[Any]]:
@@ -122,22 +122,26 @@ class Trajectory(Kept):
         with self._reading("its index") as file:
             layout.require_index(file)
 
+    def require_intact(self, frames: int | None = None) -> None:
+        """Raise a SceneError that names what does not match its checksum, of all, or of so many frames."""
+        with self._reading("its values"):
+            self._checked.require_intact(self._frames if frames is None else frames)
+
     def frame(self, k: int) -> Particles:
         """The particles at frame k; negative k count from the end. Who comes later is at NaN: see `born`."""
         k = self._number(k)
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
-            position, velocity = (everything[f"{name}/value"][k].T for name in layout.PARTS)
+            position, velocity = (self._of_frame(name, k).T for name in layout.PARTS)
             image, spin = (
-                everything[f"{name}/value"][k].T if name in everything else None
-                for name in (layout.IMAGES, layout.SPINS)
+                self._of_frame(name, k).T if name in everything else None for name in (layout.IMAGES, layout.SPINS)
             )
-            there = self._there(file, k)
+            there, mass = self._there(file, k), self._checked.constant("particles/all/mass")
             if there is not None:
-                return Particles.of_frame(position, velocity, everything["mass"][()], image, there)
-            radius = everything[layout.RADII][()] if layout.RADII in everything else None
-            found = Particles(position, velocity, everything["mass"][()], image, radius, spin)
-            found.volume = float(file["parameters/volume"][()]) if "parameters/volume" in file else None
+                return Particles.of_frame(position, velocity, mass, image, there)
+            found = Particles(position, velocity, mass, image, self.radius, spin)
+            has_volume = "parameters/volume" in file
+            found.volume = float(self._checked.constant("parameters/volume")) if has_volume else None
             return found
 
     def columns(self, k: int) -> dict[str, NDArray[Any]]:
@@ -145,7 +149,7 @@ class Trajectory(Kept):
         k = self._number(k)
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
-            held = {name: everything[f"{name}/value"][k] for name in layout.KEPT if name in everything}
+            held = {name: self._of_frame(name, k) for name in layout.KEPT if name in everything}
             there = self._there(file, k)
             for name in layout.PARTS:
                 finite(held[name] if there is None else held[name][there], "particle")
@@ -178,8 +182,8 @@ class Trajectory(Kept):
         k, name = self._number(k), f"particles/all/{layout.COUNTS}"
         if not self._has(name):
             raise SceneError(f"{self.path} keeps no impacts of particles: an older version wrote it; run it again")
-        with self._reading(f"the impacts of frame {k}") as file:
-            counts = file[f"{name}/value"][k].astype(np.int64)
+        with self._reading(f"the impacts of frame {k}"):
+            counts = self._of_frame(layout.COUNTS, k).astype(np.int64)
             if (counts < 0).any():
                 raise ValueError(f"expected 0 or more, got {counts.min()} of particle {counts.argmin()}")
         return np.asarray(counts)
@@ -193,8 +197,8 @@ class Trajectory(Kept):
         k, name = self._number(k), f"particles/all/{layout.COLLISIONS}"
         if not self._has(name):
             raise SceneError(f"{self.path} keeps no collisions: its particles have no radius, and do not meet")
-        with self._reading(f"the collisions of frame {k}") as file:
-            return np.asarray(file[f"{name}/value"][k].astype(np.int64))
+        with self._reading(f"the collisions of frame {k}"):
+            return np.asarray(self._of_frame(layout.COLLISIONS, k).astype(np.int64))
 
     def escape_times(self, k: int) -> NDArray[np.float64]:
         """Times at which the particles of frame k have passed an opening of a wall [s], (N,); NaN of those inside."""
@@ -208,7 +212,7 @@ class Trajectory(Kept):
         k, name = self._number(k), f"particles/all/{kind}"
         with self._reading(f"{kind} of frame {k}") as file:
             kept = len(file["particles/all/mass"])
-            times = file[f"{name}/value"][k].astype(np.float64) if name in file else np.full(kept, np.nan)
+            times = self._of_frame(kind, k).astype(np.float64) if name in file else np.full(kept, np.nan)
             if (times < 0.0).any():
                 raise ValueError(f"expected 0 or later, got {np.nanmin(times)} of particle {np.nanargmin(times)}")
         return np.asarray(times)
@@ -237,8 +241,10 @@ class Trajectory(Kept):
                 f"got {i}"
             )
         with self._reading(f"particle {i}") as file:
-            position, velocity = (file[f"particles/all/{name}/value"][: self._frames, column] for name in layout.PARTS)
-            born = file[f"particles/all/{layout.BIRTHS[0]}"][column] if self._comes(file) else -math.inf
+            position, velocity = (
+                self._checked.path(f"particles/all/{name}/value", column, self._frames) for name in layout.PARTS
+            )
+            born = self._births()[column] if self._comes(file) else -math.inf
             there = self.times >= born
             for values in (position, velocity):
                 finite(values[there])
@@ -248,7 +254,11 @@ class Trajectory(Kept):
         """Who is there at frame k; None where no one comes."""
         if not self._comes(file):
             return None
-        return np.asarray(file[f"particles/all/{layout.BIRTHS[0]}"][()] <= float(file["parameters/time"][k]))
+        return np.asarray(self._births() <= float(self._checked.row("parameters/time", k)))
+
+    def _of_frame(self, name: str, k: int) -> NDArray[Any]:
+        """What is kept of the particles at frame k by a name, checked."""
+        return np.asarray(self._checked.row(f"particles/all/{name}/value", k))
 
 
 def load(path: str | Path) -> Trajectory:

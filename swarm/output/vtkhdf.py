@@ -6,6 +6,8 @@ follow one another, and Steps says where those of each begin; what does not chan
 fails if steps are also at its root, while that of VTK 9.7 shows the first step for ever if they are not.
 """
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,53 +20,77 @@ from .exported import Exported
 VERSION = (2, 0)
 # In the order of the columns of CellOffsets and ConnectivityIdOffsets.
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")
+# Digits that somebody types, and how far a multiple of such a number is from the nearest float.
+_DIGITS, _ROUND_OFF = 12, 4.0
 
 
 def write(chosen: Exported, path: Path) -> None:
-    """Write the particles; bonds of bodies are lines."""
-    n, frames = len(chosen), len(chosen.numbers)
+    """Write the particles that are there; bonds of bodies are lines."""
+    n, frames, counts = len(chosen), len(chosen.numbers), chosen.counts
+    firsts = np.cumsum([0, *counts])
+    # Where particles come each step has a part of its own. Those that are there come first, so the parts share what
+    # does not change, and their cells.
+    parts = counts if len(set(counts)) > 1 else counts[:1]
     with h5py.File(path, "w") as file:
-        root = begin(file, {"Vertices": np.arange(n)[:, None], "Lines": chosen.bonds}, n)
-        steps = timed(root, chosen, n)
+        root = begin(file, {"Vertices": np.arange(n)[:, None], "Lines": chosen.bonds}, parts)
+        steps = timed(root, chosen, firsts[:-1])
         values: dict[str, Any] = {}
-        for done, moment in enumerate(chosen.moments(absent=True)):
+        for done, moment in enumerate(chosen.moments()):
             columns = {"position": moment.position, "velocity": moment.velocity, **moment.more}
             for name, column in columns.items():
                 if name not in values:
                     where = "Points" if name == "position" else f"PointData/{name}"
-                    values[name] = root.create_dataset(where, (frames * n, *column.shape[1:]), column.dtype)
+                    values[name] = root.create_dataset(where, (firsts[-1], *column.shape[1:]), column.dtype)
                     if name != "position":
-                        steps[f"PointDataOffsets/{name}"] = n * np.arange(frames)
-                values[name][done * n : (done + 1) * n] = column
+                        steps[f"PointDataOffsets/{name}"] = firsts[:-1]
+                values[name][firsts[done] : firsts[done + 1]] = column
         balls = {} if chosen.radius is None else {"radius": chosen.radius}
         for name, constant in {"id": chosen.ids, "mass": chosen.mass, **balls}.items():
             root[f"PointData/{name}"], steps[f"PointDataOffsets/{name}"] = constant, np.zeros(frames, np.int64)
 
 
-def begin(file: h5py.File, cells: dict[str, NDArray[np.int64]], points: int) -> Any:
-    """The root of a PolyData of one part with these cells, rows of as many points as each has."""
+def begin(file: h5py.File, cells: dict[str, NDArray[np.int64]], parts: Sequence[int]) -> Any:
+    """The root of a PolyData with these cells, rows of as many points as each has, in parts of so many points each.
+
+    If there is more than one part, each has the first of the vertices, one a point.
+    """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array(VERSION)
     # VTK reads a text of fixed length only.
     root.attrs["Type"] = np.bytes_(b"PolyData")
-    root["NumberOfPoints"] = np.array([points])
+    root["NumberOfPoints"] = np.array(parts)
     for name in CELLS:
         rows = cells.get(name, np.zeros((0, 1), np.int64))
-        root[f"{name}/NumberOfConnectivityIds"], root[f"{name}/NumberOfCells"] = [rows.size], [len(rows)]
+        each = np.array(parts) if name == "Vertices" and len(parts) > 1 else np.full(len(parts), len(rows))
+        root[f"{name}/NumberOfCells"], root[f"{name}/NumberOfConnectivityIds"] = each, rows.shape[1] * each
         root[f"{name}/Connectivity"] = rows.astype(np.int64).ravel()
         root[f"{name}/Offsets"] = rows.shape[1] * np.arange(len(rows) + 1)
     return root
 
 
-def timed(root: Any, chosen: Exported, points: int) -> Any:
-    """Its steps, each of which has so many points of its own, and the cells of all."""
+def timed(root: Any, chosen: Exported, firsts: NDArray[np.int64]) -> Any:
+    """Its steps, each with the place of its first point, and with a part of its own if there is more than one."""
     frames = len(chosen.numbers)
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = frames
-    steps["Values"] = chosen.times
-    # All steps have the one part: VTK 9.3 would look for cells of others behind its own.
-    steps["PartOffsets"], steps["NumberOfParts"] = np.zeros(frames, np.int64), np.ones(frames, np.int64)
-    steps["PointOffsets"] = points * np.arange(frames)
+    steps["Values"] = [as_typed(time) for time in chosen.times.tolist()]
+    # With one part for all steps VTK 9.3 does not look for cells of others behind its own.
+    several = len(root["NumberOfPoints"]) > 1
+    steps["PartOffsets"] = np.arange(frames) if several else np.zeros(frames, np.int64)
+    steps["NumberOfParts"] = np.ones(frames, np.int64)
+    steps["PointOffsets"] = firsts
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = np.zeros((frames, len(CELLS)), np.int64)
     return steps
+
+
+def as_typed(time: float) -> float:
+    """The decimal of few digits that a time is but for round-off, if there is one: of frame 3 at every 0.1 s it is 0.3.
+
+    Programs look for the last step at or before a time that somebody types, and 0.30000000000000004 is after it.
+
+    >>> as_typed(3 * 0.1), as_typed(1.0 / 3.0)
+    (0.3, 0.3333333333333333)
+    """
+    typed = float(f"{time:.{_DIGITS}g}")
+    return typed if abs(typed - time) <= _ROUND_OFF * math.ulp(time) else time

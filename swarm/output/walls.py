@@ -37,7 +37,7 @@ def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
     firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
     triangles = np.concatenate([shape.triangles + first for shape, first in zip(drawn, firsts, strict=False)])
     with h5py.File(path, "w") as file:
-        root = vtkhdf.begin(file, {"Polygons": triangles}, int(firsts[-1]))
+        root = vtkhdf.begin(file, {"Polygons": triangles}, [int(firsts[-1])])
         counts = [len(shape.triangles) for shape in drawn]
         root["CellData/surface"] = np.repeat([shape.surface for shape in drawn], counts)
         root["CellData/solid"] = np.repeat([int(shape.solid) for shape in drawn], counts)
@@ -47,7 +47,7 @@ def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
         if not chosen.trajectory.scene.moves():
             root["Points"] = np.concatenate([shape.vertices for shape in drawn])
             return
-        steps = vtkhdf.timed(root, chosen, int(firsts[-1]))
+        steps = vtkhdf.timed(root, chosen, int(firsts[-1]) * np.arange(len(chosen.numbers)))
         for name in root["CellData"]:
             steps[f"CellDataOffsets/{name}"] = np.zeros(len(chosen.numbers), np.int64)
         points = root.create_dataset("Points", (len(chosen.numbers) * firsts[-1], 3), np.float64)
@@ -65,7 +65,7 @@ def write_solids(chosen: Exported, path: Path) -> None:
     first = solids_of(scene, times[0], absent=True)
     count = sum(len(one.centers) for one in first)
     with h5py.File(path, "w") as file:
-        root = vtkhdf.begin(file, {"Vertices": np.arange(count)[:, None]}, count)
+        root = vtkhdf.begin(file, {"Vertices": np.arange(count)[:, None]}, [count])
         names = {
             "surface": _of_all(first, lambda one: np.full(len(one.centers), one.surface)),
             "kind": _of_all(first, lambda one: np.full(len(one.centers), KINDS.index(one.kind))),
@@ -85,7 +85,7 @@ def write_solids(chosen: Exported, path: Path) -> None:
             root["Points"][rows] = _of_all(there, lambda one: one.centers)
             root["PointData/orientation"][rows] = _of_all(there, lambda one: one.turns)
         if scene.moves():
-            steps = vtkhdf.timed(root, chosen, count)
+            steps = vtkhdf.timed(root, chosen, count * np.arange(frames))
             for name in (*names, "orientation"):
                 moved = count * np.arange(frames) if name == "orientation" else np.zeros(frames, np.int64)
                 steps[f"PointDataOffsets/{name}"] = moved

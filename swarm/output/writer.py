@@ -14,7 +14,7 @@ from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
 from ..state import State
-from . import paths
+from . import checksums, paths
 from .appended import AppendedFile, put
 from .layout import ABSORBED, ARRAYS, BIRTHS, COLLISIONS, COUNTS, ESCAPES, IMAGES, KEPT, PARTS, RADII, SPINS
 from .provenance import Course, makers
@@ -36,6 +36,10 @@ _PACKED: dict[str, dict[str, Any]] = {
     "gzip": {"compression": "gzip", "compression_opts": 1, "shuffle": True},
     "lzf": {"compression": "lzf", "shuffle": True},
 }
+
+# The datasets that grow, but those of particles and observables.
+_STEP, _TIME, _WALL_TIME = "parameters/frame", "parameters/time", "parameters/wall_time"
+_EDGES = "particles/all/box/edges/value"
 
 # Number, time [s], positions, velocities and impacts, observables.
 Written = tuple[int, float, State, dict[str, Any]]
@@ -73,6 +77,8 @@ class TrajectoryWriter(AppendedFile):
         self._wall_time: Any = None
         self._radius, self._turns, self._volume = particles.radius, particles.spin is not None, particles.volume
         self._edges: Any = None
+        # None of a file of an older version.
+        self._sums: checksums.RowSums | None = None
 
     def __enter__(self) -> WriteFrames:
         self._open()
@@ -157,7 +163,9 @@ class TrajectoryWriter(AppendedFile):
         self._step, self._time = parameters["frame"], parameters["time"]
         self._wall_time = parameters.get("wall_time") if self.course is not None else None
         if self._wall_time is not None and self.course is not None:
-            parameters["until"][()], parameters["threads"][()] = self.course.until, self.course.threads
+            again = {"until": self.course.until, "threads": self.course.threads}
+            checksums.replace(self._file, {f"parameters/{name}": value for name, value in again.items()})
+        self._sums = checksums.RowSums.of(self._file)
         kept = [name for name in KEPT if f"particles/all/{name}" in self._file]
         self._edges = self._file.get("particles/all/box/edges/value")
         groups = {"particles/all": kept, "observables": list(self._file["observables"])}
@@ -183,31 +191,58 @@ class TrajectoryWriter(AppendedFile):
         most, chunks = tuple(length or None for length in shape), tuple(length or 1 for length in chunks)
         return group.create_dataset("value", (0, *shape), kind, maxshape=(None, *most), chunks=chunks, **options)
 
+    def _make_observables(self, seen: dict[str, Any]) -> None:
+        """Make room for the observables, which are known with the first frame, and for checksums of all, and begin."""
+        for name in (name for name in seen if name != "time"):
+            entry = np.asarray(seen[name])
+            chunk = max(1, min(_ENTRIES, _MOST_BYTES // max(1, entry.nbytes))), *entry.shape
+            self._observables[name] = self._element(f"observables/{name}", entry.shape, entry.dtype, chunk)
+        self._sums = checksums.RowSums.create(self._file, self._growing())
+        self._begin()
+
     def _write(self, frames: list[Written]) -> None:
         with self._writing(f"frame {frames[0][0]}"):
             numbers, times, states, observed = zip(*frames, strict=True)
             first, seen = numbers[0], observed[0]
             if not self._observables:
-                for name in (name for name in seen if name != "time"):
-                    entry = np.asarray(seen[name])
-                    chunk = max(1, min(_ENTRIES, _MOST_BYTES // max(1, entry.nbytes))), *entry.shape
-                    self._observables[name] = self._element(f"observables/{name}", entry.shape, entry.dtype, chunk)
-                self._begin()
+                self._make_observables(seen)
+            if self._sums is not None and self._sums.forget(first, len(frames)):
+                # A kill between a row that is written again and its checksum is no damage.
+                self._file.flush()
             for name, dataset in self._values.items():
                 parts = [getattr(state, name) for state in states]
-                put(dataset, first, parts if parts[0].ndim == 1 else rows(parts, dataset.dtype))
+                entries = parts if parts[0].ndim == 1 else rows(parts, dataset.dtype)
+                self._put(f"particles/all/{name}/value", dataset, first, entries)
             if self._edges is not None:
-                put(self._edges, first, [_edges_of(self._scene)] * len(frames))
+                self._put(_EDGES, self._edges, first, [_edges_of(self._scene)] * len(frames))
             for name, dataset in self._observables.items():
-                put(dataset, first, [seen[name] for seen in observed])
+                self._put(f"observables/{name}/value", dataset, first, [seen[name] for seen in observed])
             if self._wall_time is not None and self.course is not None:
-                put(self._wall_time, first, [self.course.clock()] * len(frames))
+                self._put(_WALL_TIME, self._wall_time, first, [self.course.clock()] * len(frames))
+            if self._sums is not None:
+                for name, dataset, column in ((_STEP, self._step, numbers), (_TIME, self._time, times)):
+                    self._sums.add(name, np.array(column, dataset.dtype))
+                self._sums.write(first)
             self._file.flush()
             put(self._step, first, numbers)
             put(self._time, first, times)
             self._flush()
             if self._is_new():
                 self._take_name()
+
+    def _growing(self) -> dict[str, tuple[int, int]]:
+        """The datasets that grow: how many entries their rows have, and of how many each there is a checksum."""
+        there = {_EDGES: self._edges, _WALL_TIME: self._wall_time}
+        names = [_STEP, _TIME, *(name for name, dataset in there.items() if dataset is not None)]
+        names += [f"observables/{name}/value" for name in self._observables]
+        of_each = {f"particles/all/{name}/value": (len(self._mass), checksums.BLOCK) for name in self._values}
+        return dict.fromkeys(names, (1, 0)) | of_each
+
+    def _put(self, name: str, dataset: Any, first: int, values: Any) -> None:
+        """Write rows of a dataset, and note their checksums."""
+        entries = put(dataset, first, values)
+        if self._sums is not None:
+            self._sums.add(name, entries)
 
     def _take_name(self) -> None:
         """Take the name of the trajectory from an older file, and remove the checkpoint of that one."""

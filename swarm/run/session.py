@@ -141,6 +141,7 @@ class Session:
             if self.first == 0:
                 return  # a kill came before the first frame of the trajectory
             before.require_holds(self._job.frame + 1, self._job.rows, self._path)
+            before.require_intact()
 
     def _refuse_to_restart(self, until: float) -> None:
         """Raise an error that says what the trajectory without a checkpoint is."""
@@ -187,6 +188,7 @@ class Session:
                     f"{trajectory} must hold {saved.frame + 1} frames, as {self._path} says, got {len(before)}: it was "
                     "changed since; remove both to start again"
                 )
+            before.require_intact(saved.frame + 1)
         if saved.time >= until:
             raise SceneError(f"until must be after the time of {self._path}, {saved.time:g} s, got {until:g} s")
         self._job, self._arrays = saved, arrays

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from conftest import edited
 
 import swarm
 from swarm.output import facts
@@ -51,8 +52,9 @@ def test_frames(path):
             for rows in (frame.position, frame.velocity):
                 np.testing.assert_array_equal(np.isnan(rows), np.broadcast_to(lacks, rows.shape))
             np.testing.assert_array_equal(trajectory.columns(k)["position"].T, frame.position)
-            if n + there:
-                assert len(frame.born()) == n + there
+            born = frame.born()
+            assert (len(born), born.velocity.shape) == (n + there, (3, n + there))
+            assert np.isfinite(born.position).all()
         position, _velocity = trajectory.particle(n + 1)
         assert np.isnan(position).sum(axis=1).tolist() == [2, 2, 2]
         seen = trajectory.observables
@@ -61,11 +63,10 @@ def test_frames(path):
 
 
 def test_damage_is_still_found(path, tmp_path):
-    import h5py
 
     copy = tmp_path / "copy.h5"
     copy.write_bytes(path.read_bytes())
-    with h5py.File(copy, "r+") as file:
+    with edited(copy) as file:
         file["particles/all/position/value"][4, -1, 1] = np.nan
     with swarm.load(copy) as trajectory:
         trajectory.frame(3)
@@ -93,6 +94,21 @@ def test_a_start_from_a_frame_has_those_that_are_there(path, tmp_path):
     """
     (tmp_path / "scene.toml").write_text(text)
     assert len(read(tmp_path / "scene.toml").start()) == given(path) + 2
+
+
+def test_a_start_from_a_frame_in_which_nobody_is(path, tmp_path):
+    with swarm.load(path) as trajectory:
+        text = repr(trajectory.frame(0).born())
+        assert text == f"Particles({given(path)})"
+        assert trajectory.frame(0).born()._repr_html_().count("0 particles") == (given(path) == 0)
+    if given(path):
+        return
+    (tmp_path / "scene.toml").write_text(
+        f'particles = {{from = "{path}", frame = 0}}\nsurface = [{{kind = "sphere", radius = 9.0}}]\n'
+        'method.kind = "impact"\nrun.until = 1.0\n'
+    )
+    with pytest.raises(swarm.SceneError, match=r"no particle is there at frame 0 of .*run\.h5; choose a later one"):
+        read(tmp_path / "scene.toml").start()
 
 
 def test_tables_and_arrays(path):
@@ -133,8 +149,8 @@ def test_exports(path, tmp_path):
         np.testing.assert_array_equal(file[2].log["particles/id"], np.arange(n + 2))
         np.testing.assert_allclose(file[-1].particles.velocity, last.velocity.T, rtol=1e-6)
     with h5py.File(vtk) as file:
-        points = file["VTKHDF/Points"][()].reshape(5, n + 4, 3)
-        assert np.isnan(points[..., 0]).sum(axis=1).tolist() == [4, 3, 2, 1, 0]
+        assert file["VTKHDF/NumberOfPoints"][()].tolist() == counts
+        assert np.isfinite(file["VTKHDF/Points"][()]).all()
 
 
 def test_pictures(path, tmp_path):

@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from children import python
+from conftest import edited
 from matplotlib.collections import LineCollection
 
 import swarm
@@ -189,7 +190,7 @@ def test_particles_are_no_bodies(tmp_path):
     ],
 )
 def test_a_damaged_body_is_named(run, name, value, message):
-    with h5py.File(run[0], "r+") as file:
+    with edited(run[0]) as file:
         del file[f"parameters/{name}"]
         file[f"parameters/{name}"] = value
     with pytest.raises(swarm.SceneError, match=message), swarm.load(run[0]) as trajectory:
@@ -386,7 +387,7 @@ def test_work_of_anchors_is_no_drift(tmp_path):
     led = swarm.Body([(0.0, 0.0, 0.0), (0.0, 0.0, -0.1)], 1.0, springs=[(0, 1, 50.0, 0.1)], anchors={0: motion})
     start = swarm.Bodies(led, led.points.T, np.zeros((3, 2)))
     write(tmp_path / "run.h5", [start, start])
-    with h5py.File(tmp_path / "run.h5", "r+") as file:
+    with edited(tmp_path / "run.h5") as file:
         file["observables/work/value"][:] = [0.0, 0.25]
         file["observables/total_energy/value"][:] = [1.0, 1.25]
     rows = summary.of_trajectory(tmp_path / "run.h5")

@@ -11,6 +11,7 @@ import zipfile
 import h5py
 import numpy as np
 import pytest
+from conftest import edited
 
 import swarm
 from swarm import scene_file, summary
@@ -192,7 +193,7 @@ STRANGE = {
 @pytest.mark.parametrize("name", STRANGE)
 def test_values_that_no_run_writes_are_reported(whole, name):
     change, message = STRANGE[name]
-    with h5py.File(whole, "r+") as file:
+    with edited(whole) as file:
         change(file)
     with pytest.raises(swarm.SceneError) as told:
         everything(whole)
@@ -330,7 +331,7 @@ def test_no_frame_is_a_sentence(whole):
 
 
 def test_of_a_damaged_trajectory_there_is_no_half_recording(whole):
-    with h5py.File(whole, "r+") as file:
+    with edited(whole) as file:
         file["particles/all/position/value"][3, 0, 0] = np.nan
     with swarm.load(whole) as trajectory, pytest.raises(swarm.SceneError, match=r"run\.h5 is damaged: frame 3"):
         recorded.record(trajectory, whole.with_suffix(".rrd"), recording.Settings())

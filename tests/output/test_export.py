@@ -1,12 +1,13 @@
 """Exported files, opened by the programs they are for: VTK, ASE and GSD's own reader."""
 
 import sys
+from decimal import Decimal
 
 import ase.io
 import gsd.hoomd
-import h5py
 import numpy as np
 import pytest
+from conftest import edited
 from test_cli import command
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -76,7 +77,7 @@ def test_vtk_reads_every_step(stored, tmp_path, kind):
         found = list(steps_of(tmp_path / "out.vtkhdf"))
         assert len(found) == len(trajectory) == 6
         for k, (time, position, points, _cells, (vertices, lines, triangles)) in enumerate(found):
-            assert time == trajectory.times[k]
+            assert time == pytest.approx(trajectory.times[k], rel=1e-15)
             expected = trajectory.columns(k)
             assert position.dtype == expected["position"].dtype
             np.testing.assert_array_equal(position, expected.pop("position"))
@@ -104,6 +105,23 @@ def test_the_steps_are_found_by_their_times(stored, tmp_path):
             )
 
 
+@pytest.mark.parametrize("every", ["0.1", "0.007", "1e-3"])
+def test_the_steps_are_found_by_times_that_are_typed(tmp_path, every):
+    """Of 0.30000000000000004, 3 times 0.1 in binary, 0.3 would be the step before."""
+    first = swarm.Particles([0.0, 0.0, 0.0], [0.1, 0.0, 0.0])
+    path = run(tmp_path, CAVITY, first, until=20 * float(every), every=float(every), compile="never")
+    with swarm.load(path) as trajectory:
+        assert len(trajectory) == 21
+        trajectory.export(tmp_path / "out.vtkhdf", surfaces=False)
+        reader = vtkHDFReader()
+        reader.SetFileName(str(tmp_path / "out.vtkhdf"))
+        reader.UpdateInformation()
+        for k in range(21):
+            reader.UpdateTimeStep(float(k * Decimal(every)))
+            x = vtk_to_numpy(reader.GetOutput().GetPoints().GetData())[0, 0]
+            assert x == trajectory.frame(k).position[0, 0]
+
+
 def test_walls_are_triangles_where_they_are(stored, tmp_path):
     for kind, steps in (("cavity", 1), ("shaken", 6)):
         with swarm.load(stored[kind]) as trajectory:
@@ -112,7 +130,7 @@ def test_walls_are_triangles_where_they_are(stored, tmp_path):
         found = list(steps_of(tmp_path / f"{kind}.surfaces.vtkhdf"))
         assert len(found) == steps
         for k, (time, position, _points, cells, (_vertices, _lines, triangles)) in enumerate(found):
-            assert time == (times[k] if steps > 1 else 0.0)
+            assert time == pytest.approx(times[k] if steps > 1 else 0.0, rel=1e-15)
             corners = position[triangles].reshape(-1, 3, 3)
             assert cells["solid"].tolist() == [int(scene.surfaces[i].is_solid()) for i in cells["surface"]]
             for i in range(2):
@@ -254,7 +272,7 @@ def test_what_cannot_be_finished_leaves_the_old_file(stored, tmp_path):
     older = (tmp_path / "out.xyz").read_text()
     broken = tmp_path / "broken.h5"
     broken.write_bytes(stored["cavity"].read_bytes())
-    with h5py.File(broken, "r+") as file:
+    with edited(broken) as file:
         file["particles/all/position/value"][3, 2, 1] = np.nan
     with swarm.load(broken) as trajectory:
         for name in ("out.xyz", "out.gsd", "out.vtkhdf"):

@@ -1,0 +1,324 @@
+"""Checksums of the values of an HDF5 file: of each row of what grows, and of what is written once.
+
+HDF5 has checksums of its metadata (objects, attributes of a fixed length, indexes of chunks), not of values. Its filter
+Fletcher-32 would cover a chunk as a whole: one of ten frames is written again as each of them comes, and a kill in the
+middle of that would lose the frames before it, which other processes could not read meanwhile either. So each row of a
+dataset, in blocks of 250 particles, has a CRC-32 in the file: parameters/checksums/rows, (frames, columns) uint32, 0 of
+what is not known. parameters/checksums/columns says of which dataset the columns are, a line of its name, how many
+there are, and the entries of each (0: the row). parameters/checksums/constants has a line of the name and the checksum
+of each dataset that is written once, and of each attribute that is a text, GROUP@NAME. Both are texts of a fixed
+length. Files of older versions have none of them.
+"""
+
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from .appended import put
+from .layout import text
+
+GROUP = "parameters/checksums"
+_ROWS, _COLUMNS, _CONSTANTS = (f"{GROUP}/{name}" for name in ("rows", "columns", "constants"))
+# Particles of a block: the path of one is read with those beside it, and a call takes as long as a few kB.
+BLOCK = 250
+# Bytes of a chunk of checksums.
+_CHUNK = 1 << 14
+# Rows that are read at once, in bytes.
+_AT_ONCE = 1 << 24
+
+Sums = NDArray[np.uint32]
+
+
+def checksum_of(data: Any, before: int = 0) -> int:
+    """The CRC-32 of the bytes of an array or a text, after those of which it is `before`; never 0."""
+    if isinstance(data, str):
+        return zlib.crc32(data.encode("utf-8", "surrogateescape"), before) or 1
+    values: Any = np.ascontiguousarray(data)
+    values = values.astype(values.dtype.newbyteorder("<"), copy=False)
+    return (zlib.crc32(memoryview(values).cast("B"), before) if values.size else before) or 1
+
+
+def row_sums(entries: Any, block: int = 0) -> Sums:
+    """The checksums of rows (rows, n, ...), of each or of each `block` of its n entries: (rows, blocks).
+
+    >>> row_sums(np.zeros((2, 5, 3)), 2).shape
+    (2, 3)
+    """
+    values: Any = np.ascontiguousarray(entries)
+    values = values.astype(values.dtype.newbyteorder("<"), copy=False)
+    count = max(1, -(-values.shape[1] // block)) if block else 1
+    if not values.size:
+        return np.ones((len(values), count), np.uint32)
+    view = memoryview(values).cast("B")
+    width = len(view) // len(values)
+    step = width // values.shape[1] * block if block else width
+    sums = [
+        zlib.crc32(view[k : min(k + step, row + width)]) or 1
+        for row in range(0, len(view), width)
+        for k in range(row, row + width, step)
+    ]
+    return np.array(sums, np.uint32).reshape(len(values), count)
+
+
+class RowSums:
+    """The checksums of a file that is written, or None of a file that has none."""
+
+    def __init__(self, file: Any) -> None:
+        self._data, self._new = file[_ROWS], dict[str, Sums]()
+        self._blocks = {name: (count, block) for name, count, block in _columns(file)}
+
+    @classmethod
+    def create(cls, file: Any, growing: dict[str, tuple[int, int]], other: Sequence[str] = ()) -> "RowSums":
+        """Make room for those of these datasets, entries a row and of a block, and add those of what is constant.
+
+        `other` datasets have none.
+        """
+        blocks = {
+            name: (max(1, -(-entries // block)) if block else 1, block) for name, (entries, block) in growing.items()
+        }
+        total = sum(count for count, _block in blocks.values())
+        rows = max(10, min(1024, _CHUNK // (4 * total)))
+        file.create_dataset(_ROWS, (0, total), np.uint32, maxshape=(None, total), chunks=(rows, total))
+        file[_COLUMNS] = np.bytes_(
+            "\n".join(f"{name} {count} {block}" for name, (count, block) in blocks.items()).encode()
+        )
+        sums = {name: checksum_of(_value(file[name])) for name in constants(file) if name not in other}
+        file[_CONSTANTS] = np.bytes_(_told(sums | _attributes(file)))
+        return cls(file)
+
+    @classmethod
+    def of(cls, file: Any) -> "RowSums | None":
+        """Those of a file that is there."""
+        return cls(file) if _ROWS in file else None
+
+    def forget(self, first: int, count: int) -> bool:
+        """Whether some of these rows have checksums; from now on they are not known, until they are written."""
+        there = min(count, int(self._data.shape[0]) - first)
+        if there > 0:
+            put(self._data, first, np.zeros((there, self._data.shape[1]), np.uint32))
+        return there > 0
+
+    def add(self, name: str, entries: Any) -> None:
+        """Those of the next rows of a dataset."""
+        if name in self._blocks:
+            self._new[name] = row_sums(entries, self._blocks[name][1])
+
+    def take(self, sums: dict[str, list[int]]) -> None:
+        """Add those of rows by the names of their datasets."""
+        self._new |= {name: np.array(each, np.uint32)[:, None] for name, each in sums.items()}
+
+    def write(self, first: int) -> None:
+        """Write what was added, from row `first` on."""
+        rows = len(next(iter(self._new.values())))
+        # Who has taken a dataset out of the file has no rows of it.
+        nothing = {name: np.zeros((rows, count), np.uint32) for name, (count, _block) in self._blocks.items()}
+        put(self._data, first, np.hstack(list((nothing | self._new).values())))
+        self._new.clear()
+
+
+def checksum_of_attribute(group: Any, name: str) -> int:
+    """The checksum of an attribute of texts."""
+    return checksum_of("\n".join(map(str, np.ravel(group.attrs[name]))))
+
+
+def _attributes(file: Any) -> dict[str, int]:
+    """The checksums of the attributes whose texts are in the heap, by GROUP@NAME."""
+    found = {}
+
+    def look(name: str, one: Any) -> None:
+        kinds = {key: one.attrs.get_id(key).dtype for key in one.attrs}
+        texts = [key for key, kind in kinds.items() if h5py.check_string_dtype(kind)]
+        found.update({f"{name}@{key}": checksum_of_attribute(one, key) for key in texts})
+
+    file.visititems(look)
+    return found
+
+
+def replace(file: Any, values: dict[str, Any]) -> None:
+    """Write constants anew; a kill at any moment leaves a file in which they are as before, as now, or not known."""
+    known = dict(_constants(file)) if _CONSTANTS in file else {}
+    values = {name: value for name, value in values.items() if file[name][()] != value}
+    if not values:
+        return
+    for sums in (dict.fromkeys(values, 0), {name: checksum_of(file[name].dtype.type(values[name])) for name in values}):
+        if known:
+            file[_CONSTANTS][()] = np.bytes_(_told(known | {name: sums[name] for name in values if name in known}))
+            file.flush()
+        if not any(sums.values()):
+            for name, value in values.items():
+                file[name][()] = value
+            file.flush()
+
+
+def constants(file: Any) -> list[str]:
+    """The names of the datasets that do not grow."""
+    found = []
+
+    def look(name: str, one: Any) -> None:
+        if not isinstance(one, h5py.Dataset) or one.is_virtual or name.startswith(GROUP):
+            return
+        if one.shape == () or one.maxshape[0] is not None:
+            found.append(name)
+
+    file.visititems(look)
+    return sorted(found)
+
+
+class Checked:
+    """Reads the values of a file, and holds them against their checksums, if it has some.
+
+    A value that differs is a ValueError that names its dataset and its frame, or what a row of it is.
+    """
+
+    def __init__(self, file: Any, path: Path, opened: Callable[[Path], Any]) -> None:
+        self._file, self._path, self._opened = file, path, opened
+        self._sums = file.get(_ROWS)
+        self._constants = _constants(file) if _CONSTANTS in file else {}
+        self._places, first = dict[str, tuple[slice, int]](), 0
+        for name, count, block in _columns(file) if self._sums is not None else ():
+            self._places[name] = slice(first, first + count), block
+            first += count
+        self._parts: dict[str, Checked] = {}
+
+    def close(self) -> None:
+        """Close the files of shards."""
+        for part in self._parts.values():
+            part._file.close()
+
+    def has_any(self) -> bool:
+        """Whether there are checksums."""
+        return self._sums is not None
+
+    def constant(self, name: str) -> Any:
+        """A dataset that is written once: a number, an array or a text."""
+        value = text(self._file[name], self._path) if _is_text(self._file[name]) else self._file[name][()]
+        if (known := self._constants.get(name)) and known != checksum_of(value):
+            raise ValueError(f"{name} does not match its checksum")
+        return value
+
+    def row(self, name: str, k: int) -> Any:
+        """Row k of a dataset that grows."""
+        return self.rows(name, k, k + 1)[0]
+
+    def rows(self, name: str, first: int, last: int) -> Any:
+        """Rows of a dataset that grows."""
+        if self._file[name].is_virtual:
+            return self._joined(name, first, last)
+        values = self._file[name][first:last]
+        if name in self._places:
+            where, block = self._places[name]
+            self._compare(name, first, row_sums(values, block), self._sums[first:last, where])
+        return values
+
+    def path(self, name: str, i: int, frames: int) -> Any:
+        """Entry i of the first rows of a dataset, (rows, ...)."""
+        data = self._file[name]
+        if data.is_virtual:
+            for one in data.virtual_sources():
+                (_, to, *_), (_, end, *_) = one.vspace.get_select_bounds()
+                if to <= i <= end:
+                    at = one.src_space.get_select_bounds()[0][1]
+                    return self._part(one.file_name).path(one.dset_name, at + i - to, frames)
+        if name not in self._places:
+            return data[:frames, i]
+        where, block = self._places[name]
+        begin = i // block * block
+        each = max(1, _AT_ONCE // (block * data.dtype.itemsize))
+        found = []
+        for first in range(0, frames, each):
+            last = min(frames, first + each)
+            values = data[first:last, begin : begin + block]
+            known = self._sums[first:last, where.start + i // block][:, None]
+            self._compare(name, first, row_sums(values), known)
+            found.append(values[:, i - begin])
+        return np.concatenate(found) if found else data[:0, i]
+
+    def compare_rows(self, name: str, data: Any, k: int, rows: tuple[int, int]) -> None:
+        """Hold the rows of a column that are of frame k against their checksum."""
+        if name in self._places:
+            found, (begin, end) = 0, rows
+            each = _AT_ONCE // (data.dtype.itemsize * int(np.prod(data.shape[1:])))
+            for first in range(begin, end, each):
+                found = checksum_of(data[first : min(end, first + each)], found)
+            self._compare(name, k, np.array([[found or 1]], np.uint32), self._sums[k : k + 1, self._places[name][0]])
+
+    def require_constants(self) -> None:
+        """Hold all that is written once against its checksum."""
+        for name in constants(self._file):
+            self.constant(name)
+        # Behind the texts: these say whether the heap, in which the texts of attributes are too, can be read.
+        self.require_attributes()
+
+    def require_attributes(self, group: str = "") -> None:
+        """Hold the attributes of a group, or of all of them, that are texts against their checksums."""
+        for name, known in self._constants.items():
+            where, has_one, attribute = name.rpartition("@")
+            if has_one and where.startswith(group) and checksum_of_attribute(self._file[where], attribute) != known:
+                raise ValueError(f"the attribute {attribute} of {where} does not match its checksum")
+
+    def require_intact(self, frames: int) -> None:
+        """Hold all constants, and all rows of the first frames, against their checksums."""
+        self.require_constants()
+        virtual = [f"particles/all/{name}/value" for name in self._file.get("particles/all", ())]
+        virtual = [name for name in virtual if name in self._file and self._file[name].is_virtual]
+        for name in (*self._places, *virtual):
+            data = self._file[name]
+            each = max(1, _AT_ONCE // max(1, data.dtype.itemsize * int(np.prod(data.shape[1:]))))
+            for first in range(0, frames, each):
+                self.rows(name, first, min(frames, first + each))
+
+    def _compare(self, name: str, first: int, found: Sums, known: Sums) -> None:
+        wrong = ((found != known) & (known != 0)).any(axis=1)
+        if len(known) < len(found):
+            raise ValueError(f"{name} has {first + len(found)} rows, and {first + len(known)} checksums")
+        if wrong.any():
+            shown = name.removesuffix("/value")
+            raise ValueError(f"{shown} of frame {first + int(wrong.argmax())} does not match its checksum")
+
+    def _part(self, name: str) -> "Checked":
+        """The file of a shard."""
+        if name not in self._parts:
+            path = self._path.parent / name
+            self._parts[name] = Checked(self._opened(path), path, self._opened)
+        return self._parts[name]
+
+    def _joined(self, name: str, first: int, last: int) -> Any:
+        """Rows that are in the files of shards."""
+        data = self._file[name]
+        out, read = np.zeros((last - first, *data.shape[1:]), data.dtype), dict[str, Any]()
+        for one in data.virtual_sources():
+            (_, to, *_), (_, end, *_) = one.vspace.get_select_bounds()
+            at = one.src_space.get_select_bounds()[0][1]
+            if one.file_name not in read:
+                read = {one.file_name: self._part(one.file_name).rows(one.dset_name, first, last)}
+            out[:, to : end + 1] = read[one.file_name][:, at : at + end + 1 - to]
+        return out
+
+
+def _is_text(data: Any) -> bool:
+    return data.shape == () and h5py.check_string_dtype(data.dtype) is not None
+
+
+def _value(data: Any) -> Any:
+    return str(data.asstr(errors="surrogateescape")[()]) if _is_text(data) else data[()]
+
+
+def _told(sums: dict[str, int]) -> bytes:
+    return "\n".join(f"{name} {known:08x}" for name, known in sums.items()).encode()
+
+
+def _lines(file: Any, name: str, numbers: int) -> Iterator[list[str]]:
+    return (line.rsplit(" ", numbers) for line in file[name][()].decode().split("\n"))
+
+
+def _constants(file: Any) -> dict[str, int]:
+    return {name: int(known, 16) for name, known in _lines(file, _CONSTANTS, 1)}
+
+
+def _columns(file: Any) -> Iterator[tuple[str, int, int]]:
+    return ((name, int(count), int(block)) for name, count, block in _lines(file, _COLUMNS, 2))
