@@ -59,7 +59,7 @@ def cone(surface: Cone, low: Floats, high: Floats, frame: Floats) -> Triangles:
 
 def without_gaps(normals: Floats, triangles: Indices) -> Floats:
     """Unit normals (V, 3), and where there is none, as at the apex of a cone, the mean of those beside the point."""
-    missing = ~normals.any(axis=1)
+    missing = np.asarray((normals == 0.0).all(axis=1))
     if not missing.any():
         return normals
     sums = np.zeros_like(normals)
