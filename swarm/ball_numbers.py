@@ -42,8 +42,8 @@ def volume_of(scene: Scene, particles: Particles) -> float:
         return particles.volume
     lengths = [None if scene.period is None else scene.period[k] for k in scene.axes()]
     # Surfaces in a cell take some of it, which only `fill` knows.
-    if not scene.surfaces:
-        return float(np.prod([float(length or 0.0) for length in lengths]))
+    if not scene.surfaces and None not in lengths:
+        return math.prod(length for length in lengths if length is not None)
     return math.nan
 
 

@@ -1,23 +1,27 @@
 """Optional packages."""
 
 import contextlib
+import shlex
 from collections.abc import Iterator
 
 from .errors import SceneError
 
-_PACKAGES = {
-    "record": "rerun-sdk scikit-image contourpy",
-    "plot": "matplotlib scikit-image",
+# What walls are drawn with.
+_DRAWN = "contourpy scikit-image scipy"
+# The packages of each extra of pyproject.toml: all that an import within `needed_by` may lack.
+PACKAGES = {
+    "record": f"rerun-sdk {_DRAWN}",
+    "plot": f"matplotlib {_DRAWN}",
     "bodies": "scipy",
-    "mesh": "trimesh libigl",
+    "mesh": "trimesh libigl lxml networkx scipy",
     "table": "pandas",
     "parquet": "pandas pyarrow",
     "xarray": "xarray",
-    "animation": "matplotlib scikit-image imageio-ffmpeg",
-    "notebook": "'rerun-sdk[notebook]' scikit-image contourpy",
-    "cluster": "distributed",
+    "animation": f"matplotlib imageio-ffmpeg pillow {_DRAWN}",
+    "notebook": f"rerun-sdk[notebook] {_DRAWN}",
+    "cluster": "distributed cloudpickle",
     "gsd": "gsd",
-    "report": "jinja2 matplotlib scikit-image",
+    "report": f"jinja2 markupsafe matplotlib pillow {_DRAWN}",
 }
 
 
@@ -27,8 +31,10 @@ def needed_by(what: str, extra: str) -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        if str(error.name).startswith("swarm"):
+        package = str(error.name).partition(".")[0]
+        if package == "swarm":
             raise
         raise SceneError(
-            f"{what} needs the package {error.name!r}, which is not installed: pip install {_PACKAGES[extra]}"
+            f"{what} needs the package {package!r}, which is not installed: pip install "
+            f"{' '.join(map(shlex.quote, PACKAGES[extra].split()))}"
         ) from error

@@ -90,11 +90,6 @@ class Scene(Pieces):
         for i, part in enumerate(pull or ()):
             checks.magnitude(f"|gravity[{i}]|", abs(part))
         lengths, plane = lengths_of(period), planes.checked(plane)
-        if not surfaces and not planes.repeats_along_all(plane, lengths):
-            raise SceneError(
-                "surfaces must hold at least one surface, or the scene must repeat in every direction, got none; give "
-                "the walls, or a period (Lx, Ly, Lz)"
-            )
         named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
         images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
         images = with_reach(images)

@@ -33,10 +33,12 @@ _LONG, _ARRAY = 1000, "sha256:"
 
 def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None, pairs: Any = None) -> Scene:
     """A scene from its tables: a list of surface tables; gravity, the period, the plane and the pairs, or None."""
-    # A scene that repeats in every direction may have none.
-    surfaces = [] if surfaces is None and period is not None else surfaces
-    if not isinstance(surfaces, list) or not (surfaces or period is not None):
-        raise SceneError("surface: expected at least one [[surface]] table, got none")
+    # Balls need none.
+    surfaces = [] if surfaces is None else surfaces
+    if not isinstance(surfaces, list):
+        raise SceneError(
+            "surface: expected at least one [[surface]] table, or none where balls meet in free space, got something else"
+        )
     built = [surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
     met = None if pairs is None else _pairs_of(pairs)
     return Scene(surfaces=built, gravity=gravity, period=period, plane=plane, pairs=met)

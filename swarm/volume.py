@@ -245,5 +245,5 @@ class Volume:
     def extent(self) -> float:
         """Distance from the origin within which the scene's surfaces lie."""
         lengths = [length for length in self.period or () if length is not None]
-        farthest = max([*(surface.extent() for surface in self.surfaces), *lengths])
+        farthest = max((*(surface.extent() for surface in self.surfaces), *lengths), default=0.0)
         return farthest if farthest > _AT_ORIGIN else 1.0

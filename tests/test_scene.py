@@ -73,8 +73,6 @@ def test_no_volume_is_refused(surfaces):
 @pytest.mark.parametrize(
     ("build", "parts"),
     [
-        (lambda: Scene([]), ["surfaces", "at least one surface", "none"]),
-        (lambda: Scene([], period=(1.0, 1.0, None)), ["surfaces", "repeat in every direction", "none"]),
         (lambda: Scene([BALL, "ball"]), ["surfaces[1]", "surface", "'ball'"]),
         (lambda: Scene([BALL], gravity=9.81), ["gravity", "three numbers", "9.81"]),
         (lambda: Scene([BALL], gravity=(0, 0)), ["gravity", "three numbers", "got 2"]),

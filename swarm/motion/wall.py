@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from .. import checks
 from ..checks import Vector
 from ..errors import SceneError
-from ..notebook import shortened
 from .given import (
     Floats,
     Given,
@@ -33,6 +32,9 @@ from .given import (
     unit_axis,
     vector_of,
 )
+
+# A path of more times is shown without them.
+_FEW = 4
 
 
 @dataclass(frozen=True, repr=False)
@@ -75,8 +77,10 @@ class Path(Given):
             )
 
     def __repr__(self) -> str:
-        times, positions = (", ".join(shortened(values)) for values in (self.times, self.positions))
-        return f"Path(times=({times}), positions=({positions}))"
+        """The call that makes it; of many times their number and their ends, for sentences hold it."""
+        if len(self.times) > _FEW:
+            return f"Path(<{len(self.times)} times from {self.times[0]:g} to {self.times[-1]:g} s>)"
+        return f"Path(times={self.times}, positions={self.positions})"
 
     @functools.cached_property
     def cubics(self) -> Floats:

@@ -39,6 +39,9 @@ ENERGIES = {
     "kinetic": BLUE, "rotational": SKY, "potential": GREEN, "contact": PINK, "elastic": PINK, "dissipated": RED,
     "brought by": ORANGE, "work of": _PURPLE, "energy of": _BROWN,
 }  # fmt: skip
+# Walls of a cavity, and solids: their faces and their lines.
+CAVITY, CAVITY_LINE = "#C9D6E2", "#6F8296"
+SOLID, SOLID_LINE = "#E3C9A8", "#A5733C"
 _STEPS = 256
 # The scale ends at this many times the speed of the mean energy at the start.
 _FASTER = 1.5

@@ -12,6 +12,7 @@ from .colours import Colours
 from .framed import around, eye_of, window
 from .scenery import NO_TIES, Scenery, Ties, red_green_blue
 from .shape import Shape
+from .speeds import are_alike
 from .style import MAP
 from .triad import INK
 
@@ -60,16 +61,23 @@ def aspect(shapes: list[Shape], points: Floats, across: int | None) -> float:
 
 
 def colour_bar(
-    figure: Any, axes: Any, quantity: str, low: float, high: float, packed: list[Colours] | None = None
+    figure: Any,
+    axes: Any,
+    quantity: str,
+    low: float,
+    high: float,
+    packed: list[Colours] | None = None,
+    values: Floats | None = None,
 ) -> None:
-    """A colour bar for the particles, below these axes; where all have one colour of it, 0xRRGGBBAA, words."""
+    """A colour bar for the particles, below these axes; where all have one colour of it, 0xRRGGBBAA, words.
+
+    The words are about the `values` of the particles, or, where these are not known, about those of the colour.
+    """
     every = np.unique(np.concatenate(packed)) if packed else np.empty(0, np.uint32)
     there = every[every & 0xFF > 0]
     if len(there) == 1:
-        far = np.abs(np.asarray(MAP(np.arange(MAP.N)))[:, :3] - red_green_blue(there)).sum(axis=1)
-        value = low + (int(far.argmin()) + 0.5) / MAP.N * (high - low)
-        name, _, unit = quantity.rstrip("]").partition(" [")
-        figure.supxlabel(f"all at one {name}, {value:.2g} {unit}".strip(), fontsize=8.5, color=INK)
+        told = _colour_in_words(quantity, low, high, there) if values is None else _values_in_words(quantity, values)
+        figure.supxlabel(told, fontsize=8.5, color=INK)
         return
     bar = figure.colorbar(
         ScalarMappable(Normalize(low, high), MAP), ax=axes, location="bottom", shrink=0.5, aspect=55, pad=0.01
@@ -77,3 +85,34 @@ def colour_bar(
     bar.set_label(quantity, color=INK, fontsize=8.5)
     bar.outline.set_visible(False)
     bar.ax.tick_params(colors=INK, labelsize=7.5, length=2.0)
+
+
+def _values_in_words(quantity: str, values: Floats) -> str:
+    """What values that have one colour are; NaN is of a particle that is not there."""
+    values = values[~np.isnan(values)]
+    least, most = float(values.min()), float(values.max())
+    name, unit = _named(quantity)
+    if name == "speed" and most == 0.0:
+        return "at rest" if len(values) == 1 else "all at rest"
+    if len(values) == 1:
+        return f"{name} {most:.4g} {unit}".strip()
+    if are_alike(values):
+        return f"all at one {name}, {most:.4g} {unit}".strip()
+    return f"all at a {name} from {least:.4g} to {most:.4g} {unit}".strip()
+
+
+def _colour_in_words(quantity: str, low: float, high: float, colour: Colours) -> str:
+    """Which values have a colour: those of a step of the scale, or all that are beyond its end."""
+    far = np.abs(np.asarray(MAP(np.arange(MAP.N)))[:, :3] - red_green_blue(colour)).sum(axis=1)
+    step = int(far.argmin())
+    ends = [f"{low + k / MAP.N * (high - low):.4g}" for k in (step, step + 1)]
+    name, unit = _named(quantity)
+    within = f"of at most {ends[1]}" if step == 0 else f"of at least {ends[0]}"
+    told = within if step in (0, MAP.N - 1) else f"from {ends[0]} to {ends[1]}"
+    return f"all at a {name} {told} {unit}".strip()
+
+
+def _named(quantity: str) -> tuple[str, str]:
+    """The name of a quantity and its unit."""
+    name, _, unit = quantity.rstrip("]").partition(" [")
+    return name, unit

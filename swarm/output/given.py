@@ -1,4 +1,4 @@
-"""Triangles of walls that are known without a grid: of tori, of outlines, and of meshes."""
+"""Triangles of walls that are known without a grid: of tori, of cones, of outlines, and of meshes."""
 
 import math
 from typing import Any
@@ -8,7 +8,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..state import Floats
-from ..surfaces import Torus
+from ..surfaces import Cone, Torus
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from .curves import Indices, neighbours
@@ -16,6 +16,8 @@ from .cut import Smooth
 
 # Points around the tube of a torus and along it, parts of the height of an outline, and points of a line on it.
 _AROUND, _ALONG, _HIGH, _FINE = 32, 96, 8, 201
+# Parts of the height of a cone.
+_RINGS = 32
 
 Triangles = tuple[Floats, Indices]
 
@@ -30,6 +32,41 @@ def torus(surface: Torus) -> Triangles:
     place = np.arange(_ALONG * _AROUND).reshape(_ALONG, _AROUND)
     a, b = place, np.roll(place, -1, axis=0)
     return points, _halved(a, b, np.roll(b, -1, axis=1), np.roll(place, -1, axis=1))
+
+
+def cone(surface: Cone, low: Floats, high: Floats, frame: Floats) -> Triangles:
+    """A cone as far as a box goes that is given in a frame whose z is the axis: a grid would lose the apex."""
+    apex = np.array(surface.center) @ frame
+    slope = math.tan(surface.half_angle)
+    widest = math.hypot(*np.maximum(np.abs(high - apex), np.abs(low - apex))[:2])
+    top, bottom = min(float(high[2] - apex[2]), widest / slope), max(float(low[2] - apex[2]), 0.0)
+    if not bottom < top:
+        return np.empty((0, 3)), np.empty((0, 3), np.int64)
+    around = np.linspace(0.0, 2.0 * math.pi, _ALONG, endpoint=False)
+    along = np.linspace(bottom, top, _RINGS + 1)
+    heights, angles = np.meshgrid(along, around, indexing="ij")
+    own = np.stack([slope * heights * np.cos(angles), slope * heights * np.sin(angles), heights], axis=-1)
+    a = np.arange(own.size // 3).reshape(heights.shape)
+    b = np.roll(a, -1, axis=1)
+    quadrilaterals = a[:-1], b[:-1], b[1:], a[1:]
+    if bottom == 0.0:
+        # All points of the first ring are the apex: one of them stands for it, in one triangle of each pair.
+        a[0] = b[0] = a[0, 0]
+    triangles = _halved(*quadrilaterals)
+    kept = (triangles[:, 0] != triangles[:, 1]) & (triangles[:, 1] != triangles[:, 2])
+    return (own.reshape(-1, 3) + apex) @ frame.T, triangles[kept]
+
+
+def without_gaps(normals: Floats, triangles: Indices) -> Floats:
+    """Unit normals (V, 3), and where there is none, as at the apex of a cone, the mean of those beside the point."""
+    missing = np.asarray((normals == 0.0).all(axis=1))
+    if not missing.any():
+        return normals
+    sums = np.zeros_like(normals)
+    for k in range(3):
+        np.add.at(sums, triangles[:, k], normals[triangles].sum(axis=1))
+    lengths = np.maximum(np.sqrt((sums**2).sum(axis=1, keepdims=True)), np.finfo(np.float64).tiny)
+    return np.where(missing[:, None], sums / lengths, normals)
 
 
 def upright(surface: Outlined, low: float, high: float) -> Triangles:

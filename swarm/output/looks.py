@@ -6,15 +6,15 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from ..state import Floats
-from . import series, style
+from . import colours, series
 from .colours import BACKGROUND, curve_colour, rgb
 from .drawn import Drawn
 from .playback import LINES, MESH, PARTICLES
 from .shape import Shape
 
 # The colours of matplotlib's pictures.
-_CAVITY, _SOLID = (*rgb(style.CAVITY), 60), (*rgb(style.SOLID), 255)
-_CAVITY_WIRE, _SOLID_WIRE = (*rgb(style.CAVITY_LINE), 255), (*rgb(style.SOLID_LINE), 255)
+_CAVITY, _SOLID = (*rgb(colours.CAVITY), 60), (*rgb(colours.SOLID), 255)
+_CAVITY_WIRE, _SOLID_WIRE = (*rgb(colours.CAVITY_LINE), 255), (*rgb(colours.SOLID_LINE), 255)
 # Plots that are seen at once, and which these are: those of other groups come after them.
 _SEEN = 4
 _FIRST = (

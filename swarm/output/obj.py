@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces.instant import side_of
-from . import style
+from . import colours
 from .shape import Shape
 from .shapes import bodies_of, shapes_of, since_start
 
@@ -51,7 +51,7 @@ def write_objects(trajectory: Any, number: int, path: Path, materials: Path) -> 
             file.write(f"o {shape.name}\nv ".encode() + corners + b"\n" + material + b"\nf " + triangles + b"\n")
             first += len(shape.vertices)
     with open(materials, "w", encoding="ascii") as out:
-        for name, colour in (("cavity", style.CAVITY), ("solid", style.SOLID)):
+        for name, colour in (("cavity", colours.CAVITY), ("solid", colours.SOLID)):
             shade = " ".join(f"{int(colour[k : k + 2], 16) / 255.0:.4f}" for k in (1, 3, 5))
             out.write(f"newmtl {name}\nKd {shade}\nd {_OPACITY[name]:g}\nillum 1\n")
 

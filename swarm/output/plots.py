@@ -172,15 +172,16 @@ def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most:
         across,
         drawn.radius,
     )
-    drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high, [packed])
+    shown = values(drawn.points(end.position), drawn.points(end.velocity))
+    drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high, [packed], shown)
     count = content.count // (1 if content.body is None else len(content.body))
     left = how_many_left(content.seen, content.gone.get(name))
     here = drawn.shown if content.body else int((~np.isnan(position[0])).sum())
     count -= sum(left.values())
-    shown = many(count) if here == count else f"{many(here)} of {many(count)}"
+    told = many(count) if here == count else f"{many(here)} of {many(count)}"
     noun = drawn.noun if end.radius is None else "balls" if content.scene.plane is None else "discs"
     noun = noun if count != 1 else {"bodies": "body"}.get(noun, noun.removesuffix("s"))
-    title = f"{shown} {noun}{' inside' * bool(left)}, t = {amount(float(content.seen['time'][-1]), 's')}"
+    title = f"{told} {noun}{' inside' * bool(left)}, t = {amount(float(content.seen['time'][-1]), 's')}"
     if (alike := speeds.of_all(content)) is not None:
         title += f",\neach with {amount(alike, 'm/s')}" if alike else ", all at rest"
     if left:

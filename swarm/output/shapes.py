@@ -97,6 +97,8 @@ def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
 
 
 def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) -> list[Shape]:
+    if not scene.surfaces:
+        return []
     walls, shapes = PlaneWalls(scene, positions, time), []
     grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
     parts = parts_of(scene, time) if any(isinstance(surface, Joined) for surface in scene.surfaces) else []

@@ -12,7 +12,7 @@ from ..errors import SceneError
 from ..kernel.vector import vec
 from ..motion import Pose, pose
 from ..state import Floats
-from ..surfaces import Torus
+from ..surfaces import Cone, Torus
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
@@ -77,7 +77,7 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
     inwards = 1.0 if part.solid else -1.0
     for found, wall in _pieces(placed) if (low < high).all() else ():
         points.append(found.points)
-        normal = wall.normals(found.points)
+        normal = given.without_gaps(wall.normals(found.points), found.triangles)
         triangles.append(first + _turned_to(found.points, found.triangles, inwards * normal))
         normals.append(inwards * normal)
         edges += curves.joined(found.points, found.rims)
@@ -113,6 +113,9 @@ def _pieces(placed: _Placed) -> Iterator[tuple[Any, Smooth]]:
     """The triangles of every smooth wall, cut, and the wall."""
     surface: Any = placed.part.surface
     walls, upright = smooth_walls(surface), isinstance(surface, Outlined)
+    if isinstance(surface, Cone):
+        # Of the plane through the apex only that point is a wall.
+        walls = walls[-1:]
     if upright:
         points, triangles = given.upright(surface, float(placed.low[2]), float(placed.high[2]))
         # Moved onto themselves, they would stay where they are.
@@ -205,7 +208,11 @@ def _in(frame: Floats, point: Any) -> Any:
 
 def _triangles(surface: Any, wall: Smooth, low: Floats, high: Floats, frame: Floats) -> tuple[Floats, Indices]:
     """Triangles on a smooth wall in a box."""
-    return given.torus(surface) if isinstance(surface, Torus) else found_in(wall, low, high, frame)
+    if isinstance(surface, Torus):
+        return given.torus(surface)
+    if isinstance(surface, Cone):
+        return given.cone(surface, low, high, frame)
+    return found_in(wall, low, high, frame)
 
 
 def _turned_to(points: Floats, triangles: Indices, normals: Floats) -> NDArray[np.int64]:

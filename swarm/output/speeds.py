@@ -30,7 +30,7 @@ def of_frames(content: Any) -> Spread:
     if not found:
         return {}
     top = _top(found)
-    told = [values for values in found.values() if not _is_single(values)]
+    told = [values for values in found.values() if not are_alike(values)]
     return (
         found if any(np.histogram(values, _BINS, (0.0, top))[0].max() < _ALL * len(values) for values in told) else {}
     )
@@ -48,7 +48,7 @@ def of_all(content: Any) -> float | None:
         return None
     values = np.sqrt((frame.velocity**2).sum(axis=0))
     values = values[~np.isnan(values)]
-    return float(values.mean()) if len(values) > 1 and _is_single(values) else None
+    return float(values.mean()) if len(values) > 1 and are_alike(values) else None
 
 
 def maxwell(speeds: Floats, mean_square: float, dimensions: int) -> Floats:
@@ -71,7 +71,7 @@ def draw(axes: Any, content: Any, spread: Spread) -> None:
     for name, values in spread.items():
         colour = style.GREY if name == "start" and len(spread) > 1 else style.BLUE
         when = "at the start" if name == "start" else "at the end"
-        if _is_single(values):
+        if are_alike(values):
             place = float(values.mean()) * factor
             axes.axvline(place, color=colour, linewidth=1.4, linestyle="--",
                          label=f"{when} all {amount(float(values.mean()), 'm/s', 3)}")  # fmt: skip
@@ -92,7 +92,7 @@ def _law(axes: Any, content: Any, spread: Spread, bin_width: float, factor: floa
     """The law of Maxwell of the last speeds, where these are near it."""
     values, frame = list(spread.values())[-1], list(content.frames.values())[-1]
     masses = frame.mass
-    if content.body is not None or np.ptp(masses) > 1e-9 * masses.max() or _is_single(values) or len(values) < _BINS:
+    if content.body is not None or np.ptp(masses) > 1e-9 * masses.max() or are_alike(values) or len(values) < _BINS:
         return
     dimensions = 3 if content.scene.plane is None else 2
     at = np.linspace(0.0, _top(spread), 400)
@@ -104,6 +104,6 @@ def _law(axes: Any, content: Any, spread: Spread, bin_width: float, factor: floa
                   label="Maxwell, same energy")  # fmt: skip
 
 
-def _is_single(values: Floats) -> bool:
-    """Whether all speeds are the same up to round-off."""
-    return bool(np.ptp(values) <= _ALIKE * values.max())
+def are_alike(values: Floats) -> bool:
+    """Whether all values, such as speeds, are the same up to round-off."""
+    return bool(np.ptp(values) <= _ALIKE * np.abs(values).max())

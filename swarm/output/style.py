@@ -13,7 +13,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from . import colours
-from .colours import BLUE, CURVES, ENERGIES, GREEN, ORANGE, PINK, RED, SKY
+from .colours import BLUE, CAVITY, CAVITY_LINE, CURVES, ENERGIES, GREEN, ORANGE, PINK, RED, SKY, SOLID, SOLID_LINE
 
 __all__ = [
     "BLUE", "CAVITY", "CAVITY_LINE", "CURVES", "ENERGIES", "GREEN", "GREY", "MAP", "ORANGE", "PINK", "RED", "SKY",
@@ -21,9 +21,6 @@ __all__ = [
 ]  # fmt: skip
 # What only guides the eye: laws beside measurements, limits, bands.
 GREY = "#8A8A8A"
-# Walls of a cavity, and solids: their faces and their lines.
-CAVITY, CAVITY_LINE = "#C9D6E2", "#6F8296"
-SOLID, SOLID_LINE = "#E3C9A8", "#A5733C"
 # Particles by their speed, or another number: from slow to fast.
 MAP = ListedColormap(colours.table(), name="swarm")
 

@@ -29,7 +29,7 @@ def require_balls(scene: Scene, particles: Particles | None, method: Method, opt
         if not scene.surfaces:
             raise SceneError(
                 "surfaces must hold at least one surface for particles without a radius, which meet nothing else, got "
-                "none; give the walls, or give the particles a radius"
+                "none; give the walls, or give the particles a radius, by which they meet one another in free space"
             )
         if scene.pairs is not None:
             raise SceneError(

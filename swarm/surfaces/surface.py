@@ -289,12 +289,15 @@ def side_sign(side: str) -> float:
 
 
 def rotated_box(rotation: Any, box: Box, center: Vector) -> Box:
-    """Bounds of a box that is rotated about `center`."""
-    if rotation is None or not all(map(math.isfinite, (*box[0], *box[1]))):
-        return box if rotation is None else UNBOUNDED
-    matrix = rotations.matrix(rotation)
-    middle, half = (np.array(box[0]) + box[1]) / 2.0, (np.array(box[1]) - box[0]) / 2.0
+    """Bounds of a box that is rotated about `center`; an axis along which it has an end at most is open."""
+    if rotation is None:
+        return box
+    matrix, (low, high) = rotations.matrix(rotation), np.array(box)
+    is_open = ~(np.isfinite(low) & np.isfinite(high))
+    low, high = np.where(is_open, center, low), np.where(is_open, center, high)
+    middle, half = (low + high) / 2.0, (high - low) / 2.0
     middle, half = center + rotations.product(matrix, middle - center), rotations.product(np.abs(matrix), half)
+    half[(np.abs(matrix[:, is_open]) > TILT).any(axis=1)] = math.inf
     return tuple((middle - half).tolist()), tuple((middle + half).tolist())
 
 

@@ -10,7 +10,7 @@ from matplotlib.collections import PathCollection
 from matplotlib.text import Text
 
 import swarm
-from swarm.output import drawing, film, flat, framed, plots, style, triad
+from swarm.output import colours, drawing, film, flat, framed, plots, style, triad
 from swarm.output.eye import eye_at, eye_for
 from swarm.output.raster import Raster
 from swarm.output.scenery import Scenery
@@ -176,7 +176,50 @@ def test_where_all_have_one_speed_there_are_words_and_no_bar():
             drawing.colour_bar(figure, axes, "speed [m/s]", 0.0, 2.0, [np.array(colours, np.uint32)])
             assert len(figure.axes) == bars
             words = figure._supxlabel.get_text() if figure._supxlabel else ""
-            assert words.startswith("all at one speed, ") == (bars == 1)
+            assert words.startswith("all at a speed ") == (bars == 1)
+
+
+def words_below(quantity, low, high, values=None, shown=()):
+    """What stands where a colour bar would say nothing: about values, or about the colours of some."""
+    scale = colours.Scale(quantity, low, high)
+    packed = scale.colours(np.asarray(shown if values is None else values, np.float64))
+    figure = style.picture(4.0, 4.0)
+    axes = drawing.view(figure, None)
+    drawing.colour_bar(figure, axes, quantity, low, high, [packed], None if values is None else np.array(values))
+    assert len(figure.axes) == 1
+    return figure.get_supxlabel()
+
+
+def test_the_words_instead_of_a_bar_are_about_the_values_not_about_their_colour():
+    speed = "speed [m/s]", 0.0, 6.7
+    assert words_below(*speed, [0.0, 0.0, math.nan]) == "all at rest"
+    assert words_below(*speed, [0.0, math.nan]) == "at rest"
+    assert words_below(*speed, [0.5, math.nan]) == "speed 0.5 m/s"
+    assert words_below(*speed, [0.5, 0.5, math.nan]) == "all at one speed, 0.5 m/s"
+    assert words_below(*speed, [1e-3, 2e-2]) == "all at a speed from 0.001 to 0.02 m/s"
+    assert words_below(*speed, [7.0, 9.0]) == "all at a speed from 7 to 9 m/s"
+
+
+def test_a_colour_alone_says_between_which_values_they_are():
+    """A step of 256 of the scale; beyond its ends there is one colour."""
+    assert words_below("speed [m/s]", 0.0, 2.56, shown=[0.0, 9e-3]) == "all at a speed of at most 0.01 m/s"
+    assert words_below("speed [m/s]", 0.0, 2.56, shown=[9.0, 2.5599]) == "all at a speed of at least 2.55 m/s"
+    assert words_below("speed [m/s]", 0.0, 2.56, shown=[1.285]) == "all at a speed from 1.28 to 1.29 m/s"
+    assert (
+        words_below("log10 of the error", -16.0, -6.0, shown=[-16.0]) == "all at a log10 of the error of at most -15.96"
+    )
+
+
+def test_a_picture_of_a_run_at_rest_names_no_speed(tmp_path):
+    bowl = swarm.Scene([swarm.Box((1.0, 1.0, 1.0), restitution=0.2, friction=0.9)], gravity=(0.0, 0.0, -9.81))
+    start = swarm.fill(bowl, 3, speed=1.0, seed=1)
+    path = tmp_path / "rest.h5"
+    swarm.simulate(bowl, start, swarm.Impact(), until=6.0, every=6.0, trajectory=path, compile="never")
+    with swarm.load(path) as trajectory:
+        assert not trajectory.frame(-1).velocity.any()
+        texts = [text.get_text() for text in trajectory.plot().findobj(Text)]
+    assert "all at rest" in texts
+    assert not [text for text in texts if "speed" in text or "m/s" in text]
 
 
 def test_a_scenery_without_walls():

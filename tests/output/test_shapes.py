@@ -50,6 +50,27 @@ def test_areas(name):
     np.testing.assert_allclose(areas, AREAS[name], rtol=0.015)
 
 
+@pytest.mark.parametrize("side", ["inside", "outside"])
+@pytest.mark.parametrize(
+    ("angle", "axis"), [(math.pi / 6.0, (0.0, 0.0, 1.0)), (0.05, (1.0, 0.3, 0.2)), (1.5, (0.0, -1.0, 0.0))]
+)
+def test_a_cone_is_drawn_with_its_tip(angle, axis, side):
+    """A grid has no point at the apex, so that particles in it would be seen outside the wall."""
+    apex = np.array([1.0, 2.0, 3.0])
+    scene = swarm.Scene([swarm.Cone(angle, axis, apex, side=side), swarm.Sphere(2.0, apex)])
+    cone = shapes_of(scene, NOWHERE)[0]
+    far = np.sqrt(((cone.vertices - apex) ** 2).sum(axis=1))
+    assert far.min() < 1e-12
+    assert far.max() == pytest.approx(2.0)
+    assert cone.area() == pytest.approx(math.pi * 4.0 * math.sin(angle), rel=2e-3)
+    # All round the apex
+    at_apex = cone.triangles[(far < 1e-12)[cone.triangles].any(axis=1)]
+    assert len(at_apex) > 50
+    np.testing.assert_allclose((cone.normals**2).sum(axis=1), 1.0)
+    a, b, c = np.moveaxis(cone.vertices[cone.triangles], 1, 0)
+    assert ((np.cross(b - a, c - a) * cone.normals[cone.triangles].sum(axis=1)).sum(axis=1) > -1e-12).all()
+
+
 def test_where_a_wall_is_open_nothing_is_drawn():
     hole = swarm.Sphere(0.3, (0.0, 0.0, 0.5))
     (shape,) = shapes_of(swarm.Scene([swarm.Sphere(0.5, openings=[hole])]), NOWHERE)

@@ -94,18 +94,25 @@ def test_a_law_that_keeps_the_speed_keeps_the_energy_to_the_last_digit(gravity):
 
 # --- Cercignani and Lampis -------------------------------------------------------------------------------
 
-PAIRS = [(1.0, 1.0), (0.3, 0.7), (0.8, 0.2), (0.0, 0.5), (0.5, 0.0)]
+PAIRS = [(1.0, 1.0), (0.3, 0.7), (0.8, 0.2), (0.0, 0.5), (0.5, 0.0), (0.6, 1.6), (0.4, 2.0)]
 
 
 @pytest.mark.parametrize(("normal", "tangential"), PAIRS)
 def test_a_gas_of_the_walls_temperature_stays_one(normal, tangential):
-    """Detailed balance: what comes as the flux of a Maxwellian leaves as that."""
+    """Detailed balance: what comes as the flux of a Maxwellian leaves as that, and would come back as it came.
+
+    Both tangential velocities are normal with one variance, so that their correlation, 1 - sigma_t, is all that a
+    reversal could change, and it is the same both ways; that of the normal ones is seen in the order of their energies.
+    """
     n, temperature, mass = 20_000, 0.7, 2.5
     before = flux(n, temperature / mass, np.random.default_rng(8))
     v = struck([swarm.CercignaniLampis(temperature, normal, tangential)], before, mass)
     assert kolmogorov(np.exp(-mass * (NORMAL @ v) ** 2 / (2.0 * temperature))) < KOLMOGOROV
     for way in (FIRST, SECOND):
         assert kolmogorov(ndtr(way @ v * math.sqrt(mass / temperature))) < KOLMOGOROV
+        assert np.corrcoef(way @ before, way @ v)[0, 1] == pytest.approx(1.0 - tangential, abs=4.0 / math.sqrt(n))
+    comes, goes = -NORMAL @ before, NORMAL @ v
+    assert (goes > comes).mean() == pytest.approx(0.5, abs=4.0 * 0.5 / math.sqrt(n)) or normal == 0.0
 
 
 @pytest.mark.parametrize(("normal", "tangential"), PAIRS)
@@ -135,6 +142,8 @@ def test_its_limits_are_a_thermal_wall_and_a_mirror():
     v = struck([swarm.CercignaniLampis(temperature, 1.0, 1.0)], before)
     assert kolmogorov(np.exp(-((NORMAL @ v) ** 2) / (2.0 * temperature))) < KOLMOGOROV
     assert kolmogorov(ndtr(FIRST @ v / math.sqrt(temperature))) < KOLMOGOROV
+    reversed_ = struck([swarm.CercignaniLampis(temperature, 0.0, 2.0)], before)
+    assert reversed_ == pytest.approx(-before, abs=1e-15)
     mirrored = struck([swarm.CercignaniLampis(temperature, 0.0, 0.0)], before)
     assert mirrored == pytest.approx(before + 2.2 * NORMAL[:, None], abs=1e-15)
     # At 0 K the normal speed is sqrt(1 - alpha_n) of what it was.
@@ -150,6 +159,10 @@ def test_it_stays_in_a_plane():
     assert not v[2].any()
     assert kolmogorov(np.exp(-((normal @ v) ** 2) / (2.0 * temperature))) < KOLMOGOROV
     assert kolmogorov(ndtr(across @ v / math.sqrt(temperature))) < KOLMOGOROV
+    v = struck([swarm.CercignaniLampis(temperature, 1.0, 1.5)], before, plane="z", normal=normal)
+    assert not v[2].any()
+    width = math.sqrt(0.75 * temperature)
+    assert kolmogorov(ndtr((across @ v + 0.5 * 0.2) / width)) < KOLMOGOROV
 
 
 @pytest.mark.parametrize("a", [1.0, 0.6, 0.2])
@@ -446,6 +459,8 @@ class Booked(Half):
         ([swarm.Absorb(barrier=-1.0)], r"laws\[0\].barrier must be 0 J or more, got -1"),
         ([swarm.CercignaniLampis(-1.0, 0.5, 0.5)], r"laws\[0\].temperature must be 0 J or more, got -1"),
         ([swarm.CercignaniLampis(1.0, 1.5, 0.5)], r"laws\[0\].normal must be from 0 to 1, got 1.5"),
+        ([swarm.CercignaniLampis(1.0, 0.5, 2.1)], r"laws\[0\].tangential must be from 0 to 2, got 2.1"),
+        ([swarm.CercignaniLampis(1.0, 0.5, -0.1)], r"laws\[0\].tangential must be from 0 to 2, got -0.1"),
         ([swarm.CercignaniLampis(1.0, 0.5, math.nan)], r"laws\[0\].tangential must be a finite number, got nan"),
         ([swarm.Sticky(-1.0)], r"laws\[0\].time must be 0 s or more, got -1"),
         ([Booked()], r'laws\[0\] must have book = "heat" or "dissipated" in its class, Booked has'),

@@ -126,7 +126,7 @@ def laws_in(random):
     """One, two or three laws of the package, in any order."""
     kinds = [
         swarm.Lambert(float(random.choice([0.5, 1.0]))),
-        swarm.CercignaniLampis(*random.uniform([0.1, 0.0, 0.0], [1.0, 1.0, 1.0]).tolist()),
+        swarm.CercignaniLampis(*random.uniform([0.1, 0.0, 0.0], [1.0, 1.0, 2.0]).tolist()),
         [swarm.Absorb(0.2), swarm.Absorb(barrier=0.8, loss=0.1)][random.integers(2)],
     ]
     return [kinds[k] for k in random.permutation(3)[: random.integers(1, 4)]]

@@ -59,6 +59,13 @@ def read_soup(path: Path, scale: float) -> Soup:
         vertices = scale * vertices
     except SceneError:
         raise
+    except ModuleNotFoundError as error:
+        # As trimesh raises it again, it has no name.
+        name = error.name or str(error).rpartition(" ")[2].strip("'")
+        raise SceneError(
+            f"cannot read the mesh {path}: a file {path.suffix} needs the package {name!r}, which is not installed: "
+            f"pip install {name}, or write the mesh as STL"
+        ) from error
     except Exception as error:  # what readers of a dozen formats raise
         raise SceneError(f"cannot read the mesh {path}: {error or type(error).__name__}") from error
     if not len(triangles):
@@ -152,6 +159,13 @@ def _by_library(path: Path) -> tuple[Floats, Indices, Indices, list[str]]:
         ]
     else:
         meshes = [("", read, np.eye(4))]
+    for _name, mesh, _place in meshes:
+        if not hasattr(mesh, "faces"):
+            kind = "points" if isinstance(mesh, trimesh.PointCloud) else "curves"
+            raise SceneError(
+                f"the mesh {path} must hold triangles, got {kind} alone; make a closed mesh of them in the program "
+                "that wrote it"
+            )
     found, triangles, group, names, before = [], [], [], [], 0  # type: ignore[var-annotated]
     for name, mesh, place in meshes:
         vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)

@@ -1,5 +1,6 @@
 """A surface by samples of phi on a regular grid."""
 
+import math
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -28,6 +29,8 @@ _RIPPLE = 0.1
 # Of what phi changes in a cell where it does most: a sample that is nearer to 0 is on the surface, whatever sign its
 # round-off has. That of meshes in float32 is 1e-7 of their size.
 _ON = 1e-4
+# The width of a cell along an axis on which phi does not depend [m]: no particle leaves it.
+_ENDLESS = 1e150
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -46,7 +49,8 @@ class Sampled(Surface):
         mesh_error: how far the surface is from the mesh that it was made from [m]; None: from none.
         mesh_weld: how far corners of that mesh were moved at most to close its seams [m]; None: none were.
 
-    Where the surface reaches the border of the grid, other surfaces must keep particles in the grid.
+    Where the surface reaches the border of the grid, other surfaces, or the plane of the scene, must keep particles in
+    the grid. Samples that are all the same along an axis are those of a cylinder, which has no normal along it.
 
     Raises:
         SceneError: an argument is out of its range, the file cannot be read, a sample is not finite, all have the same
@@ -99,8 +103,11 @@ class Sampled(Surface):
     def _spline(self) -> Spline:
         made = self._made
         low = np.array(rotations.turned_back(self.rotation, self._middle())) - 0.5 * made.widths
-        width, cells = np.array(self.spacing), np.array(self.values.shape) - 1.0
-        first, wide, inverse, shape = (vec(row.tolist()) for row in (low, width, 1.0 / width, cells))
+        # Along an axis on which phi does not depend, all points are at the first sample of one cell.
+        width, cells = np.where(made.endless, _ENDLESS, self.spacing), np.array(self.values.shape) - 1.0
+        first, wide, inverse, shape = (
+            vec(row.tolist()) for row in (low, width, np.where(made.endless, 0.0, 1.0 / width), cells)
+        )
         return Spline(first, wide, inverse, shape, made.steepness, made.coefficients)
 
     def _middle(self) -> Vector:
@@ -111,16 +118,19 @@ class Sampled(Surface):
 
     def size(self) -> float:
         low, high = self._made.inner_box
-        return 0.5 * float((high - low).min())
+        return 0.5 * float((high - low)[~self._made.endless].min())
 
     def bounds(self) -> Box:
         if self.side == "outside" or not self._made.is_closed:
             return UNBOUNDED
-        return self._placed(*self._made.inner_box)
+        endless = np.where(self._made.endless, math.inf, 0.0)
+        low, high = self._made.inner_box
+        return self._placed(low - endless, high + endless)
 
     def known_in(self) -> Box | None:
         """The box outside of which nothing is known of the surface; None: it is nowhere else."""
-        return None if self._made.is_closed else self._placed(np.zeros(3), self._made.widths)
+        everywhere = self._made.is_closed and not self._made.endless.any()
+        return None if everywhere else self._placed(np.zeros(3), self._made.widths)
 
     def _placed(self, low: Floats, high: Floats) -> Box:
         box = tuple(tuple((np.array(self.origin) + corner).tolist()) for corner in (low, high))
@@ -157,9 +167,15 @@ class Samples:
         return least, -most
 
     @cached_property
+    def endless(self) -> NDArray[np.bool_]:
+        """Along which axes all samples are the same, so that the surface is a cylinder."""
+        return np.array([not np.diff(self.values, axis=k).any() for k in range(3)])
+
+    @cached_property
     def is_closed(self) -> bool:
-        """Whether phi is above 0 all over the border of the grid."""
-        return all(least_at_border(self.coefficients, k, end) > 0.0 for k in range(3) for end in (0, -1))
+        """Whether phi is above 0 all over the border of the grid, of a cylinder but for its ends."""
+        across = np.flatnonzero(~self.endless).tolist()
+        return all(least_at_border(self.coefficients, k, end) > 0.0 for k in across for end in (0, -1))
 
     @cached_property
     def inner_box(self) -> tuple[Floats, Floats]:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ... import checks
 from ...checks import Vector
 from ...errors import SceneError
+from ...extras import needed_by
 from ...kernel.vector import Vec
 from .. import rotation as rotations
 from ..data.mesh_files import Floats, Indices, read_soup
@@ -110,6 +111,8 @@ class Mesh(Surface):
 
     def _mended(self) -> _Made:
         """The triangles of the file or the arrays."""
+        with needed_by("a mesh", "mesh"):
+            import scipy.spatial  # noqa: F401
         scale = checks.length("scale", self.scale)
         weld = None if self.weld is None else checks.magnitude("weld", self.weld)
         path = Path("of these arrays")

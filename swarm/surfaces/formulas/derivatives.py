@@ -23,8 +23,9 @@ _MOST_OPERATIONS = 4000
 _CELLS = 16
 # A cavity is looked for in cubes with these powers of 2 as half widths [m].
 _SMALLEST, _LARGEST = -40, 24
-# The box is found by cutting layers off its sides, each this part of it, of so many cells along an edge.
-_LAYERS, _LAYER_CELLS = tuple(0.5**k for k in range(2, 11)), 24
+# The box is found by cutting layers off its sides, each this part of it, of so many cells along an edge; of a cube in
+# which a cavity is looked for, so many.
+_LAYERS, _LAYER_CELLS, _CUBES = tuple(0.5**k for k in range(2, 11)), 24, 8
 # Room around the box that was found, relative to it.
 _ROOM = 1e-3
 
@@ -75,30 +76,36 @@ class Derived(NamedTuple):
         return Derived(self.phi.subs(numbers), gradient, hessian, pieces, self.axes, self.functions)
 
     def found_box(self) -> Box | None:
-        """A box that surely holds all of phi <= 0 up to the largest cube; None if that is open."""
+        """A box that surely holds all of phi <= 0 up to the largest cube; None if that is open.
+
+        A formula that lacks a coordinate is a cylinder: the box has no ends along that axis.
+        """
+        across = [k for k, axis in enumerate(self.axes) if axis in self.phi.free_symbols] or [0, 1, 2]
         for power in range(_LARGEST, _SMALLEST, -1):
             half = 2.0**power
-            cells = Cells.grid(self.axes, ((-half,) * 3, (half,) * 3), (8, 8, 8))
-            shell = (np.maximum(-cells.lower, cells.upper) > 0.5 * half).any(axis=0)
+            cells = Cells.grid(self.axes, ((-half,) * 3, (half,) * 3), _shape(across, _CUBES))
+            shell = (np.maximum(-cells.lower, cells.upper) > 0.5 * half)[across].any(axis=0)
             if not (cells.bounds(self.phi).low > 0.0)[shell].all():
-                return None if power == _LARGEST else self._tightened(half)
+                return None if power == _LARGEST else self._tightened(half, across)
         raise SceneError("phi must be 0 somewhere, got above 0 everywhere")
 
-    def _tightened(self, half: float) -> Box:
-        """The cube without the layers that surely hold none of phi <= 0."""
+    def _tightened(self, half: float, across: list[int]) -> Box:
+        """The cube without the layers that surely hold none of phi <= 0, cut off along the axes `across`."""
         box = np.array([[-half] * 3, [half] * 3])
         for part in _LAYERS:
-            for axis, end in itertools.product(range(3), range(2)):
-                while self._is_empty(layer := _layer(box, axis, end, part)):
+            for axis, end in itertools.product(across, range(2)):
+                while self._is_empty(layer := _layer(box, axis, end, part), across):
                     box[end, axis] = layer[1 - end, axis]
                     if box[1, axis] - box[0, axis] < 2.0**_SMALLEST * half:
                         raise SceneError("phi must be 0 somewhere, got above 0 everywhere")
         room = _ROOM * (box[1] - box[0])
+        room[[k for k in range(3) if k not in across]] = math.inf
         return tuple((box[0] - room).tolist()), tuple((box[1] + room).tolist())
 
-    def _is_empty(self, layer: Any) -> bool:
+    def _is_empty(self, layer: Any, across: list[int]) -> bool:
         thin = layer[1] - layer[0]
-        cells = Cells.grid(self.axes, layer, np.where(thin < 0.5 * thin.max(), 1, _LAYER_CELLS))
+        along = [k for k in across if not thin[k] < 0.5 * thin[across].max()]
+        cells = Cells.grid(self.axes, layer, _shape(along, _LAYER_CELLS))
         if (cells.bounds(self.phi).low > 0.0).all():
             return True
         return bool((cells.centred(self.phi, self.gradient).low > 0.0).all())
@@ -138,6 +145,11 @@ class Derived(NamedTuple):
                 "it is a number that the second derivative in any direction never exceeds"
             )
         return Bend.of_entries(low, high)
+
+
+def _shape(along: list[int], cells: int) -> list[int]:
+    """So many cells along some axes, one along others."""
+    return [cells if k in along else 1 for k in range(3)]
 
 
 def _layer(box: Any, axis: int, end: int, part: float) -> Any:

@@ -103,7 +103,10 @@ def _box_of(bounds: Any) -> Box | None:
 
 @dataclass(frozen=True)
 class Form:
-    """phi in its own coordinates, its box, and how much it bends."""
+    """phi in its own coordinates, its box, and how much it bends.
+
+    A box may have no ends along an axis on which phi does not depend.
+    """
 
     kind: Any
     parameters: tuple[float, ...]
@@ -127,30 +130,45 @@ class Form:
         """The reach of the surface from its center."""
         if self.box is None:
             return self.size if math.isfinite(self.size) else 1.0
-        return max(farthest(corner) for corner in self.box)
+        return max(farthest(corner) for corner in self.corners.tolist())
+
+    @functools.cached_property
+    def corners(self) -> Floats:
+        """Those of the box, (2, 3); along an axis without ends of its largest width: phi is the same all along it."""
+        corners = np.array(self.box)
+        endless = np.isinf(corners[0])
+        half = 0.5 * (corners[1] - corners[0])[~endless].max()
+        corners[:, endless] = [[-half], [half]]
+        return corners
 
     def domain(self) -> Box | None:
         """The box in which the bend must be known: a solid's has the margin on each side."""
         if self.box is None:
             return None
-        low, high = np.array(self.box)
+        low, high = self.corners
         room = _MARGIN * (high - low).min() if self.side == "outside" else 0.0
         return tuple((low - room).tolist()), tuple((high + room).tolist())
 
     @functools.cached_property
+    def endless(self) -> NDArray[np.bool_]:
+        """Along which axes phi is constant, so that its surface is a cylinder: by its gradient at points of the box."""
+        return np.asarray((self.slope(self.points(_SAMPLES)) == 0.0).all(axis=1))
+
+    @functools.cached_property
     def encloses(self) -> bool:
-        """Whether phi is not below 0 on the faces of the box."""
-        (low, high), s = np.array(self.box), np.linspace(0.0, 1.0, 33)
+        """Whether phi is not below 0 on the faces of the box, but for those across the axis of a cylinder."""
+        (low, high), s = self.corners, np.linspace(0.0, 1.0, 33)
         u, v = (grid.ravel() for grid in np.meshgrid(s, s))
-        faces = [np.insert([u, v], axis, end, axis=0) for axis in range(3) for end in (0.0, 1.0)]
+        axes = np.flatnonzero(~self.endless).tolist()
+        faces = [np.insert([u, v], axis, end, axis=0) for axis in axes for end in (0.0, 1.0)]
         return bool((self.value(low[:, None] + (high - low)[:, None] * np.hstack(faces)) >= 0.0).all())
 
     def bounds(self, center: Vector, rotation: Any) -> Box:
         """`Surface.bounds`."""
         if self.side == "outside" or self.box is None or not self.encloses:
             return UNBOUNDED
-        low, high = (tuple(a + c for a, c in zip(corner, center, strict=True)) for corner in self.box)
-        return rotated_box(rotation, (low, high), center)  # type: ignore[arg-type]
+        low, high = np.where(self.endless, [[-math.inf], [math.inf]], self.box) + np.array(center)
+        return rotated_box(rotation, (tuple(low.tolist()), tuple(high.tolist())), center)
 
     def value(self, points: Floats) -> Floats:
         """phi at points (3, N) relative to the center."""
@@ -165,7 +183,8 @@ class Form:
 
     def points(self, n: int) -> Floats:
         """Random points of the box, or about the center where there is none."""
-        low, high = np.array(self.box or ((-self.reach(),) * 3, (self.reach(),) * 3))[:, :, None]
+        box = np.array(((-self.reach(),) * 3, (self.reach(),) * 3)) if self.box is None else self.corners
+        low, high = box[:, :, None]
         return np.asarray(low + (high - low) * np.random.default_rng(0).random((3, n)))
 
     # --- Checks ------------------------------------------------------------------------------------------
@@ -230,7 +249,7 @@ class Form:
 
     def sampled_bend(self) -> Bend:
         """The bend by differences of the gradient at some points, its range doubled."""
-        (low, high), points = np.array(self.box), self.points(_SAMPLES)
+        (low, high), points = self.corners, self.points(_SAMPLES)
         # Of a solid in a box that is larger by twice the margin
         points = points + (2.0 * _MARGIN if self.side == "outside" else 0.0) * (points - 0.5 * (low + high)[:, None])
         side = side_sign(self.side)

@@ -6,7 +6,10 @@ from typing import Any
 from ...kernel.random import circle, logarithm, tangents
 from ...kernel.vector import cross, dot
 from ..wall_law import WallLaw
-from .numbers import require_magnitude, require_probability
+from .numbers import require_magnitude, require_part, require_probability
+
+# The accommodation at which the tangential momentum is reversed; the variance sigma_t (2 - sigma_t) is 0 there.
+_REVERSED = 2.0
 
 
 class CercignaniLampis(WallLaw):
@@ -15,8 +18,8 @@ class CercignaniLampis(WallLaw):
     Args:
         temperature: k_B T of the wall [J], 0 or more, as of a thermal wall.
         normal: alpha_n in [0, 1], the accommodation of the energy of the motion along the normal.
-        tangential: sigma_t in [0, 1], the accommodation of the tangential momentum. Both 1: a thermal wall; both 0: a
-            mirror.
+        tangential: sigma_t in [0, 2], the accommodation of the tangential momentum; above 1 particles are scattered
+            back. Both 1: a thermal wall; both 0: a mirror; 0 and 2: each velocity is reversed.
 
     With w = v - u in units of sqrt(2 k_B T/m), normal part w_n and tangential part w_t, a particle leaves with
 
@@ -45,7 +48,7 @@ class CercignaniLampis(WallLaw):
         """Each number in its range."""
         require_magnitude(f"{name}.temperature", self.temperature, "J")
         require_probability(f"{name}.normal", self.normal)
-        require_probability(f"{name}.tangential", self.tangential)
+        require_part(f"{name}.tangential", self.tangential, _REVERSED)
 
     def leave(self, v, n, u, random, mass):
         """u + w_n' n + w_t', by four numbers of two blocks of the stream."""

@@ -7,8 +7,13 @@ from ...errors import SceneError
 
 def require_probability(name: str, value: Any) -> None:
     """Raise a `SceneError` where a number is no probability."""
-    if value is None or not 0.0 <= value <= 1.0:
-        raise SceneError(f"{name} must be from 0 to 1, got {'none' if value is None else f'{value:g}'}")
+    require_part(name, value, 1.0)
+
+
+def require_part(name: str, value: Any, most: float) -> None:
+    """Raise a `SceneError` where a number is below 0 or above the most, or missing."""
+    if value is None or not 0.0 <= value <= most:
+        raise SceneError(f"{name} must be from 0 to {most:g}, got {'none' if value is None else f'{value:g}'}")
 
 
 def require_magnitude(name: str, value: Any, unit: str) -> None:

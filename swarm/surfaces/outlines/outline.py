@@ -199,9 +199,11 @@ def _checked(name: str, rows: Any) -> tuple[Row, ...]:
         values = [number(f"{name}[{k}][{i}]", part) for i, part in enumerate(parts)]
         magnitude(f"|{name}[{k}]|", max(map(abs, values)))
         found.append((*values, 0.0)[:3])
+    extent = max((max(abs(x), abs(y)) for x, y, _bulge in found), default=0.0)
+    if _is_ring(found, _NOTHING * extent):
+        found.pop()
     if len(found) < 2 or (len(found) == 2 and not any(bulge for _x, _y, bulge in found)):
         raise SceneError(f"{name} must have at least three vertices, or two and an arc, got {len(found)}")
-    extent = max(max(abs(x), abs(y)) for x, y, _bulge in found)
     for k, (x, y, _bulge) in enumerate(found):
         j = (k + 1) % len(found)
         if math.hypot(found[j][0] - x, found[j][1] - y) <= _NOTHING * extent:
@@ -210,6 +212,14 @@ def _checked(name: str, rows: Any) -> tuple[Row, ...]:
                 "is joined to the first)"
             )
     return tuple(found)
+
+
+def _is_ring(rows: list[Row], nothing: float) -> bool:
+    """Whether the last vertex is the first one again, as GIS writes rings; no side begins there, so it has no bulge."""
+    if len(rows) < 3:
+        return False
+    (x0, y0, _bulge), (x1, y1, bulge) = rows[0], rows[-1]
+    return bulge == 0.0 and math.hypot(x1 - x0, y1 - y0) <= nothing
 
 
 def _reversed(rows: tuple[Row, ...]) -> list[Row]:

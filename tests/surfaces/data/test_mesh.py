@@ -157,3 +157,48 @@ def test_a_mesh_in_a_scene_file(tmp_path):
     }.items():
         with pytest.raises(swarm.SceneError, match=said):
             read(more)
+
+
+def test_3mf_is_read_with_what_the_extra_has(tmp_path):
+    """By lxml and networkx; the objects are groups."""
+    parts = {"box": trimesh.creation.box((1.0, 1.0, 1.0)), "ball": trimesh.creation.icosphere(1, 0.2)}
+    parts["ball"].apply_translation((3.0, 0.0, 0.0))
+    path = written(tmp_path, trimesh.Scene(parts), "two.3mf")
+    mesh = swarm.Mesh(path, side="outside", groups={"ball": {"restitution": 0.5}})
+    assert sorted(mesh.names) == ["ball", "box"]
+    assert len(mesh.triangles) == 12 + 80
+    assert mesh.phi([[0.0, 3.0], [0.0, 0.0], [0.0, 0.6]]) == pytest.approx([-0.5, 0.4], abs=0.02)
+
+
+POINTS = trimesh.PointCloud([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+CURVES = trimesh.load_path([[(0.0, 0.0), (1.0, 0.0)], [(1.0, 0.0), (0.0, 1.0)]])
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "what"),
+    [
+        ("points.ply", "points", POINTS),
+        ("points.glb", "points", trimesh.Scene([trimesh.creation.box(), POINTS])),
+        ("curves.dxf", "curves", CURVES),
+    ],
+)
+def test_what_is_no_triangle_is_one_sentence(name, kind, what, tmp_path):
+    path, data = tmp_path / name, what.export(file_type=name[-3:])
+    path.write_bytes(data if isinstance(data, bytes) else data.encode())
+    for read in (swarm.Mesh, lambda file: swarm.from_mesh(file, 0.1)):
+        with pytest.raises(swarm.SceneError, match=rf"the mesh .*{name} must hold triangles, got {kind} alone; make"):
+            read(path)
+
+
+def test_a_format_whose_package_is_missing_names_it(tmp_path, monkeypatch):
+    """As trimesh raises it again, without the name of the module."""
+
+    def load(*_given, **_named):
+        raise ModuleNotFoundError("No module named 'cascadio'")
+
+    path = written(tmp_path, trimesh.creation.box(), "part.ply")
+    monkeypatch.setattr(trimesh, "load", load)
+    with pytest.raises(
+        swarm.SceneError, match=r"a file \.ply needs the package 'cascadio'.*: pip install cascadio, or"
+    ):
+        swarm.Mesh(path)
