@@ -39,8 +39,9 @@ _DISPATCHED = (type(None), float, object)
 # What a named tuple has, and the modules that Python says its functions are of.
 _NAMED_TUPLE = dir(collections.namedtuple("_NAMED_TUPLE", ()))
 _NAMED_TUPLES = ("collections", "namedtuple_")
+_ONE: Any = collections.namedtuple("_ONE", "field")
 # Fields and slots of a class, which are in its `_fields`.
-_DESCRIPTORS = (types.MemberDescriptorType, types.GetSetDescriptorType, type(collections.namedtuple("_", "x").x))
+_DESCRIPTORS = (types.MemberDescriptorType, types.GetSetDescriptorType, type(_ONE.field))
 # What Python writes into a class for people and tools: kernels do not read it.
 _FOR_READERS = ("__annotations__", "__doc__", "__firstlineno__", "__match_args__", "__static_attributes__")
 
@@ -88,9 +89,10 @@ class Frozen:
         for part in _parts(code):
             # A docstring is a constant that no instruction takes.
             taken = {one.arg for one in dis.get_instructions(part) if one.opcode in dis.hasconst}
-            constants = [part.co_consts[k] for k in sorted(taken) if not isinstance(part.co_consts[k], types.CodeType)]
+            constants = [one for k, one in enumerate(part.co_consts) if k in taken]
             self.add(*_CODE(part))
-            self.add(*(sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in constants))
+            plain = (one for one in constants if not isinstance(one, types.CodeType))
+            self.add(*(sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in plain))
         copy.__defaults__ = self.value(function.__defaults__, own=own)
         self.add(*sorted((function.__kwdefaults__ or {}).items()))
         copy.__kwdefaults__ = function.__kwdefaults__
@@ -134,7 +136,8 @@ class Frozen:
         elif isinstance(value, types.ModuleType) and code is not None:
             return self._module(value, code, own)
         elif isinstance(value, enum.EnumType):
-            self.add("enum", [(one.name, one.value) for one in value])
+            members: Any = value.__members__
+            self.add("enum", *(f"{name} {one.value!r}" for name, one in members.items()))
         else:
             self._object(value, code, own)
         return value
