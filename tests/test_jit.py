@@ -3,16 +3,11 @@
 import ast
 import functools
 import graphlib
-import importlib
-import importlib.util
-import inspect
 import math
 import os
-import shutil
 import subprocess
 import sys
 import threading
-import types
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,7 +15,7 @@ import numba
 import numpy as np
 import pytest
 from children import python
-from conftest import LAWS, METHODS, call, compiled, every_surface, numbers_of, rarely, scene_of
+from conftest import LAWS, call, compiled, every_surface, numbers_of, rarely, scene_of
 from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import TypingError
 
@@ -33,7 +28,6 @@ from swarm.kernel.gravity import Gravity, accelerated, displacement, potential
 from swarm.kernel.jit import select
 from swarm.kernel.record import Record
 from swarm.kernel.vector import Vec, absolute, cross, dot, largest, moves, norm, square, times, total
-from swarm.run.engine import Run
 from swarm.scene import MOST_WALLS
 from swarm.surfaces import flights
 
@@ -428,154 +422,6 @@ assert sys.getrecursionlimit() == 1000
 def test_a_script_runs_in_the_most_walls(laws, gravity, tmp_path):
     code = MANY_PLANES.format(tests=str(Path(__file__).parent), laws=laws, gravity=gravity)
     python("-c", code, env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}).check_returncode()
-
-
-# --- The cache -------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def digests(tmp_path_factory):
-    """A cache folder that already has the digest of the package as it is."""
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture
-def copied(tmp_path, monkeypatch, digests):
-    """A copy of the package, and the cache folder that its `cache` names."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(digests))
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # it knows an edit by the second
-    shutil.copytree(PACKAGE, tmp_path / "swarm", ignore=shutil.ignore_patterns("__pycache__"))
-
-    parent = types.ModuleType("copied")
-    parent.__path__ = [str(tmp_path / "swarm" / "kernel")]
-    monkeypatch.setitem(sys.modules, "copied", parent)
-    monkeypatch.delitem(sys.modules, "copied.frozen", raising=False)
-
-    def folder():
-        spec = importlib.util.spec_from_file_location("copied.cache", tmp_path / "swarm" / "kernel" / "cache.py")
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        return module.cache_folder()
-
-    return tmp_path / "swarm", folder
-
-
-KERNEL_FILES = ["surfaces/shapes/sphere.py", "lanes/block.py", "kernel/jit.py", "methods/base.py", "status.py"]
-
-
-@pytest.mark.parametrize("edited", KERNEL_FILES)
-def test_an_edit_of_code_of_kernels_names_another_cache(copied, edited):
-    """Numba looks at the file of the kernel only; an old answer must not come back."""
-    package, folder = copied
-    before = folder()
-    assert folder() == before
-    source = (package / edited).read_text()
-    (package / edited).write_text(source + "\nEDITED = 1\n")
-    assert folder() != before
-    (package / edited).write_text(source)
-    assert folder() == before
-
-
-@pytest.mark.parametrize("edited", KERNEL_FILES)
-def test_an_edit_of_comments_names_the_same_cache(copied, edited):
-    package, folder = copied
-    before, source = folder(), (package / edited).read_text()
-    # The docstring, which is the first, and lines that move all others.
-    (package / edited).write_text(source.replace('"""', '"""Edited: ', 1).replace("\n\n\n", "\n\n\n# edited\n\n"))
-    assert folder() == before
-
-
-def test_an_edit_of_what_is_not_in_kernels_names_the_same_cache(copied):
-    package, folder = copied
-    before = folder()
-    for edited in ("cli.py", "run/engine.py", "output/writer.py", "scene.py", "kernel.py"):
-        with open(package / edited, "a") as file:
-            file.write("\nEDITED = 1\n")
-    assert folder() == before
-
-
-def test_where_nothing_can_be_written_the_folder_is_the_same(copied, tmp_path, monkeypatch):
-    _package, folder = copied
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    before = folder()
-    known = next((before.parent / "sources").iterdir())
-    assert known.read_text() == before.name
-    known.unlink()
-    known.mkdir()
-    assert folder() == before
-
-
-def in_kernels(path):
-    return path.relative_to(PACKAGE).parts[0] in cache.SOURCES
-
-
-def test_nothing_else_is_in_kernels():
-    """What names the cache is complete: functions, constants and the types of arguments are from its files."""
-    for parts, path in modules().items():
-        for target, names in imported_names(parts):
-            source = modules()[target]
-            if not in_kernels(path):
-                assert target != ("kernel", "jit"), f"{path} has functions of kernels"
-            elif not in_kernels(source):
-                module = importlib.import_module(".".join(("swarm", *target)))
-                for name in names:
-                    value = getattr(module, name, None)
-                    constant = isinstance(value, (int, float, str, tuple, np.ndarray))
-                    assert not constant, f"{path} takes {name} from {source}"
-
-
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
-@every_surface
-def test_no_argument_of_a_kernel_is_of_another_type(name, method):
-    scene = scene_of(name)
-    start = swarm.Particles(np.zeros(3), np.zeros(3))
-    for _kernel, arguments in Run(scene, start, method, 1, None, "never").calls():
-        for kind in kinds_of(arguments):
-            assert kind is tuple or in_kernels(Path(inspect.getfile(sys.modules[kind.__module__]))), kind
-
-
-def kinds_of(nested):
-    return {type(nested)}.union(*map(kinds_of, nested)) if isinstance(nested, tuple) else set()
-
-
-EDITED = """
-import logging, sys
-sys.path.insert(0, {root!r})
-import numpy as np
-import swarm
-from swarm import observables
-from swarm.kernel import arrays, cache
-logging.basicConfig(level="INFO", format="%(message)s")
-with cache.kernels_compiled(lambda sentence: None):
-    from swarm.run.engine import Run
-    start = swarm.Particles((0.1, 0.0, 0.0), (1.0, 0.0, 0.0))
-    run = Run(swarm.Scene([swarm.Sphere(0.5)]), start, swarm.Impact(), 1, None)
-    # The block of this number, and no other kernel.
-    observables.observe(*run._observing(np.zeros(1, np.int64)))
-    print(float(run.seen()["kinetic_energy"]))
-"""
-
-
-@compiled_only
-def test_an_edit_of_comments_compiles_nothing_and_one_of_code_does(copied):
-    """Of the file of a kernel itself, whose time and size Numba looks at: this fails when it stores them elsewhere."""
-    package, _folder = copied
-    file, told = package / "observables.py", []
-    source = file.read_text()
-    for text in (source, "# edited\n\n" + source, source.replace("0.5 * square(v)", "1.5 * square(v)")):
-        file.write_text(text)
-        done = python("-c", EDITED.format(root=str(package.parent)), env={**os.environ, "PYTHONPATH": ""})
-        assert done.returncode == 0, done.stderr
-        told.append((float(done.stdout), done.stderr.count("once: observe")))
-    assert told == [(0.5, 1), (0.5, 0), (1.5, 1)]
-
-
-def test_the_user_sets_the_folder(monkeypatch, tmp_path):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "numba"))
-    assert cache.cache_folder().parent == tmp_path / "numba"
-    monkeypatch.delenv("NUMBA_CACHE_DIR")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert cache.cache_folder().parent == tmp_path / "xdg" / "swarm"
 
 
 # --- The start -------------------------------------------------------------------------------------------

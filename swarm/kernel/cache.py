@@ -16,10 +16,13 @@ from pathlib import Path
 from types import CodeType
 from typing import Any
 
+import llvmlite
 import numba
+import numpy as np
 from numba.core import event, sigutils
 from numba.core.caching import FunctionCache
 
+from .digest import key_of_kernel
 from .entries import File, Key, is_own, key_of
 from .once import held
 
@@ -27,31 +30,11 @@ _CONFIG: Any = numba.config
 _LOG = logging.getLogger("swarm")
 _LOCK = ".lock"
 _COMPILING = "compiling a kernel, once: {}"
+_DIGESTS = "digests"
 _kernels: list[Any] = []
 _compiling = threading.local()
 
-_ROOT = Path(__file__).parents[1]
-# What kernels are made of: the functions and constants that they compile, and the types of their arguments.
-SOURCES = (
-    "kernel",
-    "surfaces",
-    "contact",
-    "methods",
-    "lanes",
-    "grains",
-    "reacting",
-    "colliding",
-    "placing",
-    "observables.py",
-    "state.py",
-    "status.py",
-)
-
-
-def sources() -> list[Path]:
-    """The files of `SOURCES`."""
-    places = [_ROOT / name for name in SOURCES]
-    return sorted(path for place in places for path in (place.rglob("*.py") if place.is_dir() else [place]))
+_HERE = Path(__file__).parent
 
 
 def base() -> Path:
@@ -61,27 +44,17 @@ def base() -> Path:
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled kernels: that of all that is kept, then a digest of their code.
+    """Folder of the compiled kernels: that of all that is kept, then a digest of the code that makes them.
 
-    Numba's cache looks at the file of the compiled function only, so after an edit in another file it would return
-    the old code.
+    That is this folder, which every kernel goes through. What else a kernel is made of is in its key, see `digest.py`.
     """
-    texts = [(path.relative_to(_ROOT).as_posix().encode(), path.read_bytes()) for path in sources()]
-    # Their code takes 0.1 s to read, so the result is kept under a digest of their bytes.
-    known = base() / "sources" / _digest(texts)
-    with contextlib.suppress(OSError):
-        return base() / known.read_text()
-    code = _digest([(path.name, *_code(path)) for path in sources()])
-    with contextlib.suppress(OSError):
-        known.parent.mkdir(parents=True, exist_ok=True)
-        part = known.with_suffix(f".{os.getpid()}")
-        part.write_text(code)
-        part.replace(known)
-    return base() / code
+    files = sorted(_HERE.rglob("*.py"))
+    return base() / _digest([(path.relative_to(_HERE).as_posix(), *_code(path)) for path in files])
 
 
 def _digest(texts: Any) -> str:
-    whole = repr((numba.__version__, sys.version_info[:2], texts))
+    versions = numba.__version__, llvmlite.__version__, np.__version__, sys.version_info[:2]
+    whole = repr((versions, texts))
     return hashlib.sha256(whole.encode()).hexdigest()[:16]
 
 
@@ -123,8 +96,8 @@ def cached(function: Callable[..., Any], flags: dict[str, Any], compiled: Callab
     disk = made._cache
     name, stamp = disk._impl.filename_base, disk._impl.locator.get_source_stamp()
     if is_own(function):
-        # The folder is named by the code. Numba's own stamp, the file of the function and its line, would change with
-        # every comment.
+        # The code is in the key. Numba's own stamp, the file of the function and its line, would change with every
+        # comment.
         name, stamp = f"{function.__module__}.{function.__qualname__}.{sys.implementation.cache_tag}", ""
     disk._cache_file = File(disk.cache_path, name, stamp)
     # On the object: Numba's own code calls it from C and from other kernels, and a class of ours would have to be
@@ -144,11 +117,17 @@ def calling(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """A kernel that has code from outside of this package is found only if that code is unchanged."""
+    """A kernel is found only if all code that it may trace is unchanged, for the same processor and level of LLVM."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._keys: dict[Any, Key] = {}
 
     def _index_key(self, kinds: Any, codegen: Any) -> Key:
-        outside = () if is_own(self._py_func) else (self._py_func,)
-        return key_of(kinds, *super()._index_key((), codegen), *outside)
+        if kinds not in self._keys or not is_own(self._py_func):
+            others = *super()._index_key((), codegen), str(_CONFIG.OPT)
+            self._keys[kinds] = key_of_kernel(self._py_func, kinds, others, _folder() / _DIGESTS)
+        return self._keys[kinds]
 
     def save_overload(self, kinds: Any, made: Any) -> None:
         # What Python code inside of a helper needs, as Numba does it for a kernel that it loads.

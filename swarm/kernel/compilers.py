@@ -13,14 +13,21 @@ from collections.abc import Iterator
 from typing import Any
 
 import llvmlite.binding as llvm
+import numba
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
+_CONFIG: Any = numba.config
 # Frames that a trace may nest; 1600 take less than 512 kB of a stack.
 _DEEPEST = 10_000
 
-# LLVM's levels: for one function by itself, and for a module.
-_LITTLE, _MOST = 1, 3
+# LLVM's level for one function by itself, where $NUMBA_OPT asks for no less; that of a module is Numba's.
+_LITTLE = 1
+
+
+def _level() -> int:
+    """The level of LLVM's optimisation, $NUMBA_OPT, by default 3."""
+    return int(_CONFIG.OPT)
 
 
 class _Part(JITCodeLibrary):  # type: ignore[misc]
@@ -62,7 +69,7 @@ class _Kernel(JITCodeLibrary):  # type: ignore[misc]
 
     def _optimize_functions(self, module: Any) -> None:
         module.data_layout = self._codegen._data_layout
-        builder = self._codegen._pass_builder(opt=_LITTLE)
+        builder = self._codegen._pass_builder(opt=min(_LITTLE, _level()))
         for function in module.functions:
             if not function.is_declaration:
                 builder.getFunctionPassManager().run(function, builder)
@@ -76,7 +83,7 @@ class _LongKernel(_Kernel):
     """
 
     def _optimize_final_module(self) -> None:
-        tuning = llvm.create_pipeline_tuning_options(speed_level=_MOST)
+        tuning = llvm.create_pipeline_tuning_options(speed_level=_level())
         tuning.loop_unrolling = False
         builder = llvm.create_pass_builder(self._codegen._tm, tuning)
         builder.getModulePassManager().run(self._final_module, builder)

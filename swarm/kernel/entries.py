@@ -27,12 +27,13 @@ class Key(NamedTuple):
     repeats: bool
 
 
-def key_of(kinds: Sequence[Any], *others: Any) -> Key:
+def key_of(kinds: Sequence[Any], *others: Any, package: str | None = None) -> Key:
     """The key of Numba types, and of what else tells two kernels apart: plain values and functions.
 
-    It never repeats where a function, or what is defined for a class, refers to what is not known, see `Frozen`.
+    It never repeats where a function, or what is defined for a class, refers to what is not known. With `package` it
+    holds the code of this package too that the functions and classes refer to, see `Frozen`.
     """
-    frozen, classes = Frozen(), dict[type, None]()
+    frozen, classes = Frozen(package=package), dict[type, None]()
     frozen.value(others)
     for kind in kinds:
         _add(kind, frozen, classes)

@@ -1,16 +1,18 @@
-"""A user's function, frozen: a copy of it and of all it refers to, and a digest of them; likewise a class.
+"""A function, frozen: a copy of it and of all it refers to, and a digest of them; likewise a class.
 
-The copy is compiled, so what the cache has under a digest is the code that was digested: after an edit anywhere, or
-when a global changes, the digest differs.
+The copy of a user's function is compiled, so what the cache has under a digest is the code that was digested: after an
+edit anywhere, or when a global changes, the digest differs. Functions of this package are digested, not copied.
 """
 
 import builtins
 import collections
 import contextlib
 import dis
+import enum
 import hashlib
 import operator
 import os
+import sys
 import types
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -20,9 +22,12 @@ import numpy as np
 
 Function = Callable[..., Any]
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), range)
-# Modules that are known by their version; any other is known by what the function takes from it. The cache folder is
-# named by the code of this package's kernels.
-_VERSIONS = {"math": "", "cmath": "", "builtins": "", "numpy": np.__version__, "numba": numba.__version__, "swarm": ""}
+# Modules that are known by their version; any other is known by what the function takes from it.
+_PYTHON = ".".join(map(str, sys.version_info[:3]))
+_VERSIONS = {
+    **dict.fromkeys(sys.stdlib_module_names, _PYTHON), "numpy": np.__version__, "numba": numba.__version__,
+}  # fmt: skip
+_PACKAGE, _TRACER = __name__.partition(".")[0], __name__.rpartition(".")[0]
 _CODE = operator.attrgetter(
     "co_code", "co_exceptiontable", "co_flags", "co_names", "co_varnames", "co_freevars", "co_cellvars", "co_argcount",
     "co_kwonlyargcount", "co_posonlyargcount",
@@ -31,7 +36,14 @@ _CODE = operator.attrgetter(
 _DISPATCHED = (type(None), float, object)
 
 
+# What a named tuple has, and the modules that Python says its functions are of.
 _NAMED_TUPLE = dir(collections.namedtuple("_NAMED_TUPLE", ()))
+_NAMED_TUPLES = ("collections", "namedtuple_")
+_ONE: Any = collections.namedtuple("_ONE", "field")
+# Fields and slots of a class, which are in its `_fields`.
+_DESCRIPTORS = (types.MemberDescriptorType, types.GetSetDescriptorType, type(_ONE.field))
+# What Python writes into a class for people and tools: kernels do not read it.
+_FOR_READERS = ("__annotations__", "__doc__", "__firstlineno__", "__match_args__", "__static_attributes__")
 
 
 class Frozen:
@@ -39,10 +51,14 @@ class Frozen:
 
     Args:
         prepared: makes a copy callable in kernels, if needed.
+        package: what stands for objects of this package whose value is not known; None: all of this package is known
+            by its names.
     """
 
-    def __init__(self, prepared: Callable[[Function], Function] = lambda copy: copy) -> None:
-        self._prepared = prepared
+    def __init__(
+        self, prepared: Callable[[Function], Function] = lambda copy: copy, package: str | None = None
+    ) -> None:
+        self._prepared, self._package = prepared, package
         self._hash = hashlib.sha256()
         self._copies: dict[Function, Function] = {}
         self._classes: list[type] = []
@@ -56,6 +72,10 @@ class Frozen:
         """A copy of a function."""
         function = getattr(function, "py_func", function)
         assert isinstance(function, types.FunctionType)
+        own = _is_own(function)
+        if hasattr(function, "in_kernels"):
+            self.function(function.in_kernels)
+            return function
         if function in self._copies:
             self.add("again", list(self._copies).index(function))
             return self._copies[function]
@@ -64,49 +84,75 @@ class Frozen:
         scope: dict[str, Any] = {"__name__": __name__, "__builtins__": builtins}
         cells = tuple(types.CellType() for _ in code.co_freevars)
         copy = self._copies[function] = types.FunctionType(code, scope, function.__name__, None, cells or None)
+        if own:
+            self._copies[function] = function
         for part in _parts(code):
-            constants = [one for one in part.co_consts if not isinstance(one, types.CodeType)]
+            # A docstring is a constant that no instruction takes.
+            taken = {one.arg for one in dis.get_instructions(part) if one.opcode in dis.hasconst}
+            constants = [one for k, one in enumerate(part.co_consts) if k in taken]
             self.add(*_CODE(part))
-            self.add(*(sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in constants))
-        copy.__defaults__ = self.value(function.__defaults__)
+            plain = (one for one in constants if not isinstance(one, types.CodeType))
+            self.add(*(sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in plain))
+        copy.__defaults__ = self.value(function.__defaults__, own=own)
         self.add(*sorted((function.__kwdefaults__ or {}).items()))
         copy.__kwdefaults__ = function.__kwdefaults__
         for cell, original in zip(cells, function.__closure__ or (), strict=True):
             # A cell is empty while the name has no value: its use fails as in the original.
             with contextlib.suppress(ValueError):
-                cell.cell_contents = self.value(original.cell_contents, code)
+                cell.cell_contents = self.value(original.cell_contents, code, own)
         # co_names has the names of attributes too.
         instructions = (one for part in _parts(code) for one in dis.get_instructions(part))
         for name in sorted({one.argval for one in instructions if one.opname in ("LOAD_GLOBAL", "LOAD_NAME")}):
             self.add("global", name)
             if name in function.__globals__:
-                scope[name] = self.value(function.__globals__[name], code)
-        return self._prepared(copy)
+                scope[name] = self.value(function.__globals__[name], code, own)
+        return function if own else self._prepared(copy)
 
-    def value(self, value: Any, code: types.CodeType | None = None) -> Any:
-        """A copy of what a function refers to; `code` says which of a module's names it takes."""
+    def value(self, value: Any, code: types.CodeType | None = None, own: bool = False) -> Any:
+        """A copy of what a function refers to.
+
+        Args:
+            value: any object.
+            code: which names of a module count; None: a module is not known.
+            own: whether it is code of this package that refers to it.
+        """
         if type(value) in _PLAIN or isinstance(value, np.generic):
             self.add(type(value).__name__, value)
         elif isinstance(value, tuple) and (type(value) is tuple or hasattr(value, "_fields")):
-            self.add(type(value).__name__, getattr(value, "_fields", None), len(value))
-            parts = [self.value(part, code) for part in value]
+            self.add(type(value).__name__, len(value))
+            if type(value) is not tuple:
+                self._class(type(value))
+            parts = [self.value(part, code, own) for part in value]
             return tuple(parts) if type(value) is tuple else type(value)(*parts)
         elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
             self.add("array", value.dtype.str, value.shape, value.strides, value.tobytes())
             return value.copy(order="K")
         elif isinstance(value, type) and (issubclass(value, tuple) or value in _DISPATCHED):
             self._class(value)
-        elif _root(value) in _VERSIONS:
-            self.add("known", _root(value), getattr(value, "__name__", repr(value)), _VERSIONS[_root(value)])
+        elif self._is_by_name(value):
+            self.add("known", _root(value), getattr(value, "__name__", repr(value)), _VERSIONS.get(_root(value), ""))
         elif isinstance(getattr(value, "py_func", value), types.FunctionType):
             return self.function(value)
         elif isinstance(value, types.ModuleType) and code is not None:
-            return self._module(value, code)
+            return self._module(value, code, own)
+        elif isinstance(value, enum.EnumType):
+            members: Any = value.__members__
+            self.add("enum", *(f"{name} {one.value!r}" for name, one in members.items()))
+        else:
+            self._object(value, code, own)
+        return value
+
+    def _object(self, value: Any, code: types.CodeType | None, own: bool) -> None:
+        """Any other object: one that code of this package refers to by its class and its attributes."""
+        if own and _is_own(type(value)) and hasattr(value, "__dict__"):
+            self._class(type(value))
+            self.value(tuple(sorted(vars(value).items())), code, own)
+        elif own and self._package:
+            self.add("package", self._package)
         else:
             # Nothing is known about it: a digest that never repeats.
             self.add("unknown", os.urandom(16))
             self.is_known = False
-        return value
 
     def _class(self, made: type) -> None:
         """Of a class Numba takes the fields, and traces what is defined in it and its parents."""
@@ -115,27 +161,43 @@ class Frozen:
         self._classes.append(made)
         for parent in made.__mro__:
             self.add("class", parent.__module__, parent.__qualname__, getattr(parent, "_fields", None))
-            self.value(tuple(getattr(parent, "_field_defaults", {}).values()))
-            # Those of this package are in its code.
-            if _root(parent) not in _VERSIONS:
+            self.value(tuple(getattr(parent, "_field_defaults", {}).values()), own=_is_own(parent))
+            if not self._is_by_name(parent):
                 for name, definition in sorted(vars(parent).items()):
-                    self._member(name, definition)
+                    self._member(parent, name, definition)
         return None
 
-    def _member(self, name: str, definition: Any) -> None:
+    def _is_by_name(self, value: Any) -> bool:
+        """Whether a thing is known by its name: what has a version, and this package where its code counts elsewhere.
+
+        The folder of the cache is named by the code of the tracer and of what it works with.
+        """
+        if _root(value) in _VERSIONS:
+            return True
+        return _root(value) == _PACKAGE and (self._package is None or _module_of(value).startswith(_TRACER))
+
+    def _member(self, parent: type, name: str, definition: Any) -> None:
         """A method, property or constant of a class."""
         given = getattr(definition, "fget", None) or getattr(definition, "__func__", definition)
-        if name not in _NAMED_TUPLE and isinstance(given, (types.FunctionType, *_PLAIN)):
+        is_own = _root(parent) == _PACKAGE
+        is_function = isinstance(given, types.FunctionType)
+        is_of_tuples = _module_of(given).startswith(_NAMED_TUPLES) if is_function else name in _NAMED_TUPLE
+        if is_of_tuples or (is_own and name in _FOR_READERS):
+            return
+        if is_function or isinstance(given, _PLAIN):
             self.add("definition", name)
             self.value(given)
+        elif is_own and not isinstance(given, _DESCRIPTORS):
+            self.add("definition", name)
+            self.value(given, own=True)
 
-    def _module(self, module: types.ModuleType, code: types.CodeType) -> types.ModuleType:
+    def _module(self, module: types.ModuleType, code: types.CodeType, own: bool) -> types.ModuleType:
         copy = types.ModuleType(module.__name__)
         self.add("module", module.__name__)
         for name in sorted({name for part in _parts(code) for name in part.co_names}):
             if hasattr(module, name):
                 self.add(name)
-                setattr(copy, name, self.value(getattr(module, name), code))
+                setattr(copy, name, self.value(getattr(module, name), code, own))
         return copy
 
     def add(self, *parts: Any) -> None:
@@ -154,13 +216,22 @@ def _parts(code: types.CodeType) -> Iterator[types.CodeType]:
             yield from _parts(constant)
 
 
+def _is_own(value: Any) -> bool:
+    return _root(value) == _PACKAGE
+
+
 def _root(value: Any) -> str:
     """The top module that something comes from."""
+    return _module_of(value).partition(".")[0]
+
+
+def _module_of(value: Any) -> str:
+    """The module that something comes from, or nothing where that does not say what it is."""
     if isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is value:
         return "numpy"
     if isinstance(value, types.ModuleType):
-        return value.__name__.split(".")[0]
+        return value.__name__
     # Where an instance comes from says nothing about its value; NumPy's functions have a class of their own.
     named = isinstance(value, (type, types.FunctionType, types.BuiltinFunctionType))
     named = named or (callable(value) and type(value).__module__.split(".")[0] == "numpy")
-    return str(getattr(value, "__module__", "")).split(".")[0] if named else ""
+    return str(getattr(value, "__module__", "")) if named else ""

@@ -16,7 +16,7 @@ from conftest import call, compiled
 
 import swarm
 from swarm import tables
-from swarm.kernel import cache, frozen
+from swarm.kernel import frozen
 from swarm.kernel.vector import Vec
 from swarm.lanes import block as blocks
 from swarm.surfaces.formulas import code, numbers
@@ -524,9 +524,3 @@ def test_sympy_is_loaded_only_for_a_formula():
     code = "import sys, swarm; swarm.OwnSurface, swarm.Sphere(1.0); assert 'sympy' not in sys.modules"
     environment = {**os.environ, "PYTHONPATH": str(Path(swarm.__file__).parents[1])}
     subprocess.run([sys.executable, "-c", code], env=environment, check=True)
-
-
-def test_kernels_of_the_package_are_known_by_its_folder():
-    assert "swarm" in frozen._VERSIONS
-    assert cache.cache_folder().parent == cache.base()
-    assert set(cache.sources()) >= set(Path(swarm.__file__).parent.glob("surfaces/**/*.py"))
