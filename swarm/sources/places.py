@@ -1,5 +1,8 @@
 """The places at which particles of a source are born, uniform in the area, or the volume, of the source."""
 
+import itertools
+import logging
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,16 +12,22 @@ from ..errors import SceneError
 from ..scene import Scene
 from ..surfaces.doors import Opening
 from ..surfaces.facets.mesh import Mesh
+from ..surfaces.fields.many import Many
 from ..surfaces.instant import gaps_of, side_of
+from ..surfaces.outlines.outlined import Outlined
+from ..surfaces.shapes.plane import Plane
 from ..surfaces.surface import Surface, volume_of
 from ..surfaces.union import Joined, surfaces_of
-from .pieces import NEAR, Floats, Piece, Random, distances, pieces_of, points_of
+from .pieces import NEAR, Bounds, Floats, Piece, Random, distances, pieces_of, points_of
 from .source import Source
 
+_LOG = logging.getLogger("swarm")
 # Points that are tried at a time, so that a longer run has the same first births; fewer among meshes, of which the
 # nearest triangle of each point is looked for. And so many of these in all, as long as fewer than one in a million is a
 # place of a birth.
 _BATCH, _FEW, _MOST_BATCHES = 1 << 14, 1 << 11, 250
+# After so many batches, and whenever there are twice as many, it is said how far the search is.
+_TOLD = 32
 # Round-off of a point of a surface, as a part of the scene's extent.
 _ROUND_OFF = 16.0 * np.finfo(np.float64).eps
 # Steps of a point onto its surface.
@@ -122,6 +131,29 @@ def _require_at_rest(surface: Surface, name: str) -> None:
         )
 
 
+def _box_of(surface: Surface) -> Bounds:
+    """The corners of a box that a surface is in, a solid as well as a cavity; infinite where none is known."""
+    if isinstance(surface, Mesh):
+        vertices = np.asarray(surface.vertices)
+        return vertices.min(axis=0), vertices.max(axis=0)
+    if isinstance(surface, Many) and not isinstance(surface, Outlined):
+        low, high = surface.corners()
+        return low.min(axis=1), high.max(axis=1)
+    if isinstance(surface, Joined) and surface.is_solid():
+        return np.full(3, -np.inf), np.full(3, np.inf)
+    return _bounds_of(replace(surface, side="inside") if surface.is_solid() else surface)  # type: ignore[call-arg]
+
+
+def _bounds_of(surface: Surface) -> Bounds:
+    """The corners of a box that the admissible side of a surface is in."""
+    low, high = (np.array(corner, np.float64) for corner in surface.bounds())
+    return low, high
+
+
+def _common(one: Bounds, other: Bounds) -> Bounds:
+    return np.maximum(one[0], other[0]), np.minimum(one[1], other[1])
+
+
 class Points:
     """The points of a source, drawn one batch after the other.
 
@@ -135,6 +167,9 @@ class Points:
         self._scene, self._place, self._name = scene, place, name
         self._low, self._high = self._box()
         self._extent = max(scene.extent(), place.surface.extent())
+        self._require_common_bounds()
+        if place.volume:
+            self._low, self._high = _common((self._low, self._high), _bounds_of(place.surface))
         self._pieces: list[Piece] = []
         meshes = any(isinstance(one, Mesh) for one in (place.surface, *scene.surfaces))
         self._batch = _FEW if meshes else _BATCH
@@ -150,31 +185,61 @@ class Points:
             SceneError: there is none, or far fewer than places that are tried.
         """
         found: list[Floats] = []
-        count = tried = 0
+        count, tried, told = 0, 0, _TOLD * self._batch
         while count < n:
             some = self._volume(random) if self._place.volume else self._surface(random)
             found.append(some[:, : n - count])
             count, tried = count + found[-1].shape[1], tried + self._batch
             if tried >= _MOST_BATCHES * self._batch and count < 1e-6 * tried:
                 raise SceneError(self._sentence(count, tried))
+            if tried >= told and count < n:
+                told = 2 * tried
+                _LOG.warning("%s: %d of %d births have a place so far, after %d points", self._name, count, n, tried)
         points, normals = np.concatenate(found, axis=1).reshape(2, 3, n)
         return points, normals
 
     def _sentence(self, count: int, tried: int) -> str:
+        return f"{self._beginning()}, of which {count} of {tried} points are; move it, or make it larger"
+
+    def _beginning(self) -> str:
         within = " and in within=" * bool(self._place.only)
-        return (
-            f"{self._name}.where must be in the vessel{within}, got {self._place.surface!r:.200}, of which {count} of "
-            f"{tried} points are; move it, or make it larger"
-        )
+        return f"{self._name}.where must be in the vessel{within}, got {self._place.surface!r:.200}"
+
+    def _require_common_bounds(self) -> None:
+        """Raise a SceneError where bounds alone say that no point of the source is in the vessel."""
+        surface, low, high = self._place.surface, self._low, self._high
+        slack, axes = NEAR * self._extent, self._axes_of_bounds()
+        if (apart := low - high > slack)[axes].any():
+            raise SceneError(
+                f"{self._beginning()}: along {'xyz'[int(np.argmax(apart))]} these two have nothing in common; move one"
+            )
+        least, most = _bounds_of(surface) if self._place.volume else _box_of(surface)
+        for axis in axes:
+            if max(low[axis], least[axis]) - min(high[axis], most[axis]) > slack:
+                raise SceneError(
+                    f"{self._beginning()}, which is from {least[axis]:.6g} to {most[axis]:.6g} m along {'xyz'[axis]}: "
+                    f"births can be from {low[axis]:.6g} to {high[axis]:.6g} m there; move it"
+                )
+        if isinstance(surface, Plane) and not self._place.volume and np.isfinite(high - low).all():
+            phi = surface.phi(np.array(list(itertools.product(*zip(low, high, strict=True)))).T)
+            if not (phi.min() <= slack and phi.max() >= -slack) and len(axes) == len(self._scene.axes()):
+                raise SceneError(
+                    f"{self._beginning()}, which is {np.abs(phi).min():.6g} m or more away from where births can be; "
+                    "move it"
+                )
+
+    def _axes_of_bounds(self) -> list[int]:
+        """The axes along which bounds count: not where a solid may reach over the faces of a cell that repeats."""
+        period = self._scene.period or (None, None, None)
+        return [axis for axis in self._scene.axes() if period[axis] is None]
 
     def _box(self) -> tuple[Floats, Floats]:
-        """The corners of a box that all points are in."""
+        """The corners of a box of the vessel, as far as births are wanted in it."""
         scene = self._scene
         at_rest = [one for one in scene.surfaces if not changes(one)]
         low, high = scene.bounds_of(at_rest)
-        for one in (*self._place.only, *[self._place.surface] * self._place.volume):
-            least, most = (np.array(corner, np.float64) for corner in one.bounds())
-            low, high = np.maximum(low, least), np.minimum(high, most)
+        for one in self._place.only:
+            low, high = _common((low, high), _bounds_of(one))
         if (across := scene.across()) is not None:
             low[across] = high[across] = 0.0
         return low, high

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import swarm
+from swarm.sources import places
+from swarm.sources.births import with_births
+from swarm.sources.places import Points
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 OPEN = swarm.Scene([swarm.Plane((0, 0, -1), 0.0)], gravity=(0, 0, -9.81))
@@ -118,9 +121,73 @@ TIMED = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Sphere(0.2, side="outside
         ),
     ],
 )
-def test_a_source_that_does_not_go_with_the_scene(scene, source, said):
+def test_a_source_that_does_not_go_with_the_scene(scene, source, said, monkeypatch):
+    monkeypatch.setattr(places, "_MOST_BATCHES", 3)
     with pytest.raises(swarm.SceneError, match=said):
         run(scene, [source])
+
+
+AROUND = swarm.Scene([swarm.Sphere(0.5), swarm.Box((0.4, 0.4, 0.4), (0.0, 0.0, 0.2))])
+FLAT = swarm.Scene([swarm.Stadium(0.4, 0.4)], plane="z")
+FAR = swarm.Sphere(0.1, (2.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("scene", "where", "more", "said"),
+    [
+        (SPHERE, FAR, {}, "from 1.9 to 2.1 m along x: births can be from -0.5 to 0.5 m there; move it"),
+        (SPHERE, FAR, {"volume": True}, "from 1.9 to 2.1 m along x"),
+        (SPHERE, swarm.Sphere(0.1, (2.0, 0.0, 0.0), side="outside"), {}, "from 1.9 to 2.1 m along x"),
+        (SPHERE, swarm.Box((0.1, 0.1, 0.1), (0.0, 0.0, 3.0)), {}, "from 2.9 to 3.1 m along z"),
+        (SPHERE, swarm.Spheres([(3.0, 0.0, 0.0), (4.0, 0.0, 0.0)], [0.1, 0.1]), {}, "from 2.9 to 4.1 m along x"),
+        (SPHERE, swarm.Plane((0.0, 0.0, 1.0), 3.0), {}, "which is 2.5 m or more away from where births can be"),
+        (SPHERE, swarm.Plane((0.0, 0.0, -1.0), 3.0), {}, "which is 2.5 m or more away"),
+        (SPHERE, swarm.Plane((0.0, 0.0, -1.0), -3.0), {"volume": True}, "are; move it"),
+        (SPHERE, 0, {"within": FAR}, "and in within=, .* along x these two have nothing in common"),
+        (SPHERE, swarm.Sphere(0.1), {"within": swarm.Sphere(0.1, (0.0, 0.3, 0.0))}, "births can be from 0.2 to 0.4 m"),
+        (AROUND, swarm.Sphere(0.05, (0.0, 0.0, -0.4)), {}, "along z: births can be from -0.2 to 0.5 m"),
+        (FLAT, FAR, {}, "from 1.9 to 2.1 m along x"),
+    ],
+)
+def test_a_source_whose_bounds_miss_the_vessel_is_refused_before_points_are_drawn(
+    scene, where, more, said, monkeypatch
+):
+    drawn = []
+    for name in ("_volume", "_surface"):
+        monkeypatch.setattr(Points, name, lambda *about: drawn.append(1) or np.zeros((6, 0)))
+    monkeypatch.setattr(places, "_MOST_BATCHES", 3)
+    with pytest.raises(swarm.SceneError, match=rf"sources\[0\].where must be in the vessel.*{said}"):
+        run(scene, swarm.Source(where, **GIVEN, **more))
+    assert len(drawn) == (3 if said == "are; move it" else 0)
+
+
+def test_bounds_refuse_no_source_that_has_a_place():
+    """At the faces of a cell that repeats, around its vessel, on it, and where it is open to infinity."""
+    cell = swarm.Scene([swarm.Sphere(0.3, (0.0, 0.5, 0.5), side="outside")], period=(1.0, 1.0, 1.0))
+    ball, floor = swarm.Sphere(0.2, side="outside"), swarm.Plane((0.0, 0.0, -1.0), 0.0)
+    for scene, where, more in (
+        (cell, 0, {}),
+        (cell, swarm.Sphere(0.3, (0.5, 0.5, 0.5)), {"volume": True}),
+        (SPHERE, swarm.Sphere(1.0, (1.0, 0.0, 0.0)), {}),
+        (SPHERE, swarm.Sphere(0.5), {}),
+        (SPHERE, ball, {"volume": True}),
+        (swarm.Scene([swarm.Box((0.5, 0.5, 0.5))]), swarm.Plane((0.0, 0.0, -1.0), 0.5), {}),
+        (OPEN, floor, {"within": swarm.Sphere(0.3)}),
+        (FLAT, swarm.Sphere(0.2), {"volume": True}),
+    ):
+        made = with_births(scene, None, (swarm.Source(where, count=5, stop=1.0, speed=1.0, **more),), 1, 1.0)
+        assert len(made) == 5
+
+
+def test_a_long_search_for_places_is_told(caplog, monkeypatch):
+    """Whenever it has taken twice as many points."""
+    monkeypatch.setattr(places, "_MOST_BATCHES", 100)
+    corner = swarm.Source(swarm.Sphere(0.05, (0.45, 0.45, 0.45)), volume=True, **GIVEN)
+    with pytest.raises(swarm.SceneError, match="of which 0 of 1638400 points are"):
+        run(SPHERE, corner)
+    told = [message for message in caplog.messages if "have a place so far" in message]
+    assert [message.split("after ")[1] for message in told] == ["524288 points", "1048576 points"]
+    assert told[0].startswith("sources[0]: 0 of ")
 
 
 def test_who_has_no_sources():
