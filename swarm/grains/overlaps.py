@@ -12,23 +12,20 @@ from typing import Any
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.record import Record
-from ..kernel.vector import cross, dot, norm, square
+from ..kernel.vector import norm, square
 from ..status import Status
-from ..surfaces.balls.facet import RoundTriangle
 from ..surfaces.balls.rounded import part_within
-from ..surfaces.fields.members import GrownLike, member
+from ..surfaces.fields.members import member
 from ..surfaces.posed import Posed
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
 from .arrays import AFTER, BEFORE, BEGIN, END, RADIUS, X, vector_at
 from .contacts import apart
-from .vessel import met
+from .vessel import is_of_faces, met
 
 # Columns of the failure of a step: the place of a ball in the order of cells, that of the other one or -1, the wall or
 # -1, and the overlap [m], or the length of the move if the step is too long.
 BALL, OTHER, WALL, SIZE, COLUMNS = 0, 1, 2, 3, 4
-# A flight through the edge between two triangles is through one of them: by this part a triangle is larger here.
-_SEAM = 1e-9
 
 
 class Limits(Record):
@@ -68,30 +65,19 @@ def look_at_pairs(matter, grains, near, failed):
     return status
 
 
-def _is_of_triangles(like):
-    """Whether the members of a field are triangles, which do not tell their sides: a constant for the compiler."""
-    return _is_of_triangles(like.body) if isinstance(like, (GrownLike, Rotated)) else isinstance(like, RoundTriangle)
-
-
-def _beyond(triangle, r, move):
-    """How far a move that leads through a triangle ends behind its plane [m], -1 where it does not."""
-    d, a, b = r - triangle.corner, triangle.first, triangle.second
-    n = cross(a, b)
-    before, after = dot(d, n), dot(d + move, n)
-    changes = ((before > 0.0) & (after <= 0.0)) | ((before <= 0.0) & (after > 0.0))
-    p = d + (before / (before - after) if changes else 0.0) * move
-    least = -_SEAM * square(n)
-    u, v = dot(cross(p, b), n), dot(cross(a, p), n)
-    is_through = changes & (u >= least) & (v >= least) & (square(n) - u - v >= least)
-    return abs(after) / norm(n) if is_through else -1.0
+def _passed(face, r, move):
+    """How far a move that leads through a part of a face ends behind it [m], -1 where it does not."""
+    if isinstance(face, Rotated):
+        return _passed(face.body, face.place_in(r), face.vector_in(move))
+    return face.passed_by(r, move)
 
 
 @outlined
-def _beyond_any(wall, near, k, r, move):
-    """The same of the triangles that are listed in row k."""
+def _passed_any(wall, near, k, r, move):
+    """The same of all that are listed in row k."""
     most = -1.0
     for m in range(near.spans[k, BEGIN], near.spans[k, END]):
-        most = max(most, _beyond(member(wall.members, index(near.listed[index(m)])), r, move))
+        most = max(most, _passed(member(wall.members, index(near.listed[index(m)])), r, move))
     return most
 
 
@@ -109,10 +95,11 @@ def look_at_wall(matter, wall, grains, near, failed, number):
             # A step over an edge
             overlap = max(overlap, own.gap_of(own.inner(r + 0.5 * move)))
         is_through = overlap > radius
-        if isinstance(wall, Field) and _is_of_triangles(wall.members.like):
-            depth = _beyond_any(wall, near, c, r, move)
-            is_through = depth >= 0.0
-            overlap = radius + depth if is_through else overlap
+        if isinstance(wall, Field) and is_of_faces(wall.members.like):
+            # Far behind a part of a face its distance does not tell the sides apart.
+            depth = _passed_any(wall, near, c, r, move)
+            is_through = is_through | (depth >= 0.0)
+            overlap = max(overlap, radius + depth) if depth >= 0.0 else overlap
         is_long = False
         if longest is not None:
             is_long = (norm(move) > longest) & (overlap > -norm(move))

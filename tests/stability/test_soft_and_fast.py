@@ -9,7 +9,8 @@ import pytest
 import swarm
 
 RADIUS, MASS = 0.01, 0.01
-SEEDS = range(24)
+# The last two fly far behind a side of a polygon in one step.
+SEEDS = (*range(24), 1112, 1402)
 ROOM = swarm.Box((50.0, 50.0, 50.0))
 SIDES = np.array([
     (0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 4, 5), (0, 5, 1),

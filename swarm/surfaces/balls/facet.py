@@ -6,6 +6,9 @@ from ...kernel.jit import select
 from ...kernel.vector import Vec, cross, dot, either, norm, square
 from .rounded import Rounded, part_within
 
+# A flight through the edge between two triangles is through one of them: by this part each is larger then.
+_SEAM = 1e-9
+
 
 class RoundTriangle(Rounded):
     """A triangle of a mesh: balls are outside of what is within the radius from it."""
@@ -33,3 +36,15 @@ class RoundTriangle(Rounded):
         # On the triangle itself either side is as near.
         there = away > 0.0
         return away, either(there, e, n) * (1.0 / select(there, away, select(n2 > 0.0, math.sqrt(n2), 1.0)))
+
+    def passed_by(self, r, move):
+        """How far a move that leads through the triangle ends behind its plane [m], -1 where it does not."""
+        d, a, b = r - self.corner, self.first, self.second
+        n = cross(a, b)
+        n2 = square(n)
+        before, after = dot(d, n), dot(d + move, n)
+        changes = ((before > 0.0) & (after <= 0.0)) | ((before <= 0.0) & (after > 0.0))
+        p = d + (before / select(changes, before - after, 1.0)) * move
+        u, v = dot(cross(p, b), n), dot(cross(a, p), n)
+        within = (u >= -_SEAM * n2) & (v >= -_SEAM * n2) & (n2 - u - v >= -_SEAM * n2)
+        return select(changes & within, abs(after) / select(n2 > 0.0, math.sqrt(n2), 1.0), -1.0)

@@ -65,6 +65,12 @@ class RoundSide(contract.Smooth):
         half = times(times(t, t) + times(n, n), half)
         return wall.beside(middle)[1] <= self.radius + 1.000001 * norm(half)
 
+    def passed_by(self, r, move):
+        """How far a move that leads out through the side ends behind it [m], -1 where it does not."""
+        time, _found = self.wall.first_hit(r, move)
+        behind = self.wall.signed(r + move)[0]
+        return select(time <= 1.0, select(behind > 0.0, behind, 0.0), -1.0)
+
     # --- Flight ---
 
     def parallel(self):
