@@ -67,6 +67,13 @@ def test_bars_quick():
 
 
 @pytest.mark.long
+def test_order_quick():
+    told = printed("order")
+    assert re.search(r"^sphere +Impact, centred .* exact ", told, re.MULTILINE)
+    assert re.search(r"^torus +AugmentedLagrangian, centred .* [12]\.\d+ ", told, re.MULTILINE)
+
+
+@pytest.mark.long
 def test_scenes_quick():
     told = printed("scenes")
     assert "capped cylinder" in told

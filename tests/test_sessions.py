@@ -203,6 +203,15 @@ def test_a_longer_run_goes_on_from_a_shorter_one(tmp_path):
     assert longer.observables["time"].tolist() == expected.observables["time"].tolist()
 
 
+def test_contact_steps_before_the_impact_go_on_with_the_same_bits(tmp_path):
+    method = swarm.Impact(contact_step=0.05, contact_start="centred")
+    stopped_at(tmp_path / "run.h5", 3, until=4.0, method=method)
+    resumed = run(tmp_path / "run.h5", until=4.0, method=method, resume=True)
+    expected = run(tmp_path / "whole.h5", until=4.0, method=method)
+    assert np.array_equal(resumed.particles.position, expected.particles.position)
+    assert np.array_equal(resumed.particles.velocity, expected.particles.velocity)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
