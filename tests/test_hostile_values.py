@@ -147,6 +147,12 @@ def test_names_that_are_too_long_for_the_system(tmp_path):
             read(name)
 
 
+def test_every_kth_particle_by_an_array_of_one_number(tmp_path):
+    swarm.simulate(**CALLS["simulate"], impacts=tmp_path / "log.h5", impact_particles=np.array(2))
+    with swarm.load_impacts(tmp_path / "log.h5") as log:
+        assert log.kept == 2
+
+
 # --- Booleans --------------------------------------------------------------------------------------------
 
 NO_BOOLEAN = ["no", "false", "", math.nan, 0, 1, 1.0, None, [], {}, object(), np.array(True), np.array([True])]

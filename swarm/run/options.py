@@ -121,7 +121,8 @@ class RunOptions:
             known = len(given) > 0 and all(isinstance(i, (int, np.integer)) and i >= 0 for i in given)
             object.__setattr__(self, "impact_particles", tuple(sorted({int(i) for i in given})) if known else given)
         else:
-            known = checks.count("impact_particles", given) > 0
+            object.__setattr__(self, "impact_particles", checks.count("impact_particles", given))
+            known = True
         if not known:
             raise SceneError(
                 'impact_particles must be "all", k for every k-th particle, or a list of numbers of particles from 0 '
