@@ -57,7 +57,7 @@ def number(name: str, value: Any, expected: str = "a finite number") -> float:
         if isinstance(value, (bool, str, bytes, np.complexfloating, np.ma.MaskedArray)):
             raise TypeError
         result = float(value)
-    except (TypeError, ValueError, OverflowError):
+    except Exception:  # of float(), or of an object of others
         raise SceneError(f"{name} must be {expected}, got {shown(value)}") from None
     if not math.isfinite(result):
         raise SceneError(f"{name} must be {expected}, got {result}")
@@ -177,12 +177,35 @@ def flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
+def parts_of(value: Any) -> tuple[Any, ...] | None:
+    """The parts of a list or of anything that can be gone through; None of a text and of what has no parts.
+
+    >>> parts_of(np.array(5.0)) is None, parts_of([1, 2])
+    (True, (1, 2))
+    """
+    if isinstance(value, (str, bytes, type)):
+        return None
+    try:
+        return tuple(value)
+    except Exception:  # an array without axes, or an object of others
+        return None
+
+
+def brackets(value: Any) -> str:
+    """A hint where a class came in place of an object, or nothing.
+
+    >>> brackets(float)
+    '; to make one of the class, call it: float(...)'
+    """
+    return f"; to make one of the class, call it: {value.__name__}(...)" if isinstance(value, type) else ""
+
+
 def entries(name: str, value: Any, count: int, expected: str) -> tuple[Any, ...]:
     """`value` as a tuple of so many parts; `expected` says what they are."""
     try:
         # One more than there should be: what has no end is refused as well.
         parts = tuple(itertools.islice(value, count + 1))
-    except TypeError:
+    except Exception:  # it has no parts, or is an object of others
         raise SceneError(f"{name} must be {expected}, got {shown(value)}") from None
     if len(parts) != count:
         came = len(value) if isinstance(value, (list, tuple)) else len(parts) if len(parts) < count else "more"
@@ -210,7 +233,7 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
         # A view of one number may say that it has any shape: nothing of that size is copied.
         if _DOUBLE * given.size <= memory():
             return given.astype(np.float64, copy=False)
-    except (TypeError, ValueError, OverflowError):
+    except Exception:  # of float(), or of an object of others
         came = value.dtype.name if isinstance(value, np.ndarray) else type(value).__name__
         raise SceneError(f"{name} must be an array of numbers, got {came}") from None
     raise _too_large(name, f", got shape {given.shape}, which takes", _DOUBLE * given.size)

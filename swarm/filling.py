@@ -66,7 +66,7 @@ def fill(
     n = checks.count("n", n)
     checks.particles_fit("n", n)
     seed = checks.count("seed", seed, least=0)
-    check_velocities("fill", speed, temperature, exact)
+    speed, temperature = check_velocities("fill", speed, temperature, exact)
     random = np.random.default_rng(seed)
     # Checks the masses too; velocities follow, since a Maxwellian needs the masses.
     if radius is None:
@@ -80,17 +80,20 @@ def fill(
     return particles
 
 
-def check_velocities(user: str, speed: float | None, temperature: float | None, exact: bool) -> None:
-    """Raise a `SceneError` unless they say how fast particles are."""
+def check_velocities(
+    user: str, speed: float | None, temperature: float | None, exact: bool
+) -> tuple[float | None, float | None]:
+    """The speed and the temperature as numbers; a `SceneError` unless they say how fast particles are."""
     if (speed is None) == (temperature is None):
         came = "neither" if speed is None else "both"
         raise SceneError(f"{user} needs one of speed and temperature, got {came}")
     if speed is not None:
-        checks.magnitude("speed", speed)
+        speed = checks.magnitude("speed", speed)
     if temperature is not None:
-        checks.magnitude("temperature", temperature)
+        temperature = checks.magnitude("temperature", temperature)
     if checks.flag("exact", exact) and temperature is None:
         raise SceneError("exact must be False with speed, got True: it scales velocities to a temperature")
+    return speed, temperature
 
 
 def fill_velocities(

@@ -100,6 +100,7 @@ def contact_history(
     particle = Particles(position, velocity, mass)
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")
+    mass = float(particle.mass[0])
     check_surfaces(method, scene)
     method.check(scene, particle)
     # The functions of kernels, in plain Python; with NumPy's numbers 1/0 is an infinity as in compiled kernels.

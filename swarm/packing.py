@@ -79,7 +79,7 @@ def pack(
     seed = checks.count("seed", seed, least=0)
     moves = speed is not None or temperature is not None
     if moves:
-        check_velocities("pack", speed, temperature, False)
+        speed, temperature = check_velocities("pack", speed, temperature, False)
     still, random = _at_rest(scene), np.random.default_rng(seed)
     room = room_of(still, random, "pack")
     radii = _radii(still, n, radius, fraction, room)

@@ -10,7 +10,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
-from .checks import closest, shown
+from .checks import closest, parts_of, shown
 from .errors import SceneError
 
 _ALLOWED: ContextVar[tuple[str, ...]] = ContextVar("_ALLOWED", default=())
@@ -26,10 +26,11 @@ def checked_modules(given: Any) -> tuple[str, ...]:
     Raises:
         SceneError: one is no name of a module.
     """
-    if isinstance(given, (str, bytes)) or not isinstance(given, Iterable):
+    modules = parts_of(given)
+    if modules is None:
         raise SceneError(f'plugins must be a list of names of modules, such as ["mylaws"], got {shown(given)}')
     found = []
-    for one in given:
+    for one in modules:
         for name in one.split(",") if isinstance(one, str) else [one]:
             if not isinstance(name, str) or not re.fullmatch(_MODULE, name.strip()):
                 raise SceneError(f"plugins must be names of modules, such as mylaws, without .py, got {shown(name)}")

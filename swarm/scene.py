@@ -36,6 +36,23 @@ from .surfaces.walls import Walls
 MOST_WALLS = 24
 
 
+def _surfaces(value: Any) -> tuple[Surface, ...]:
+    """The argument `surfaces`, checked."""
+    given = (value,) if isinstance(value, Surface) else checks.parts_of(value)
+    if given is None:
+        raise SceneError(
+            f"surfaces must be a list of surfaces such as swarm.Sphere(radius=0.5), got {checks.shown(value)}"
+            f"{checks.brackets(value)}"
+        )
+    for i, surface in enumerate(given):
+        if not isinstance(surface, Surface):
+            raise SceneError(
+                f"surfaces[{i}] must be a surface such as swarm.Sphere, got {checks.shown(surface)}"
+                f"{checks.brackets(surface)}"
+            )
+    return given
+
+
 @dataclass(frozen=True, init=False, repr=False)
 class Scene(Pieces):
     """Rigid surfaces, whose admissible sides intersect in the volume that holds the particles, and gravity.
@@ -81,10 +98,7 @@ class Scene(Pieces):
         plane: str | None = None,
         pairs: Pairs | None = None,
     ) -> None:
-        surfaces = (surfaces,) if isinstance(surfaces, Surface) else tuple(surfaces)
-        for i, surface in enumerate(surfaces):
-            if not isinstance(surface, Surface):
-                raise SceneError(f"surfaces[{i}] must be a surface such as swarm.Sphere, got {surface!r}")
+        surfaces = _surfaces(surfaces)
         required.require_description(surfaces)
         pull = None if gravity is None else checks.vector("gravity", gravity)
         for i, part in enumerate(pull or ()):

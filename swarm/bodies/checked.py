@@ -160,7 +160,9 @@ def each(name: str, rows: Iterable[Any], width: int, parts: str) -> Iterator[tup
             given = row.tolist() if isinstance(row, np.ndarray) else row
             where = f"{name}[{k}]"
             yield where, checks.entries(where, given, width, f"{width} {'values ' * named}{parts}")
-    except TypeError:
+    except SceneError:
+        raise
+    except Exception:  # it has no parts, or is an object of others
         expected = f"rows {parts}" if named else f"rows of {width} {parts}"
         raise SceneError(f"{name} must be {expected}, got {checks.shown(rows)}") from None
 

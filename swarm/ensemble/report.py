@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from ..checks import flag
 from ..extras import needed_by
 from ..output import paths
 
@@ -47,9 +48,10 @@ def report(
     '1 particle in a sphere: Impact, 1 s'
     """
     source = paths.given("path", path)
+    flag("overwrite", overwrite)
     if output is None:
         return page_of(source, None)
-    target = checked(source, Path(output), overwrite)
+    target = checked(source, paths.given("output", output), overwrite)
     page = page_of(source, target)
     page.save(target, overwrite=overwrite)
     return page

@@ -106,6 +106,7 @@ class Impact(base.Method):
         object.__setattr__(self, "sliding_tolerance", tolerance)
         if self.dt is not None:
             object.__setattr__(self, "dt", checks.positive("dt", self.dt))
+        object.__setattr__(self, "order", checks.count("order", self.order))
         if self.order not in (2, 4):
             raise SceneError(f"order must be 2 or 4, got {self.order}")
         checks.one_of("contact_start", self.contact_start, base.CONTACT_STARTS)

@@ -8,7 +8,7 @@ with the displacement d, and the rotation A about the centre c, both of one moti
 import functools
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -61,9 +61,11 @@ class Path(Given):
 
     def __post_init__(self) -> None:
         times = _times(self.times)
-        if isinstance(self.positions, (str, bytes)) or not isinstance(self.positions, Iterable):
-            raise SceneError(f"positions must be three numbers for each of the times, got {self.positions!r:.200}")
-        places = tuple(vector_of(f"positions[{k}]", place) for k, place in enumerate(self.positions))
+        given = checks.parts_of(self.positions)
+        if given is None:
+            came = checks.shown(self.positions)
+            raise SceneError(f"positions must be three numbers for each of the times, got {came}")
+        places = tuple(vector_of(f"positions[{k}]", place) for k, place in enumerate(given))
         if len(places) != len(times):
             raise SceneError(f"positions must be one for each of the {len(times)} times, got {len(places)}")
         checks.assign(self, times=times, positions=places)
@@ -164,8 +166,10 @@ KINDS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def parts_of_wall(value: Any, where: str = "motion") -> "WallMotion | None":
+def parts_of_wall(value: Any, where: str = "motion", within: tuple[Any, ...] = ()) -> "WallMotion | None":
     """`value` as the motion of a wall: None, a motion, its table, or a list of several; errors say where it is.
+
+    `within` are the lists that it is in.
 
     Raises:
         SceneError: it is none of these.
@@ -175,14 +179,16 @@ def parts_of_wall(value: Any, where: str = "motion") -> "WallMotion | None":
     if isinstance(value, Mapping):
         return _of_table(value, where)
     if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and len(value):
-        parts = [parts_of_wall(one, f"{where}[{k}]") for k, one in enumerate(value)]
+        if any(value is one for one in within):
+            raise SceneError(f"{where} must not contain itself, got a list that does")
+        parts = [parts_of_wall(one, f"{where}[{k}]", (*within, value)) for k, one in enumerate(value)]
         try:
             return parts[0] if len(parts) == 1 else Sum(tuple(parts))  # type: ignore[arg-type]
         except SceneError as error:
             raise SceneError(f"{where}: {error}") from None
     raise SceneError(
         f"{where} must be None, swarm.Translation, Oscillation, Rotation, Path, Guide or a sum of them, got "
-        f"{value!r:.200}"
+        f"{checks.shown(value)}{checks.brackets(value)}"
     )
 
 

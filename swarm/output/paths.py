@@ -6,7 +6,7 @@ import stat
 from pathlib import Path
 from typing import Any
 
-from ..checks import shown
+from ..checks import flag, shown
 from ..errors import SceneError
 
 # Part of the names of temporary files, which no other program uses.
@@ -116,6 +116,7 @@ def check_target(path: Path, overwrite: bool, what: str = "trajectory", allow: s
         what: the output; `marks` knows the kind of each.
         allow: how an existing file may be replaced, for the sentence.
     """
+    overwrite = flag("overwrite", overwrite)
     check_place(path, what)
     if path.exists() and not overwrite:
         stopped = what == "trajectory" and checkpoint_of(path).exists()

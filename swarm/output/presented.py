@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import notebook
+from .. import checks, notebook
 from ..columns import frame_of
 from ..errors import SceneError
 from ..extras import needed_by
@@ -181,6 +181,7 @@ class Presented(Stored):
         """
         with needed_by("a report", "report"):
             from .page import html, run
+        checks.flag("overwrite", overwrite)
         if path is not None:
             html.checked_target(path, overwrite, (self.path,))
         page = run.of_trajectory(self)

@@ -78,9 +78,9 @@ class RunOptions:
             object.__setattr__(self, name, None if value is None else paths.target_of_run(name, value))
         paths.check_distinct({**self.files(), "recording": self.recording}, {})
         if self.checkpoint is not None:
-            checks.at_least("checkpoint", self.checkpoint, _OFTEN)
+            object.__setattr__(self, "checkpoint", checks.at_least("checkpoint", self.checkpoint, _OFTEN))
         if self.walltime is not None:
-            checks.positive("walltime", self.walltime)
+            object.__setattr__(self, "walltime", checks.positive("walltime", self.walltime))
         times = self.times
         object.__setattr__(self, "until", times.until)
         for name in ("threads", "block_size", "shards"):
@@ -103,7 +103,7 @@ class RunOptions:
         """Raise a SceneError unless what a recording and a display are given is known, also where there is none."""
         checks.count("record_particles", self.record_particles)
         checks.one_of("record_color", self.record_color, COLOURS)
-        checks.positive("record_megabytes", self.record_megabytes)
+        object.__setattr__(self, "record_megabytes", checks.positive("record_megabytes", self.record_megabytes))
         if not isinstance(self.live, str):
             checks.flag("live", self.live)
         if not callable(self.progress) and not isinstance(self.progress, Display):
@@ -116,12 +116,13 @@ class RunOptions:
         given = self.impact_particles
         if isinstance(given, str):
             known = given == "all"
-        elif isinstance(given, (list, tuple, np.ndarray)):
+        elif isinstance(given, (list, tuple)) or (isinstance(given, np.ndarray) and given.ndim):
             # A number is known when it is checked against that of the particles.
             known = len(given) > 0 and all(isinstance(i, (int, np.integer)) and i >= 0 for i in given)
             object.__setattr__(self, "impact_particles", tuple(sorted({int(i) for i in given})) if known else given)
         else:
-            known = checks.count("impact_particles", given) > 0
+            object.__setattr__(self, "impact_particles", checks.count("impact_particles", given))
+            known = True
         if not known:
             raise SceneError(
                 'impact_particles must be "all", k for every k-th particle, or a list of numbers of particles from 0 '

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import notebook
+from .. import checks, notebook
 from ..bodies.state import Bodies
 from ..columns import frame_of
 from ..errors import SceneError
@@ -225,6 +225,7 @@ class Result:
         >>> page.title, page.html[:15]
         ('10 particles in a sphere: Impact, 2 s', '<!DOCTYPE html>')
         """
+        checks.flag("overwrite", overwrite)
         with needed_by("a report", "report"):
             from ..output.page import html, run
         if self.trajectory is not None and self.trajectory.is_file():

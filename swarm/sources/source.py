@@ -87,12 +87,12 @@ class Source:
         elif not isinstance(self.where, (Surface, Opening)):
             raise SceneError(
                 f"where must be a surface, one of the openings of a surface, or the number of a surface of the scene, "
-                f"got {self.where!r:.200}"
+                f"got {checks.shown(self.where)}"
             )
         if self.volume and isinstance(self.where, Opening):
             raise SceneError("volume must be False at an opening, got True; give the surface that is its volume")
         if self.within is not None and not isinstance(self.within, (Surface, Opening)):
-            raise SceneError(f"within must be a surface, or None, got {self.within!r:.200}")
+            raise SceneError(f"within must be a surface, or None, got {checks.shown(self.within)}")
 
     def _check_times(self) -> None:
         given = [name for name in ("rate", "times") if getattr(self, name) is not None]
@@ -163,7 +163,7 @@ def checked_sources(value: Any) -> tuple[Source, ...]:
         return ()
     given = [value] if isinstance(value, Source) else list(value) if isinstance(value, (list, tuple)) else None
     if given is None:
-        raise SceneError(f"sources must be a list of swarm.Source, got {value!r:.200}")
+        raise SceneError(f"sources must be a list of swarm.Source, got {checks.shown(value)}")
     for k, one in enumerate(given):
         if not isinstance(one, Source):
             raise SceneError(f"sources[{k}] must be a swarm.Source, got {one!r:.200}")

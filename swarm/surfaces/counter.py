@@ -1,10 +1,9 @@
 """Counters: surfaces that stop nobody and count what crosses them, as users describe them."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..checks import shown
+from ..checks import parts_of, shown
 from ..errors import SceneError
 from .surface import Surface
 
@@ -54,10 +53,11 @@ def require_bare(name: str, given: Any, why: str) -> None:
 
 def checked_counters(value: Any) -> tuple[Counter, ...]:
     """The argument `counters`: each as a `Counter`."""
-    if isinstance(value, (Surface, Counter, str)) or not isinstance(value, Iterable):
+    given = None if isinstance(value, (Surface, Counter)) else parts_of(value)
+    if given is None:
         raise SceneError(f"counters must be a list of surfaces such as swarm.Plane, got {shown(value)}")
     found = []
-    for k, one in enumerate(value):
+    for k, one in enumerate(given):
         if not isinstance(one, Counter):
             require_bare(f"counters[{k}]", one, "a counter stops nobody")
         found.append(one if isinstance(one, Counter) else Counter(one))

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from .. import checks
 from ..errors import SceneError
 from ..kernel.gravity import as_vector
 from ..kernel.jit import select
@@ -50,8 +51,7 @@ class Opening:
     between: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.between, bool):
-            raise SceneError(f"between must be True or False, got {self.between!r:.200}")
+        object.__setattr__(self, "between", checks.flag("between", self.between))
         object.__setattr__(self, "times", checked_spans("times", self.times))
 
 
@@ -64,9 +64,10 @@ def checked_spans(name: str, value: Any) -> Spans:
     if value is None:
         return None
     expected = f"{name} must be a list of pairs (t0, t1) of seconds"
-    if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
-        raise SceneError(f"{expected}, got {value!r:.200}")
-    spans = [_pair(f"{name}[{k}]", pair) for k, pair in enumerate(value)]
+    given = checks.parts_of(value)
+    if given is None:
+        raise SceneError(f"{expected}, got {checks.shown(value)}")
+    spans = [_pair(f"{name}[{k}]", pair) for k, pair in enumerate(given)]
     if not spans:
         raise SceneError(f"{expected}, got none; leave {name} out for what does not change")
     for k, ((_begin, end), (begin, _end)) in enumerate(itertools.pairwise(spans)):
@@ -81,8 +82,8 @@ def checked_spans(name: str, value: Any) -> Spans:
 def _pair(name: str, value: Any) -> tuple[float, float]:
     try:
         begin, end = (float(part) for part in value)
-    except (TypeError, ValueError):
-        raise SceneError(f"{name} must be a pair (t0, t1) of seconds, got {value!r:.200}") from None
+    except Exception:  # no pair, no numbers, or an object of others
+        raise SceneError(f"{name} must be a pair (t0, t1) of seconds, got {checks.shown(value)}") from None
     if not 0.0 <= begin < end:  # also where one is no number
         raise SceneError(
             f"{name} must be from a time of 0 s or more to a later one, got ({begin:g}, {end:g}); a run begins at 0 s, "

@@ -197,16 +197,13 @@ def lengths_of(period: Any) -> Lengths | None:
     """The argument `period`, checked; None where no direction repeats."""
     if period is None:
         return None
-    try:
-        if isinstance(period, (str, bytes)):
-            raise TypeError
-        given = list(period)
-    except TypeError:
-        raise SceneError(f"period must be three lengths, or None, got {period!r}") from None
+    given = checks.parts_of(period)
+    if given is None:
+        raise SceneError(f"period must be three lengths, or None, got {checks.shown(period)}")
     if len(given) != 3:
         raise SceneError(
             f"period must be three lengths (Lx, Ly, Lz), None for a direction that does not repeat, got {len(given)}: "
-            f"{period!r}"
+            f"{checks.shown(period)}"
         )
     x, y, z = (
         None if one is None or one is False else checks.length(f"period[{k}]", one) for k, one in enumerate(given)

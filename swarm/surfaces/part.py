@@ -1,9 +1,9 @@
 """The parts of a union or an intersection: checked, with what is given to the whole, and turned inside out."""
 
-from collections.abc import Iterable
 from dataclasses import fields, replace
 from typing import Any
 
+from .. import checks
 from ..errors import SceneError
 from .shapes.plane import Plane
 from .surface import Surface
@@ -14,14 +14,15 @@ _HANDED_DOWN = ("restitution", "friction", "temperature", "accommodation", "laws
 
 def checked_parts(value: Any, name: str) -> tuple[Surface, ...]:
     """The argument `parts`, checked."""
-    if isinstance(value, (Surface, str, bytes)) or not isinstance(value, Iterable):
-        raise SceneError(f"parts must be a list of surfaces such as swarm.Sphere, got {value!r:.200}")
-    given = tuple(value)
+    given = None if isinstance(value, Surface) else checks.parts_of(value)
+    if given is None:
+        raise SceneError(f"parts must be a list of surfaces such as swarm.Sphere, got {checks.shown(value)}")
     if not given:
         raise SceneError(f"parts must hold at least one surface of the {name}, got none")
     for k, part in enumerate(given):
         if not isinstance(part, Surface):
-            raise SceneError(f"parts[{k}] must be a surface such as swarm.Sphere, got {part!r:.200}")
+            came = f"{checks.shown(part)}{checks.brackets(part)}"
+            raise SceneError(f"parts[{k}] must be a surface such as swarm.Sphere, got {came}")
     return given
 
 

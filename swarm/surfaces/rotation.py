@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Vector, number, vector
+from ..checks import Vector, number, parts_of, shown, vector
 from ..errors import SceneError
 from ..kernel.gravity import Gravity, as_vector
 from ..kernel.vector import Vec, dot, vec
@@ -51,13 +51,11 @@ def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
     if count == 3:
         parts = vector(name, value)
     else:
-        try:
-            parts = tuple(number(f"{name}[{i}]", part) for i, part in enumerate(value))
-        except TypeError:
-            parts = ()
-        if isinstance(value, (str, bytes)) or len(parts) != count:
+        parts = tuple(number(f"{name}[{i}]", part) for i, part in enumerate(parts_of(value) or ()))
+        if len(parts) != count:
             raise SceneError(
-                f"{name} must be a quaternion of four numbers (w, x, y, z), or a table of axis and angle, got {value!r}"
+                f"{name} must be a quaternion of four numbers (w, x, y, z), or a table of axis and angle, got "
+                f"{shown(value)}"
             )
     largest = max(map(abs, parts))
     if largest == 0.0:

@@ -1,13 +1,13 @@
 """A surface as users describe it, checked. As kernels take it, it is a record: see contract.py."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import checks
 from .. import motion as motions
 from ..checks import Vector, array, magnitude, number, one_of, positive, vector
 from ..errors import SceneError
@@ -249,9 +249,9 @@ def volume_of(opening: Surface | Opening) -> Surface:
 
 def _openings(value: Any) -> tuple[Surface | Opening, ...]:
     """The argument `openings`, checked."""
-    if isinstance(value, (Surface, Opening)) or not isinstance(value, Iterable):
-        raise SceneError(f"openings must be a list of surfaces such as swarm.Sphere, got {value!r:.200}")
-    given = tuple(value)
+    given = None if isinstance(value, (Surface, Opening)) else checks.parts_of(value)
+    if given is None:
+        raise SceneError(f"openings must be a list of surfaces such as swarm.Sphere, got {checks.shown(value)}")
     for k, one in enumerate(given):
         opening = one.surface if isinstance(one, Opening) else one
         if not isinstance(opening, Surface):

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import checks
 from ...errors import SceneError
@@ -30,7 +31,7 @@ def given_arrays(vertices: Any, triangles: Any, group: Any, names: Any, scale: f
         raise SceneError(
             f"vertices must be (V, 3) finite numbers, got shape {corners.shape}; or give the path of a file"
         )
-    cells = np.asarray(triangles)
+    cells = _whole("triangles", triangles)
     if cells.ndim != 2 or cells.shape[1] != 3 or not len(cells) or cells.dtype.kind not in "iu":
         raise SceneError(f"triangles must be (T, 3) whole numbers, got shape {cells.shape} of {cells.dtype}")
     if cells.min() < 0 or cells.max() >= len(corners):
@@ -39,7 +40,7 @@ def given_arrays(vertices: Any, triangles: Any, group: Any, names: Any, scale: f
             f"triangles must be numbers from 0 to {len(corners) - 1}, of which each is a corner, got "
             f"{cells[wrong].tolist()} in row {wrong}"
         )
-    of = np.zeros(len(cells), np.int64) if group is None else np.asarray(group, np.int64)
+    of = np.zeros(len(cells), np.int64) if group is None else _whole("group", group).astype(np.int64)
     known = tuple(map(str, names)) or tuple(map(str, range(int(of.max()) + 1))) if group is not None else ("",)
     if of.shape != (len(cells),) or of.min() < 0 or of.max() >= len(known):
         raise SceneError(
@@ -47,6 +48,17 @@ def given_arrays(vertices: Any, triangles: Any, group: Any, names: Any, scale: f
             f"{of.shape} from {of.min()} to {of.max()}"
         )
     return Soup(scale * corners, cells.astype(np.int64), of, known)
+
+
+def _whole(name: str, values: Any) -> NDArray[Any]:
+    """An argument as an array of whole numbers, at least one."""
+    try:
+        found = np.asarray(values)
+    except Exception:  # rows of different lengths, or an object of others
+        found = np.empty(0)
+    if found.dtype.kind not in "iu" or not found.size:
+        raise SceneError(f"{name} must be whole numbers, one or more, got {checks.shown(values)}")
+    return found
 
 
 def sorted_by_place(mesh: Closed) -> Closed:

@@ -104,7 +104,8 @@ class Mesh(Surface):
         if self._made is None or any(a is not b for a, b in zip(self._made.given, given, strict=True)):
             made = self._mended()
             given = made.vertices, made.triangles, made.group, made.names
-            said = {"scale": 1.0, "weld": None, "mesh_weld": made.weld or self.mesh_weld or None}
+            welded = None if self.mesh_weld is None else checks.magnitude("mesh_weld", self.mesh_weld)
+            said = {"scale": 1.0, "weld": None, "mesh_weld": made.weld or welded or None}
             own = dict(zip(("vertices", "triangles", "group", "names"), given, strict=True))
             checks.assign(self, **own, **said, _made=made._replace(given=given))
         object.__setattr__(self, "groups", self._checked_groups())
@@ -133,7 +134,7 @@ class Mesh(Surface):
         if self.groups is None:
             return None
         if not isinstance(self.groups, Mapping):
-            raise SceneError(f"groups must be a table of laws by the names of groups, got {self.groups!r:.200}")
+            raise SceneError(f"groups must be a table of laws by the names of groups, got {checks.shown(self.groups)}")
         there = ", ".join(map(repr, filter(None, self.names))) or "none, since the file names none"
         for name, laws in self.groups.items():
             if name not in self.names:

@@ -93,9 +93,10 @@ def _box_of(bounds: Any) -> Box | None:
     """The argument `bounds`, checked."""
     if bounds is None:
         return None
-    if isinstance(bounds, (str, bytes)) or not hasattr(bounds, "__len__") or len(bounds) != 2:
-        raise SceneError(f"bounds must be two corners ((x, y, z), (x, y, z)), got {bounds!r}")
-    low, high = (checks.vector(f"bounds[{i}]", corner) for i, corner in enumerate(bounds))
+    corners = checks.parts_of(bounds) or ()
+    if len(corners) != 2:
+        raise SceneError(f"bounds must be two corners ((x, y, z), (x, y, z)), got {checks.shown(bounds)}")
+    low, high = (checks.vector(f"bounds[{i}]", corner) for i, corner in enumerate(corners))
     if not all(a < b for a, b in zip(low, high, strict=True)):
         raise SceneError(f"bounds must be a lower and an upper corner, got {low} and {high}")
     return low, high

@@ -70,6 +70,8 @@ class Formula(FormSurface):
 
     def _made(self) -> Form:
         checks.assign(self, parameters=_checked(self.parameters))
+        if not isinstance(self.formula, str):
+            raise SceneError(f"phi must be a formula in quotes, got {checks.shown(self.formula)}")
         names, values = tuple(self.parameters or ()), tuple((self.parameters or {}).values())
         code = derived(self.formula, names)
         exact = code.with_values(values)

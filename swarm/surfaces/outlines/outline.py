@@ -7,14 +7,13 @@ they are where n.d + k/2 |d|^2 = 0 with d = r - a, whose value is the distance t
 """
 
 import math
-from collections.abc import Iterable
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import magnitude, number, shown
+from ...checks import magnitude, number, parts_of, shown
 from ...errors import SceneError
 from .apart import Edges, along, require_apart
 
@@ -188,12 +187,12 @@ class Outline:
 
 def _checked(name: str, rows: Any) -> tuple[Row, ...]:
     expected = "rows (x, y) or (x, y, bulge)"
-    if isinstance(rows, (str, bytes)) or not isinstance(rows, Iterable):
+    given = parts_of(rows)
+    if given is None:
         raise SceneError(f"{name} must be {expected}, one for each vertex, got {shown(rows)}")
-    given = list(rows)
     found: list[Row] = []
     for k, row in enumerate(given):
-        parts = list(row) if isinstance(row, Iterable) and not isinstance(row, (str, bytes)) else []
+        parts = parts_of(row) or ()
         if len(parts) not in (2, 3):
             raise SceneError(f"{name}[{k}] must be (x, y) or (x, y, bulge), got {shown(row)}")
         values = [number(f"{name}[{k}][{i}]", part) for i, part in enumerate(parts)]

@@ -2,11 +2,10 @@
 
 import itertools
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from ...checks import Vector, length, one_of, vector
+from ...checks import Vector, length, one_of, parts_of, shown, vector
 from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations
@@ -100,9 +99,10 @@ def _face(normal: Vector, half: float, center: Vector) -> PlaneNumbers:
 
 def _faces(value: Any) -> tuple[str, ...]:
     """The argument `open`."""
-    if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
-        raise SceneError(f"open must be a list of faces such as '+x', got {value!r}")
-    faces = tuple(one_of(f"open[{i}]", face, FACES) for i, face in enumerate(value))
+    given = parts_of(value)
+    if given is None:
+        raise SceneError(f"open must be a list of faces such as '+x', got {shown(value)}")
+    faces = tuple(one_of(f"open[{i}]", face, FACES) for i, face in enumerate(given))
     for i, face in enumerate(faces):
         if face in faces[:i]:
             raise SceneError(f"open must name each face once, got {face!r} twice")

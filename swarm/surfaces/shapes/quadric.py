@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Vector, number, vector
+from ...checks import Vector, entries, number, vector
 from ...errors import SceneError
 from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, box_around, extents, farthest, side_sign
@@ -160,9 +160,8 @@ class Quadric(Surface):
 
 def _symmetric(value: Any) -> Matrix:
     """The argument `matrix` as three rows."""
-    if isinstance(value, (str, bytes)) or not hasattr(value, "__len__") or len(value) != 3:
-        raise SceneError(f"matrix must be three rows of three numbers, got {value!r}")
-    a = np.array([vector(f"matrix[{i}]", row) for i, row in enumerate(value)])
+    rows = entries("matrix", value, 3, "three rows of three numbers")
+    a = np.array([vector(f"matrix[{i}]", row) for i, row in enumerate(rows)])
     for i, k in ((0, 1), (0, 2), (1, 2)):
         if abs(a[i, k] - a[k, i]) > _ASYMMETRY * abs(a).max():
             raise SceneError(
