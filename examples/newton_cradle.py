@@ -17,6 +17,8 @@ from .asked import Asked
 from .page import page
 
 COUNT, RADIUS, HALF, FRAMES = 6, 0.05, 1.0, 600
+# Of a line in the picture [points]: less than balls at rest are apart.
+_WIDE = 4.5
 
 
 class Swung(NamedTuple):
@@ -63,17 +65,14 @@ CRADLES = {
 
 
 def draw(found: dict[str, Swung], file: Path) -> None:
-    """Where the balls are over time, as wide as they are."""
+    """Where the centres of the balls are over time: lines of one width, which at rest are a diameter apart."""
     from swarm.output.style import CURVES
 
     title = "Newton's cradle on a rail: as many balls leave the row as came, unless one is heavier or energy is lost"
     with page(file, title, 1, len(found), (11.0, 4.8), sharey=True) as axes:
         for one, (name, swung) in zip(axes, found.items(), strict=True):
             for k, colour in enumerate(CURVES):
-                x = swung.place[:, k]
-                one.fill_betweenx(
-                    swung.time, x - RADIUS, x + RADIUS, color=colour, linewidth=0.0, label=f"ball {k + 1}"
-                )
+                one.plot(swung.place[:, k], swung.time, color=colour, linewidth=_WIDE, label=f"ball {k + 1}")
             one.set(title=name, xlabel="place [m]", xlim=(-HALF, HALF), ylim=(0.0, swung.time[-1]))
             one.grid(False)
         axes[0].set(ylabel="time [s], upwards")

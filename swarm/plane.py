@@ -69,8 +69,8 @@ def require_all(
     """Raise a `SceneError` where gravity, a wall or a motion would send particles out of the plane."""
     if gravity is not None:
         _require_pull(plane, gravity)
-    lengths = [one for one in lengths or () if one is not None]
-    farthest = max((*(surface.extent() for surface in surfaces), *lengths), default=0.0)
+    repeated = [one for one in lengths or () if one is not None]
+    farthest = max((*(surface.extent() for surface in surfaces), *repeated), default=0.0)
     _require_walls(plane, surfaces, 2.0 * farthest or 1.0)
 
 

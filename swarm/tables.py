@@ -37,7 +37,7 @@ def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None,
     surfaces = [] if surfaces is None else surfaces
     if not isinstance(surfaces, list):
         raise SceneError(
-            "surface: expected [[surface]] tables, or none at all where balls meet in free space, got something else"
+            "surface: expected at least one [[surface]] table, or none for balls in free space, got something else"
         )
     built = [surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
     met = None if pairs is None else _pairs_of(pairs)

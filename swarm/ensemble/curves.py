@@ -95,7 +95,8 @@ def _graph(sweep: SweepFolder, rows: list[dict[str, Any]], key: str, name: str) 
 
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         if split:
-            axes.legend(title=split, fontsize=7.5, title_fontsize=7.5)
+            # Beside the axes, where it covers no curve.
+            axes.legend(title=split, fontsize=7.5, title_fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes.set_xlabel(key)
         unit = _MAIN.get(_stem(name), "")
         axes.set_title(f"{name}{f' [{unit}]' * bool(unit)}")

@@ -15,6 +15,7 @@ from ..output import paths
 from ..output.lock import only_writer
 from ..plugins import checked_modules
 from ..run.options import cores
+from ..signature import lined
 from .plan import Plan, read
 from .pool import Pool
 from .results import TABLES, Results, require_written
@@ -65,6 +66,7 @@ class Outcome:
     wall_time: float
 
 
+@lined
 def sweep(  # noqa: PLR0913  the keywords are the public interface
     path: str | os.PathLike[str],
     folder: str | os.PathLike[str] | None = None,

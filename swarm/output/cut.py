@@ -17,6 +17,8 @@ Level = Callable[[Floats], Floats]
 
 # Triangles near a cut are halved until it is this straight, as a part of their width, or there are so many of them.
 _STRAIGHT, _MOST, _ROUNDS = 0.01, 1500, 6
+# For each of many bodies that cut a surface, so many more; for at most so many bodies.
+_EACH, MOST_BODIES = 100, 200
 # Bisections of an edge at a cut, and steps onto a surface.
 _BISECTIONS, _STEPS = 8, 3
 # Normals this parallel are those of a plane.
@@ -61,10 +63,13 @@ class Smooth(NamedTuple):
         return points
 
 
-def found_in(surface: Smooth, low: Floats, high: Floats, frame: Floats) -> tuple[Floats, Indices]:
-    """The triangles of a surface in a box that is given in a frame, the columns of a matrix."""
+def found_in(surface: Smooth, low: Floats, high: Floats, frame: Floats, is_cut: bool = False) -> tuple[Floats, Indices]:
+    """The triangles of a surface in a box that is given in a frame, the columns of a matrix.
+
+    Those of a plane are few, but where many bodies cut it: these are smaller.
+    """
     points, triangles = _on_grid(surface, low, high, frame, _POINTS)
-    if len(points):
+    if len(points) and not is_cut:
         normals = surface.normals(points)
         if np.abs(normals @ normals[0]).min() > 1.0 - _FLAT:
             return _on_grid(surface, low, high, frame, _FEW)
@@ -87,12 +92,15 @@ def _on_grid(surface: Smooth, low: Floats, high: Floats, frame: Floats, count: i
     return surface.onto((points + low) @ frame.T, max(spacing)), triangles.astype(np.int64)
 
 
-def cut(surface: Smooth, points: Floats, triangles: Indices, level: Level) -> Cut:
-    """The part of triangles on a surface at which a level, a distance to first order, is not above 0."""
+def cut(surface: Smooth, points: Floats, triangles: Indices, level: Level, bodies: int = 0) -> Cut:
+    """The part of triangles on a surface at which a level, a distance to first order, is not above 0.
+
+    For each of so many `bodies` that cut it there may be more triangles, so that its hole is as round as one alone.
+    """
     if not len(triangles):
         return Cut(points, triangles, np.empty((0, 2), np.int64))
     values = level(points)
-    points, triangles, values = _finer(surface, points, triangles, values, level)
+    points, triangles, values = _finer(surface, points, triangles, values, level, _MOST + _EACH * bodies)
     kept = values <= 0.0
     inside = kept[triangles].sum(axis=1)
     # So that the corner that differs from both others comes first
@@ -125,13 +133,13 @@ def _widths(points: Floats, triangles: Indices) -> Floats:
 
 
 def _finer(
-    surface: Smooth, points: Floats, triangles: Indices, values: Floats, level: Level
+    surface: Smooth, points: Floats, triangles: Indices, values: Floats, level: Level, most: int
 ) -> tuple[Floats, Indices, Floats]:
     """Triangles at the cut in four, as long as it bends within them: points, triangles and the levels of points."""
     for _ in range(_ROUNDS):
         wide, of = _widths(points, triangles), values[triangles]
         near = np.flatnonzero((of.min(axis=1) < wide) & (of.max(axis=1) > -wide))
-        if not 0 < len(near) <= _MOST:
+        if not 0 < len(near) <= most:
             break
         sides = np.sort(triangles[near][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         edges, places = np.unique(sides, axis=0, return_inverse=True)

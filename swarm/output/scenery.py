@@ -18,7 +18,7 @@ from .framed import eye_of, window
 from .raster import Raster, corners_of, lit
 from .shape import Shape
 from .silhouette import silhouette
-from .style import CAVITY, CAVITY_LINE, SOLID, SOLID_LINE
+from .style import CAVITY_LINE, SOLID, SOLID_LINE, backdrop
 from .triad import BAR, STRIP, draw_triad, say_beyond
 
 # Around a vessel, as a part of its width or height; pixels of a raster for each of the picture, and the most.
@@ -236,7 +236,8 @@ def _glass(normals: Floats) -> Floats:
     """The colours of the inner side of a cavity: clear where it faces the eye."""
     part = (_CLEAR + (_TINTED - _CLEAR) * (1.0 - normals[:, 2].clip(0.0)) ** 1.5)[:, None]
     part = part * (1.0 - 0.25 * normals[:, 1:2])
-    return np.asarray((1.0 - part) + part * np.array(to_rgb(CAVITY)))
+    paper, tint = (np.array(to_rgb(colour)) for colour in backdrop())
+    return np.asarray((1.0 - part) * paper + part * tint)
 
 
 def _runs_of(seen: Floats, kept: NDArray[np.bool_]) -> list[Floats]:

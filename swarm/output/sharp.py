@@ -14,11 +14,12 @@ from ..motion import Pose, pose
 from ..state import Floats
 from ..surfaces import Cone, Torus
 from ..surfaces.facets.mesh import Mesh
+from ..surfaces.fields.many import Many
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
 from . import curves, given
-from .cut import Indices, Smooth, cut, found_in
+from .cut import MOST_BODIES, Indices, Smooth, cut, found_in
 from .parts import Cover, Part
 
 # Of the size of what is drawn, a step along edges of a mesh that others may cut.
@@ -126,9 +127,10 @@ def _pieces(placed: _Placed) -> Iterator[tuple[Any, Smooth]]:
         others = [other for other in walls if other is not wall][: 1 if upright else None]
         low, high = placed.low, placed.high
         for _ in range(_AGAIN):
-            points, triangles = _triangles(placed.part.surface, wall, low, high, placed.frame)
+            points, triangles = _triangles(placed, wall, low, high)
             covers = _near(placed, points)
-            found = cut(wall, points, triangles, placed.level(wall, covers, others))
+            bodies = sum(len(one.surface) for one in covers if isinstance(one.surface, Many))
+            found = cut(wall, points, triangles, placed.level(wall, covers, others), min(bodies, MOST_BODIES))
             if not len(found.points):
                 break
             seen = found.points @ placed.frame
@@ -206,13 +208,14 @@ def _in(frame: Floats, point: Any) -> Any:
     return tuple((frame.T @ np.array(point)).tolist())
 
 
-def _triangles(surface: Any, wall: Smooth, low: Floats, high: Floats, frame: Floats) -> tuple[Floats, Indices]:
+def _triangles(placed: _Placed, wall: Smooth, low: Floats, high: Floats) -> tuple[Floats, Indices]:
     """Triangles on a smooth wall in a box."""
+    surface, frame = placed.part.surface, placed.frame
     if isinstance(surface, Torus):
         return given.torus(surface)
     if isinstance(surface, Cone):
         return given.cone(surface, low, high, frame)
-    return found_in(wall, low, high, frame)
+    return found_in(wall, low, high, frame, any(isinstance(one.surface, Many) for one in placed.part.covers))
 
 
 def _turned_to(points: Floats, triangles: Indices, normals: Floats) -> NDArray[np.int64]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import matplotlib as mpl
 from matplotlib import style
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, to_rgb
 from matplotlib.figure import Figure
 
 from . import colours
@@ -17,10 +17,12 @@ from .colours import BLUE, CAVITY, CAVITY_LINE, CURVES, ENERGIES, GREEN, ORANGE,
 
 __all__ = [
     "BLUE", "CAVITY", "CAVITY_LINE", "CURVES", "ENERGIES", "GREEN", "GREY", "MAP", "ORANGE", "PINK", "RED", "SKY",
-    "SOLID", "SOLID_LINE", "Picture", "applied", "ink", "picture",
+    "SOLID", "SOLID_LINE", "Picture", "applied", "backdrop", "ink", "picture",
 ]  # fmt: skip
 # What only guides the eye: laws beside measurements, limits, bands.
 GREY = "#8A8A8A"
+# Walls of a cavity on a dark background.
+_CAVITY_IN_THE_DARK = "#3A4653"
 # Particles by their speed, or another number: from slow to fast.
 MAP = ListedColormap(colours.table(), name="swarm")
 
@@ -48,6 +50,12 @@ def applied(dark: bool = False) -> Iterator[None]:
 def picture(width: float, height: float) -> Picture:
     """An empty picture of this size [inches], to be drawn in `applied`."""
     return Picture(figsize=(width, height), layout="constrained")
+
+
+def backdrop() -> tuple[str, str]:
+    """The background of now, and the colour of the walls of a cavity on it: a light one would glare on a dark page."""
+    paper = str(mpl.rcParams["figure.facecolor"])
+    return paper, CAVITY if sum(to_rgb(paper)) > sum(to_rgb(CAVITY_LINE)) else _CAVITY_IN_THE_DARK
 
 
 def ink() -> str:

@@ -3,15 +3,19 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pages import Read
 
 import swarm
-from swarm.output import paths
+from swarm import summary
+from swarm.output import drawing, paths, style
 from swarm.output.page import html, pictures
+from swarm.output.shapes import shapes_of
 
 SCENE = """
 gravity = [0.0, 0.0, -9.81]
@@ -276,3 +280,33 @@ def test_very_many_frames_are_pixels(monkeypatch, folder):
     monkeypatch.setattr(pictures, "_LARGEST", 1000)
     read = Read(swarm.report(folder / "<b>run.h5").html)
     assert "svg" not in read.tags
+
+
+def test_a_picture_says_how_many_of_the_particles_it_draws(folder, monkeypatch):
+    assert "are drawn" not in swarm.report(folder / "<b>run.h5").html
+    monkeypatch.setattr(pictures, "_SHOWN", 7)
+    page = swarm.report(folder / "<b>run.h5").html
+    assert page.count(": 7 of 20 particles are drawn") == 2
+
+
+def test_the_impacts_a_second_are_named_by_what_they_count(page, folder):
+    """A page knows the wall time alone, compilation included; a run says how many there were in the rest of it."""
+    assert "impacts a second of it" in page.html
+    result = run(folder / "named.h5")
+    for compiling, end in ((0.0, " impacts/s"), (0.5 * result.wall_time, " impacts/s in the rest")):
+        told = summary.of_result(replace(result, compile_time=compiling), None)["wall time"]
+        assert told.endswith(end)
+
+
+def test_a_cavity_is_dark_on_a_dark_page():
+    """Its far side is of the colours of the background, not a white patch."""
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    for dark in (False, True):
+        with style.applied(dark):
+            figure = style.picture(2.0, 2.0)
+            axes = drawing.view(figure, None)
+            drawing.frame(axes, np.empty((0, 3)), np.empty(0, np.uint32), shapes_of(scene, np.zeros((3, 1))))
+            canvas = FigureCanvasAgg(figure)
+            canvas.draw()
+        middle = np.asarray(canvas.buffer_rgba())[100, 100, :3]
+        assert (middle < 90).all() if dark else (middle > 200).all()

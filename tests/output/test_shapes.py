@@ -71,6 +71,19 @@ def test_a_cone_is_drawn_with_its_tip(angle, axis, side):
     assert ((np.cross(b - a, c - a) * cone.normals[cone.triangles].sum(axis=1)).sum(axis=1) > -1e-12).all()
 
 
+def test_where_pegs_go_through_a_wall_their_outlines_are_circles():
+    """As many as Galton's board has, between the points of the coarse grid on a flat wall."""
+    places = np.stack(np.meshgrid(np.linspace(-0.4, 0.4, 9), [0.0], np.linspace(-0.4, 0.4, 9)), axis=-1).reshape(-1, 3)
+    pegs = swarm.Cylinders(places, 0.02, axes=(0.0, 1.0, 0.0))
+    box = shapes_of(swarm.Scene([swarm.Box((0.5, 0.05, 0.5)), pegs]), NOWHERE)[0]
+    rims = [edge for edge in box.edges if np.abs(edge[:, [0, 2]]).max() < 0.45]
+    assert len(rims) == 2 * 81
+    for rim in rims:
+        middle = 0.5 * (rim.min(axis=0) + rim.max(axis=0))
+        assert np.hypot(*(rim - middle)[:, [0, 2]].T) == pytest.approx(0.02, rel=0.05)
+        assert len(rim) > 10
+
+
 def test_where_a_wall_is_open_nothing_is_drawn():
     hole = swarm.Sphere(0.3, (0.0, 0.0, 0.5))
     (shape,) = shapes_of(swarm.Scene([swarm.Sphere(0.5, openings=[hole])]), NOWHERE)

@@ -12,8 +12,9 @@ from matplotlib import rc_context
 from matplotlib.text import Text
 
 from .. import plots, style
-from ..amounts import amount
+from ..amounts import amount, many
 from ..content import Content
+from ..drawn import Drawn as Chosen
 from ..shape import Shape
 from ..shapes import shapes_of
 
@@ -40,8 +41,16 @@ def of_places(content: Content) -> list[Drawn]:
         if name in content.frames:
             moment = amount(float(times[k]), "s")
             picture = _png(lambda dark, name=name, k=k: _placed(content, name, k, dark), f"particles at {moment}")
-            found.append(Drawn(picture, f"At the {name}, {moment}"))
+            found.append(Drawn(picture, f"At the {name}, {moment}{_how_many(content, name)}"))
     return found
+
+
+def _how_many(content: Content, name: str) -> str:
+    """How many of the particles, or bodies, of a frame are drawn, where that is not all."""
+    drawn = Chosen(len(content.frames[name]), content.body, _SHOWN)
+    if drawn.shown == drawn.count:
+        return ""
+    return f": {many(drawn.shown)} of {many(drawn.count)} {drawn.noun} are drawn"
 
 
 def _placed(content: Content, name: str, k: int, dark: bool) -> Any:

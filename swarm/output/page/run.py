@@ -132,7 +132,7 @@ def _speed(content: Content, spent: float | None, threads: int | None) -> list[t
     events = float(content.seen["impacts"][-1]) + float(content.seen.get("collisions", [0.0])[-1])
     rows = [("wall time", f"{amount(spent, 's', 3)}, compilation included")]
     if events and spent > 0.0:
-        rows.append(("impacts a second", many(float(f"{events / spent:.3g}"))))
+        rows.append(("impacts a second of it", many(float(f"{events / spent:.3g}"))))
     return rows + ([] if threads is None else [("threads", str(threads))])
 
 

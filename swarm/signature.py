@@ -1,0 +1,62 @@
+"""Signatures that `help` shows in lines of a terminal: a parameter each, with the short names of types."""
+
+import inspect
+import re
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from numpy.typing import ArrayLike
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+# The columns of a terminal; the modules of a type, before its name.
+_COLUMNS, _MODULES = 80, re.compile(r"\b(?:\w+\.)+(?=[A-Za-z])")
+# What NumPy's name of all that becomes an array stands for: a line of 300 characters.
+_ARRAY = inspect.formatannotation(ArrayLike)
+
+
+class Lined(inspect.Signature):
+    """A signature whose text has a line for each parameter where one line would be too long."""
+
+    def __str__(self) -> str:
+        return self.format()
+
+    def format(self, *, max_width: int | None = None, **_more: Any) -> str:
+        """The text; a line is as wide as a terminal, or as `max_width`, for which Python 3.13 asks."""
+        returned = _short(str(inspect.Signature(return_annotation=self.return_annotation)))[2:]
+        parts: list[str] = []
+        named = False
+        for parameter in self.parameters.values():
+            if parameter.kind is parameter.KEYWORD_ONLY and not named:
+                parts.append("*")
+            named |= parameter.kind in (parameter.KEYWORD_ONLY, parameter.VAR_POSITIONAL)
+            parts.append(_short(str(parameter)))
+        line = f"({', '.join(parts)}){returned}"
+        if len(line) <= (max_width or _COLUMNS):
+            return line
+        return "".join(["(\n", *(f"    {part},\n" for part in parts), ")", returned])
+
+
+def _short(text: str) -> str:
+    """The text of an annotation without modules, and with the names that stand for long ones."""
+    inner = _ARRAY.removeprefix("typing.").removeprefix("Union[").removesuffix("]")
+    for end, name in ((", NoneType]", "ArrayLike | None"), ("]", "ArrayLike")):
+        text = text.replace(f"Union[{inner}{end}", name)
+    return _MODULES.sub("", text.replace(f"{_ARRAY} | None", "ArrayLike | None").replace(_ARRAY, "ArrayLike"))
+
+
+def lined(function: Function) -> Function:
+    """A function whose signature is shown in lines.
+
+    >>> @lined
+    ... def function(first: Callable[[int], str] | None = None, *, second: str = "none", third: float = 0.5): ...
+    >>> print(inspect.signature(function))
+    (
+        first: Callable[[int], str] | None = None,
+        *,
+        second: str = 'none',
+        third: float = 0.5,
+    )
+    """
+    function.__signature__ = Lined.from_callable(function)  # type: ignore[attr-defined]
+    return function

@@ -1,0 +1,40 @@
+"""What `help` shows first: signatures of public functions in the lines of a terminal."""
+
+import inspect
+import pydoc
+
+import pytest
+
+import swarm
+
+LINED = ["contact_history", "fill", "pack", "rigid", "simulate", "sweep"]
+
+
+@pytest.mark.parametrize("name", LINED)
+def test_help_begins_with_lines_as_wide_as_a_terminal(name):
+    function = getattr(swarm, name)
+    lines = pydoc.plain(pydoc.render_doc(function)).splitlines()
+    assert max(map(len, lines[: len(inspect.signature(function).parameters) + 5])) <= 80
+
+
+@pytest.mark.parametrize("name", LINED)
+def test_the_signature_holds_every_name_and_default(name):
+    function = getattr(swarm, name)
+    shown, plain = inspect.signature(function), inspect.Signature.from_callable(inspect.unwrap(function))
+    code = function.__code__
+    names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+    assert tuple(shown.parameters) == names
+    assert shown.parameters == plain.parameters
+    defaults = dict(
+        zip(names[code.co_argcount - len(function.__defaults__ or ()) :], function.__defaults__ or (), strict=False)
+    )
+    for key, value in (defaults | (function.__kwdefaults__ or {})).items():
+        assert shown.parameters[key].default is value
+    assert shown.return_annotation == function.__annotations__["return"]
+    for key in names:
+        assert key in str(shown)
+
+
+def test_arguments_are_bound_as_before():
+    bound = inspect.signature(swarm.fill).bind("scene", 3, speed=1.0)
+    assert bound.arguments == {"scene": "scene", "n": 3, "speed": 1.0}
