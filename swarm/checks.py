@@ -1,12 +1,15 @@
 """Checks of arguments: each returns the value in its final type or raises a `SceneError` that names it."""
 
 import difflib
+import errno
 import functools
 import itertools
 import math
 import operator
+import os
 import re
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -168,6 +171,32 @@ def duration(name: str, value: str) -> float:
     if not known or not re.fullmatch(r"(\d+\.?\d*\s*[a-z]*\s*)+", value):
         raise SceneError(f'{name} must be a time such as "2h", "1h30m" or "90s", got {value!r}')
     return positive(name, sum(float(number) * _SECONDS[unit] for number, unit in parts))
+
+
+def path_of(name: str, value: Any) -> Path:
+    """The argument `name` as the path of a file.
+
+    Raises:
+        SceneError: it is not a path, it is empty, or it is too long for the system.
+    """
+    text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else value
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise SceneError(f"{name} must be the path of a file, got {shown(text)}")
+    path = Path(text)
+    require_short(name, path, path)
+    return path
+
+
+def require_short(name: str, path: Path, longest: Path) -> None:
+    """Raise a `SceneError` if the system finds the name of a file too long."""
+    try:
+        os.lstat(longest)
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise SceneError(
+                f"{name} must be the path of a file, got one of {len(str(path))} characters, which is too long for "
+                f"this system, {path!s:.40}...; choose a shorter name"
+            ) from None
 
 
 def flag(name: str, value: Any) -> bool:

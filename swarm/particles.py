@@ -95,7 +95,7 @@ class Particles:
         """
         there = ~np.isnan(self.position[0])
         held = {name: getattr(self, name) for name in ("position", "velocity", "mass", "image", "radius", "spin")}
-        some = {name: None if rows is None else rows[..., there] for name, rows in held.items()}
+        some: dict[str, Any] = {name: None if rows is None else rows[..., there] for name, rows in held.items()}
         if there.any():
             return Particles(**some)
         made = object.__new__(Particles)

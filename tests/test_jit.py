@@ -500,7 +500,8 @@ LAYERS = [
     ["snapshot"],
     ["checks", "columns", "notebook"],
     ["extras"],
-    ["state", "status", "errors", "version", "interrupt"],
+    ["links"],
+    ["state", "status", "errors", "version", "interrupt", "signature"],
 ]
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 

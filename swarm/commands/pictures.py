@@ -98,7 +98,8 @@ def _picture(output: Path, source: Path) -> Path:
 
     A picture of swarm is cheap to draw again, so it is replaced without an option.
     """
-    from ..output.paths import check_distinct, check_target, target_of
+    from ..output.marks import check_target
+    from ..output.paths import check_distinct, target_of
 
     target = target_of("picture", output)
     if target.suffix.lower() not in (".png", ".pdf", ".svg"):

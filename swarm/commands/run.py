@@ -137,7 +137,7 @@ def _check_outputs(job: "Job", options: "RunOptions", alone: list[str]) -> None:
 
     What the scene file names alone is not overwritten: --overwrite is meant for files of the command line.
     """
-    from ..output import paths
+    from ..output import marks, paths
     from ..scene_file import OUTPUTS
 
     paths.check_distinct({**options.files(), "recording": options.recording}, job.inputs())
@@ -150,9 +150,9 @@ def _check_outputs(job: "Job", options: "RunOptions", alone: list[str]) -> None:
             paths.check_place(file, name)  # the session reads what is there
         elif name in alone:
             allow = f"overwrite it by naming it on the command line: {option} {file} --overwrite"
-            paths.check_target(file, False, name, allow)
+            marks.check_target(file, False, name, allow)
         else:
-            paths.check_target(file, options.overwrite, name)
+            marks.check_target(file, options.overwrite, name)
 
 
 def _stopped(reason: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:

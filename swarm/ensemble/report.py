@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from ..checks import flag
+from ..checks import flag, path_of
 from ..extras import needed_by
-from ..output import paths
 
 if TYPE_CHECKING:
     from ..output.page.html import Page
@@ -47,11 +46,11 @@ def report(
     >>> page.title
     '1 particle in a sphere: Impact, 1 s'
     """
-    source = paths.given("path", path)
+    source = path_of("path", path)
     flag("overwrite", overwrite)
     if output is None:
         return page_of(source, None)
-    target = checked(source, paths.given("output", output), overwrite)
+    target = checked(source, path_of("output", output), overwrite)
     page = page_of(source, target)
     page.save(target, overwrite=overwrite)
     return page

@@ -80,13 +80,13 @@ class Results:
         """Raise a SceneError if a file that the sweep is to replace is none of a sweep."""
         for path, what in ((self.path, "table"), (self.folder / KEPT, "sweep file")):
             if path.exists() and not (what == "sweep file" and self._is_kept(path)):
-                paths.require_own(path, what)
+                marks.require_own(path, what)
         for variant in self.plan.variants:
             for file, what in ((self.trajectory(variant), "trajectory"), (self.impacts(variant), "impacts")):
                 if file is not None and file.exists():
-                    paths.require_own(file, what)
+                    marks.require_own(file, what)
             if (file := self.status_file(variant)).exists() and not _is_status(file):
-                paths.require_own(file, "status")
+                marks.require_own(file, "status")
 
     def _is_kept(self, path: Path) -> bool:
         """Whether a sweep file in the folder is that of the plan, or one that a sweep in this folder has left."""

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import checks, interrupt
+from ..checks import path_of
 from ..errors import FileError, SceneError
 from ..extras import needed_by
-from ..output import paths
 from ..output.lock import only_writer
 from ..plugins import checked_modules
 from ..run.options import cores
@@ -130,8 +130,8 @@ def carry_out(path: str | os.PathLike[str], options: SweepOptions) -> Outcome:
     """Carry out a sweep; an interrupt or the wall time limit ends it with its table written."""
     began = time.monotonic()
     require_written(options.table)
-    source = paths.given("path", path)
-    folder = Path(source.stem) if options.folder is None else paths.given("folder", options.folder)
+    source = path_of("path", path)
+    folder = Path(source.stem) if options.folder is None else path_of("folder", options.folder)
     plan = read(source, options.plugins)
     results = Results(plan, folder, options.table)
     _require_free(results, options)

@@ -14,7 +14,7 @@ from typing import Any
 from .. import checks
 from ..errors import SceneError
 from ..extras import needed_by
-from . import paths
+from . import marks, paths
 from .exported import Exported, Progress, numbers_of
 from .replaced import together
 from .solids import is_many
@@ -66,7 +66,7 @@ def export(
             from . import walls  # noqa: F401  what is missing is found before anything is written
     for one in (*targets, *stale):
         paths.check_distinct({"export": one}, {"trajectory": trajectory.path})
-        paths.check_target(one, overwrite, "export")
+        marks.check_target(one, overwrite, "export")
     with together(target, targets, stale) as parts:
         if kind == ".obj":
             form.write_objects(trajectory, number, *parts)

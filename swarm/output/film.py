@@ -18,7 +18,7 @@ from .. import checks
 from ..errors import FileError, SceneError
 from ..plane import shown_as
 from ..state import Floats
-from . import colours, drawing, flat, framed, paths, style
+from . import colours, drawing, flat, framed, marks, paths, style
 from .amounts import many
 from .drawn import Drawn
 from .gone import gone_at, without
@@ -62,7 +62,7 @@ def animate(trajectory: Any, path: Any, frames: int, fps: float, size: Any, part
     target = paths.target_of("animate", path)
     if target.suffix.lower() not in _SUFFIXES:
         raise SceneError(f"animate: expected a file name that ends in {' or '.join(_SUFFIXES)}, got {path}")
-    paths.check_target(target, overwrite, "film")
+    marks.check_target(target, overwrite, "film")
     paths.check_distinct({"film": target}, {"trajectory": trajectory.path})
     most, rate = checks.count("frames", frames), checks.positive("fps", fps)
     pixels = pixels_of(size)

@@ -23,6 +23,8 @@ _ELEMENTS: dict[str, tuple[str, tuple[int, ...]]] = {
     ABSORBED: (_REAL, ()), COLLISIONS: (_INTEGER, ()), SPINS: (_REAL, (3,)),
 }  # fmt: skip
 KEPT = tuple(_ELEMENTS)
+# Those whose values may be in shards.
+JOINED = tuple(f"particles/all/{name}/value" for name in KEPT)
 # Of each particle of a run with sources: when it came [s], and the number of its source, -1 of those of the start.
 BIRTHS = "birth_time", "birth_source"
 # Long arrays of the scene, by their digests.

@@ -5,8 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from ..checks import flag
+from ..errors import SceneError
 from ..version import VERSION
+from . import paths
 
+_ALLOW = "overwrite it (--overwrite, overwrite=True)"
 # Bytes at the beginning of a file in which its mark is.
 _HEAD = 4096
 # The entry of the metadata of a picture that names the program that drew it, by the suffix.
@@ -19,6 +23,37 @@ _COLUMNS_OF_TABLE = {"file", "state", "error", "wall_time"}
 def of_picture(path: Path) -> dict[str, Any]:
     """The metadata by which a picture, of a suffix that matplotlib writes, is known as one of swarm."""
     return {_DRAWN_BY[path.suffix.lower()]: f"{_PROGRAM} {VERSION}"}
+
+
+def check_target(path: Path, overwrite: bool, what: str = "trajectory", allow: str = _ALLOW) -> None:
+    """Raise a SceneError if `path` cannot become a new file, or replace the one that is there.
+
+    A file is replaced only by one of its own kind, which its content says.
+
+    Args:
+        path: the file.
+        overwrite: whether an existing file may be replaced.
+        what: the output; its kind is one of `_KINDS` or, by its suffix, of `_FORMATS`.
+        allow: how an existing file may be replaced, for the sentence.
+    """
+    overwrite = flag("overwrite", overwrite)
+    paths.check_place(path, what)
+    if path.exists() and not overwrite:
+        stopped = what == "trajectory" and paths.checkpoint_of(path).exists()
+        on = ", or go on with it, which was stopped (--resume, resume=True)" if stopped else ""
+        raise SceneError(f"{what}: {path} exists; choose another name, or {allow}{on}")
+    if path.exists():
+        require_own(path, what)
+
+
+def require_own(path: Path, what: str) -> None:
+    """Raise a SceneError if the file at `path` is not of the kind that `what` replaces."""
+    kind = why_not(path, what)
+    if kind is not None:
+        raise SceneError(
+            f"{what}: {path} is not {kind}, and only such a file is overwritten; choose another name, or move that "
+            "file away"
+        )
 
 
 def why_not(path: Path, what: str) -> str | None:
@@ -66,7 +101,6 @@ def _is_log(path: Path) -> bool:
 
 def _of_hdf5(path: Path, holds: Callable[[Any], bool], name: bytes) -> bool:
     """Whether an HDF5 file holds what it should; of a damaged one its beginning must have the names of its parts."""
-    from ..errors import SceneError
     from .sources import DAMAGE, DamagedError
     from .stored import open_stored
 

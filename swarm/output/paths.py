@@ -1,33 +1,16 @@
 """Names of the files of a run, and checks that a path can become a file."""
 
-import errno
 import os
 import stat
 from pathlib import Path
 from typing import Any
 
-from ..checks import flag, shown
+from ..checks import path_of, require_short
 from ..errors import SceneError
+from ..links import SHARDS
 
 # Part of the names of temporary files, which no other program uses.
 _OURS = "swarm-"
-# Of the folder of shards.
-SHARDS = ".shards"
-_ALLOW = "overwrite it (--overwrite, overwrite=True)"
-
-
-def given(name: str, value: Any) -> Path:
-    """The argument `name` as the path of a file.
-
-    Raises:
-        SceneError: it is not a path, or it is empty.
-    """
-    text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else value
-    if not isinstance(text, str) or not text or "\0" in text:
-        raise SceneError(f"{name} must be the path of a file, got {shown(text)}")
-    path = Path(text)
-    _require_short(name, path, path)
-    return path
 
 
 def target_of(name: str, value: Any) -> Path:
@@ -36,7 +19,7 @@ def target_of(name: str, value: Any) -> Path:
     Raises:
         SceneError: it is not a path.
     """
-    path = given(name, value)
+    path = path_of(name, value)
     return path.resolve() if path.is_symlink() else path
 
 
@@ -47,20 +30,8 @@ def target_of_run(name: str, value: Any) -> Path:
         SceneError: it is not a path, or a name is too long for the system.
     """
     path = target_of(name, value)
-    _require_short(name, path, part_of(checkpoint_of(path)))
+    require_short(name, path, part_of(checkpoint_of(path)))
     return path
-
-
-def _require_short(name: str, path: Path, longest: Path) -> None:
-    """Raise a SceneError if the system finds the name of a file too long."""
-    try:
-        os.lstat(longest)
-    except OSError as error:
-        if error.errno == errno.ENAMETOOLONG:
-            raise SceneError(
-                f"{name} must be the path of a file, got one of {len(str(path))} characters, which is too long for "
-                f"this system, {path!s:.40}...; choose a shorter name"
-            ) from None
 
 
 def checkpoint_of(trajectory: Path) -> Path:
@@ -105,27 +76,6 @@ def identity(path: Path) -> tuple[int, int] | None:
     return status.st_dev, status.st_ino
 
 
-def check_target(path: Path, overwrite: bool, what: str = "trajectory", allow: str = _ALLOW) -> None:
-    """Raise a SceneError if `path` cannot become a new file, or replace the one that is there.
-
-    A file is replaced only by one of its own kind, which its content says.
-
-    Args:
-        path: the file.
-        overwrite: whether an existing file may be replaced.
-        what: the output; `marks` knows the kind of each.
-        allow: how an existing file may be replaced, for the sentence.
-    """
-    overwrite = flag("overwrite", overwrite)
-    check_place(path, what)
-    if path.exists() and not overwrite:
-        stopped = what == "trajectory" and checkpoint_of(path).exists()
-        on = ", or go on with it, which was stopped (--resume, resume=True)" if stopped else ""
-        raise SceneError(f"{what}: {path} exists; choose another name, or {allow}{on}")
-    if path.exists():
-        require_own(path, what)
-
-
 def check_place(path: Path, what: str) -> None:
     """Raise a SceneError if no file can be at `path`: its folder is not there, or something else is."""
     try:
@@ -140,18 +90,6 @@ def check_place(path: Path, what: str) -> None:
         raise SceneError(f"{what}: expected a file name, got the folder {path}")
     if not stat.S_ISREG(there.st_mode):
         raise SceneError(f"{what}: expected a file name, got {path}, which is a device or a pipe")
-
-
-def require_own(path: Path, what: str) -> None:
-    """Raise a SceneError if the file at `path` is not of the kind that `what` replaces."""
-    from . import marks
-
-    kind = marks.why_not(path, what)
-    if kind is not None:
-        raise SceneError(
-            f"{what}: {path} is not {kind}, and only such a file is overwritten; choose another name, or move that "
-            "file away"
-        )
 
 
 def check_distinct(outputs: dict[str, Path | None], inputs: dict[str, Path | None]) -> None:

@@ -34,7 +34,7 @@ from ..errors import FileError, SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
-from . import about, colours, instanced, looks, paths, series, sight, solids, viewer
+from . import about, colours, instanced, looks, marks, series, sight, solids, viewer
 from .content import Content
 from .drawn import Drawn
 from .origin import origin_of
@@ -95,7 +95,7 @@ class RecordingWriter:
         body: Body | None = None,
     ) -> None:
         if path is not None:
-            paths.check_target(path, overwrite, "recording")
+            marks.check_target(path, overwrite, "recording")
             # Asked first: a sink of Rerun that fails writes lines of its own.
             if not os.access(path if path.exists() else path.parent, os.W_OK):
                 raise FileError(f"cannot write the recording {path}: no permission")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileError, SceneError
-from . import film, paths
+from . import film, marks, paths
 
 # Notebooks with more base64 than this hang when they are opened, saved or scrolled.
 _MOST = 30_000_000
@@ -66,7 +66,7 @@ class Film:
                 f"save: this film is {'a' if self.suffix == '.gif' else 'an'} {self.suffix}, expected a file name "
                 f"that ends so, got {path}; trajectory.animate writes the other kind"
             )
-        paths.check_target(target, overwrite, "film")
+        marks.check_target(target, overwrite, "film")
         part = paths.part_of(target)
         try:
             part.write_bytes(self.content)

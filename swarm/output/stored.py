@@ -13,12 +13,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import plugins, run_tables, tables
+from .. import links, plugins, run_tables, tables
+from ..checks import path_of
 from ..errors import SceneError
 from ..methods import Method
 from ..scene import Scene
 from ..surfaces.counter import Counter
-from . import driver, layout, links, paths, superblock
+from . import driver, layout, superblock
 from .checksums import Checked
 from .sources import DAMAGE, DamagedError, reason, require_file
 
@@ -29,7 +30,7 @@ class Stored:
     """A file on disk, a context that closes it; `what` it should be and the function that opens it are for errors."""
 
     def __init__(self, path: str | Path, what: str, opener: str) -> None:
-        self.path, self._opener = paths.given("path", path), opener
+        self.path, self._opener = path_of("path", path), opener
         require_file(self.path, what)
         self._file = open_stored(self.path)
 
@@ -152,7 +153,7 @@ def open_stored(path: Path) -> h5py.File:
     try:
         layout.require_heaps(path)
         what = "its structure"
-        links.require_none(file, path, shards=True)
+        links.require_none(file, path, layout.JOINED)
     except SceneError:
         file.close()
         raise

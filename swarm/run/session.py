@@ -14,7 +14,7 @@ from .. import run_tables
 from ..errors import CompleteError, SceneError, WallTimeError
 from ..frames import FrameTimes
 from ..kernel.cache import Spent
-from ..output import checkpoint, paths
+from ..output import checkpoint, marks, paths
 from ..output.lock import only_writer
 from ..version import VERSION
 from .base import BaseRun
@@ -127,7 +127,7 @@ class Session:
         if self._resumes and (not overwrite or self._path.exists()):
             paths.check_place(path, what)  # it goes on in the file, which it reads first
         else:
-            paths.check_target(path, overwrite, what)
+            marks.check_target(path, overwrite, what)
 
     def _find_log(self, path: Path, overwrite: bool) -> None:
         """Raise a SceneError if the log of impacts is none to go on with, or to begin anew."""

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from ...checks import flag
 from ...errors import SceneError
 from ...version import VERSION
-from .. import paths
+from .. import marks, paths
 from ..replaced import replaced
 
 _HERE = Path(__file__).parent
@@ -65,7 +65,7 @@ def checked_target(path: Any, overwrite: bool, sources: tuple[Path, ...]) -> Pat
     if target.suffix.lower() not in _SUFFIXES:
         raise SceneError(f"report: expected a file name that ends in .html, got {target}")
     paths.check_distinct({"report": target}, dict.fromkeys(("file that it is of", "file"), None) | _named(sources))
-    paths.check_target(target, overwrite, "report")
+    marks.check_target(target, overwrite, "report")
     return target
 
 

@@ -58,7 +58,7 @@ def _of_npy(path: Path) -> Floats:
 def _of_hdf5(path: Path) -> Floats:
     import h5py
 
-    from ...output import links
+    from ... import links
 
     with h5py.File(path, "r") as file:
         links.require_none(file, path)

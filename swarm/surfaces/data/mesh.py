@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from ... import checks
+from ...checks import path_of
 from ...errors import SceneError
 from ...extras import needed_by
-from ...output import paths
 from . import triangles
 from .mesh_files import Floats
 from .sampled import Sampled
@@ -65,7 +65,7 @@ def from_mesh(
     spacing, scale = checks.length("spacing", spacing), checks.length("scale", scale)
     if weld is not None:
         weld = checks.magnitude("weld", weld)
-    mesh = triangles.read_mesh(paths.given("path", path), scale, weld)
+    mesh = triangles.read_mesh(path_of("path", path), scale, weld)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     counts = np.ceil((high - low) / spacing) + 2.0 * _MARGIN + 1.0
     size = float(counts.prod()) * _SAMPLE

@@ -1,31 +1,31 @@
 """Links of an HDF5 file to other files, which who reads it would open unasked: all are refused but those to shards."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
+from .errors import SceneError
 
-from ..errors import SceneError
-from .layout import KEPT
-from .paths import SHARDS
-
+# Of the folder of the shards of a trajectory.
+SHARDS = ".shards"
 # The file of a shard as the trajectory of all names it, in the folder beside it.
 _SHARD = re.compile(rf"[^/\\:]+{re.escape(SHARDS)}/\d{{4,}}\.h5")
-_JOINED = tuple(f"particles/all/{name}/value" for name in KEPT)
 
 
-def require_none(file: h5py.File, path: Path, shards: bool = False) -> None:
+def require_none(file: Any, path: Path, joined: Sequence[str] = ()) -> None:
     """Raise a SceneError if a part of a file is in another file.
 
     Args:
         file: the file, open.
         path: its path, for the sentence.
-        shards: True where the particles of a trajectory may be in its shards.
+        joined: the datasets whose values may be in the shards of a trajectory.
 
     Raises:
         SceneError: it has an external link, external storage, or a virtual dataset of another file.
     """
+    import h5py
+
     found: list[str] = []
 
     def look_at_link(name: bytes, info: Any) -> bool | None:
@@ -38,8 +38,7 @@ def require_none(file: h5py.File, path: Path, shards: bool = False) -> None:
             if one.external is not None:
                 found.append(f"{name}, whose values are in {one.external[0][0]!r:.200}")
             elif one.is_virtual:
-                of_shards = shards and name in _JOINED
-                wrong = (source.file_name for source in one.virtual_sources() if not _is_within(source, of_shards))
+                wrong = (source.file_name for source in one.virtual_sources() if not _is_within(source, name in joined))
                 found.extend(f"{name}, whose values are in {source!r:.200}" for source in list(wrong)[:1])
         return True if found else None
 
