@@ -15,6 +15,7 @@ from . import (
     contacts,
     endurance,
     fields,
+    grains,
     laws,
     meshes,
     motion,
@@ -65,6 +66,7 @@ def main() -> None:
     commands.add_parser("laws", help="laws of walls: what an impact costs under each, the books, first calls")
     commands.add_parser("unions", help="vessels of several parts: what an impact costs beside one of them, first calls")
     commands.add_parser("collisions", help="balls that meet: what a collision costs, memory, first calls, how exact")
+    commands.add_parser("grains", help="soft balls: what a grain and step costs, at rest and as they fall, how exact")
     commands.add_parser("meshes", help="meshes of triangles: the scene, its memory, an impact, the first call")
     first = commands.add_parser("compile", help="first calls: processor time, functions compiled, and the next process")
     first.add_argument(
@@ -110,6 +112,7 @@ def main() -> None:
         "sweep": sweeps,
         "cluster": cluster,
         "collisions": collisions,
+        "grains": grains,
         "endurance": endurance,
     }
     if not arguments.quick:

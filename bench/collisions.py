@@ -13,7 +13,6 @@ from swarm.run.colliding import CollidingRun
 from swarm.run.state import Seeding
 from swarm.run.tally import Watched
 
-from . import grains
 from .report import Row, child, in_turn, show, write
 
 # (name, balls, packing, whether the cell repeats, the microseconds that a collision may take)
@@ -139,7 +138,6 @@ def main(quick: bool = False) -> None:
         with tempfile.TemporaryDirectory() as folder:
             cold = [float(child(_COLD, NUMBA_CACHE_DIR=f"{folder}/{k}")) for k in range(3)]
         rows.append(Row("first call, a box", min(cold), sorted(cold)[1], "s", "3"))
-    rows += grains.rows(quick)
     show(rows)
     if not quick:
         write(rows, "collisions")

@@ -6,7 +6,7 @@ import numpy as np
 
 import swarm
 
-from .report import Row, repeated
+from .report import Row, repeated, show, write
 
 G, DIAMETER = 9.81, 0.01
 MASS = 2500.0 * np.pi / 6.0 * DIAMETER**3
@@ -110,6 +110,9 @@ def impact(quick: bool) -> list[Row]:
     ]
 
 
-def rows(quick: bool) -> list[Row]:
-    """All of it."""
-    return [row for part in (impact, exactness, speed) for row in part(quick)]
+def main(quick: bool = False) -> None:
+    """Measure and report."""
+    rows = [row for part in (impact, exactness, speed) for row in part(quick)]
+    show(rows)
+    if not quick:
+        write(rows, "grains")

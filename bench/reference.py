@@ -228,12 +228,12 @@ def soft(particles: swarm.Particles, times: list[float]) -> dict[str, NDArray]:
     return {f"{SOFT}/{key}": values for key, values in {**known, "end": np.array(ends)}.items()}
 
 
-def main(path: Path) -> None:
-    """Write the file."""
+def main(path: Path, quick: bool = False) -> None:
+    """Write the file; `quick`: a particle for the shortest time, and nothing is written."""
     values = {}
     for name, scene in SCENES.items():
-        particles = swarm.fill(scene, PARTICLES, speed=SPEED, seed=5)
-        times = times_of(scene, particles)
+        particles = swarm.fill(scene, 1 if quick else PARTICLES, speed=SPEED, seed=5)
+        times = times_of(scene, particles)[: 1 if quick else None]
         ends = [fly(scene, r, v, times) for r, v in zip(particles.position.T, particles.velocity.T, strict=True)]
         values[f"{name}/position"], values[f"{name}/velocity"] = particles.position, particles.velocity
         values[f"{name}/times"] = np.array(times)
@@ -241,6 +241,8 @@ def main(path: Path) -> None:
         print(f"{name}: {times} s, {np.mean([impacts for _end, impacts in ends]):.1f} impacts each")
         if name == "sphere":
             values |= soft(particles, times)
+    if quick:
+        return
     path.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(path, **values)
     print(f"written to {path}")
@@ -249,4 +251,6 @@ def main(path: Path) -> None:
 if __name__ == "__main__":
     ask = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     ask.add_argument("-o", metavar="FILE", type=Path, default=OUT / PATH.name, help="default: %(default)s")
-    main(ask.parse_args().o)
+    ask.add_argument("--quick", action="store_true", help="to see that it runs; nothing is written")
+    given = ask.parse_args()
+    main(given.o, given.quick)

@@ -54,7 +54,7 @@ EPSILON = float(np.finfo(np.float64).eps)
 
 def pytest_ignore_collect(collection_path, config):
     """Files of the long ring take seconds to import: not where `-m` is as in pyproject.toml and no file is named."""
-    is_long = collection_path.name == "long" and config.option.markexpr == "not long"
+    is_long = collection_path.name == "long" and config.option.markexpr == "not long and not slow"
     return True if is_long and not any("long" in argument for argument in config.args) else None
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 import runpy
 import subprocess
@@ -19,15 +20,17 @@ from swarm.kernel import cache
 pytestmark = pytest.mark.physics
 
 
+ROOT = Path(__file__).parents[1]
+
+
 def printed(name):
-    """What `python -m bench NAME --quick` prints."""
-    root = Path(__file__).parents[1]
-    done = python("-m", "bench", name, "--quick", cwd=root, timeout=3600)
+    """What `python -m bench NAME --quick` prints; nothing is timed, so LLVM does the least."""
+    module = ("bench", name) if name != "reference" else ("bench.reference",)
+    done = python("-m", *module, "--quick", cwd=ROOT, timeout=3600, env={**os.environ, "NUMBA_OPT": "0"})
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
-@pytest.mark.long
 def test_throughput_quick():
     told = printed("throughput")
     for row in (
@@ -42,7 +45,6 @@ def test_throughput_quick():
         assert row in told
 
 
-@pytest.mark.long
 def test_peers_quick():
     """None of them is installed where the tests run: a sentence says so, and how to get it."""
     told = printed("peers")
@@ -52,7 +54,6 @@ def test_peers_quick():
     assert "plain Verlet in Numba" in told
 
 
-@pytest.mark.long
 def test_bars_quick():
     told = printed("bars")
     for row in (
@@ -66,49 +67,44 @@ def test_bars_quick():
         assert row in told
 
 
-@pytest.mark.long
 def test_order_quick():
     told = printed("order")
     assert re.search(r"^sphere +Impact, centred .* exact ", told, re.MULTILINE)
     assert re.search(r"^torus +AugmentedLagrangian, centred .* [12]\.\d+ ", told, re.MULTILINE)
 
 
-@pytest.mark.long
 def test_scenes_quick():
     told = printed("scenes")
     assert "capped cylinder" in told
     assert "formula of the ellipsoid" in told
 
 
-@pytest.mark.long
 def test_plane_quick():
     told = printed("plane")
     assert "circle" in told
     assert "stadium" in told
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_contacts_quick():
     told = printed("contacts")
     for row in ("cone with a lid", "hopper, friction 0.4", "mass ratio 100^2", "composed step, ellipsoid, 2 threads"):
         assert row in told
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_bodies_quick():
     told = printed("bodies")
     for row in ("chain of ten, a step, two threads", "tetrahedron in a sphere, link error"):
         assert row in told
 
 
-@pytest.mark.long
 def test_accuracy_quick():
     told = printed("accuracy")
     assert "sphere: Choose Impact" in told
     assert "distance <= 1e-06 (bar: Impact takes 1/1000 of plain Verlet in Numba): " in told
 
 
-@pytest.mark.long
 def test_stability_quick():
     told = printed("stability")
     assert "stiffness: Penalty: energy within 1e-12 in 3 of 3 cells" in told
@@ -125,6 +121,38 @@ def test_endurance_quick():
     told = printed("endurance")
     for row in ("checkpoint of 1000 particles", "memory grown", "a particle's path"):
         assert row in told
+
+
+@pytest.mark.slow
+def test_grains_quick():
+    told = printed("grains")
+    for row in ("Hertz, gap after the contact", "500 rough, mu = 0.5 grains that fall", "  at rest, a grain and step"):
+        assert row in told
+
+
+@pytest.mark.slow
+def test_meshes_quick():
+    assert "triangles" in printed("meshes")
+
+
+@pytest.mark.slow
+def test_cluster_quick():
+    assert "two workers of one thread" in printed("cluster")
+
+
+def test_reference_quick():
+    assert "sphere: [" in printed("reference")
+
+
+# It reads tables, and has no --quick; its tests are below.
+READ_TABLES = {"compare"}
+
+
+def test_every_command_of_the_readme_runs():
+    told = re.findall(r"^\| `python -m bench[ .](\w+)", (ROOT / "bench" / "README.md").read_text(), re.MULTILINE)
+    tested = {name.removeprefix("test_").removesuffix("_quick") for name in globals() if name.endswith("_quick")}
+    assert len(told) > 20
+    assert set(told) == tested | READ_TABLES
 
 
 def table(path, **rows):
@@ -178,42 +206,42 @@ def test_what_others_took_is_told(monkeypatch):
     assert "an unknown part" in report.told_of_others((100, 1000))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_motion_quick():
     told = printed("motion")
     for row in ("piston, T V^(2/3) - 1", "heavy piston, impacts", "Galperin, 100^4 kg", "box oscillating, an impact"):
         assert row in told
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_fields_quick():
     told = printed("fields")
     for row in ("27 balls, an impact", "  the plain loop", "1000 balls, an impact", "  particles in a ball"):
         assert row in told
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_laws_quick():
     told = printed("laws")
     for row in ("Lambert, an impact", "one's own Lambert, an impact", "energy that no book has"):
         assert row in told
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_collisions_quick():
     told = printed("collisions")
     for row in ("8788 balls, packing 0.4, box, a collision", "momentum along the cell", "overlap at 5 frames"):
         assert row in told
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_unions_quick():
     told = printed("unions")
     for row in ("two balls, an impact", "a box, a tube, a box under gravity, an impact"):
         assert row in told
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_sweep_quick():
     told = printed("sweep")
     for row in ("compile once", "swarm sweep, nothing compiled before", "memory of a worker, at the end"):

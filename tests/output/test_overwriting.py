@@ -404,6 +404,7 @@ def test_an_attribute_of_another_type_is_damage_and_one_that_is_not_there_is_not
     for name in ("name", "version", "python", "numpy", "numba", "hdf5", "machine"):
         shutil.copy(whole / "run.h5", tmp_path / "run.h5")
         with h5py.File(tmp_path / "run.h5", "r+") as file:
+            del file["parameters/checksums"]  # as in files of older versions, which may have fewer attributes
             del file["h5md/creator"].attrs[name]
         with swarm.load(tmp_path / "run.h5") as trajectory:
             assert name not in trajectory.makers
