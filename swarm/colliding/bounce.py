@@ -74,6 +74,8 @@ def bounce(box, flock, books, clock, i, now):
         wall = closed
     after = _turned(box, flock, books, walls, wall, (i, now, r, v))
     _book(box, books, walls, wall, i, after)
+    if box.repose is not None:
+        box.repose.count(clock, after.impulse * after.impulse, now)
     ended = FLIES if box.laws.own is None else _end(box, clock, wall, i, now, after)
     v1 = either(ended == FLIES, after.v, v)
     flock.put(i, now, r, v1)

@@ -22,6 +22,7 @@ class Box(Record):
     gates: Any = None  # None, or `Gates` where balls may leave the walls
     heavy: Any = None  # None, or `Heavy` where walls have a mass
     source: Any = None  # None, or `Source` where walls send them off
+    repose: Any = None  # None, or `Repose` where balls may come to rest
 
 
 class Books(NamedTuple):

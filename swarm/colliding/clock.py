@@ -3,8 +3,10 @@
 import math
 
 # Of a clock: how many epochs have ended, their length [s], events and collisions so far, the last ones at one time; how
-# far balls are to fly in an epoch, about [m].
-EPOCHS, LENGTH, EVENTS, COLLISIONS, SAME, REACH, CLOCK = 0, 1, 2, 3, 4, 5, 6
+# far balls are to fly in an epoch, about [m]; impacts that are counted since a time [s since the start], how many of
+# them were slow, and when balls were found at rest first (see resting.py), 0 for never.
+EPOCHS, LENGTH, EVENTS, COLLISIONS, SAME, REACH = 0, 1, 2, 3, 4, 5
+IMPACTS, SLOW, SINCE, RESTED, CLOCK = 6, 7, 8, 9, 10
 
 
 def moment_of(clock, now):

@@ -17,6 +17,7 @@ from .box import Box
 from .cells import Axis, Grid
 from .meet import Loss
 from .queue import FIRST, SPARE
+from .resting import repose_of
 from .rows import CELL, FLOATS, NOBODY, RADIUS, WALL, WHOLES, Flock, Kept
 from .window import OUT
 
@@ -109,7 +110,10 @@ def described(scene: Scene, particles: Particles) -> tuple[Box, Flock]:
     flock, grid = with_room(flock_of(particles, grid, loss is not None, bool(scene.surfaces)), grid)
     shortest = max(_SHORTEST * epoch_of(scene, particles, grid), 0.0 if loss is None else loss.duration)
     walls = scene.walls(0.0) if scenery is None else scenery.given
-    return Box(walls, laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest), flock
+    made = Box(walls, laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest)
+    if scene.gravity is not None and (loss is not None or laws.send_off):
+        made = made._replace(repose=repose_of(math.hypot(*scene.gravity), particles.radius))
+    return made, flock
 
 
 def kinds_of(particles: Particles, flight: Any) -> Any:

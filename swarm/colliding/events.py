@@ -50,6 +50,8 @@ def _collide(box, flock, books, clock, i, now):
         flock.put(one, now, r, blow.one)
         flock.put(other, now, there, blow.other)
         _book(flock, books, clock, (one, other), blow, now)
+        if box.repose is not None:
+            box.repose.count(clock, square((blow.other - blow.one) - (w - v)), now)
         if box.log is not None:
             impulse = box.kinds.mass_of(one) * norm(blow.one - v)
             note_pair(box, books, clock, (one, other, now), (r, v, blow.one), impulse)

@@ -41,6 +41,8 @@ def strike_heavy(box, flock, books, clock, i, now):
     if books.dissipated.size > 0:
         books.dissipated[index(i)] += blow.lost
     books.impacts[index(i)] += blow.impulse > 0.0
+    if box.repose is not None:
+        box.repose.count(clock, (blow.impulse / m) * (blow.impulse / m), now)
     heavy.counts[STRIKES] += 1.0
     stays = all_stay(heavy.walls, wall, heavy.freedoms)
     aim_again(box, flock, i, now)

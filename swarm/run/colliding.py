@@ -29,6 +29,7 @@ from .base import Arrays, BaseRun
 from .doors import comers
 from .impacts import Page
 from .observed import gone_of, poses_of
+from .resting import warn_of_rest
 from .state import Seeding
 from .tally import Watched
 from .tiers import Tier
@@ -89,6 +90,7 @@ class CollidingRun(BaseRun):
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._threads = threads if n >= _FEW else 1
         self._numbers = BallNumbers(scene, particles)
+        self._told_of_rest = False
         self._ends = np.zeros(2)  # of the frame, and of the one before [s]
         self._start = np.zeros(1)
         self._choose_tier()
@@ -119,6 +121,7 @@ class CollidingRun(BaseRun):
                 self._next_window()
         if page is not None:
             page.close()
+        self._told_of_rest = self._told_of_rest or warn_of_rest(self._box, self._clock)
         self._cut_short = status == Status.INTERRUPTED
         if not self._cut_short and status == Status.DONE:
             self._show(moment)
