@@ -5,7 +5,6 @@ HDF5's mode for one writer and many readers (SWMR) orders the writes so that eve
 
 import contextlib
 import os
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,12 @@ import numpy as np
 
 from ..errors import FileError
 from . import driver, paths, superblock
+from .sources import cause
 
 # HDF5's default chunk cache, 1 MB a dataset, would fill during 100 000 frames, which looks like a memory leak.
 _SMALL_CACHE = 1 << 16
+# Bytes that a new file has before its first frame, about.
+_BEGINNING = 1 << 17
 # The oldest format with SWMR.
 _FORMAT = ("v110", "v110")
 
@@ -39,7 +41,7 @@ class AppendedFile:
         except (OSError, RuntimeError) as problem:
             self._abandon()
             if error is None:
-                raise FileError(f"cannot close the {self._what} {self._path}: {_reason(problem)}") from problem
+                raise FileError(f"cannot close the {self._what} {self._path}: {cause(problem)}") from problem
         finally:
             self._handle.close()
         if self._is_new():
@@ -51,17 +53,27 @@ class AppendedFile:
         try:
             os.fsync(self._handle.fileno())
         except OSError as error:
-            raise FileError(f"cannot write the {self._what} {self._path}: {error}") from error
+            raise FileError(f"cannot write the {self._what} {self._path}: {cause(error)}") from error
 
     def _open(self) -> None:
         """Open the file, or raise a FileError."""
         self._size, self._block = 0, b""
         try:
             if not self._following:
-                self._part.touch()
+                self._require_room()
             self._open_as("r+" if self._following else "w")
         except OSError as error:
-            raise FileError(f"cannot write the {self._what} {self._path}: {error}") from error
+            if not self._following:
+                self._part.unlink(missing_ok=True)
+            raise FileError(f"cannot write the {self._what} {self._path}: {cause(error)}") from error
+
+    def _require_room(self) -> None:
+        """Create the file, or raise an OSError if its beginning has no room: HDF5 crashes as it frees its objects."""
+        with open(self._part, "wb", buffering=0) as file:
+            left = _BEGINNING
+            while left > 0:  # the first write may be in part
+                left -= file.write(bytes(left))
+            file.truncate(0)
 
     def _open_as(self, mode: str) -> None:
         self._handle = open(self._part, "r+b", buffering=0)  # noqa: SIM115  closed by `__exit__`
@@ -87,6 +99,25 @@ class AppendedFile:
         self._size = os.fstat(self._handle.fileno()).st_size
 
     @contextlib.contextmanager
+    def _beginning(self) -> Iterator[None]:
+        """Open the file, and create it or find its datasets; of a new one an error leaves nothing.
+
+        HDF5 would crash the process if a file that it cannot write were closed as it is.
+        """
+        self._open()
+        try:
+            with self._writing(f"the beginning of the {self._what}"):
+                try:
+                    yield
+                except (LookupError, ValueError):
+                    # What was not written cannot be read back: why says the system.
+                    self._file.flush()
+                    raise
+        except FileError as error:
+            self.__exit__(FileError, error, None)
+            raise
+
+    @contextlib.contextmanager
     def _writing(self, what: str) -> Iterator[None]:
         """Write `what`; an error is a FileError that leaves what was written before as it is."""
         try:
@@ -99,7 +130,7 @@ class AppendedFile:
             self._abandon()
             if not self._handle.closed:
                 superblock.put_back(self._handle, self._block)
-            raise FileError(f"cannot write {what} to {self._path}: {_reason(error)}") from error
+            raise FileError(f"cannot write {what} to {self._path}: {cause(error)}") from error
 
     def _rename(self) -> None:
         """Take the name from an older file."""
@@ -164,9 +195,3 @@ def put(dataset: Any, first: int, values: Any) -> Any:
 
 def _descriptor_of(file: h5py.File) -> int:
     return int(file.id.get_vfd_handle())
-
-
-def _reason(error: Exception) -> str:
-    """The message of the system, without HDF5's addresses."""
-    found = re.search(r"error message = '([^']*)'", str(error))
-    return found.group(1) if found else str(error)

@@ -68,9 +68,8 @@ def row_sums(entries: Any, block: int = 0) -> Sums:
 class RowSums:
     """The checksums of a file that is written, or None of a file that has none."""
 
-    def __init__(self, file: Any) -> None:
-        self._data, self._new = file[_ROWS], dict[str, Sums]()
-        self._blocks = {name: (count, block) for name, count, block in _columns(file)}
+    def __init__(self, file: Any, blocks: dict[str, tuple[int, int]]) -> None:
+        self._data, self._new, self._blocks = file[_ROWS], dict[str, Sums](), blocks
 
     @classmethod
     def create(cls, file: Any, growing: dict[str, tuple[int, int]], other: Sequence[str] = ()) -> "RowSums":
@@ -89,12 +88,15 @@ class RowSums:
         )
         sums = {name: checksum_of(_value(file[name])) for name in constants(file) if name not in other}
         file[_CONSTANTS] = np.bytes_(_told(sums | _attributes(file)))
-        return cls(file)
+        # Of a disk that is full nothing is read back.
+        return cls(file, blocks)
 
     @classmethod
     def of(cls, file: Any) -> "RowSums | None":
         """Those of a file that is there."""
-        return cls(file) if _ROWS in file else None
+        if _ROWS not in file:
+            return None
+        return cls(file, {name: (count, block) for name, count, block in _columns(file)})
 
     def forget(self, first: int, count: int) -> bool:
         """Whether some of these rows have checksums; from now on they are not known, until they are written."""

@@ -4,6 +4,7 @@ import bisect
 import contextlib
 import os
 import shutil
+import signal
 from pathlib import Path
 from subprocess import CalledProcessError
 from typing import Any
@@ -25,6 +26,7 @@ from .gone import gone_at, without
 from .scenery import Scenery, red_green_blue
 from .shape import Shape
 from .shapes import cell_of, shapes_of, since_start
+from .sources import cause
 
 _SUFFIXES = (".mp4", ".gif")
 # Pixels of a side of the film.
@@ -128,8 +130,9 @@ def _reason(error: Exception) -> str:
     """The message of an error, of ffmpeg the last line that it has written."""
     if isinstance(error, CalledProcessError):
         said = error.stderr.decode(errors="replace") if isinstance(error.stderr, bytes) else error.stderr
-        return (said or "").strip().rpartition("\n")[2] or str(error)
-    return str(error)
+        ended = signal.strsignal(-error.returncode) if error.returncode < 0 else f"exit code {error.returncode}"
+        return (said or "").strip().rpartition("\n")[2] or f"ffmpeg ended: {ended}"
+    return cause(error)
 
 
 class _Film:

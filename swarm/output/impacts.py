@@ -69,8 +69,7 @@ class ImpactWriter(AppendedFile):
         self._whole: list[dict[str, int]] = []
 
     def __enter__(self) -> WriteFrames:
-        self._open()
-        with self._writing("its beginning"):
+        with self._beginning():
             if not self._following:
                 self._create()
             self._find()

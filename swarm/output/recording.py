@@ -38,8 +38,9 @@ from . import about, colours, instanced, looks, marks, series, sight, solids, vi
 from .content import Content
 from .drawn import Drawn
 from .origin import origin_of
-from .playback import LINES, MESH, PARTICLES
+from .playback import LINES, MESH, PARTICLES, is_whole
 from .shapes import shapes_of, since_start
+from .sources import cause
 from .writer import WriteFrames, Written, rows
 
 # Bytes of a particle (position and colour), of a line (ends, where it begins, colour), and at most of a number of a
@@ -50,6 +51,8 @@ _MEGABYTE = 1e6
 _ROWS, _PATIENCE = 50, 0.5
 # Longest flush [s]: usually milliseconds, but it may never return if the file cannot be written.
 _LONGEST = 10.0
+# Bytes that say whether a disk is full.
+_BLOCK = 1 << 16
 # Rerun counts nanoseconds in 64 bits, 292 years; the exact time is in /time.
 _LATEST = 9.2e9
 
@@ -121,6 +124,8 @@ class RecordingWriter:
         # Where walls come and go they are sent from each instant on, of which this is the number.
         self._has_doors, self._instant = scene.has_doors() and not scene.moves(), -1
         self._failed = False
+        # Where it is written: until it is whole another name, if it is made of a trajectory.
+        self.file = path
         self._url = viewer.live_url(settings.live) if settings.live else None
 
     def colour_by(self, shown: Particles) -> None:
@@ -148,7 +153,7 @@ class RecordingWriter:
         self.stream = rr.RecordingStream("swarm")
         sinks: list[Any] = [rr.GrpcSink(self._url)] if self._url else []
         try:
-            sinks += [rr.FileSink(self._path)] if self._path else []
+            sinks += [rr.FileSink(self.file)] if self.file else []
             plane = self._scene.plane
             eye = sight.eye_controls(plane, self._shapes, self._at_start.T, self._center)
             blueprint = looks.blueprint(self._series, self._drawn.noun, eye, plane)
@@ -156,15 +161,30 @@ class RecordingWriter:
                 self.stream.set_sinks(*sinks, default_blueprint=blueprint)
             else:
                 self.stream.send_blueprint(blueprint)
-        except RuntimeError as error:
-            raise FileError(f"cannot write the recording {self._path}: {error}") from error
+            self.stream.flush(timeout_sec=_LONGEST)
+            self._log_static(many)
+            # A full disk is noticed by a flush alone, and what is sent after it may never return.
+            self.stream.flush(timeout_sec=_LONGEST)
+        except (RuntimeError, ValueError) as error:
+            raise self._error(f"cannot write the recording {self._path}", error) from error
+        return self._write
+
+    def _log_static(self, many: list[solids.Solids]) -> None:
+        """Log what does not change."""
         self.stream.set_log_time_enabled(False)
         looks.log_static(self.stream, self._drawn, [] if self._has_doors else self._shapes, self._center)
         if not self._has_doors:
             self._log_solids(many, static=True)
         looks.log_series(self.stream, self._series)
         about.log_about(self.stream, self._drawn, self._scale, self._stride, self._center, self._scene.plane)
-        return self._write
+
+    def _error(self, what: str, error: Exception) -> FileError:
+        """The error of a recording that ends here."""
+        self._failed = True
+        # Closing the stream, or Rerun at the exit of the process, would wait forever for its dead thread.
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self.stream))
+        atexit.unregister(rr.rerun_shutdown)
+        return FileError(f"{what}: {_full(self.file) or error}")
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         if self._failed:
@@ -176,9 +196,12 @@ class RecordingWriter:
             self.stream.flush(timeout_sec=_LONGEST)
             if self._url or self._path:
                 self.stream.disconnect()
+            # Rerun says nothing of an end that it could not write.
+            if self.file is not None and not is_whole(self.file):
+                raise RuntimeError("its end could not be written")
         except (RuntimeError, ValueError) as problem:
             if error is None:
-                raise FileError(f"cannot close the recording {self._path}: {problem}") from problem
+                raise self._error(f"cannot close the recording {self._path}", problem) from problem
 
     def _write(self, frames: list[Written]) -> None:
         chosen = [frame for frame in frames if frame[0] % self._stride == 0 or frame[0] == self._last]
@@ -208,11 +231,7 @@ class RecordingWriter:
             # Without a flush a full disk is not noticed, and the next `send` to the thread that it ended never returns.
             self.stream.flush(timeout_sec=_LONGEST)
         except (RuntimeError, ValueError) as error:
-            self._failed = True
-            # Closing the stream, or Rerun at the exit of the process, would wait forever for its dead thread.
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self.stream))
-            atexit.unregister(rr.rerun_shutdown)
-            raise FileError(f"cannot write frame {numbers[0]} to the recording {self._path}: {error}") from error
+            raise self._error(f"cannot write frame {numbers[0]} to the recording {self._path}", error) from error
 
     def _log_outcome(self) -> None:
         """Log the run in words, as plots have it above and below."""
@@ -291,3 +310,21 @@ class RecordingWriter:
             rr.TimeColumn("sim_time", duration=np.clip(times, -_LATEST, _LATEST)),
         ]
         self.stream.send_columns(path, indexes, columns)
+
+
+def _full(path: Path | None) -> str:
+    """What the system says if no more can be written to a file, which Rerun does not tell; else ""."""
+    if path is None:
+        return ""
+    try:
+        size = path.stat().st_size
+        try:
+            with open(path, "ab", buffering=0) as file:
+                # The first may be written in part.
+                for _ in range(2):
+                    file.write(bytes(_BLOCK))
+        finally:
+            os.truncate(path, size)
+    except OSError as error:
+        return cause(error)
+    return ""

@@ -9,6 +9,7 @@ from typing import IO
 
 from ..errors import FileError, SwarmError
 from . import paths
+from .sources import cause
 
 
 @contextlib.contextmanager
@@ -33,7 +34,7 @@ def replaced(path: Path, what: str) -> Iterator[IO[bytes]]:
                 os.close(folder)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise FileError(f"cannot write the {what} {path}: {error}; the previous {what} is unchanged") from error
+        raise FileError(f"cannot write the {what} {path}: {cause(error)}; the previous {what} is unchanged") from error
 
 
 @contextlib.contextmanager
@@ -59,7 +60,7 @@ def together(target: Path, files: Sequence[Path], stale: Sequence[Path] = ()) ->
     except SwarmError:
         raise
     except (OSError, RuntimeError) as error:
-        raise FileError(f"cannot write {target}: {error}") from error
+        raise FileError(f"cannot write {target}: {cause(error)}") from error
     finally:
         with contextlib.suppress(OSError):
             _remove(folder)

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..errors import FileError, SceneError
 from . import film, marks, paths
+from .sources import cause
 
 # Notebooks with more base64 than this hang when they are opened, saved or scrolled.
 _MOST = 30_000_000
@@ -72,7 +73,7 @@ class Film:
             part.write_bytes(self.content)
             os.replace(part, target)
         except OSError as error:
-            raise FileError(f"cannot write the film {target}: {error}") from error
+            raise FileError(f"cannot write the film {target}: {cause(error)}") from error
         finally:
             part.unlink(missing_ok=True)
         return target

@@ -1,5 +1,6 @@
 """Errors of files that are read, missing, of another kind or damaged."""
 
+import os
 import re
 import stat
 from pathlib import Path
@@ -30,6 +31,13 @@ def require_file(path: Path, expected: str) -> None:
         raise SceneError(f"{path} is not a regular file; expected {expected}")
     if found.st_size == 0:
         raise SceneError(f"{path} is empty; expected {expected}")
+
+
+def cause(error: BaseException) -> str:
+    """The message of the system about a file that cannot be written, without names of parts and texts of HDF5."""
+    told = re.findall(r"error message = '([^']*)'", str(error))
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if number else told[-1] if told else reason(error)
 
 
 def reason(error: BaseException | None) -> str:

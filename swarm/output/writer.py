@@ -81,11 +81,11 @@ class TrajectoryWriter(AppendedFile):
         self._sums: checksums.RowSums | None = None
 
     def __enter__(self) -> WriteFrames:
-        self._open()
-        if self._following:
-            self._find()
-        else:
-            self._create()
+        with self._beginning():
+            if self._following:
+                self._find()
+            else:
+                self._create()
         return self._write
 
     def _create(self) -> None:
