@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import h5py
+import numpy as np
 from numpy.typing import NDArray
 
 from .sources import DamagedError
@@ -23,6 +24,11 @@ _ELEMENTS: dict[str, tuple[str, tuple[int, ...]]] = {
     ABSORBED: (_REAL, ()), COLLISIONS: (_INTEGER, ()), SPINS: (_REAL, (3,)),
 }  # fmt: skip
 KEPT = tuple(_ELEMENTS)
+# The attribute with the unit of a dataset. H5MD calls it `unit`, of which MDAnalysis takes no SI units.
+UNIT = "swarm_unit"
+UNITS = {
+    name: np.bytes_(unit) for name, unit in (("position", "m"), ("velocity", "m/s"), ("mass", "kg"), ("time", "s"))
+}
 # Those whose values may be in shards.
 JOINED = tuple(f"particles/all/{name}/value" for name in KEPT)
 # Of each particle of a run with sources: when it came [s], and the number of its source, -1 of those of the start.

@@ -16,7 +16,21 @@ from ..scene import Scene
 from ..state import State
 from . import checksums, paths
 from .appended import AppendedFile, put
-from .layout import ABSORBED, ARRAYS, BIRTHS, COLLISIONS, COUNTS, ESCAPES, IMAGES, KEPT, PARTS, RADII, SPINS
+from .layout import (
+    ABSORBED,
+    ARRAYS,
+    BIRTHS,
+    COLLISIONS,
+    COUNTS,
+    ESCAPES,
+    IMAGES,
+    KEPT,
+    PARTS,
+    RADII,
+    SPINS,
+    UNIT,
+    UNITS,
+)
 from .provenance import Course, makers
 from .storage import Storage
 
@@ -122,6 +136,7 @@ class TrajectoryWriter(AppendedFile):
         if repeats is not None:
             self._edges = self._element("particles/all/box/edges", (3,), np.float64, (1024, 3))
         everything["mass"] = self._mass
+        everything["mass"].attrs[UNIT], self._time.attrs[UNIT] = UNITS["mass"], UNITS["time"]
         everything["id"] = np.arange(self._count)[self._kept]
         if self._births is not None:
             everything[BIRTHS[0]], everything[BIRTHS[1]] = (
@@ -157,6 +172,8 @@ class TrajectoryWriter(AppendedFile):
         chunk = 1 if packed else _CHUNK[0], min(shape[0], _CHUNK[1]), *shape[1:]
         options = {**packed, "rdcc_nbytes": self._cache()}
         self._values[name] = self._element(f"particles/all/{name}", shape, kind, chunk, **options)
+        if name in UNITS:
+            self._values[name].attrs[UNIT] = UNITS[name]
 
     def _find(self) -> None:
         parameters = self._file["parameters"]

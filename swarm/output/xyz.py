@@ -1,5 +1,8 @@
 """Extended XYZ: text, a line a particle and two before each frame; of OVITO, ASE and others.
 
+Readers have no common names: OVITO takes velocities from `velo` and masses from `mass`, ASE from `momenta` and
+`masses`. All are written, but for the `mass` of particles that have the same one, which is in the line before them.
+
 Species are X. Lattice and Origin are there where the scene repeats: in a direction in which it does not, the cell has
 the length of the scene. Numbers have as many digits as give the same bits again.
 """
@@ -24,7 +27,14 @@ def write(chosen: Exported, path: Path) -> None:
     encode = msgspec.json.Encoder().encode
     with open(path, "wb") as file:
         for moment in chosen.moments():
-            columns = {"position": moment.position, "velocity": moment.velocity, "id": moment.ids, **moment.more}
+            columns = {
+                "position": moment.position,
+                "velocity": moment.velocity,
+                "momenta": moment.mass[:, None] * moment.velocity,
+                "masses": moment.mass,
+                "id": moment.ids,
+                **moment.more,
+            }
             columns |= {} if alike else {"mass": moment.mass}
             columns |= {} if chosen.radius is None else {"radius": chosen.radius}
             about = [cell, "Properties=species:S:1"]

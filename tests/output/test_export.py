@@ -155,6 +155,9 @@ def test_ase_reads_every_bit(stored, tmp_path, kind):
                 np.testing.assert_array_equal(atoms.arrays[name], values)
             assert set(atoms.symbols) == {"X"}
             assert (atoms.info["Time"], atoms.info["frame"]) == (trajectory.times[k], k)
+            np.testing.assert_array_equal(atoms.get_masses(), trajectory.frame(k).mass)
+            moved = atoms.get_velocities(), trajectory.frame(k).velocity.T
+            np.testing.assert_allclose(*moved, rtol=1e-15, atol=1e-300)
             mass = atoms.arrays["mass"] if "mass" in atoms.arrays else np.full(len(atoms), atoms.info["mass"])
             np.testing.assert_array_equal(mass, trajectory.frame(k).mass)
             repeats = kind == "cell"

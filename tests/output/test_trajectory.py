@@ -77,7 +77,7 @@ def test_layout_is_h5md(run):
             assert {"step", "time", "value"} == set(element)
             assert element["value"].shape[0] == element["step"].shape[0] == element["time"].shape[0] == 4
         assert file["particles/all/position/value"].shape == (4, 30, 3)
-        assert not file["particles/all/position/value"].attrs
+        assert list(file["particles/all/position/value"].attrs) == ["swarm_unit"]
 
 
 def wait_for(path, frames):
@@ -123,7 +123,10 @@ def test_refused_before_anything_is_touched(tmp_path):
             swarm.simulate(SCENE, particles, METHOD, until=0.1, trajectory=path)
     with pytest.raises(swarm.SceneError, match=r"^dt|until must be a whole number of steps"):
         swarm.simulate(SCENE, particles, METHOD, until=0.105, trajectory=present, overwrite=True)
+    with pytest.raises(swarm.SceneError, match=r"present\.h5 is not a trajectory of swarm"):
+        swarm.simulate(SCENE, particles, METHOD, until=0.1, trajectory=present, overwrite=True)
     assert present.read_bytes() == b"mine"
+    present.write_bytes(b"")
     swarm.simulate(SCENE, particles, METHOD, until=0.1, trajectory=present, overwrite=True)
     with swarm.load(present) as trajectory:
         assert len(trajectory) == 2
@@ -228,3 +231,13 @@ def test_other_programs_read_it_while_the_run_goes_on(tmp_path):
     swarm.simulate(SCENE, particles, METHOD, until=0.05, every=0.01, trajectory=path, progress=look)
     assert (told[0].returncode, told[0].stderr) == (0, "")
     assert told[0].stdout.splitlines() == ["4 True", *(["4 (30, 3) True"] if with_mdanalysis else [])]
+
+
+def test_places_velocities_masses_and_times_say_their_unit(tmp_path):
+    """By a name of our own: of H5MD's `unit` MDAnalysis takes no metres."""
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    swarm.simulate(scene, swarm.fill(scene, 3, speed=1.0), swarm.Impact(), until=0.2, trajectory=tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5") as file:
+        group = file["particles/all"]
+        of = {"position/value": b"m", "velocity/value": b"m/s", "mass": b"kg", "position/time": b"s"}
+        assert {name: group[name].attrs["swarm_unit"] for name in of} == of
