@@ -1,9 +1,10 @@
 """Kernels on disk are found by what they trace: an edit of that compiles again, and no other edit does."""
 
+import dis
 import os
 import shutil
 from pathlib import Path
-from types import FunctionType
+from types import CodeType, FunctionType
 
 import numba
 import pytest
@@ -11,7 +12,7 @@ from children import python
 
 import swarm
 from swarm.grains import step
-from swarm.kernel import cache, digest, entries
+from swarm.kernel import cache, digest, entries, frozen
 from swarm.kernel.entries import key_of
 from swarm.kernel.frozen import Frozen
 from swarm.kernel.trace import calls
@@ -88,6 +89,17 @@ def test_no_other_edit_changes_it(cavity, as_it_is, monkeypatch):
     assert code_of(*cavity) == as_it_is
 
 
+def test_what_a_function_takes_is_what_its_instructions_say():
+    for function in (code_of, block._look, Lanes.load, flights.end, key_of):
+        for part in frozen._parts(function.__code__):
+            names = set()
+            constants = frozen._taken(part, names)
+            instructions = list(dis.get_instructions(part))
+            assert names == {one.argval for one in instructions if one.opname == "LOAD_GLOBAL"}
+            said = {part.co_consts[one.arg] for one in instructions if one.opcode in dis.hasconst}
+            assert set(constants) == {one for one in said if not isinstance(one, CodeType)}
+
+
 @pytest.fixture
 def traced(monkeypatch):
     """The code of all functions that a trace goes through."""
@@ -129,12 +141,12 @@ def test_all_that_is_traced_is_in_the_digest(name, traced):
         function = kernel.py_func
         kernel.typingctx.refresh()
         assert Helper(function, function, outlined=False).whole(kernel.typingctx, kinds) is not None
-        frozen = Frozen(package="")
-        frozen.value(function)
+        found = Frozen(package="")
+        found.value(function)
         for kind in kinds:
-            entries._add(kind, frozen, {})
-        assert frozen.is_known
-        covered = {one.__code__ for one in frozen._copies}
+            entries._add(kind, found, {})
+        assert found.is_known
+        covered = {one.__code__ for one in found._copies}
         # The folder of kernels is named by the code of `swarm/kernel`.
         own = [one for one in traced if one.__module__.startswith("swarm.")]
         rest = [one for one in own if not one.__module__.startswith("swarm.kernel.")]
@@ -256,3 +268,13 @@ def test_each_level_of_optimisation_has_its_own_kernels(monkeypatch, tmp_path):
         assert made(1.0) == 2.0
         found.append(sum(made.stats.cache_hits.values()))
     assert found == [0, 0, 1]
+
+
+def test_what_was_never_compiled_needs_no_digest(cavity, tmp_path, monkeypatch):
+    """A run of few particles begins in plain Python, and only asks whether its kernels are there."""
+    monkeypatch.setattr(digest, "is_package_as_imported", lambda: True)
+    kernel, kinds = cavity
+    asked = getattr(kernel, "py_func", kernel), kinds, ("a processor",), tmp_path
+    assert not digest.was_compiled(*asked)
+    looked_up(cavity, tmp_path, monkeypatch)
+    assert digest.was_compiled(*asked)

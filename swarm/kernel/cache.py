@@ -22,7 +22,7 @@ import numpy as np
 from numba.core import event, sigutils
 from numba.core.caching import FunctionCache
 
-from .digest import key_of_kernel
+from .digest import key_of_kernel, was_compiled
 from .entries import File, Key, is_own, key_of
 from .once import held
 
@@ -125,9 +125,15 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
     def _index_key(self, kinds: Any, codegen: Any) -> Key:
         if kinds not in self._keys or not is_own(self._py_func):
-            others = *super()._index_key((), codegen), str(_CONFIG.OPT)
-            self._keys[kinds] = key_of_kernel(self._py_func, kinds, others, _folder() / _DIGESTS)
+            self._keys[kinds] = key_of_kernel(*self._asked(kinds, codegen))
         return self._keys[kinds]
+
+    def was_compiled(self, kinds: Any, codegen: Any) -> bool:
+        """Whether it was compiled for arguments of these types, of whatever code."""
+        return kinds in self._keys or was_compiled(*self._asked(kinds, codegen))
+
+    def _asked(self, kinds: Any, codegen: Any) -> tuple[Any, ...]:
+        return self._py_func, kinds, (*super()._index_key((), codegen), str(_CONFIG.OPT)), _folder() / _DIGESTS
 
     def save_overload(self, kinds: Any, made: Any) -> None:
         # What Python code inside of a helper needs, as Numba does it for a kernel that it loads.
@@ -170,6 +176,8 @@ def _is_found(kernel: Any, kinds: Any) -> bool:
     """Whether a kernel is compiled for arguments of these types, in this process or on disk."""
     if kinds in kernel.overloads:
         return True
+    if not kernel._cache.was_compiled(kinds, kernel.targetctx.codegen()):
+        return False
     file = kernel._cache._cache_file
     name = file._load_index().get(_key_of(kernel, kinds))
     # A kill may come between the entry of the index and its file.

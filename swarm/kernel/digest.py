@@ -33,8 +33,7 @@ def key_of_kernel(function: Any, kinds: Sequence[Any], others: tuple[Any, ...], 
     Returns:
         A key that repeats in another process if all that the kernel may trace is the same there.
     """
-    user = () if is_own(function) else (function,)
-    names = key_of(kinds, *others, function.__module__, function.__qualname__, *user)
+    names = _names_of(function, kinds, others)
     known = kept / f"{names.text}{text_of_package()}"
     # Another text than that which this process runs says nothing about its code.
     is_text = names.repeats and is_package_as_imported()
@@ -45,6 +44,16 @@ def key_of_kernel(function: Any, kinds: Sequence[Any], others: tuple[Any, ...], 
     if is_text and whole.repeats and is_package_as_imported():
         _write(known, whole.text)
     return whole
+
+
+def was_compiled(function: Any, kinds: Sequence[Any], others: tuple[Any, ...], kept: Path) -> bool:
+    """Whether a kernel of these names was compiled before, of whatever code: else it needs no key to be missed."""
+    return any(kept.glob(f"{_names_of(function, kinds, others).text}*"))
+
+
+def _names_of(function: Any, kinds: Sequence[Any], others: tuple[Any, ...]) -> Key:
+    user = () if is_own(function) else (function,)
+    return key_of(kinds, *others, function.__module__, function.__qualname__, *user)
 
 
 def _write(known: Path, text: str) -> None:
