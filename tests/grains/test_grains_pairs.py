@@ -7,7 +7,6 @@ import pytest
 from grains_runs import ROOM, cloud, ran
 
 import swarm
-from swarm.errors import RunError
 from swarm.grains import arrays, lists
 from swarm.grains.cell import Lengths, nearest
 from swarm.kernel.vector import Vec
@@ -67,9 +66,9 @@ def test_energy_momentum_and_angular_momentum_are_conserved_at_any_step(exponent
     assert abs(seen["angular_momentum"] - seen["angular_momentum"][0]).max() < 1e-14 * 5.0 * scale
 
 
-def test_a_step_that_is_far_too_long_ends_the_run_with_a_sentence():
+def test_a_step_that_is_far_too_long_is_refused_with_a_sentence():
     start, _method = two_balls(1e-3)
-    with pytest.raises(RunError, match="smaller dt"):
+    with pytest.raises(swarm.SceneError, match="use dt < "):
         ran(ROOM, start, swarm.Penalty(1.0, ALPHA), 1.0)
 
 

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 import swarm
+from swarm import plugins
 from swarm.cli import app
 from swarm.output import marks, paths
 from swarm.run.cluster import shards
@@ -231,6 +232,7 @@ def test_an_output_is_no_plugin(tmp_path, monkeypatch):
         )[1]
     finally:
         sys.modules.pop("numbers_for_a_run", None)
+        plugins.imported.discard("numbers_for_a_run")
     assert "is also the module numbers_for_a_run of --plugins" in told
     assert (tmp_path / "numbers_for_a_run.py").read_text() == code
 

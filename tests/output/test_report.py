@@ -211,7 +211,7 @@ def test_a_run_that_goes_on_says_so(folder, monkeypatch, tmp_path):
 def test_files_of_older_versions_have_one(tmp_path):
     run(tmp_path / "run.h5")
     with h5py.File(tmp_path / "run.h5", "r+") as file:
-        for name in ("until", "threads", "wall_time"):
+        for name in ("until", "threads", "wall_time", "checksums"):
             del file[f"parameters/{name}"]
         for name in ("python", "date", "machine"):
             del file["h5md/creator"].attrs[name]

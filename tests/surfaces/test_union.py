@@ -250,7 +250,7 @@ def test_an_opening_of_a_nested_part_opens_that_part_alone():
 
 def test_a_scene_file_names_the_opening_of_a_part():
     room = swarm.Scene([swarm.Union([swarm.Sphere(0.5), swarm.Union([OPEN_ROOM])])])
-    source = {"count": 1, "speed": 1.0}
+    source = {"count": 1, "stop": 1.0, "speed": 1.0}
     place = {"surface": 0, "part": [1, 0, 0], "opening": 0}
     (made,) = run_tables.sources_of([{**source, "where": place}], room)
     assert made.where is HOLE

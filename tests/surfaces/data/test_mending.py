@@ -174,7 +174,7 @@ WRONG = {
     "both": (lambda p: swarm.Mesh(p, FACES), r"triangles must be None with the path of a file"),
     "no triangles": (lambda p: swarm.Mesh(CORNERS), r"triangles must be \(T, 3\) numbers of corners, got None"),
     "a corner beyond": (lambda p: swarm.Mesh(CORNERS, FACES + 1), r"numbers from 0 to 7, .* got \[.*\] in row"),
-    "fractions": (lambda p: swarm.Mesh(CORNERS, FACES + 0.5), r"whole numbers, got shape \(12, 3\) of float64"),
+    "fractions": (lambda p: swarm.Mesh(CORNERS, FACES + 0.5), r"triangles must be whole numbers, one or more, got"),
     "a scale": (lambda p: swarm.Mesh(p, scale=0.0), r"scale must be above 0"),
     "open": (lambda p: swarm.Mesh(CORNERS, FACES[1:]), r"closed .*3 edges of one triangle"),
 }  # fmt: skip
