@@ -39,8 +39,8 @@ from .content import Content
 from .drawn import Drawn
 from .origin import origin_of
 from .playback import LINES, MESH, PARTICLES, is_whole
+from .replaced import no_room
 from .shapes import shapes_of, since_start
-from .sources import cause
 from .writer import WriteFrames, Written, rows
 
 # Bytes of a particle (position and colour), of a line (ends, where it begins, colour), and at most of a number of a
@@ -51,8 +51,8 @@ _MEGABYTE = 1e6
 _ROWS, _PATIENCE = 50, 0.5
 # Longest flush [s]: usually milliseconds, but it may never return if the file cannot be written.
 _LONGEST = 10.0
-# Bytes that say whether a disk is full.
-_BLOCK = 1 << 16
+# Bytes of a blueprint and of what is static besides surfaces, and more.
+_BEGINNING = 1 << 18
 # Rerun counts nanoseconds in 64 bits, 292 years; the exact time is in /time.
 _LATEST = 9.2e9
 
@@ -150,6 +150,12 @@ class RecordingWriter:
         fixed += 12 * triangles
         room = max(self._settings.megabytes * _MEGABYTE - fixed, frame)
         self._stride = math.ceil((self._last + 1) * frame / room)
+        is_new = self.file is not None and not self.file.exists()
+        # Rerun never returns from a file that has no room for its blueprint.
+        if problem := no_room(self.file, _BEGINNING + fixed):
+            if is_new and self.file is not None:
+                self.file.unlink(missing_ok=True)
+            raise FileError(f"cannot write the recording {self._path}: {problem}")
         self.stream = rr.RecordingStream("swarm")
         sinks: list[Any] = [rr.GrpcSink(self._url)] if self._url else []
         try:
@@ -184,7 +190,7 @@ class RecordingWriter:
         # Closing the stream, or Rerun at the exit of the process, would wait forever for its dead thread.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self.stream))
         atexit.unregister(rr.rerun_shutdown)
-        return FileError(f"{what}: {_full(self.file) or error}")
+        return FileError(f"{what}: {no_room(self.file) or error}")
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         if self._failed:
@@ -310,21 +316,3 @@ class RecordingWriter:
             rr.TimeColumn("sim_time", duration=np.clip(times, -_LATEST, _LATEST)),
         ]
         self.stream.send_columns(path, indexes, columns)
-
-
-def _full(path: Path | None) -> str:
-    """What the system says if no more can be written to a file, which Rerun does not tell; else ""."""
-    if path is None:
-        return ""
-    try:
-        size = path.stat().st_size
-        try:
-            with open(path, "ab", buffering=0) as file:
-                # The first may be written in part.
-                for _ in range(2):
-                    file.write(bytes(_BLOCK))
-        finally:
-            os.truncate(path, size)
-    except OSError as error:
-        return cause(error)
-    return ""

@@ -11,6 +11,27 @@ from ..errors import FileError, SwarmError
 from . import paths
 from .sources import cause
 
+# Bytes that say whether a disk is full.
+_BLOCK = 1 << 16
+
+
+def no_room(path: Path | None, room: int = _BLOCK) -> str:
+    """What the system says if so many bytes more cannot be written to a file, which libraries do not tell; else ""."""
+    if path is None:
+        return ""
+    size = path.stat().st_size if path.exists() else 0
+    try:
+        try:
+            with open(path, "ab", buffering=0) as file:
+                left = room
+                while left > 0:  # the first write may be in part
+                    left -= file.write(bytes(min(left, _BLOCK)))
+        finally:
+            os.truncate(path, size)
+    except OSError as error:
+        return cause(error)
+    return ""
+
 
 @contextlib.contextmanager
 def replaced(path: Path, what: str) -> Iterator[IO[bytes]]:
@@ -48,10 +69,10 @@ def together(target: Path, files: Sequence[Path], stale: Sequence[Path] = ()) ->
         FileError: they cannot be written; the old ones are there.
     """
     folder = paths.part_of(target)
+    parts = [folder / one.name for one in files]
     try:
         _remove(folder)
         folder.mkdir()
-        parts = [folder / one.name for one in files]
         yield parts
         if len(files) == 1 and not stale:
             os.replace(parts[0], files[0])
@@ -60,7 +81,9 @@ def together(target: Path, files: Sequence[Path], stale: Sequence[Path] = ()) ->
     except SwarmError:
         raise
     except (OSError, RuntimeError) as error:
-        raise FileError(f"cannot write {target}: {cause(error)}") from error
+        # HDF5's and gsd's own errors do not always say why.
+        full = "" if getattr(error, "errno", None) else no_room(_begun(parts))
+        raise FileError(f"cannot write {target}: {full or cause(error)}") from error
     finally:
         with contextlib.suppress(OSError):
             _remove(folder)
@@ -71,6 +94,11 @@ def named_when_whole(target: Path) -> Iterator[Path]:
     """The name under which others write one file; as `together`."""
     with together(target, [target]) as (part,):
         yield part
+
+
+def _begun(parts: Sequence[Path]) -> Path | None:
+    """The last file that was begun."""
+    return next((one for one in reversed(parts) if one.is_file()), None)
 
 
 def _remove(folder: Path) -> None:
