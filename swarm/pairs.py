@@ -21,7 +21,8 @@ class Pairs:
         contact_duration: t_c [s], of Impact: a particle that met another less than this before meets particles and
             walls without a loss, so that losing impacts never become infinitely many in a time. 0: never; None: 1e-4
             of the time in which the smallest particle flies its diameter, under gravity 1e-3 of that in which it flies
-            or falls so far.
+            or falls so far. Balls that rest under gravity collide without end, about once in this time: a run says so,
+            and a longer time, or `Penalty`, makes it shorter.
 
     Raises:
         SceneError: an argument is out of its range.
