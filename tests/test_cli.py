@@ -221,7 +221,7 @@ def test_json_is_printed_at_every_end(folder):
     # A limit of the size of files stands in for a full disk.
     code, failed = told("-o", "failed.h5", file_size=20_000)
     assert (code, failed["status"]) == (1, "failed")
-    assert failed["error"].startswith("cannot write frame 0 to failed.h5: ")
+    assert failed["error"].startswith("cannot write the trajectory failed.h5: ")
 
 
 @pytest.mark.parametrize("options", [["--overwrite"], []])

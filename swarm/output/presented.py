@@ -43,7 +43,7 @@ class Presented(Stored):
     >>> dict(dataset.position.sizes), float(dataset.velocity.sel(axis="x", particle=0)[-1])
     ({'time': 2, 'particle': 1, 'axis': 3}, -1.0)
     >>> last
-    'X 0.0 0.0 0.0 -1.0 0.0 0.0 0 1'
+    'X 0.0 0.0 0.0 -1.0 0.0 0.0 -1.0 0.0 0.0 1.0 0 1'
     """
 
     def __repr__(self: Any) -> str:
