@@ -17,7 +17,7 @@ from ..kernel.gravity import as_vector
 from ..kernel.jit import select
 from ..kernel.record import Record
 from .course import Fall, Quartic, close
-from .frames import Framed
+from .frames import Unturned
 from .rising import Step
 
 # The distance at which a particle is from a wall that is not there, and the level of such a wall.
@@ -124,19 +124,12 @@ def instants_of(every: Iterable[Spans]) -> tuple[float, ...]:
 # --- In kernels ------------------------------------------------------------------------------------------
 
 
-def _same(self, given):
-    """The way into the frame of a wall, and out of it: there is none."""
-    return given
-
-
-class Present(Framed):
+class Present(Unturned):
     """A wall, and whether it is there: 1 or 0. One that is not there is far from everywhere, and no flight meets it."""
 
     body: Any
     there: float
 
-    place_in = end_in = velocity_in = vector_in = way_in = gravity_in = _same
-    place_out = end_out = vector_out = normal_out = _same
     # Its safe steps are taken in lanes only where its level is known as a whole.
     in_steps, has_levels = False, False
 

@@ -107,3 +107,13 @@ for _name, _roles, _result in _FORWARDED:
     setattr(Framed, _name, _forwarded(_name, _roles, _result))
 for _name in _CONSTANTS:
     setattr(Framed, _name, property(lambda self, name=_name: getattr(self.body, name)))  # type: ignore[misc]
+
+
+class Unturned(Framed):
+    """A surface in the frame of its body: each way in and out is the identity. Subclasses change what is answered."""
+
+    def _same(self, given):
+        return given
+
+    place_in = end_in = velocity_in = vector_in = way_in = gravity_in = _same
+    place_out = end_out = vector_out = normal_out = _same

@@ -7,22 +7,15 @@ from typing import Any
 
 from ..kernel.jit import select
 from .contract import Smooth
-from .frames import Framed
+from .frames import Unturned
 
 
-def _same(self, given):
-    """The way into the frame of a wall, and out of it: there is none."""
-    return given
-
-
-class Lowered(Framed):
+class Lowered(Unturned):
     """A wall whose gap is less by `level`; flights meet the wall itself."""
 
     body: Any
     level: float
 
-    place_in = end_in = velocity_in = vector_in = way_in = gravity_in = _same
-    place_out = end_out = vector_out = normal_out = _same
     # A chord from the wall may have a closed form that one from a level does not have.
     chord_guess, chord_improve, chord_sweeps = Smooth.chord_guess, Smooth.chord_improve, Smooth.chord_sweeps
 
