@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .catalog import components_of
 from .errors import SceneError
 from .extras import needed_by
 
@@ -20,41 +21,8 @@ _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*")
 # Columns of numbers above 0.
 _POSITIVE = {"mass", "radius", "length", "half_x", "half_y", "half_z", "a", "b", "c"}
 
-# The names of all that runs have, which functions of one's own cannot take.
-NAMES = frozenset((
-    "absorbed", "angular_momentum", "born", "cavity_impulse", "chunk_sums", "collision_rate", "collisions",
-    "contact_energy", "crossed_energy",
-    "crossed_momentum", "crossed_slowness", "crossings", "dissipated_energy", "energy_error", "escaped", "impacts",
-    "impulse",
-    "kinetic_energy", "largest_overlap", "link_error", "max_penetration", "member_absorbed", "member_heat",
-    "member_impacts",
-    "member_residence", "momentum", "part_heat", "part_impulse", "potential_energy", "pressure", "rotational_energy",
-    "sliding", "sliding_time",
-    "source_energy", "sweeps", "time", "total_energy", "unconverged", "wall_energy", "wall_heat",
-    "wall_orientation", "wall_position", "wall_spin", "wall_velocity", "wall_work", "work",
-))  # fmt: skip
-
-# Those that are no number at the start, where there is no frame before, and where no volume is known.
-MAY_BE_NAN = frozenset(("collision_rate", "pressure"))
-
-# What the last axis of an observable, or of a column of a log, is where it is neither a surface nor a cavity.
-COMPONENTS = dict.fromkeys(
-    (
-        "momentum",
-        "angular_momentum",
-        "wall_position",
-        "wall_velocity",
-        "wall_spin",
-        "crossed_momentum",
-        "position",
-        "velocity_before",
-        "velocity_after",
-        "slip",
-        "image",
-        "spin",
-    ),
-    ("x", "y", "z"),
-) | {"wall_orientation": ("w", "x", "y", "z")}
+# The names of the entries of the last axis of a column of a log.
+_OF_LOGS = dict.fromkeys(("position", "velocity_before", "velocity_after", "slip", "image", "spin"), ("x", "y", "z"))
 
 
 def flattened(observables: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
@@ -70,8 +38,8 @@ def flattened(observables: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
         values = np.asarray(observables[name])
         for place in np.ndindex(values.shape[1:]):
             parts = [str(i) for i in place]
-            if name in COMPONENTS:
-                parts[-1] = COMPONENTS[name][place[-1]]
+            if (components := components_of(name) or _OF_LOGS.get(name)) is not None:
+                parts[-1] = components[place[-1]]
             columns["_".join([name, *parts])] = values[:, *place]
     return columns
 

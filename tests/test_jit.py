@@ -501,7 +501,7 @@ LAYERS = [
     ["checks", "columns", "notebook"],
     ["extras"],
     ["links"],
-    ["state", "status", "errors", "version", "interrupt", "signature"],
+    ["catalog", "state", "status", "errors", "version", "interrupt", "signature"],
 ]
 LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 

@@ -5,7 +5,7 @@ import pytest
 from test_sessions import stopped_at
 
 import swarm
-from swarm.columns import NAMES
+from swarm.catalog import OBSERVABLES
 from swarm.run import machine
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
@@ -64,7 +64,9 @@ def test_they_are_what_the_engines_own_are_and_stand_beside_them(name, tmp_path)
     seen, other = one.observables, swarm.simulate(scene, start, method, **QUICK).observables
     for key, values in other.items():
         assert values.tobytes() == seen[key].tobytes(), key
-        assert key in NAMES
+        lengths = {"surface": len(scene.surfaces), "part": len(scene.parts)}
+        shape = OBSERVABLES[key].shape(lengths)
+        assert [known in (got, None) for got, known in zip(values.shape[1:], shape, strict=True)] == [True] * len(shape)
     assert set(seen) == set(other) | set(OWN)
     assert seen["kinetic"] == pytest.approx(seen["kinetic_energy"], rel=1e-13)
     assert seen["energy"] == pytest.approx(seen["kinetic_energy"] + seen["potential_energy"], rel=1e-12)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ..columns import NAMES
+from ..catalog import MAIN, NAMES, OBSERVABLES
 from ..output import style
 from ..output.amounts import plain
 from ..output.page.pictures import Drawn, svg
@@ -12,13 +12,6 @@ from .folder import SweepFolder
 
 # Graphs of each parameter, curves of another parameter in one, and values of a parameter that are numbers on an axis.
 _MOST, _CURVES, _LABELS = 6, 6, 12
-# What says the most, the first the most; [unit].
-_MAIN = {
-    "kinetic_energy": "J", "total_energy": "J", "dissipated_energy": "J", "pressure": "Pa", "impacts": "",
-    "collisions": "", "escaped": "", "absorbed": "", "born": "", "crossings": "", "wall_heat": "J", "wall_work": "J",
-    "work": "J", "source_energy": "J", "potential_energy": "J", "sliding": "", "impulse": "N s", "energy_error": "",
-    "max_penetration": "m", "largest_overlap": "m",
-}  # fmt: skip
 # Numbers that differ by less, as a part of the largest, are one; errors below are those of round-off.
 _SAME, _ROUND_OFF, _ERRORS = 1e-9, 1e-12, ("energy_error", "max_penetration")
 _REPEATS = "seed"
@@ -39,9 +32,8 @@ def main_observables(sweep: SweepFolder) -> list[str]:
     columns = {name: values[np.isfinite(values)] for name, values in columns.items()}
     found = [name for name, values in columns.items() if len(values) and _differ(values)]
     found = [name for name in found if name not in _ERRORS or columns[name].max() > _ROUND_OFF]
-    stems = list(_MAIN)
     own = [name for name in found if not any(name == known or name.startswith(f"{known}_") for known in NAMES)]
-    told = sorted((name for name in found if _stem(name) in _MAIN), key=lambda name: stems.index(_stem(name)))
+    told = sorted((name for name in found if _stem(name) in MAIN), key=lambda name: MAIN.index(_stem(name)))
     chosen: list[str] = []
     for name in [*own, *told]:
         # Without gravity the total energy is the kinetic one.
@@ -74,7 +66,7 @@ def worst(sweep: SweepFolder) -> list[tuple[str, str]]:
 
 def _stem(name: str) -> str:
     """The observable of a column such as impulse_0."""
-    return next((known for known in _MAIN if name == known or name.removeprefix(f"{known}_").isdecimal()), "")
+    return next((known for known in MAIN if name == known or name.removeprefix(f"{known}_").isdecimal()), "")
 
 
 def _graph(sweep: SweepFolder, rows: list[dict[str, Any]], key: str, name: str) -> Drawn:
@@ -98,8 +90,8 @@ def _graph(sweep: SweepFolder, rows: list[dict[str, Any]], key: str, name: str) 
             # Beside the axes, where it covers no curve.
             axes.legend(title=split, fontsize=7.5, title_fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes.set_xlabel(key)
-        unit = _MAIN.get(_stem(name), "")
-        axes.set_title(f"{name}{f' [{unit}]' * bool(unit)}")
+        unit = OBSERVABLES[_stem(name)].unit if _stem(name) else "1"
+        axes.set_title(f"{name}{f' [{unit}]' * (unit != '1')}")
         return Drawn(svg(figure, f"{name} against {key}"), "")
 
 

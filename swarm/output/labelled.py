@@ -7,7 +7,7 @@ import xarray as xr
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from ..columns import COMPONENTS
+from ..catalog import OBSERVABLES
 from . import layout
 from .named import name_of, names_of_parts
 
@@ -22,13 +22,6 @@ _PARTICLES = {
     layout.COLLISIONS: ("collisions_per_particle", "1"),
     layout.SPINS: (layout.SPINS, "rad s-1"),
 }
-# Of observables by the end of their name, in this order; of all others "1".
-_UNITS = {
-    "angular_momentum": "kg m2 s-1", "momentum": "kg m s-1", "impulse": "N s", "energy_error": "1", "energy": "J",
-    "penetration": "m", "heat": "J", "work": "J", "time": "s", "position": "m", "velocity": "m s-1", "spin": "rad s-1",
-    "overlap": "m", "residence": "s",
-    "slowness": "s m-1", "pressure": "Pa", "collision_rate": "s-1",
-}  # fmt: skip
 _AXES = ("x", "y", "z")
 
 
@@ -60,11 +53,11 @@ def dataset_of(trajectory: Any) -> xr.Dataset:
     coordinates = _coordinates(trajectory)
     own = trajectory.own_observables
     for name, values in trajectory.observables.items():
-        if name in own:
+        if name in own or name not in OBSERVABLES:
             data[name] = (("time", *(f"{name}_{axis}" for axis in range(values.ndim - 1))), values)
         elif name != "time":
-            unit = next((unit for end, unit in _UNITS.items() if name.endswith(end)), "1")
-            data[name] = (("time", *_dimensions(name, values.ndim)), values, {"units": unit})
+            known = OBSERVABLES[name]
+            data[name] = (("time", *known.axes), values, {"units": known.unit})
     if any("quaternion" in dimensions for dimensions, *_rest in data.values()):
         coordinates["quaternion"] = list("wxyz")
     if trajectory.has_particles():
@@ -97,13 +90,3 @@ def _coordinates(trajectory: Any) -> dict[str, Any]:
     if trajectory.counters:
         found["sense"] = ["out", "back"]
     return found
-
-
-def _dimensions(name: str, dimensions: int) -> list[str]:
-    """The dimensions of an observable besides the time."""
-    last = {None: [], 3: ["axis"], 4: ["quaternion"]}[len(COMPONENTS[name]) if name in COMPONENTS else None]
-    if name.startswith("cross"):
-        return ["counter", "sense", *last]
-    first = next((kind for kind in ("cavity", "part", "member") if name.startswith(kind)), "surface")
-    first = "source" if name == "born" else first
-    return [first] * (dimensions - 1 - len(last)) + last

@@ -1,7 +1,7 @@
 """The layout that a trajectory is checked for before it is read: datasets, their types, and consistent shapes."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import IO, Any
 
@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..catalog import OBSERVABLES
 from .sources import DamagedError
 
 # Of each particle: its impacts, which files of older versions lack; the cells that it has come through, where the scene
@@ -43,28 +44,6 @@ _DENSEST = 1032
 _HEADER, _HEAP = 16, b"GCOL"
 # The version of a heap, which follows its signature; and the bytes in which a writer puts the texts of attributes.
 _VERSION, _BEGINNING = b"\1\0\0\0", 1 << 20
-
-# The shape of an entry of the observables of every run; None stands for one of each surface, or of each part.
-_OBSERVABLES: dict[str, tuple[int | None, ...]] = {
-    **dict.fromkeys(("kinetic_energy", "potential_energy", "contact_energy", "total_energy", "dissipated_energy"), ()),
-    **dict.fromkeys(("energy_error", "max_penetration", "impacts", "escaped", "unconverged"), ()),
-    "impulse": (None,),
-}
-# Of balls.
-_OF_BALLS = ("collisions", "collision_rate", "pressure", "rotational_energy", "largest_overlap")
-# Of each part of the unions of a scene.
-_OF_PARTS = ("part_impulse", "part_heat")
-# Of each counter.
-_OF_COUNTERS = ("crossings", "crossed_momentum", "crossed_energy", "crossed_slowness")
-# Likewise, but files of older versions have none of them, or only those of bodies.
-_LATER: dict[str, tuple[int | None, ...]] = {
-    **dict.fromkeys(("sliding", "sliding_time", "link_error", "work", "source_energy", *_OF_BALLS), ()),
-    **dict.fromkeys(("absorbed", "wall_heat", "wall_work", "wall_energy", *_OF_PARTS), (None,)),
-    **dict.fromkeys(("wall_position", "wall_velocity", "wall_spin"), (None, 3)),
-    "wall_orientation": (None, 4),
-    **dict.fromkeys(_OF_COUNTERS, (None, 2)),
-    "crossed_momentum": (None, 2, 3),
-}
 
 
 def missing(file: Any) -> str | None:
@@ -196,15 +175,22 @@ def _require_heap(file: IO[bytes], begin: int) -> None:
         at += step
 
 
-def require_observables(seen: dict[str, NDArray[Any]], surfaces: int, parts: int, counters: int) -> None:
-    """Raise a ValueError if an observable of every run is missing or has another shape."""
+def require_observables(seen: dict[str, NDArray[Any]], own: Collection[str], lengths: dict[str, int]) -> None:
+    """Raise a ValueError if an observable of every run is missing, or one has another shape than it should.
+
+    Args:
+        seen: the observables by their names, one entry a frame.
+        own: the names of those of the user.
+        lengths: the lengths of axes of `catalog.OBSERVABLES` that are known.
+    """
     n = len(seen["time"])
-    for name, entry in {**_OBSERVABLES, **{name: _LATER[name] for name in _LATER if name in seen}}.items():
-        each = parts if name in _OF_PARTS else counters if name in _OF_COUNTERS else surfaces
-        shape = (n, *(each if length is None else length for length in entry))
-        if name not in seen or seen[name].shape != shape:
-            came = "nothing" if name not in seen else str(seen[name].shape)
-            raise ValueError(f"expected {name} of the shape {shape}, got {came}")
+    for name, one in OBSERVABLES.items():
+        if name in own or (name not in seen and not one.every):
+            continue
+        shape = (n, *one.shape(lengths))
+        came = None if name not in seen else seen[name].shape
+        if came is None or not _is_of(came, shape):
+            raise ValueError(f"expected {name} of the shape {_shown(shape)}, got {'nothing' if came is None else came}")
 
 
 def dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | None, ...] | None = None) -> Any:
@@ -215,14 +201,19 @@ def dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | N
     if kinds is not None and found.dtype.kind not in kinds:
         raise ValueError(f"{name} must hold numbers, got {found.dtype}")
     if shape is not None:
-        same = len(found.shape) == len(shape) and all(
-            wanted is None or got == wanted or (axis == 0 and got > wanted)
-            for axis, (got, wanted) in enumerate(zip(found.shape, shape, strict=True))
-        )
-        if not same:
-            expected = ", ".join("any" if wanted is None else str(wanted) for wanted in shape)
-            raise ValueError(f"{name} must have the shape ({expected}), got {found.shape}")
+        is_longer = bool(shape and found.shape) and shape[0] is not None and found.shape[0] > shape[0]
+        if not _is_of(found.shape, (None, *shape[1:]) if is_longer else shape):
+            raise ValueError(f"{name} must have the shape {_shown(shape)}, got {found.shape}")
     return found
+
+
+def _is_of(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    """Whether a shape is the wanted one, in which None is any length."""
+    return len(shape) == len(wanted) and all(k in (length, None) for length, k in zip(shape, wanted, strict=True))
+
+
+def _shown(shape: tuple[int | None, ...]) -> str:
+    return f"({', '.join('any' if k is None else str(k) for k in shape)})"
 
 
 def require_fits(dataset: Any, rows: int, path: Path) -> None:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..columns import MAY_BE_NAN
+from ..catalog import may_be_nan
 from ..errors import SceneError
 from ..particles import Particles
 from . import layout, provenance
@@ -85,7 +85,7 @@ class Trajectory(Kept):
             for name in group:
                 with self._reading(f"its observable {name}"):
                     read = self._checked.rows(f"observables/{name}/value", *some.indices(self._frames)[:2])
-                    seen[name] = read if name in own or name in MAY_BE_NAN else finite(read)
+                    seen[name] = read if name in own or may_be_nan(name) else finite(read)
         return seen
 
     @property
@@ -109,7 +109,8 @@ class Trajectory(Kept):
         """The observables, checked to include those of every run."""
         seen, scene = self.observables, self.scene
         with self._reading("its observables"):
-            layout.require_observables(seen, len(scene.surfaces), len(scene.parts), len(self.counters))
+            lengths = {"surface": len(scene.surfaces), "part": len(scene.parts), "counter": len(self.counters)}
+            layout.require_observables(seen, self.own_observables, lengths)
         return seen
 
     def require_frames(self) -> None:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..columns import MAY_BE_NAN, NAMES
+from ..catalog import OBSERVABLES
 from ..pairs import MOST_PRESSED
 from ..state import Floats
 from .amounts import amount, counted_in_words, listed, many, plain
@@ -71,7 +71,7 @@ def _numbers(content: Any) -> list[Verdict]:
     """Whether all observables of every run are numbers."""
     bad = []
     for name, values in content.seen.items():
-        if name in NAMES and name not in MAY_BE_NAN and np.asarray(values).dtype.kind == "f":
+        if name in OBSERVABLES and not OBSERVABLES[name].may_be_nan and np.asarray(values).dtype.kind == "f":
             wrong = ~np.isfinite(np.asarray(values).reshape(len(values), -1)).all(axis=1)
             bad += [f"{name} from {amount(content.seen['time'][wrong.argmax()], 's')} on"] if wrong.any() else []
     if bad:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import interrupt
+from ..catalog import CHUNK_SUMS
 from ..frames import Frame
 from ..kernel.cache import kernels_compiled
 from ..particles import Particles
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
     from ..output.background import Background
 
 _LOG = logging.getLogger("swarm")
-# The observable that holds the sums over chunks of a shard: those of all shards are joined from it.
-CHUNK_SUMS = "chunk_sums"
 _OF_PARTICLES = "position", "velocity", "mass", "image", "radius", "spin"
 # So many frames are packed into arrays: as Python objects they take 3 kB each.
 _PACKED = 1024

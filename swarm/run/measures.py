@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..catalog import NAMES
 from ..checks import shown
-from ..columns import NAMES
 from ..errors import RunError, SceneError
 from ..frames import Frame
 from ..snapshot import Snapshot

@@ -13,23 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import observables
+from ...catalog import CHUNK_SUMS, OBSERVABLES
 from ...lanes.arrays import booked
 from ...output.sequence import values_of
 from ...output.trajectory import Trajectory, load
 from ...output.writer import TrajectoryWriter
 from ...snapshot import Snapshot
 from .. import energies
-from ..machine import CHUNK_SUMS, Columns
+from ..machine import Columns
 from ..measures import NONE, Measures
 from ..options import Task
 from ..present import total_of
 from ..tally import OBSERVED, units_of, value_of
 from . import shards
 
-# The largest value of any shard is that of all; the other observables, whole numbers, add up exactly.
-_LARGEST = ("energy_error", "max_penetration", "link_error")
-# The same of every shard.
-_COMMON = ("wall_position", "wall_orientation")
 # Frames that are read at a time.
 _AT_ONCE = 256
 
@@ -93,12 +90,15 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
     for name in (name for name in parts[0] if name != CHUNK_SUMS):
         if name in added:
             seen[name] = added[name]
-        elif name in _COMMON:
-            seen[name] = parts[0][name]
-        else:
-            values = [part[name] for part in parts]
+            continue
+        values, joined = [part[name] for part in parts], OBSERVABLES[name].joined
+        if joined == "same":
+            seen[name] = values[0]
+        elif joined == "largest":
+            seen[name] = max(values).item()
+        else:  # whole numbers, which add up exactly
             total = np.sum(values, axis=0)
-            seen[name] = max(values).item() if name in _LARGEST else total if total.ndim else int(total)
+            seen[name] = total if total.ndim else int(total)
     if task.options.member_impacts:
         units = units_of(task)._asdict().items()
         seen |= {OBSERVED[name]: value_of(seen[OBSERVED[name]], unit) for name, unit in units if unit is not None}
