@@ -103,6 +103,7 @@ def of_result(result: Result, volume: float | None) -> dict[str, str]:
         **({} if volume is None else {"volume": f"{volume:.4g} m^3"}),
         **facts.of_meshes(result.scene),
         **facts.of_run(seen, result.particles.radius),
+        **facts.of_verdicts(result.content("a summary")),
         "wall time": f"{result.wall_time:.2f} s{compiled}, {rate:.3g} impacts/s{rest}",
         "trajectory": f"{result.trajectory} ({len(seen['time'])} frames)",
     }

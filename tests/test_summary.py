@@ -133,3 +133,15 @@ def test_a_log_of_impacts_is_told(tmp_path):
         assert rows["columns"].startswith("time, particle, surface, member, position")
     with pytest.raises(swarm.SceneError, match=r"there is no file .*none\.h5; expected a trajectory or a log"):
         summary.of_file(tmp_path / "none.h5")
+
+
+def test_info_and_the_end_of_a_run_say_whether_it_went_well(tmp_path):
+    """In the lines of pictures and reports; a run that loses energy is marked."""
+    file = tmp_path / "run.h5"
+    scene, start = swarm.Scene([swarm.Sphere(1.0)]), swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    result = swarm.simulate(scene, start, swarm.Impact(), until=3.0, trajectory=file, compile="never")
+    told = summary.of_trajectory(file)["verdicts"]
+    assert told.startswith("✓ energy: every particle")
+    assert summary.of_result(result, None)["verdicts"] == told
+    observed(file, energy_error=1e-3)
+    assert summary.of_trajectory(file)["verdicts"].startswith("✗ energy")

@@ -9,7 +9,7 @@ from ..bodies.body import Body
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
-from .gone import Gone, without
+from .gone import Gone, gone_at, without
 
 
 @dataclass(frozen=True)
@@ -36,3 +36,22 @@ class Content:
     def inside(self, name: str) -> Particles:
         """The particles of a frame, with those that have gone at NaN."""
         return without(self.frames[name], self.gone.get(name))
+
+
+def content_of(trajectory: Any) -> Content:
+    """The part of a `Trajectory` that a picture shows."""
+    trajectory.require_frames()
+    last = len(trajectory) - 1
+    numbers = {"start": 0, "end": last} if last else {"start": 0}
+    numbers = numbers if trajectory.has_particles() else {}
+    left = {name: gone_at(trajectory, k) for name, k in numbers.items()}
+    return Content(
+        trajectory.path.name,
+        trajectory.scene,
+        trajectory.method,
+        trajectory.body,
+        trajectory.count,
+        trajectory.observed(),
+        {name: trajectory.frame(k) for name, k in numbers.items()},
+        {name: one for name, one in left.items() if one is not None},
+    )

@@ -8,7 +8,9 @@ from ..ball_numbers import balls_volume
 from ..notebook import shortened
 from ..observables import drift
 from ..surfaces.facets.mesh import Mesh
+from .content import Content, content_of
 from .sources import DamagedError
+from .verdicts import marked
 
 
 def of_trajectory(trajectory: Any) -> dict[str, str]:
@@ -25,8 +27,13 @@ def of_trajectory(trajectory: Any) -> dict[str, str]:
         "size": f"{trajectory.path.stat().st_size / 1e6:.1f} MB",
     }
     if len(times):
-        rows |= of_run(seen, trajectory.radius)
+        rows |= of_run(seen, trajectory.radius) | of_verdicts(content_of(trajectory))
     return rows
+
+
+def of_verdicts(content: Content) -> dict[str, str]:
+    """Whether a run went well: a line for each thing that should hold."""
+    return {"verdicts": "\n".join(marked(content))}
 
 
 def of_log(log: Any) -> dict[str, str]:

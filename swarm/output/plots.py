@@ -12,10 +12,10 @@ from .. import checks
 from ..errors import SceneError
 from . import colours, drawing, graphs, marks, sentences, series, speeds, style, verdicts, words
 from .amounts import amount, many
-from .content import Content
+from .content import Content, content_of
 from .drawn import Drawn
 from .framed import most_of
-from .gone import gone_at, how_many_left
+from .gone import how_many_left
 from .replaced import named_when_whole
 from .shape import Shape
 from .shapes import cell_of, shapes_of
@@ -42,25 +42,6 @@ def draw_plot(trajectory: Any, target: Path) -> None:
     figure = figure_of(content_of(trajectory), None, SHOWN)
     with named_when_whole(target) as part, style.applied():
         figure.savefig(part, metadata=marks.of_picture(part))
-
-
-def content_of(trajectory: Any) -> Content:
-    """The part of a `Trajectory` that a picture shows."""
-    trajectory.require_frames()
-    last = len(trajectory) - 1
-    numbers = {"start": 0, "end": last} if last else {"start": 0}
-    numbers = numbers if trajectory.has_particles() else {}
-    left = {name: gone_at(trajectory, k) for name, k in numbers.items()}
-    return Content(
-        trajectory.path.name,
-        trajectory.scene,
-        trajectory.method,
-        trajectory.body,
-        trajectory.count,
-        trajectory.observed(),
-        {name: trajectory.frame(k) for name, k in numbers.items()},
-        {name: one for name, one in left.items() if one is not None},
-    )
 
 
 def figure_of(content: Content, figsize: Any, particles: int) -> style.Picture:

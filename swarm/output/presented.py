@@ -92,7 +92,8 @@ class Presented(Stored):
         """
         with needed_by("a plot", "plot"):
             from . import plots
-        return plots.figure_of(plots.content_of(self), figsize, particles)  # type: ignore[arg-type]
+            from .content import content_of
+        return plots.figure_of(content_of(self), figsize, particles)  # type: ignore[arg-type]
 
     def animate(
         self: Any,

@@ -202,7 +202,7 @@ class Result:
         """
         with needed_by("a plot", "plot"):
             from ..output import plots
-        return plots.figure_of(self._content("plot"), figsize, particles)
+        return plots.figure_of(self.content("plot"), figsize, particles)
 
     def report(self, path: str | Path | None = None, *, overwrite: bool = False) -> "Page":
         """A page of the run, one file in HTML, which a notebook shows; see `Trajectory.report`.
@@ -235,13 +235,13 @@ class Result:
                 return written.report(path, overwrite=overwrite)
         if path is not None:
             html.checked_target(path, overwrite, ())
-        page = run.of_content(self._content("report"), self.wall_time)
+        page = run.of_content(self.content("report"), self.wall_time)
         if path is not None:
             page.save(path, overwrite=overwrite)
         return page
 
-    def _content(self, what: str) -> "Content":
-        """What a picture shows of the run."""
+    def content(self, what: str) -> "Content":
+        """The part of the run that pictures and verdicts are made of; `what` needs it, for the sentence of an error."""
         from ..output.content import Content
         from ..output.gone import gone_of
 

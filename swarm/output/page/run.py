@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...errors import SceneError
-from .. import facts, paths, plots, verdicts, words
+from .. import facts, paths, verdicts, words
 from ..amounts import amount, many
-from ..content import Content
+from ..content import Content, content_of
 from . import pictures, reproduce
 from .html import Page, filled
 
@@ -19,6 +19,10 @@ class Note(NamedTuple):
     command: str = ""
 
 
+# Rows of `facts` that a page shows in other places.
+_ELSEWHERE = ("surfaces", "gravity", "method", "verdicts")
+
+
 def of_trajectory(trajectory: Any) -> Page:
     """The report of a `Trajectory`.
 
@@ -26,7 +30,7 @@ def of_trajectory(trajectory: Any) -> Page:
         SceneError: it is damaged, or holds no frame.
     """
     trajectory.require_frames()
-    content = plots.content_of(trajectory)
+    content = content_of(trajectory)
     makers, wall_times = trajectory.makers, trajectory.wall_times
     spent = None if wall_times is None else float(wall_times[-1])
     size = trajectory.path.stat().st_size
@@ -42,7 +46,7 @@ def of_trajectory(trajectory: Any) -> Page:
         places=pictures.of_places(content),
         series=pictures.of_series(content),
         scene=list(told.items()),
-        numbers=[(name, value) for name, value in numbers.items() if name not in ("surfaces", "gravity", "method")],
+        numbers=[(name, value) for name, value in numbers.items() if name not in _ELSEWHERE],
         speed=_speed(content, spent, trajectory.threads) + _versions(makers, trajectory.seed),
         again=reproduce.of_trajectory(trajectory),
     )
