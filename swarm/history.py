@@ -16,6 +16,8 @@ from .kernel.vector import Vec, vec
 from .methods import AugmentedLagrangian, Impact, Method, Penalty
 from .methods.base import check_surfaces
 from .particles import Particles
+from .run.knows import Asked, require_known
+from .run.options import RunOptions
 from .scene import Scene
 from .signature import lined
 from .status import Status
@@ -98,10 +100,11 @@ def contact_history(
                 f"surfaces[{i}] must be at rest, without motion, mass and inertia, for a single contact step, got "
                 f"{surface}; use simulate"
             )
-    scene = scene.apart("contact_history")
     particle = Particles(position, velocity, mass)
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")
+    require_known(Asked(scene, particle, method, RunOptions(until=1.0)))
+    scene = scene.ungrouped("contact_history")
     mass = float(particle.mass[0])
     check_surfaces(method, scene)
     method.check(scene, particle)

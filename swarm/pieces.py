@@ -201,7 +201,7 @@ class Pieces(Volume):
         np.maximum.at(counts, surface, member + 1)
         return np.split(values, np.cumsum(np.maximum(counts, 1))[:-1], axis=-1)
 
-    def _unions(self) -> list[int]:
+    def unions(self) -> list[int]:
         """The surfaces that are unions of several rooms."""
         return [self.owners_of_pieces[rooms[0][0]] for rooms in self.order.unions]
 

@@ -34,6 +34,11 @@ from .surfaces.walls import Walls
 
 # Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
 MOST_WALLS = 24
+# Of a field, and of a union of rooms, in a scene in which impacts move a surface.
+BESIDE_MASS = (
+    "surfaces[{i}] must not be {kind} where impacts move a surface, got {got}; give that surface a motion instead of a "
+    f"mass and an inertia, or list the bodies one by one, at most {MOST_WALLS} walls in all"
+)
 
 
 def _surfaces(value: Any) -> tuple[Surface, ...]:
@@ -112,12 +117,8 @@ class Scene(Pieces):
         checks.assign(self, _volumes=volumes, _doorways=doorways_of_pieces(images, volumes))
         self._require_few_walls("")
         require_few(self.openings() or ())
-        for i in (*self._fields(), *self._unions()) if self.reacts() else ():
-            raise SceneError(
-                f"surfaces[{i}] must not be {type(surfaces[i]).__name__} where impacts move a surface, got "
-                f"{surfaces[i]}; give that surface a motion instead of a mass and an inertia, or list the bodies one "
-                f"by one, at most {MOST_WALLS} walls in all"
-            )
+        for i in (*self.fields(), *self.unions()) if self.reacts() else ():
+            raise SceneError(BESIDE_MASS.format(i=i, kind=type(surfaces[i]).__name__, got=surfaces[i]))
         checks.assign(self, gravity=pull if pull is not None and any(pull) else None)
         if plane is not None:
             planes.require_all(plane, surfaces, pull, lengths)
@@ -167,35 +168,12 @@ class Scene(Pieces):
                 "cavities as parts of a swarm.Union"
             )
 
-    def require_no_rooms(self, what: str) -> None:
-        """Raise a `SceneError` where a surface is a union of rooms, or a foam of them, which `what` does not know."""
-        foams = [i for i, one in enumerate(self.surfaces) if isinstance(one, Many) and one.is_foam()]
-        for i in (*self._unions(), *foams):
-            raise SceneError(
-                f"surfaces[{i}] must not be a {type(self.surfaces[i]).__name__} of several rooms with {what}, got "
-                f"{self.surfaces[i]!r:.200}; use Impact with contact_step = 0, for particles"
-            )
-
-    def apart(self, what: str) -> "Scene":
-        """The scene with every wall compiled by itself, for `what` knows no fields.
-
-        Raises:
-            SceneError: it has a field, or too many walls.
-        """
-        for i in self._fields():
-            raise SceneError(
-                f"surfaces[{i}] must not be {type(self.surfaces[i]).__name__} with {what}, got {self.surfaces[i]}; use "
-                f"Impact with contact_step = 0, or list its bodies one by one, at most {MOST_WALLS} walls"
-            )
-        return self.ungrouped(what)
-
     def ungrouped(self, what: str) -> "Scene":
-        """The scene whose fields are those that it was given, for `what` knows no rooms.
+        """The scene whose solids of one kind are no field, for `what`, which does not support them.
 
         Raises:
-            SceneError: it has rooms, or too many walls.
+            SceneError: it has too many walls.
         """
-        self.require_no_rooms(what)
         if not self.order.groups:
             return self
         made = copy.copy(self)
@@ -315,6 +293,6 @@ class Scene(Pieces):
     def _has_fields(self) -> bool:
         return bool(self.order.fields or self.order.groups)
 
-    def _fields(self) -> list[int]:
+    def fields(self) -> list[int]:
         """The surfaces that are many bodies."""
         return [self.owners_of_pieces[i] for i in self.order.fields]

@@ -157,7 +157,7 @@ def test_any_number_of_solids_of_one_kind_are_a_scene():
     scene = Scene([Box((0.5, 0.5, 0.5)), *balls])
     assert len(scene.owners()) == 30
     with pytest.raises(SceneError, match=r"at most 24 walls in all with Verlet, got 30 of 28 surfaces"):
-        scene.apart("Verlet")
+        scene.ungrouped("Verlet")
 
 
 # --- Laws of walls ---------------------------------------------------------------------------------------

@@ -121,30 +121,11 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
             )
 
     def check(self, scene: Scene, particles: Particles) -> None:
-        base.check_laws("AugmentedLagrangian", scene)
-        base.check_motions("AugmentedLagrangian", scene)
-        if self.adaptive or self.on_unconverged == "impact":
-            self._require_rest(scene)
-        if scene.gravity is not None and (self.adaptive or self.on_unconverged == "impact"):
-            name, value = ("adaptive", True) if self.adaptive else ("on_unconverged", '"impact"')
-            raise SceneError(
-                f"{name} = {value} does not know gravity yet, got gravity={tuple(scene.gravity)}; use fixed steps with "
-                'on_unconverged="count", Penalty, or gravity=None'
-            )
+        base.check_bends(scene)
         if self.adaptive:
             base.check_crossing("dt", self.dt, scene, particles)
         else:
             fixed_step.check_solids(scene, particles, self.dt)
-
-    def _require_rest(self, scene: Scene) -> None:
-        """Raise a `SceneError` where a wall moves: steps that are cut at impacts, and exact ones, know none."""
-        for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
-            if surface.motion is not None:
-                name, value = ("adaptive", True) if self.adaptive else ("on_unconverged", '"impact"')
-                raise SceneError(
-                    f"surfaces[{i}].motion must be None with {name} = {value}, whose impacts are with walls at rest, "
-                    f'got {surface.motion}; use fixed steps with on_unconverged="count", Penalty, or Impact'
-                )
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         # The reaction, the chord that starts the loop, and the exact impacts that may replace a contact

@@ -9,24 +9,12 @@ from ..kernel.jit import select
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import required
-from ..surfaces.drive import drive_of
 from ..surfaces.moving import lacks_bend
 
 # Where a contact step begins: at the impact, or half of it before.
 CONTACT_STARTS = ("impact", "centred")
 # Default shortest flight as a part of the crossing time size/|v|.
 SHORTEST = 1e-4
-# The laws of a surface, and their values where there is none.
-_WITHOUT_LAWS = {
-    "restitution": 1,
-    "friction": 0,
-    "temperature": None,
-    "laws": (),
-    "mass": None,
-    "inertia": None,
-    "openings": (),
-    "present": None,
-}
 
 
 def younger(default: Any) -> Any:
@@ -100,31 +88,6 @@ def check_surfaces(method: Method, scene: Scene) -> None:
     # `escaped` asks where flights without gravity end.
     seen = ("first_hit",) if scene.is_open() and scene.gravity is None else ()
     required.require(scene.surfaces, purpose, (*method.needs(scene), "distance", *seen))
-
-
-def check_laws(name: str, scene: Scene) -> None:
-    """Raise a `SceneError` if a surface has a law that a method of this name does not know: any but a given motion."""
-    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
-        for law, without in _WITHOUT_LAWS.items():
-            value = getattr(surface, law)
-            if value != without:
-                came = f"{value:g}" if isinstance(value, float) else f"{value}"
-                raise SceneError(
-                    f"surfaces[{i}].{law} must be {without} with {name}, which knows elastic walls only, got "
-                    f"{came}; use Impact"
-                )
-
-
-def check_motions(name: str, scene: Scene) -> None:
-    """Raise a `SceneError` if a surface moves in a way that steps of a method of this name cannot follow."""
-    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
-        if surface.motion is not None and drive_of(surface, 0.0).turn is not None:
-            raise SceneError(
-                f"surfaces[{i}].motion must not turn the surface with {name}, got {surface.motion}: in the frame of a "
-                "wall that turns its step has no solution in closed form; use Impact, a Translation, Oscillation or "
-                "Path, or a rotation that leaves the surface as it is"
-            )
-    check_bends(scene)
 
 
 def check_bends(scene: Scene) -> None:

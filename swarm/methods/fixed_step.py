@@ -44,8 +44,7 @@ class SoftWalls(base.Method):
 
     def check(self, scene: Scene, particles: Particles) -> None:
         if particles.radius is None:
-            base.check_laws(type(self).__name__, scene)
-            base.check_motions(type(self).__name__, scene)
+            base.check_bends(scene)
         check_solids(scene, particles, self.dt)
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:

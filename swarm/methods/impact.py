@@ -20,7 +20,6 @@ from ..scene import Scene
 from ..surfaces import flights
 from ..surfaces.surface import Surface
 from . import base, contract
-from .walls import require_no_waiting, require_reacting
 
 # Of the sliding tolerance: round-off, and steps that no longer follow the wall.
 _FINEST, _COARSEST = 1e-13, 1e-3
@@ -119,19 +118,6 @@ class Impact(base.Method):
     def check(self, scene: Scene, particles: Particles) -> None:
         base.check_crossing("contact_step", self.contact_step, scene, particles)
         base.check_crossing("shortest_flight", self.shortest_flight, scene, particles)
-        if self.contact_step > 0.0 and scene.laws() is not None:
-            raise SceneError(
-                f"contact_step must be 0 where a surface has a restitution below 1, friction, a temperature or a "
-                f"motion, got {self.contact_step:g}: the contact step conserves the energy"
-            )
-        if self.contact_step > 0.0 and scene.has_doors():
-            raise SceneError(
-                f"contact_step must be 0 where a wall is present, or an opening open, for some times only, got "
-                f"{self.contact_step:g}: a contact step would last while they change"
-            )
-        require_no_waiting(scene)
-        if scene.reacts():
-            require_reacting(scene)
         base.check_bends(scene)
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:

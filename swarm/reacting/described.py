@@ -24,7 +24,7 @@ def scenery_of(scene: Scene, moment: float) -> Scenery:
     """The walls of a scene in the frame that ends at a moment [s]."""
     owners = np.array(scene.owners())
     rest = [surface for surface in scene.surfaces if not surface.reacts()]
-    given = scene.of_some(rest).apart("walls that react") if rest else None
+    given = scene.of_some(rest).ungrouped("walls that react") if rest else None
     reacts = np.array([surface.reacts() for surface in scene.surfaces])[owners]
     return Scenery(
         Walls(()) if given is None else given.walls(moment),

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..bodies.state import Bodies
 from ..errors import SceneError
-from ..methods import Impact, Penalty
+from ..methods import Impact
 from ..methods.base import Method, check_surfaces
 from ..motion import Path, parts_of
 from ..motion.given import require_angles
@@ -19,10 +19,11 @@ from ..surfaces.shapes.cone import Cone
 from ..surfaces.shapes.quadric import Quadric
 from . import passing, workload
 from .balls import require_apart, require_balls
-from .counting import require_counters, require_no_counters
+from .counting import require_counters
+from .knows import Asked, require_known
 from .options import RunOptions, Task
 from .starts import require_inside
-from .with_bodies import require_method_of_bodies, require_walls_of_bodies
+from .with_bodies import require_steps_of_bodies
 
 # Of the size of a scene, a place ahead that tells on which side of a wall a flight begins, and of that way, how far
 # outside it is where it begins in a tip.
@@ -43,29 +44,16 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
     for name, value, allowed in kinds:
         if not isinstance(value, allowed) and not (name == "particles" and value is None and options.sources):
             raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
-    _require_births(scene, particles, method, options)
+    require_known(Asked(scene, particles, method, options))
     if isinstance(particles, Bodies):
-        _require_no_log("of particles, not of bodies, whose points meet walls together", options)
-        require_no_counters("of particles, not of bodies, whose points are tied to one another", options)
-        # Of springs each point may be in every wall at once.
-        scene.require_no_rooms("bodies")
-        known = scene if isinstance(method, Impact) else scene.apart("bodies and soft walls")
+        known = scene if isinstance(method, Impact) else scene.ungrouped("bodies and soft walls")
         return _task_of_bodies(known, particles.copy(), method, options)
-    scene = _with_walls_of(scene, particles, method)
-    if isinstance(method, Impact) and method.dt is not None:
-        raise SceneError(
-            f"dt of Impact is the step of bodies, got {method.dt:g} for particles, which need none; leave it out"
-        )
+    if not isinstance(method, Impact) or method.contact_step > 0.0:
+        scene = scene.ungrouped(type(method).__name__ if not isinstance(method, Impact) else "a contact_step")
     # The arrays of Particles may have been changed since it checked them.
     start = None if particles is None else _in_the_cell(scene, particles.copy(), options.times.until)
-    are_balls = start is not None and start.radius is not None
-    if scene.period is not None and not method.knows_period() and not (are_balls and isinstance(method, Penalty)):
-        raise SceneError(
-            f"period must be None with {method}, whose steps do not end where a particle leaves the cell, got "
-            f"{scene.period}; use Impact() with contact_step = 0"
-        )
     check_surfaces(method, scene)
-    require_balls(scene, start, method, options)
+    require_balls(scene, start, method)
     scene = scene.of_balls(None if start is None else start.radius)
     if options.compile != "never":
         counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
@@ -74,10 +62,10 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
     times = options.times
     _require_motions(scene, times.until)
     particles = with_births(scene, start, options.sources, options.seed, times.until)
-    _require_instants(scene, particles, method, options)
+    _require_logged(particles, options)
     _require_precision(scene, particles, options)
     method.check(scene, particles)
-    require_counters(scene, particles, method, options)
+    require_counters(scene, particles, options)
     assert times.every is not None
     method.span("until", times.until)
     method.span("every", times.every)
@@ -87,14 +75,6 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
         _require_place(scene, start, method)
     workload.require_few_impacts(scene, particles, method, times.until, times.every)
     return Task(scene, particles, method, options)
-
-
-def _with_walls_of(scene: Scene, particles: Particles | None, method: Method) -> Scene:
-    """The scene with its walls as the method takes them."""
-    if not isinstance(method, Impact):
-        knows_fields = isinstance(method, Penalty) and particles is not None and particles.radius is not None
-        return scene.ungrouped("Penalty") if knows_fields else scene.apart(type(method).__name__)
-    return scene.apart("a contact_step") if method.contact_step > 0.0 else scene
 
 
 def _require_place(scene: Scene, start: Particles, method: Method) -> None:
@@ -107,27 +87,7 @@ def _require_place(scene: Scene, start: Particles, method: Method) -> None:
 
 
 def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
-    require_method_of_bodies(scene, bodies, method, options)
-    if options.member_impacts and bodies.body.cavities:
-        raise SceneError(
-            "member_impacts must be False with bodies that carry cavities, which are no surfaces of the scene, got True"
-        )
-    if scene.pairs is not None:
-        raise SceneError(f"pairs must be None with bodies, which do not meet one another, got {scene.pairs}")
-    if scene.period is not None:
-        raise SceneError(
-            f"period must be None with bodies, whose points would be torn apart by the faces, got {scene.period}; use "
-            "particles, or a vessel without a period"
-        )
-    if scene.plane is not None:
-        raise SceneError(
-            f'plane must be None with bodies, which turn in space, got "{scene.plane}"; use particles, or leave it out'
-        )
-    require_walls_of_bodies(scene)
-    if options.frames not in ("all", "none"):
-        raise SceneError(
-            f'frames must be "all" or "none" with bodies, so that none is torn apart, got {options.frames}'
-        )
+    require_steps_of_bodies(scene, bodies, method, options)
     for point, motion in bodies.body.anchors.items():
         require_angles(f"anchors[{point}]", motion, options.times.until)
     assert method.dt is not None  # type: ignore[attr-defined]
@@ -142,23 +102,6 @@ def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOp
     points = bodies.particles()
     _require_precision(scene, points, options)
     return Task(scene, points, method, options, bodies)
-
-
-def _require_births(scene: Scene, particles: Particles | Bodies | None, method: Method, options: RunOptions) -> None:
-    """Raise a `SceneError` where particles cannot come during a run, and are to."""
-    if not options.sources:
-        return
-    expected = "sources must be left out here, particles come during a run"
-    if isinstance(particles, Bodies):
-        raise SceneError(f"{expected} of particles, not of bodies; use particles")
-    if not isinstance(method, Impact) or method.contact_step > 0.0:
-        raise SceneError(
-            f"{expected} with Impact() with contact_step = 0, whose flights may begin at any time, got {method!r:.200}"
-        )
-    if scene.reacts():
-        raise SceneError(
-            f"{expected} where impacts move no wall, got a scene with a mass or an inertia; give that wall a motion"
-        )
 
 
 def _require_motions(scene: Scene, until: float) -> None:
@@ -216,33 +159,13 @@ def _require_precision(scene: Scene, start: Particles, options: RunOptions) -> N
         require_near(scene, start)
 
 
-def _require_instants(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> None:
-    """Raise a `SceneError` where a log of impacts is asked for and cannot be, or of particles that are not there."""
-    if not isinstance(method, Impact):
-        _require_no_log(
-            f"of Impact, whose impacts have an instant, not of {type(method).__name__}; use Impact", options
-        )
-    if (
-        options.member_impacts
-        and getattr(method, "on_unconverged", "") == "impact"
-        and not getattr(method, "adaptive", True)
-    ):
-        raise SceneError(
-            'member_impacts must be False with on_unconverged = "impact" in fixed steps, one of which may have impacts '
-            'on several walls, got True; use adaptive=True, or on_unconverged = "count"'
-        )
-    if scene.reacts():
-        _require_no_log("of walls that impacts do not move; give them a motion instead of a mass", options)
+def _require_logged(particles: Particles, options: RunOptions) -> None:
+    """Raise a `SceneError` where impacts are asked for of particles that are not there."""
     numbers = options.impact_particles
     if isinstance(numbers, tuple) and numbers[-1] >= len(particles):
         raise SceneError(
             f"impact_particles must be numbers of particles, from 0 to {len(particles) - 1}, got {numbers[-1]}"
         )
-
-
-def _require_no_log(instead: str, options: RunOptions) -> None:
-    if options.impacts is not None:
-        raise SceneError(f"impacts must be None here, a log of impacts is {instead}; got {options.impacts}")
 
 
 def _require_normals(scene: Scene, particles: Particles) -> None:

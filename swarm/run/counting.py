@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..kernel.vector import vec
 from ..lanes.counters import Counters
-from ..methods import Impact
-from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
 from ..state import CROSSED, Crossed
@@ -44,24 +42,11 @@ _MOST_CELLS = 1e7
 _AT_ONCE = 65_536
 
 
-def require_counters(scene: Scene, particles: Particles, method: Method, options: RunOptions) -> None:
-    """Raise a `SceneError` where counters do not go with the other arguments of a run."""
-    if not options.counters:
-        return
-    if not isinstance(method, Impact):
-        require_no_counters(f"of flights by Impact, not of the steps of {type(method).__name__}; use Impact", options)
-    elif method.contact_step > 0.0:
-        require_no_counters(f"of flights, got a contact_step of {method.contact_step:g}; use Impact()", options)
-    if scene.reacts():
-        require_no_counters("of walls that impacts do not move; give them a motion instead of a mass", options)
-    counters_of(scene, options.counters)
-    _require_few_cells(scene, particles, options)
-
-
-def require_no_counters(instead: str, options: RunOptions) -> None:
-    """Raise a `SceneError` where there are counters."""
+def require_counters(scene: Scene, particles: Particles, options: RunOptions) -> None:
+    """Raise a `SceneError` where a surface cannot be a counter in this scene, or is crossed too often."""
     if options.counters:
-        raise SceneError(f"counters must be left out here, they are {instead}; got {len(options.counters)}")
+        counters_of(scene, options.counters)
+        _require_few_cells(scene, particles, options)
 
 
 def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) -> None:

@@ -1,4 +1,4 @@
-"""What soft balls do not know: checks before a run starts."""
+"""Damping and steps of soft balls, checked before a run starts."""
 
 import logging
 
@@ -10,7 +10,6 @@ from ..methods import Penalty
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces.facets.mesh import Mesh
 
 _LOG = logging.getLogger("swarm")
 # Steps in the shortest contact: with fewer than the first there is a warning, which proposes the second.
@@ -18,44 +17,16 @@ _FEWEST, _GOOD = 6.0, 20.0
 
 
 def require_soft_balls(scene: Scene, particles: Particles, method: Method) -> None:
-    """Raise a `SceneError` where soft balls do not go with the scene or the method."""
+    """Raise a `SceneError` where dampers or steps of soft balls are out of range."""
     if not isinstance(method, Penalty):
         return
-    _require_laws(scene)
+    _require_damping(scene)
     _require_steps(particles, method)
     _warn_of_steps(scene, particles, method)
 
 
-def _require_laws(scene: Scene) -> None:
-    """Raise a `SceneError` for what contacts of soft balls do not know."""
-    if scene.reacts():
-        raise SceneError(
-            "surfaces must have no mass and no inertia with particles that have a radius and Penalty, got a scene in "
-            "which impacts move one; give it a motion instead"
-        )
-    laws = scene.laws()
-    if laws is not None and laws.send_off:
-        raise SceneError(
-            "surfaces must have no temperature and no laws of their own with Penalty, got a scene with them; use "
-            "restitution and friction, or Impact"
-        )
-    if scene.has_doors() or scene.openings() is not None:
-        raise SceneError(
-            "surfaces must have no openings and always be present with particles that have a radius and Penalty, got a "
-            "scene with them; build the wall of parts that leave the opening, such as solid boxes"
-        )
-    for i in scene.order.fields if scene.moves() else ():
-        raise SceneError(
-            f"surfaces must not move beside a field or a mesh with particles that have a radius and Penalty, got "
-            f"surfaces[{scene.owners_of_pieces[i]}] ({type(scene.pieces[i]).__name__}) in a scene with a motion; use "
-            "Impact, or build it of single surfaces"
-        )
-    for i, surface in enumerate(scene.surfaces):
-        if isinstance(surface, Mesh) and surface.groups is not None:
-            raise SceneError(
-                f"surfaces[{i}].groups must be None with particles that have a radius and Penalty, got laws of "
-                f"{', '.join(surface.groups)}; give all of the mesh one law, make two of it, or use Impact"
-            )
+def _require_damping(scene: Scene) -> None:
+    """Raise a `SceneError` for a restitution that a damper cannot give."""
     named = [(f"surfaces[{i}]", surface.restitution) for i, surface in enumerate(scene.surfaces)]
     for name, value in (*named, *(() if scene.pairs is None else [("pairs", scene.pairs.restitution)])):
         if value < MOST_DAMPED:

@@ -22,7 +22,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from ... import interrupt
-from ...errors import RunError, SceneError, WallTimeError
+from ...errors import RunError, WallTimeError
 from ...frames import Frame
 from .. import hints
 from ..machine import End, start_of, warn_open
@@ -40,35 +40,6 @@ _SAVED, _GLANCE, _TOLD, _FOLLOWS = 60.0, 0.2, 1.0, 1.0
 _READING = 0.1
 
 
-def _require_shards(task: Task) -> None:
-    """Raise a SceneError where options do not go with a cluster, or all that is advanced depends on one another."""
-    options = task.options
-    if options.trajectory is None:
-        raise SceneError("trajectory must be given with a cluster, whose shards it joins, got none; add trajectory=")
-    if options.recording is not None or options.live:
-        raise SceneError(
-            "recording and live must be left out with a cluster; make the recording from the trajectory afterwards: "
-            "swarm record RUN.h5 -o OUT.rrd"
-        )
-    if options.impacts is not None:
-        raise SceneError(
-            f"impacts must be None with a cluster, whose shards keep no common log, got {options.impacts}; run without "
-            "a cluster"
-        )
-    if options.observables and (options.frames, options.precision) != ("all", "float64"):
-        raise SceneError(
-            "observables need all particles with a cluster, which are read from the files of its shards: frames must "
-            f'be "all" and precision "float64", got {options.frames!r} and {options.precision!r}; or run without a '
-            "cluster"
-        )
-    for i in (i for i, surface in enumerate(task.scene.surfaces) if surface.reacts()):
-        raise SceneError(
-            f"surfaces[{i}] must not react with a cluster: through a wall that has a mass or an inertia every particle "
-            "depends on all others, so that they cannot be shards; give the wall a motion in place of it, or run "
-            "without a cluster"
-        )
-
-
 def carry_out(task: Task, session: Sharded) -> End:
     """Carry out a run that is checked, on the cluster of its options.
 
@@ -77,7 +48,6 @@ def carry_out(task: Task, session: Sharded) -> End:
         RunError: a shard failed.
         KeyboardInterrupt, WallTimeError: it was stopped; its shards have saved their checkpoints.
     """
-    _require_shards(task)
     if task.scene.is_open():
         warn_open()
     hints.give(task)

@@ -1,0 +1,79 @@
+"""What each engine supports is declared once: engines are told apart, and each sentence is complete."""
+
+import string
+from pathlib import Path
+
+import pytest
+
+import swarm
+from swarm.run import knows
+from swarm.run.options import RunOptions
+
+CAVITY = swarm.Scene([swarm.Sphere(0.5)])
+PISTON = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.1, side="outside", mass=1.0)])
+POINT = swarm.Particles([0.3, 0.0, 0.0], [1.0, 0.0, 0.0])
+BALL = swarm.Particles([0.3, 0.0, 0.0], [1.0, 0.0, 0.0], radius=0.01)
+IMPACT, PENALTY, PAPER = swarm.Impact(), swarm.Penalty(1e-3, 1e4), swarm.AugmentedLagrangian(1e-3, 1e4)
+
+
+def asked(scene, particles, method, **options):
+    return knows.Asked(scene, particles, method, RunOptions(until=1.0, **options))
+
+
+@pytest.mark.parametrize(
+    ("scene", "particles", "method", "engine"),
+    [
+        (CAVITY, POINT, IMPACT, knows.POINTS),
+        (CAVITY, POINT, swarm.Impact(contact_step=1e-3), knows.CHORDS),
+        (PISTON, POINT, IMPACT, knows.MASSIVE),
+        (CAVITY, POINT, PENALTY, knows.SOFT),
+        (CAVITY, POINT, PAPER, knows.PAPER),
+        (CAVITY, POINT, swarm.Verlet(1e-3, 1e4), knows.BASELINE),
+        (CAVITY, BALL, IMPACT, knows.BALLS),
+        (PISTON, BALL, IMPACT, knows.HEAVY),
+        (CAVITY, BALL, PENALTY, knows.GRAINS),
+        (CAVITY, BALL, PAPER, knows.OTHER_BALLS),
+        (CAVITY, None, IMPACT, knows.POINTS),
+    ],
+)
+def test_a_run_has_one_engine(scene, particles, method, engine):
+    assert knows.engine_of(asked(scene, particles, method)) == engine
+
+
+def test_each_sentence_names_only_fields_that_runs_have():
+    """And says at its end what to use, or what came."""
+    fields = {"i", "k", "got", "count", "name", "value", "cut", "kind", "method", "whole", "step"}
+    for capability in knows.CAPABILITIES:
+        for engines, text in capability.refused.items():
+            named = {name for _text, name, _spec, _how in string.Formatter().parse(text) if name}
+            assert named <= fields, text
+            assert set(engines) <= {*knows.ENGINES, knows.OTHER_POINTS, knows.OTHER_BALLS, knows.OTHER_BODIES}
+            assert any(part in text for part in ("; ", "got", ": ")), text
+            assert not text.endswith("."), text
+
+
+def test_an_engine_has_one_sentence_for_a_capability():
+    for capability in knows.CAPABILITIES:
+        engines = [engine for group in capability.refused for engine in group]
+        assert len(engines) == len(set(engines)), capability.name
+
+
+def test_names_of_capabilities_differ():
+    names = [capability.name for capability in knows.CAPABILITIES]
+    assert len(names) == len(set(names))
+
+
+def test_the_first_sentence_is_raised_and_what_is_supported_is_not():
+    warm = swarm.Scene([swarm.Sphere(0.5, temperature=300.0)])
+    knows.require_known(asked(warm, POINT, IMPACT))
+    with pytest.raises(
+        swarm.SceneError, match=r"^surfaces\[0\].temperature must be None with Penalty, .* got 300; use"
+    ):
+        knows.require_known(asked(warm, POINT, PENALTY))
+    with pytest.raises(swarm.SceneError, match=r"^surfaces must have no temperature .* with Penalty"):
+        knows.require_known(asked(warm, BALL, PENALTY))
+
+
+def test_the_guide_shows_the_table():
+    guide = Path(__file__).parents[1] / "examples" / "README.md"
+    assert "\n".join(knows.markdown()) in guide.read_text()
