@@ -360,11 +360,13 @@ class Capability(NamedTuple):
         found: where a run asks for it.
         refused: the sentence for each engine that does not support it. Its fields are those of `found`, the `kind` of
             what was found, the name of the `method`, the `whole` method and its contact `step`.
+        is_argument: whether it is an argument of a method, which other methods do not have.
     """
 
     name: str
     found: Callable[[Asked], Found]
     refused: dict[tuple[str, ...], str]
+    is_argument: bool = False
 
     def sentence(self, engine: str) -> str | None:
         """The sentence for an engine, with its fields in braces; None if the engine supports this."""
@@ -378,11 +380,11 @@ CAPABILITIES = (
         "Impact(dt=...) [s]",
         (OTHER_BALLS,): "radius of the particles must be None with {method}, got radii; Impact and Penalty know "
         "particles that meet",
-    }),
+    }, True),
     Capability("no step", _no_step, {
         (BODIES,): "bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {whole}; give "
         "Impact(dt=...) [s]",
-    }),
+    }, True),
     Capability("source", _option("sources"), {
         _EVERY_BODY: "sources must be left out here, particles come during a run of particles, not of bodies; use "
         "particles",
@@ -427,32 +429,32 @@ CAPABILITIES = (
     Capability("dt of Impact", _argument("dt", None), {
         (*_RIGID_POINTS, *_RIGID_BALLS): "dt of Impact is the step of bodies, got {got} for particles, which need "
         "none; leave it out",
-    }),
+    }, True),
     Capability("contact_step", _argument("contact_step", 0.0), {
         (BODIES,): "contact_step must be 0 with bodies, whose blows are exact, got {got}",
         _RIGID_BALLS: "contact_step must be 0 where particles have a radius, got {got}; leave it out",
-    }),
+    }, True),
     Capability("gradient", _argument("gradient", "composite"), {
         (SOFT_BODIES, PAPER_BODIES): 'gradient of {method} must be "composite" with bodies, got "{got}"',
         (GRAINS,): 'gradient must be "composite" where particles have a radius, got "{got}"; leave it out',
-    }),
+    }, True),
     Capability("acceleration", _argument("acceleration", "none"), {
         (PAPER_BODIES,): 'acceleration of {method} must be "none" with bodies, got "{got}"',
-    }),
+    }, True),
     Capability("contact_start", _argument("contact_start", "impact"), {
         (PAPER_BODIES,): 'contact_start of {method} must be "impact" with bodies, got "{got}"',
-    }),
+    }, True),
     Capability("exponent of multipliers", _argument("exponent", 1.0), {
         (PAPER_BODIES,): "exponent of AugmentedLagrangian must be 1 with bodies, got {got}: its loop has no limit for "
         "others; such walls are for Penalty",
-    }),
+    }, True),
     Capability("fixed steps of multipliers", _argument("adaptive", True), {
         (PAPER_BODIES,): "adaptive of AugmentedLagrangian must be True with bodies, got {got}: a loop that does not "
         "start from the wall has no limit, and its multiplier would tear the links",
-    }),
+    }, True),
     Capability("impacts of what did not converge", _argument("on_unconverged", "raise", "count"), {
         (PAPER_BODIES,): 'on_unconverged must be "raise" or "count" with bodies, got "{got}"; use Impact(dt=...)',
-    }),
+    }, True),
     Capability("period", _period, {
         (CHORDS, *_FIXED_STEPS, OTHER_POINTS): "period must be None with {whole}, whose steps do not end where a "
         "particle leaves the cell, got {got}; use Impact() with contact_step = 0",
@@ -462,7 +464,7 @@ CAPABILITIES = (
     Capability("no wall", _no_walls, {
         _ALONE: "surfaces must hold at least one surface for particles without a radius, which meet nothing else, got "
         "none; give the walls, or give the particles a radius, by which they meet one another in free space",
-    }),
+    }, True),
     Capability("law of pairs", _of_scene("pairs"), {
         _ALONE: "pairs must be None where particles have no radius, points do not meet one another, got {got}; give "
         "the particles a radius, or leave pairs out",
@@ -561,7 +563,7 @@ CAPABILITIES = (
     Capability("motion at cut steps", _motions_at_impacts, {
         (PAPER,): "surfaces[{i}].motion must be None with {cut}, whose impacts are with walls at rest, got {got}; use "
         'fixed steps with on_unconverged="count", Penalty, or Impact',
-    }),
+    }, True),
     Capability("rotation", _rotations, {
         _FIXED_STEPS: "surfaces[{i}].motion must not turn the surface with {method}, got {got}: in the frame of a wall "
         "that turns its step has no solution in closed form; use Impact, a Translation, Oscillation or Path, or a "
@@ -574,7 +576,7 @@ CAPABILITIES = (
     Capability("gravity at cut steps", _gravity_at_impacts, {
         (PAPER,): "{cut} does not know gravity yet, got gravity={got}; use fixed steps with "
         'on_unconverged="count", Penalty, or gravity=None',
-    }),
+    }, True),
     Capability("mesh or outline", _faces, {
         _EVERY_BODY: "surfaces[{i}] must not be {kind} with bodies, got {got!r:.200}; use particles, or from_mesh with "
         "a spacing for a vessel of bodies",
@@ -594,7 +596,7 @@ CAPABILITIES = (
     Capability("impacts on members in fixed steps", _members_in_fixed_steps, {
         (PAPER,): 'member_impacts must be False with on_unconverged = "impact" in fixed steps, one of which may have '
         'impacts on several walls, got True; use adaptive=True, or on_unconverged = "count"',
-    }),
+    }, True),
     Capability("frames of some particles", _part_of_particles, {
         _EVERY_BODY: 'frames must be "all" or "none" with bodies, so that none is torn apart, got {got}',
     }),
@@ -645,10 +647,9 @@ def require_known(asked: Asked) -> None:
 
 
 def markdown() -> list[str]:
-    """The table of the guide, in lines of Markdown: "yes" where an engine supports a capability, "–" where not."""
+    """The table of the guide, in lines of Markdown: whether each engine supports each capability."""
     kinds = [engine for engine in ENGINES if engine != BASELINE]
     rows = [("", *kinds), ("---",) * (1 + len(kinds))]
-    for one in CAPABILITIES:
-        if not one.name.startswith(("method", "no ")):
-            rows.append((one.name, *("–" if one.sentence(engine) else "yes" for engine in kinds)))
+    shown = (one for one in CAPABILITIES if not one.is_argument)
+    rows += [(one.name, *("no" if one.sentence(engine) else "yes" for engine in kinds)) for one in shown]
     return [f"| {' | '.join(row)} |" for row in rows]
