@@ -50,6 +50,7 @@ class Touching(NamedTuple):
     guides: int  # G
     restitution: Any  # (walls + G + C,)
     friction: Any  # (walls + G + C,)
+    is_rough: bool  # whether any wall has friction
 
     def place(self, r, k, i):
         """The place of contact point k of a lane, or with velocities its velocity."""
@@ -186,6 +187,7 @@ class Pace(NamedTuple):
     ease: Floats  # by how much its penalty is softer than that of this step: a short one needs a stiffer one
     loops: Flags  # it goes on
     loose: Flags  # it ended above its tolerance
+    brief: Flags  # no force acts in this step, see sticking.py
 
 
 # The type of each array of `Pace`.

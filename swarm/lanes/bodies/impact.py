@@ -12,14 +12,14 @@ from ...kernel.vector import column, dot, put, square
 from .contacts import MOST_CONTACTS, direction, missing, sweep
 
 # Blows at one instant; sweeps over the contacts of one, and the change of their impulses that ends them.
-_BLOWS, _SWEEPS = 200, (2000, 1e-17)
+_BLOWS, SWEEPS = 200, (2000, 1e-17)
 # After so many short steps from impact to impact a wall that takes energy takes all of the approach.
 _CHATTER = 12
 # A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
 SHORT = 1.0 / 16.0
 # Units of round-off by which a body may miss its energy.
 _EPS = float(np.finfo(np.float64).eps)
-_ROUND_OFF = 64.0 * _EPS
+ROUND_OFF = 64.0 * _EPS
 
 
 def chatters(touching, state, number):
@@ -35,7 +35,7 @@ def restore(bodies, state, i):
     links keep their lengths.
     """
     ties, r, v, number = bodies.ties, bodies.lanes.r, bodies.lanes.v, bodies.pace.body[i]
-    kinetic, fall, elastic = _kinetic(ties, v, i), 0.0, _stretched(ties, r, i)
+    kinetic, fall, elastic = kinetic_of(ties, v, i), 0.0, _stretched(ties, r, i)
     for p in range(ties.mass.shape[0]):
         mass = 0.0
         for q in range(ties.mass.shape[0]):
@@ -43,7 +43,7 @@ def restore(bodies, state, i):
         for x in range(3):
             fall -= mass * bodies.rule.gravity[x] * r[3 * p + x, i]
     lost = state.energy[number] - state.dissipated[number] - (kinetic + fall + elastic)
-    if abs(lost) <= _ROUND_OFF * (kinetic + abs(fall) + elastic) and kinetic > 0.0:
+    if abs(lost) <= ROUND_OFF * (kinetic + abs(fall) + elastic) and kinetic > 0.0:
         # To first order: a body that has come to rest has no velocity by which more could be restored.
         factor = 0.5 * lost / kinetic
         if factor * factor <= _EPS:
@@ -61,7 +61,8 @@ def _stretched(ties, r, i):
     return total
 
 
-def _kinetic(ties, v, i):
+def kinetic_of(ties, v, i):
+    """The kinetic energy of a lane."""
     total = 0.0
     for p in range(ties.mass.shape[0]):
         for q in range(ties.mass.shape[0]):
@@ -94,6 +95,7 @@ def _blow(bodies, state, name, frame, found, i):
     bounces = 0.0 if chatters(touching, state, number) else 1.0
     m, wide = ties.links + touching.guides, touching.width(name, found)
     rows = wide * found
+    lost, elastic = 0.0, bounces == 1.0
     blow = Blow(
         bodies, name, frame, wide, scratch((3, m), np.float64), scratch((m, m), np.float64),
         scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
@@ -109,13 +111,16 @@ def _blow(bodies, state, name, frame, found, i):
         # w+ = -e w- where a wall pushes
         bounced = bounces * touching.restitution[name[a // wide, 1]] if a % wide == 0 else 0.0
         wanted[a] = (1.0 + bounced) * rate[a]
-    sweep(touching, (name, p, wide, wide), blow.schur, wanted, p, _SWEEPS)
+    sweep(touching, (name, p, wide, wide), blow.schur, wanted, p, SWEEPS)
     if max(p) == 0.0:
         return False
     is_led = max(ties.led) >= 0
-    before = _kinetic(ties, v, i) if is_led else 0.0
-    blow.give(p, i)
-    lost, elastic = 0.0, bounces == 1.0
+    before = kinetic_of(ties, v, i) if is_led else 0.0
+    against = scratch(m, np.float64)
+    if wide > 1:
+        # Links whose lengths change give their energy away in the next short step, which takes a change back.
+        lost += blow.strain(scratch(m, np.float64), against, i)
+    blow.give(p, against, i)
     for a in range(found):
         w = name[a, 1]
         elastic = elastic and touching.restitution[w] == 1.0 and touching.friction[w] == 0.0
@@ -128,7 +133,7 @@ def _blow(bodies, state, name, frame, found, i):
             lost += 0.5 * p[a] * (rate[a] + missing(blow.schur, a, rate[a], p))
     state.dissipated[number] += lost
     if is_led:
-        state.work[number] += (_kinetic(ties, v, i) - before) + lost
+        state.work[number] += (kinetic_of(ties, v, i) - before) + lost
     return True
 
 
@@ -201,11 +206,31 @@ class Blow(Record):
                     answer[a, row] -= system[j, row] * answer[a, j]
                 answer[a, row] /= system[row, row]
 
-    def give(self, p, i):
-        """v -= W sum p (b d - sum x J)"""
+    def strain(self, rate, against, i):
+        """The rates J v of links and guides, the impulses against them -(J W J)^-1 J v, and the energy that these take.
+
+        Velocities keep rates of the order of the scheme, since a step turns them round.
+        """
+        m, system = rate.size, self.system
+        for row in range(m):
+            rate[row] = dot(column(self.across, 0, row), self.between(self.bodies.lanes.v, row, i))
+            against[row] = -rate[row]
+            for k in range(row):
+                against[row] -= system[row, k] * against[k]
+            against[row] /= system[row, row]
+        lost = 0.0
+        for row in range(m - 1, -1, -1):
+            for k in range(row + 1, m):
+                against[row] -= system[k, row] * against[k]
+            against[row] /= system[row, row]
+            lost -= 0.5 * against[row] * rate[row]
+        return lost
+
+    def give(self, p, against, i):
+        """v -= W (sum p (b d - sum x J) - sum against J), where `against` is used up"""
         ties, touching, v = self.bodies.ties, self.bodies.touching, self.bodies.lanes.v
         m, points = self.answer.shape[1], v.shape[0] // 3
-        push, against = scratch((3, points), np.float64), scratch(m, np.float64)
+        push = scratch((3, points), np.float64)
         for a in range(p.size):
             for q in range(points):
                 g = p[a] * touching.reach[self.name[a // self.wide, 0], q]

@@ -44,7 +44,7 @@ def look(bodies, i, larger):
             w = wall_at(walls, met, j, c)
             gap = walls.distance(float(w), c)
             worst = max(worst, gap)
-            if not gap <= room:
+            if not gap <= room and not _stays(bodies, k, w, gap, i):
                 rate = dot(walls.unit_normal(float(w), c), touching.place(lanes.v1, k, i))
                 time = tau - gap / rate if rate > 0.0 else 0.0
                 if wall < 0 or time < first:
@@ -75,6 +75,14 @@ def look(bodies, i, larger):
     else:
         pace.trial[i] = _between(rule, pace, i)
     return AGAIN
+
+
+def _stays(bodies, k, wall, gap, i):
+    """Whether a contact of a lasting step is as far outside as it was, since short steps do not bring it back."""
+    if bodies.pace.active[i] == 0 or bodies.touching.friction[wall] == 0.0:
+        return False
+    start = bodies.walls.distance(float(wall), bodies.touching.place(bodies.lanes.r, k, i))
+    return gap - start <= bodies.rule.room
 
 
 def _inside(rule, pace, i, gap):

@@ -5,6 +5,7 @@ The system of the ties is factored once for several corrections, which are cheap
 """
 
 from ...kernel.jit import select
+from . import sticking
 
 # Most corrections, and after how many the system is factored again.
 _MOST, _AGAIN = 40, 5
@@ -29,6 +30,9 @@ def solve(contacts):
     is_rigid = (not has_guides) and ties.links == ties.ends.shape[0]
     for i in range(count):
         brief = is_rigid & (pace.active[i] == 0) & (abs(pace.h[i]) < _BRIEF * rule.dt)
+        if contacts.touching.is_rough and is_rigid and not pace.done[i]:
+            brief = sticking.leave_out(contacts, i)
+        pace.brief[i] = brief
         pace.done[i] = pace.done[i] | brief
         more += pace.active[i] > 0
         if _is_held(contacts, i):

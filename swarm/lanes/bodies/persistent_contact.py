@@ -13,7 +13,7 @@ import numpy as np
 from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.vector import dot, norm
-from . import impact, impact_time
+from . import impact, impact_time, sticking
 from .contacts import MOST_CONTACTS, NEAR, ROOM, Contacts, direction, put_direction, put_frame, sweep
 
 # From this correction of a stage on the equations may be worse by the factor, in units of round-off: where more
@@ -88,7 +88,8 @@ class HardContacts(Contacts):
                 gap[wide * a + d] = dot(direction(active.frame[i], a, d), y1 - y0)
             # Gaps of round-off stay what they are; in a composed stage a contact can also be away from its wall.
             away = self.walls.distance(float(wall), y0)
-            gap[wide * a] += away if away > 0.0 or away < -NEAR * rule.room else 0.0
+            outside = away > 0.0 and (wide == 1 or not sticking.is_short(self, i))
+            gap[wide * a] += away if outside or away < -NEAR * rule.room else 0.0
             off = abs(gap[wide * a]) if active.press[i, 3 * a] > 0.0 else max(gap[wide * a], 0.0)
             error = max(error, off / rule.room)
         before = pace.unsettled[i] if number > 0 else 1.0
@@ -119,13 +120,14 @@ class HardContacts(Contacts):
 
     @outlined
     def end(self: Any, state, i):
-        # Contacts last as long as one of them pushes.
+        # Contacts last as long as one of them pushes, and where no force has acted.
         pace, active = self.pace, self.active
-        number, pushes = pace.body[i], False
+        number, pushes = pace.body[i], pace.brief[i]
         for a in range(pace.active[i]):
             pushes = pushes or active.press[i, 3 * a] > 0.0
             state.impulse[self.walls.row(float(active.name[i, a, 1])), number] += active.impulse[i, a]
         state.dissipated[number] += active.lost[i]
+        sticking.stop(self, state, i)
         state.sliding[number] += pace.step[i]
         if not pushes:
             pace.lasts[i] = False

@@ -1,0 +1,105 @@
+"""Contacts with friction that stick: velocities at the end of a step, and steps too short for forces.
+
+A step that keeps the place of a contact turns its rate round, v1 = -v0, and that of a link at rest too: an error of
+second order in the length of the step that no force of a later step can damp. So a step in which a contact sticks ends
+with the velocities that its links and contacts permit.
+
+The forces of a short step correct the round-off of places, over h a velocity: 1e-4 m/s in 1e-11 s, which moves the
+energy of a die by 1e-9 of itself. So where a step without forces keeps lengths and gaps to round-off, none acts.
+"""
+
+import math
+
+import numpy as np
+
+from ...kernel.arrays import scratch
+from ...kernel.jit import outlined
+from ...kernel.vector import column, dot, norm, square
+from .contacts import MOST_CONTACTS, direction, missing, put_frame, sweep
+from .impact import ROUND_OFF, SHORT, SWEEPS, Blow, kinetic_of
+
+
+def is_short(bodies, i):
+    """Whether the step of a lane is a bounce on the way to rest."""
+    return bodies.pace.step[i] < SHORT * bodies.rule.dt
+
+
+@outlined
+def leave_out(bodies, i):
+    """Leave out the forces of a short step that keeps lengths and gaps to round-off without them; whether it is one."""
+    ties, touching, rule, lanes, pace = bodies.ties, bodies.touching, bodies.rule, bodies.lanes, bodies.pace
+    if not is_short(bodies, i):
+        return False
+    for a in range(ties.links):
+        y = column(lanes.p, 3 * ties.ends[a, 0], i) - column(lanes.p, 3 * ties.ends[a, 1], i)
+        # The change, not the length: to correct what steps before have left takes a force too.
+        if not abs(square(y) - square(column(lanes.y0, 3 * a, i))) <= rule.noise * ties.rest[a]:
+            return False
+    active = bodies.active
+    for a in range(pace.active[i]):
+        k, wall = active.name[i, a, 0], float(active.name[i, a, 1])
+        before = bodies.walls.distance(wall, touching.place(lanes.ra, k, i))
+        if not bodies.walls.distance(wall, touching.place(lanes.p, k, i)) - before <= rule.room:
+            return False
+    for a in range(ties.links):
+        lanes.multiplier[a, i] = 0.0
+    for a in range(3 * pace.active[i]):
+        active.press[i, a], active.before[i, a] = 0.0, math.nan
+    return True
+
+
+@outlined
+def stop(bodies, state, i):
+    """End a step of contacts of which one sticks, or a short one with friction, with velocities that they permit.
+
+    The impulses of the step change by what is missing, within the cones of friction; what is lost is booked.
+    """
+    ties, touching, lanes, active = bodies.ties, bodies.touching, bodies.lanes, bodies.active
+    number, found = bodies.pace.body[i], bodies.pace.active[i]
+    if not (_sticks(bodies, i) or (is_short(bodies, i) and touching.width(active.name[i], found) > 1)):
+        return
+    m, rows = ties.links + touching.guides, 3 * found
+    name, frame = scratch((MOST_CONTACTS, 2), np.int64), scratch((MOST_CONTACTS, 3, 3), np.float64)
+    blow = Blow(
+        bodies, name, frame, 3, scratch((3, m), np.float64), scratch((m, m), np.float64),
+        scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
+    )  # fmt: skip
+    rate, p, change = scratch(rows, np.float64), scratch(rows, np.float64), scratch(rows, np.float64)
+    strain, against = scratch(m, np.float64), scratch(m, np.float64)
+    for a in range(found):
+        k, wall, press = active.name[i, a, 0], active.name[i, a, 1], active.press[i, 3 * a]
+        name[a, 0], name[a, 1] = k, wall
+        n = bodies.walls.unit_normal(float(wall), touching.place(lanes.r, k, i))
+        t = direction(active.frame[i], a, 1)
+        t = t - dot(t, n) * n
+        put_frame(frame, a, n, t / norm(t))
+        if press > 0.0 and active.impulse[i, a] > 0.0:
+            for d in range(3):
+                p[3 * a + d] = active.impulse[i, a] * (active.press[i, 3 * a + d] / press)
+    blow.hold(i)
+    blow.respond()
+    lost = blow.strain(strain, against, i)
+    for a in range(rows):
+        rate[a] = dot(blow.direction(a), touching.place(lanes.v, name[a // 3, 0], i))
+        for row in range(m):
+            rate[a] -= blow.answer[a, row] * strain[row]
+    sweep(touching, (name, p, 3, 3), blow.schur, rate, change, SWEEPS)
+    for a in range(rows):
+        # As of a blow: the change of p times the mean of the rates before and after.
+        lost += 0.5 * change[a] * (rate[a] + missing(blow.schur, a, rate[a], change))
+    is_led = max(ties.led) >= 0
+    before = kinetic_of(ties, lanes.v, i) if is_led else 0.0
+    blow.give(change, against, i)
+    state.dissipated[number] += lost
+    if is_led:
+        state.work[number] += (kinetic_of(ties, lanes.v, i) - before) + lost
+
+
+def _sticks(bodies, i):
+    """Whether a contact is held along its wall by less than its friction can."""
+    active, sticks = bodies.active, False
+    for a in range(bodies.pace.active[i]):
+        most = bodies.touching.friction[active.name[i, a, 1]] * active.press[i, 3 * a]
+        along = math.hypot(active.press[i, 3 * a + 1], active.press[i, 3 * a + 2])
+        sticks = sticks or along < (1.0 - ROUND_OFF) * most
+    return sticks
