@@ -62,6 +62,8 @@ class Tree:
         self.folder = folder / "tree"
         self._cache = folder / "numba"
         self._changes = 0
+        self._child: subprocess.Popen[bytes] | None = None
+        self._is_over = False
         self.folder.mkdir(parents=True)
         self._cache.mkdir()
         archive = subprocess.run(["git", "archive", commit], cwd=ROOT, check=True, capture_output=True).stdout
@@ -87,12 +89,14 @@ class Tree:
 
     def run(self, arguments: list[str], seconds: float) -> tuple[int | None, str]:
         """Exit code of pytest, None where its time was over, and what it said."""
+        if self._is_over:
+            sys.exit(1)
         # Kernels are keyed by the code that they hold: of the unchanged tree those are found that a fault leaves alone.
         own = {"PYTHONPATH": str(self.folder), "NUMBA_CACHE_DIR": str(self._cache), "NUMBA_OPT": "0"}
         command = [sys.executable, "-m", "pytest", "-x", "-v", "--tb=line", "-p", "no:cacheprovider"]
         command += ["-o", f"faulthandler_timeout={HANGS}", "-o", "faulthandler_exit_on_timeout=true", *arguments]
         with tempfile.TemporaryFile("w+") as said:
-            child = subprocess.Popen(
+            child = self._child = subprocess.Popen(
                 command, cwd=self.folder, env={**os.environ, **own}, stdout=said, stderr=said, start_new_session=True
             )
             try:
@@ -100,11 +104,21 @@ class Tree:
             except subprocess.TimeoutExpired:
                 code = None
             finally:
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(child.pid, signal.SIGKILL)
-                child.wait()
+                self._end()
             said.seek(0)
             return code, said.read()
+
+    def stop(self) -> None:
+        """End what runs here, and start nothing more."""
+        self._is_over = True
+        self._end()
+
+    def _end(self) -> None:
+        # With the processes that the tests started.
+        if self._child is not None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._child.pid, signal.SIGKILL)
+            self._child.wait()
 
 
 def nearest(folder: Path, file: str) -> list[str]:
@@ -239,11 +253,17 @@ def _measure(trees: list[Tree], faults: list[tuple[int, Fault]], asked: argparse
                     if asked.json:
                         asked.json.write_text(json.dumps([asdict(one) for one in outcomes], indent=1))
 
-    threads = [threading.Thread(target=work, args=(tree,)) for tree in trees]
+    # A run that is interrupted or killed leaves no tests behind.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    threads = [threading.Thread(target=work, args=(tree,), daemon=True) for tree in trees]
     for thread in threads:
         thread.start()
-    for thread in threads:
-        thread.join()
+    try:
+        for thread in threads:
+            thread.join()
+    finally:
+        for tree in trees:
+            tree.stop()
     seen = sum(one.seen is True for one in outcomes)
     print(f"{seen} of {len(outcomes)} seen; fail without a fault: {', '.join(sorted(failing)) or 'none'}")
 
