@@ -254,6 +254,8 @@ def _measure(trees: list[Tree], faults: list[tuple[int, Fault]], asked: argparse
                         asked.json.write_text(json.dumps([asdict(one) for one in outcomes], indent=1))
 
     # A run that is interrupted or killed leaves no tests behind.
+    # Tests interrupt themselves: a shell that starts this in the background has SIGINT ignored, also by them.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threads = [threading.Thread(target=work, args=(tree,), daemon=True) for tree in trees]
     for thread in threads:
