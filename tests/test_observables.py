@@ -148,3 +148,13 @@ def test_penetration_is_the_depth_next_to_the_wall(name):
     walls = swarm.Scene([swarm.Sphere(9.0), *scene_of(name).surfaces]).walls()
     assert call(observables.penetration, walls, wall + 1e-6 * normal) == pytest.approx(1e-6, rel=1e-4)
     assert call(observables.penetration, walls, wall - 1e-6 * normal) == 0.0
+
+
+def test_walls_beside_a_field_have_their_own_impulse():
+    """Particles that fly between the balls of a field along one axis each, and meet one pair of walls."""
+    k = np.array([-0.2, 0.2])
+    field = swarm.Spheres(np.array(np.meshgrid(k, k, k)).reshape(3, -1).T, 0.1)
+    scene = swarm.Scene([field, *(swarm.Slab(axis, 0.5) for axis in np.eye(3))])
+    start = swarm.Particles(np.zeros((3, 3)), np.eye(3), [1.0, 2.0, 3.0])
+    result = swarm.simulate(scene, start, swarm.Impact(), until=1.7, compile="never", threads=1)
+    assert result.observables["impulse"][-1] == pytest.approx([0.0, 4.0, 8.0, 12.0], rel=1e-14)

@@ -47,6 +47,11 @@ def test_the_same_seed_gives_the_same_balls():
     assert not np.array_equal(one.position, other.position)
 
 
+def test_one_ball_has_the_radius_of_its_fraction():
+    one = swarm.pack(BOX, 1, fraction=0.05)
+    assert one.radius == pytest.approx([np.cbrt(0.05 / (4.0 / 3.0 * np.pi))], rel=1e-14)
+
+
 def test_two_of_three_are_enough():
     by_radius = swarm.pack(BOX, 10, 0.1)
     assert by_radius.radius.tolist() == [0.1] * 10

@@ -255,6 +255,14 @@ WARM = {
 }
 
 
+def test_absorbed_by_the_first_wall_are_counted():
+    vessel = swarm.Sphere(0.5, laws=[swarm.Absorb(0.5)])
+    one = run(swarm.Scene([vessel, swarm.Sphere(0.1, side="outside", laws=[swarm.Absorb(0.5)])]), 40)
+    counts = [counted.sum() for counted in one.member_absorbed]
+    assert counts == one.observables["absorbed"][-1].tolist()
+    assert min(counts) > 0
+
+
 @pytest.mark.parametrize("name", WARM)
 def test_heat_and_absorbed_of_members_are_those_of_surfaces(name):
     scene = WARM[name]

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import swarm
+from swarm.colliding.clock import CLOCK, LENGTH, RESTED
+from swarm.colliding.resting import LEAST_RATE, repose_of
 from swarm.kernel.vector import dot
 
 G = (0.0, 0.0, -9.81)
@@ -125,6 +127,22 @@ def test_with_the_contact_duration_that_is_proposed_nothing_is_said(caplog):
     assert proposed == pytest.approx(0.05 * FALL, rel=0.1)
     run(heap(proposed), 0.6)
     assert not sentences(caplog)
+
+
+@pytest.mark.parametrize(
+    ("pace", "speed", "share", "rests"),
+    [(1.1, 0.05, 1.0, True), (0.9, 0.05, 1.0, False), (1.1, 0.15, 1.0, False), (1.1, 0.05, 0.85, False)],
+    ids=["at rest", "few impacts", "fast", "many are fast"],
+)
+def test_what_rests_by_its_definition(pace, speed, share, rests):
+    """More impacts than the least rate, and nearly all of them slower than a tenth of the speed of a fall."""
+    n, clock = 40, np.zeros(CLOCK)
+    clock[LENGTH] = 1.0
+    repose = repose_of(9.81, np.full(n, RADIUS))
+    for k in range(1, 3000):
+        change = speed if k % 100 < 100 * share else 1.0
+        repose.count(clock, (change * 9.81 * FALL) ** 2, k * FALL / (pace * n * LEAST_RATE))
+    assert (clock[RESTED] > 0.0) == rests
 
 
 def gas(speed, restitution, gravity=G, spacing=2.02):

@@ -104,6 +104,17 @@ def test_planes_in_uniform_motion_are_planes_at_rest(method):
     require_the_same_run(CAVITIES["planes"], None, METHODS[method], start, 3.0, impacts=6)
 
 
+@pytest.mark.parametrize("method", ["penalty", "verlet", "midpoint", "trapezoidal"])
+def test_a_corner_in_uniform_motion_is_one_at_rest(method):
+    """The particle presses on two walls at once, of which each does its part of the work."""
+
+    def corner(motion):
+        return [swarm.Plane(n, 0.2, motion=motion) for n in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
+
+    start = swarm.Particles([0.0, 0.01, 0.0], [1.0, 0.9, 0.2], 2.0)
+    require_the_same_run(corner, None, METHODS[method], start, 0.4, impacts=1)
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", ["ellipsoid", "ball in a box"])
 def test_curved_walls_in_uniform_motion_are_walls_at_rest(name, method):

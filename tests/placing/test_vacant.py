@@ -3,6 +3,7 @@
 import numpy as np
 
 import swarm
+from swarm.placing import vacant as boxes
 from swarm.placing.cells import empty_cells, enter_free, find_free, order_of
 from swarm.placing.vacant import Vacant
 
@@ -56,3 +57,13 @@ def test_nothing_is_left_where_a_ball_fills_its_vessel():
     for _ in range(4):
         vacant.refine()
     assert len(vacant) == 0
+
+
+def test_boxes_are_not_halved_beyond_their_number(monkeypatch):
+    """Their memory is bounded: one halving makes eight of each box, and the next is not begun."""
+    monkeypatch.setattr(boxes, "_SOME", 40)
+    cells = filled(1, 0.25)
+    vacant, most = Vacant(SCENE, cells, LOW, HIGH, 0.25, 0.25), 4 * (boxes._MOST + 40)
+    for _ in range(6):
+        vacant.refine()
+        assert len(vacant) <= most

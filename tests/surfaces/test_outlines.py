@@ -348,3 +348,33 @@ def test_a_ring_that_ends_at_its_first_vertex_is_the_same_outline(rows):
         swarm.Polygon([*rows, (*tuple(rows[0])[:2], 0.5)])
     with pytest.raises(swarm.SceneError, match="must be apart"):
         swarm.Polygon([*ring, ring[-1]])
+
+
+# --- What holds an outline, and what balls meet of it ----------------------------------------------------
+
+
+@pytest.mark.parametrize("name", OUTLINES)
+def test_half_spaces_hold_an_outline_and_touch_it(name):
+    outline = swarm.Polygon(OUTLINES[name], center=(0.3, -0.7, 1.1), axis=(1.0, 2.0, -2.0))
+    low, high = outline.boundary.corners()
+    low, high = low.min(axis=1), high.max(axis=1)
+    plane = np.random.default_rng(3).uniform(low, high, (20_000, 2)).T
+    points = outline.frame[:, :2] @ plane + np.array(outline.center)[:, None]
+    points = points[:, outline.phi(points) <= 0.0]
+    assert points.shape[1] > 1000
+    spaces = outline.half_spaces()
+    assert len(spaces) == 4
+    for normal, offset in spaces:
+        reach = np.array(normal) @ points - offset
+        assert reach.max() <= 1e-14
+        assert reach.max() > -0.03 * (high - low).max()
+
+
+def test_sides_that_join_smoothly_are_one_face_of_balls_that_fit_into_them():
+    stadium = swarm.Stadium(0.3, 0.8)
+    assert len(set(stadium.faces_of_balls(0.2)[1])) == 1
+    assert len(set(stadium.faces_of_balls(0.4)[1])) == len(stadium.boundary) == 4
+    square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+    assert len(set(swarm.Prism(square, 0.5).faces_of_balls(0.1)[1])) == 6
+    # Around a square from outside, balls roll over the edges.
+    assert len(set(swarm.Polygon(square, side="outside").faces_of_balls(0.1)[1])) == 1
