@@ -3,11 +3,15 @@
 import contextlib
 import functools
 import gc
+import itertools
 import os
 import resource
 import signal
 import sys
 import types
+
+# Level 0 of LLVM takes half of the time to compile and gives the same bits. Tests of what level 3 makes are marked.
+os.environ.setdefault("NUMBA_OPT", "0")
 
 import numba
 import numpy as np
@@ -53,14 +57,60 @@ EPSILON = float(np.finfo(np.float64).eps)
 
 
 def pytest_ignore_collect(collection_path, config):
-    """Files of the long ring take seconds to import: not where `-m` is as in pyproject.toml and no file is named."""
-    is_long = collection_path.name == "long" and config.option.markexpr == "not long and not slow"
+    """Files of the long ring take seconds to import: not where `-m` excludes it and no file is named."""
+    is_long = collection_path.name == "long" and "not long" in config.option.markexpr
     return True if is_long and not any("long" in argument for argument in config.args) else None
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config, items):
+    """Slow items come first, those with the longest time before others: no core waits for the last of them."""
+    if int(numba.config.OPT) != 3:
+        others = [item for item in items if any(mark.kwargs for mark in item.iter_markers("level3"))]
+        config.hook.pytest_deselected(items=others)
+        items[:] = [item for item in items if item not in set(others)]
+    items.sort(key=lambda item: -max((mark.kwargs.get("seconds", 1) for mark in item.iter_markers("slow")), default=0))
 
 
 def pytest_collection_finish():
     """What is collected and imported stays to the end: no garbage collection looks at it again."""
     gc.freeze()
+
+
+@contextlib.contextmanager
+def row(*values):
+    """A row of a table within one test: a failure says in which one."""
+    try:
+        yield
+    except Exception as error:
+        error.add_note(f"in the row {', '.join(map(str, values))}")
+        raise
+
+
+def pairs_of(*axes):
+    """Rows in which each pair of values of two axes occurs, for tests of full products that take too long.
+
+    Each row begins with a pair that is left, and takes of every other axis the value with the most new pairs.
+    """
+    left = {
+        (i, a, j, b): None
+        for i, j in itertools.combinations(range(len(axes)), 2)
+        for a, b in itertools.product(range(len(axes[i])), range(len(axes[j])))
+    }
+    while left:
+        i, a, j, b = next(iter(left))
+        chosen = {i: a, j: b}
+        for k in range(len(axes)):
+            if k not in chosen:
+                gains = [sum(_pair(k, c, m, d) in left for m, d in chosen.items()) for c in range(len(axes[k]))]
+                chosen[k] = gains.index(max(gains))
+        for one, other in itertools.combinations(chosen.items(), 2):
+            left.pop(_pair(*one, *other), None)
+        yield tuple(axis[chosen[k]] for k, axis in enumerate(axes))
+
+
+def _pair(i, a, j, b):
+    return (i, a, j, b) if i < j else (j, b, i, a)
 
 
 def rarely(*values):

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 import pytest
 from children import python
-from conftest import LAWS, call, compiled, every_surface, numbers_of, rarely, scene_of
+from conftest import LAWS, call, compiled, every_surface, numbers_of, rarely, row, scene_of
 from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import TypingError
 
@@ -255,6 +255,7 @@ def summed_with_distances(tables):
         tables.second[1, i] = tables.first[2, i] + tables.row[i]
 
 
+@pytest.mark.level3(only=True)
 @compiled_only
 @pytest.mark.parametrize(("function", "known"), [(summed, False), (summed_with_distances, True)])
 def test_distances_of_rows_are_known_to_the_compiler(function, known):
@@ -268,6 +269,7 @@ def test_distances_of_rows_are_known_to_the_compiler(function, known):
     assert ("i64 384" in text) == known
 
 
+@pytest.mark.level3(only=True)
 @compiled_only
 def test_kernels_count_no_references_and_are_vectors(tmp_path):
     """The compiled text of a sphere's kernel: no call that counts, and the square root of a hit for several lanes."""
@@ -319,6 +321,7 @@ def calls_python(x):
     return in_object_mode(x)
 
 
+@pytest.mark.level3(only=True)
 @compiled_only
 @pytest.mark.filterwarnings("ignore:Code running in object mode:numba.core.errors.NumbaWarning")
 def test_a_helper_may_call_python(monkeypatch, tmp_path):
@@ -533,11 +536,11 @@ def imported(parts):
     return [target for target, _names in imported_names(parts)]
 
 
-@pytest.mark.parametrize("parts", modules(), ids=".".join)
-def test_a_module_imports_only_from_below(parts):
-    for target in imported(parts):
-        below = LAYER[target[0]] > LAYER[parts[0]]
-        assert below or (len(target) > 1 and target[0] == parts[0]), f"{'.'.join(parts)} imports {'.'.join(target)}"
+def test_a_module_imports_only_from_below():
+    for parts in modules():
+        with row(".".join(parts)):
+            above = [one for one in imported(parts) if LAYER[one[0]] <= LAYER[parts[0]]]
+            assert [".".join(one) for one in above if len(one) == 1 or one[0] != parts[0]] == []
 
 
 def test_no_imports_go_in_circles():
