@@ -13,6 +13,7 @@ import types
 # Level 0 of LLVM takes half of the time to compile and gives the same bits. Tests of what level 3 makes are marked.
 os.environ.setdefault("NUMBA_OPT", "0")
 
+import durations
 import numba
 import numpy as np
 import pytest
@@ -62,14 +63,18 @@ def pytest_ignore_collect(collection_path, config):
     return True if is_long and not any("long" in argument for argument in config.args) else None
 
 
-@pytest.hookimpl(trylast=True)
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Slow items come first, those with the longest time before others: no core waits for the last of them."""
+    """Slow tests are marked and come first, the longest before others: no core waits for the last of them."""
+    known = durations.seconds_of(durations.FILE.read_text("utf-8"))
+    for item in items:
+        if item.nodeid in known:
+            item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: -known.get(item.nodeid, 0.0))
     if int(numba.config.OPT) != 3:
         others = [item for item in items if any(mark.kwargs for mark in item.iter_markers("level3"))]
         config.hook.pytest_deselected(items=others)
         items[:] = [item for item in items if item not in set(others)]
-    items.sort(key=lambda item: -max((mark.kwargs.get("seconds", 1) for mark in item.iter_markers("slow")), default=0))
 
 
 def pytest_collection_finish():
