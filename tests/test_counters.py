@@ -141,6 +141,7 @@ def test_rows_of_the_log_are_the_crossings(name, tmp_path):
 # --- The same bits ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.level3
 @pytest.mark.parametrize("name", ["box"])
 def test_any_threads_and_blocks_count_the_same(name):
     _start, alone = run(SCENES[name], SHAPES[:3], 600, 0.2)
@@ -148,6 +149,7 @@ def test_any_threads_and_blocks_count_the_same(name):
         require_same(run(SCENES[name], SHAPES[:3], 600, 0.2, threads=threads, block_size=size)[1], alone)
 
 
+@pytest.mark.level3
 @pytest.mark.physics
 @pytest.mark.parametrize("name", ["box", rarely("fall"), "restless", rarely("moving"), "open"])
 def test_kernels_that_are_compiled_count_the_same(name, tmp_path):

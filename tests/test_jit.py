@@ -119,34 +119,40 @@ def assert_the_same(function, first, *arguments):
 NUMBERS = (Vec(0.3, -0.1, 0.4), Vec(0.5, -0.7, 0.2), Vec(0.1, -0.3, 0.9), 0.02)
 
 
+@pytest.mark.level3
 @compiled_only
 @every_surface
 def test_surfaces_are_the_same_compiled(name):
     assert_the_same(every_function_of_a_surface, numbers_of(name), *NUMBERS)
 
 
+@pytest.mark.level3
 @compiled_only
 def test_chains_are_the_same_compiled():
     assert_the_same(every_function_of_a_chain, scene_of("sphere", "plane", "ellipsoid").walls(), *NUMBERS)
 
 
+@pytest.mark.level3
 @compiled_only
 @pytest.mark.parametrize("pull", [None, Gravity(0.1, -0.2, 0.3)], ids=["none", "some"])
 def test_gravity_is_the_same_compiled(pull):
     assert_the_same(every_function_of_gravity, pull, NUMBERS[0], 0.5)
 
 
+@pytest.mark.level3
 @compiled_only
 def test_vectors_are_the_same_compiled():
     assert_the_same(every_function_of_a_vector, *NUMBERS[:2], 0.02)
 
 
+@pytest.mark.level3
 @compiled_only
 @pytest.mark.parametrize("exponent", ["1.0", "1.5"])
 def test_laws_are_the_same_compiled(exponent):
     assert_the_same(every_function_of_a_law, LAWS[exponent], -0.1, 0.3)
 
 
+@pytest.mark.level3
 @compiled_only
 def test_the_power_law_is_nearly_the_same_compiled():
     """`pow` is the one function whose last bit may differ."""
@@ -189,6 +195,7 @@ def test_methods_in_python(thing, answer):
     assert kind_of(thing, 10.0) == answer
 
 
+@pytest.mark.level3
 @compiled_only
 @pytest.mark.parametrize(("thing", "answer"), THINGS, ids=repr)
 def test_methods_in_kernels(thing, answer):
@@ -199,6 +206,7 @@ def select_all(a, b):
     return _jit.select(a > b, a, b), _jit.select(a > b, 1.0, a / (b - b)), _jit.select((a > b) & (a > 0.0), -a, a)
 
 
+@pytest.mark.level3
 @pytest.mark.parametrize("first", [1.0, 3.0])
 def test_select(first):
     """Both sides are evaluated, one is taken; an infinity on the other side has no effect."""
@@ -227,6 +235,7 @@ def used_up_often(rounds):
     return clean
 
 
+@pytest.mark.level3
 def test_scratch_is_zero_each_time():
     """Far more of it than a stack holds, if it were not released."""
     assert used_up_often(10)
@@ -295,6 +304,7 @@ def quartered(x):
     return halved(halved(x))
 
 
+@pytest.mark.level3
 @compiled_only
 def test_only_kernels_become_machine_code(monkeypatch, tmp_path):
     made = []
@@ -352,6 +362,7 @@ def limit_of_a_script():
     sys.setrecursionlimit(before)
 
 
+@pytest.mark.level3
 @compiled_only
 def test_the_deepest_fold_of_the_most_walls_compiles(limit_of_a_script, monkeypatch, tmp_path):
     """24 walls nest 1500 frames of the compiler; a script has 1000."""
