@@ -66,11 +66,12 @@ def pytest_ignore_collect(collection_path, config):
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
     """Slow tests are marked and come first, the longest before others: no core waits for the last of them."""
-    known = durations.seconds_of(durations.FILE.read_text("utf-8"))
+    seconds, unmeasured = durations.known()
     for item in items:
-        if item.nodeid in known:
+        waits = item.nodeid.partition("::")[0] in unmeasured and item.get_closest_marker("physics")
+        if item.nodeid in seconds or waits:
             item.add_marker(pytest.mark.slow)
-    items.sort(key=lambda item: -known.get(item.nodeid, 0.0))
+    items.sort(key=lambda item: -seconds.get(item.nodeid, 0.0))
     if int(numba.config.OPT) != 3:
         others = [item for item in items if any(mark.kwargs for mark in item.iter_markers("level3"))]
         config.hook.pytest_deselected(items=others)

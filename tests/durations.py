@@ -1,7 +1,8 @@
 """Processor time of each test: `python -m pytest -n 2 -m "not long" -p tests.durations` writes those that are slow.
 
 With an empty cache of kernels: a test pays for those that it is the first to need. conftest.py marks what is in the
-file as slow, and starts with the longest.
+file as slow, and starts with the longest. A file of which the table has no number yet is there with `null`: its tests
+of physics count as slow until they are measured.
 """
 
 import json
@@ -16,9 +17,11 @@ SLOW = 0.5
 _spent = {}
 
 
-def seconds_of(known):
-    """Seconds of tests by their ids, from the text of the file."""
-    return {f"{path}::{name}": time for path, names in json.loads(known).items() for name, time in names.items()}
+def known():
+    """The seconds of slow tests by their ids, and the files that are not measured yet."""
+    table = json.loads(FILE.read_text("utf-8")) if FILE.exists() else {}
+    seconds = {f"{path}::{name}": time for path, names in table.items() for name, time in (names or {}).items()}
+    return seconds, {path for path, names in table.items() if names is None}
 
 
 def _processor_time():
@@ -55,14 +58,15 @@ def pytest_sessionfinish(session):
     """What was not run keeps its time."""
     if hasattr(session.config, "workerinput") or not _spent:
         return
-    merged = {**(seconds_of(FILE.read_text()) if FILE.exists() else {}), **_spent}
-    write(FILE, merged)
+    write(_spent)
 
 
-def write(path, seconds):
-    """Write the times [s] of those that are slow, by file."""
-    table = {}
-    for name in sorted(name for name, time in seconds.items() if time >= SLOW):
+def write(spent):
+    """Write the times [s] of tests, by their ids, into the table."""
+    seconds, unmeasured = known()
+    seconds |= spent
+    table = dict.fromkeys(unmeasured - {name.partition("::")[0] for name in spent})
+    for name in (name for name, time in seconds.items() if time >= SLOW):
         file, _, test = name.partition("::")
-        table.setdefault(file, {})[test] = round(seconds[name], 1)
-    path.write_text(json.dumps(table, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        table[file] = {**(table.get(file) or {}), test: round(seconds[name], 1)}
+    FILE.write_text(json.dumps(table, indent=1, ensure_ascii=False, sort_keys=True) + "\n", encoding="utf-8")
