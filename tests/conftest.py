@@ -93,26 +93,49 @@ def row(*values):
         raise
 
 
-def pairs_of(*axes):
-    """Rows in which each pair of values of two axes occurs, for tests of full products that take too long.
+def every_pair(**axes):
+    """Parametrize by a product. The long ring has all of it, others each pair of values at least once.
 
-    Each row begins with a pair that is left, and takes of every other axis the value with the most new pairs.
+    Args:
+        axes: the values of each argument, a list, or a dictionary by what tests are named after.
+    """
+    axes = {name: axis if isinstance(axis, dict) else {str(one): one for one in axis} for name, axis in axes.items()}
+    cover = set(_cover([len(axis) for axis in axes.values()]))
+    rows = [
+        pytest.param(
+            *(value for _label, value in row),
+            marks=() if numbers in cover else pytest.mark.long,
+            id="-".join(label for label, _value in row),
+        )
+        for numbers, row in zip(
+            itertools.product(*(range(len(axis)) for axis in axes.values())),
+            itertools.product(*(axis.items() for axis in axes.values())),
+            strict=True,
+        )
+    ]
+    return pytest.mark.parametrize(list(axes), rows)
+
+
+def _cover(sizes):
+    """Rows of numbers below these sizes in which each pair of two columns occurs.
+
+    Each row begins with a pair that is left, and takes in every other column the number with the most new pairs.
     """
     left = {
         (i, a, j, b): None
-        for i, j in itertools.combinations(range(len(axes)), 2)
-        for a, b in itertools.product(range(len(axes[i])), range(len(axes[j])))
+        for i, j in itertools.combinations(range(len(sizes)), 2)
+        for a, b in itertools.product(range(sizes[i]), range(sizes[j]))
     }
     while left:
         i, a, j, b = next(iter(left))
         chosen = {i: a, j: b}
-        for k in range(len(axes)):
+        for k in range(len(sizes)):
             if k not in chosen:
-                gains = [sum(_pair(k, c, m, d) in left for m, d in chosen.items()) for c in range(len(axes[k]))]
+                gains = [sum(_pair(k, c, m, d) in left for m, d in chosen.items()) for c in range(sizes[k])]
                 chosen[k] = gains.index(max(gains))
         for one, other in itertools.combinations(chosen.items(), 2):
             left.pop(_pair(*one, *other), None)
-        yield tuple(axis[chosen[k]] for k, axis in enumerate(axes))
+        yield tuple(chosen[k] for k in range(len(sizes)))
 
 
 def _pair(i, a, j, b):
