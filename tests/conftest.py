@@ -68,8 +68,7 @@ def pytest_collection_modifyitems(config, items):
     """Slow tests are marked and come first, the longest before others: no core waits for the last of them."""
     seconds, unmeasured = durations.known()
     for item in items:
-        waits = item.nodeid.partition("::")[0] in unmeasured and item.get_closest_marker("physics")
-        if item.nodeid in seconds or waits:
+        if item.nodeid in seconds or item.nodeid.partition("::")[0] in unmeasured:
             item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: -seconds.get(item.nodeid, 0.0))
     if int(numba.config.OPT) != 3:

@@ -1,8 +1,8 @@
 """Processor time of each test: `python -m pytest -n 2 -m "not long" -p tests.durations` writes those that are slow.
 
 With an empty cache of kernels: a test pays for those that it is the first to need. conftest.py marks what is in the
-file as slow, and starts with the longest. A file of which the table has no number yet is there with `null`: its tests
-of physics count as slow until they are measured.
+file as slow, and starts with the longest. A file that is not measured yet is there with `null`: its tests count as slow
+until they are.
 """
 
 import json
