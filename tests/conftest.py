@@ -65,8 +65,12 @@ def pytest_ignore_collect(collection_path, config):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Slow tests are marked and come first, the longest before others: no core waits for the last of them."""
-    seconds, unmeasured = durations.known()
+    """Slow tests are marked and come first, the longest before others: no core waits for the last of them.
+
+    A test that is named by itself runs, however slow it is.
+    """
+    is_named = any("::" in argument for argument in config.args)
+    seconds, unmeasured = durations.known() if not is_named else ({}, set())
     for item in items:
         if item.nodeid in seconds or item.nodeid.partition("::")[0] in unmeasured:
             item.add_marker(pytest.mark.slow)
