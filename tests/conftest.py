@@ -3,12 +3,17 @@
 import contextlib
 import functools
 import gc
+import itertools
 import os
 import resource
 import signal
 import sys
 import types
 
+# Level 0 of LLVM takes half of the time to compile and gives the same bits. Tests of what level 3 makes are marked.
+os.environ.setdefault("NUMBA_OPT", "0")
+
+import durations
 import numba
 import numpy as np
 import pytest
@@ -53,14 +58,91 @@ EPSILON = float(np.finfo(np.float64).eps)
 
 
 def pytest_ignore_collect(collection_path, config):
-    """Files of the long ring take seconds to import: not where `-m` is as in pyproject.toml and no file is named."""
-    is_long = collection_path.name == "long" and config.option.markexpr == "not long and not slow"
+    """Files of the long ring take seconds to import: not where `-m` excludes it and no file is named."""
+    is_long = collection_path.name == "long" and "not long" in config.option.markexpr
     return True if is_long and not any("long" in argument for argument in config.args) else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Slow tests are marked and come first, the longest before others: no core waits for the last of them.
+
+    A test that is named by itself runs, however slow it is.
+    """
+    is_named = any("::" in argument for argument in config.args)
+    seconds, unmeasured = durations.known() if not is_named else ({}, set())
+    for item in items:
+        if item.nodeid in seconds or item.nodeid.partition("::")[0] in unmeasured:
+            item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: -seconds.get(item.nodeid, 0.0))
+    if int(numba.config.OPT) != 3:
+        others = [item for item in items if any(mark.kwargs for mark in item.iter_markers("level3"))]
+        config.hook.pytest_deselected(items=others)
+        items[:] = [item for item in items if item not in set(others)]
 
 
 def pytest_collection_finish():
     """What is collected and imported stays to the end: no garbage collection looks at it again."""
     gc.freeze()
+
+
+@contextlib.contextmanager
+def row(*values):
+    """A row of a table within one test: a failure says in which one."""
+    try:
+        yield
+    except Exception as error:
+        error.add_note(f"in the row {', '.join(map(str, values))}")
+        raise
+
+
+def every_pair(**axes):
+    """Parametrize by a product. The long ring has all of it, others each pair of values at least once.
+
+    Args:
+        axes: the values of each argument, a list, or a dictionary by what tests are named after.
+    """
+    axes = {name: axis if isinstance(axis, dict) else {str(one): one for one in axis} for name, axis in axes.items()}
+    cover = set(_cover([len(axis) for axis in axes.values()]))
+    rows = [
+        pytest.param(
+            *(value for _label, value in row),
+            marks=() if numbers in cover else pytest.mark.long,
+            id="-".join(label for label, _value in row),
+        )
+        for numbers, row in zip(
+            itertools.product(*(range(len(axis)) for axis in axes.values())),
+            itertools.product(*(axis.items() for axis in axes.values())),
+            strict=True,
+        )
+    ]
+    return pytest.mark.parametrize(list(axes), rows)
+
+
+def _cover(sizes):
+    """Rows of numbers below these sizes in which each pair of two columns occurs.
+
+    Each row begins with a pair that is left, and takes in every other column the number with the most new pairs.
+    """
+    left = {
+        (i, a, j, b): None
+        for i, j in itertools.combinations(range(len(sizes)), 2)
+        for a, b in itertools.product(range(sizes[i]), range(sizes[j]))
+    }
+    while left:
+        i, a, j, b = next(iter(left))
+        chosen = {i: a, j: b}
+        for k in range(len(sizes)):
+            if k not in chosen:
+                gains = [sum(_pair(k, c, m, d) in left for m, d in chosen.items()) for c in range(sizes[k])]
+                chosen[k] = gains.index(max(gains))
+        for one, other in itertools.combinations(chosen.items(), 2):
+            left.pop(_pair(*one, *other), None)
+        yield tuple(chosen[k] for k in range(len(sizes)))
+
+
+def _pair(i, a, j, b):
+    return (i, a, j, b) if i < j else (j, b, i, a)
 
 
 def rarely(*values):

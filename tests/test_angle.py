@@ -47,6 +47,7 @@ def test_an_odd_and_an_even_function():
         assert sine_and_versine(-angle) == (-sine, versine)
 
 
+@pytest.mark.level3
 def test_the_same_compiled():
     in_kernel = compiled(sine_and_versine)
     for angles in ANGLES.values():

@@ -1,5 +1,6 @@
 """Counters: they change no bit of a motion, and count each crossing once, out and back."""
 
+import functools
 import math
 
 import numpy as np
@@ -43,6 +44,12 @@ def run(scene, counters, n=12, until=1.0, seed=1, **keywords):
     return start, swarm.simulate(scene, start, swarm.Impact(), until=until, counters=counters, **keywords)
 
 
+@functools.cache
+def run_of(name):
+    """The run of a scene with all counters, which tests hold others against."""
+    return run(SCENES[name], SHAPES)
+
+
 def outside(surface, points):
     return side_of(surface) * surface.phi(points) > 0.0
 
@@ -68,9 +75,8 @@ def require_same(result, other):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_they_change_no_bit_and_count_who_is_outside(name):
-    scene = SCENES[name]
-    start, result = run(scene, SHAPES)
-    _start, alone = run(scene, ())
+    start, result = run_of(name)
+    _start, alone = run(SCENES[name], ())
     for key, values in alone.observables.items():
         assert values.tobytes() == result.observables[key].tobytes(), key
     assert alone.particles.position.tobytes() == result.particles.position.tobytes()
@@ -105,8 +111,7 @@ def test_each_is_a_change_of_side_in_frames_that_are_close(name, tmp_path):
 def test_rows_of_the_log_are_the_crossings(name, tmp_path):
     path = tmp_path / "i.h5"
     _start, result = run(SCENES[name], SHAPES, impacts=path)
-    _start, without = run(SCENES[name], SHAPES)
-    require_same(result, without)
+    require_same(result, run_of(name)[1])
     with swarm.load_impacts(path) as log:
         table, crossings = log.table(), log.crossings()
         assert log.counts().sum() == result.impacts_per_particle.sum() == len(log.table(surfaces=0))
@@ -141,6 +146,7 @@ def test_rows_of_the_log_are_the_crossings(name, tmp_path):
 # --- The same bits ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.level3
 @pytest.mark.parametrize("name", ["box"])
 def test_any_threads_and_blocks_count_the_same(name):
     _start, alone = run(SCENES[name], SHAPES[:3], 600, 0.2)
@@ -148,6 +154,7 @@ def test_any_threads_and_blocks_count_the_same(name):
         require_same(run(SCENES[name], SHAPES[:3], 600, 0.2, threads=threads, block_size=size)[1], alone)
 
 
+@pytest.mark.level3
 @pytest.mark.physics
 @pytest.mark.parametrize("name", ["box", rarely("fall"), "restless", rarely("moving"), "open"])
 def test_kernels_that_are_compiled_count_the_same(name, tmp_path):

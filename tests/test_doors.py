@@ -299,6 +299,7 @@ def bits_at_the_end(found):
     return [array.tobytes() for array in arrays]
 
 
+@pytest.mark.level3
 @pytest.mark.physics
 def test_the_same_bits_compiled_and_for_threads_and_blocks():
     scene = busy()

@@ -142,6 +142,7 @@ def test_who_escapes_has_a_last_row(tmp_path, gravity):
     assert all(last[p] == 0.0 for p in gone)
 
 
+@pytest.mark.level3
 @pytest.mark.parametrize("name", ["fall, friction", "thermal"])
 def test_the_rows_are_the_same_for_any_threads_and_blocks(tmp_path, monkeypatch, name):
     """And for logs of any size: here a frame fills several."""
@@ -166,6 +167,7 @@ def test_the_rows_are_the_same_for_any_threads_and_blocks(tmp_path, monkeypatch,
         assert len(found) == result.observables["impacts"][-1]
 
 
+@pytest.mark.level3
 def test_compiled_rows_are_those_of_plain_python(tmp_path, monkeypatch):
     monkeypatch.setattr(impacts, "_ROWS", 512)
     for precision in ("float64", "float32"):

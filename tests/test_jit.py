@@ -15,7 +15,7 @@ import numba
 import numpy as np
 import pytest
 from children import python
-from conftest import LAWS, call, compiled, every_surface, numbers_of, rarely, scene_of
+from conftest import LAWS, call, compiled, every_surface, numbers_of, rarely, row, scene_of
 from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import TypingError
 
@@ -119,34 +119,40 @@ def assert_the_same(function, first, *arguments):
 NUMBERS = (Vec(0.3, -0.1, 0.4), Vec(0.5, -0.7, 0.2), Vec(0.1, -0.3, 0.9), 0.02)
 
 
+@pytest.mark.level3
 @compiled_only
 @every_surface
 def test_surfaces_are_the_same_compiled(name):
     assert_the_same(every_function_of_a_surface, numbers_of(name), *NUMBERS)
 
 
+@pytest.mark.level3
 @compiled_only
 def test_chains_are_the_same_compiled():
     assert_the_same(every_function_of_a_chain, scene_of("sphere", "plane", "ellipsoid").walls(), *NUMBERS)
 
 
+@pytest.mark.level3
 @compiled_only
 @pytest.mark.parametrize("pull", [None, Gravity(0.1, -0.2, 0.3)], ids=["none", "some"])
 def test_gravity_is_the_same_compiled(pull):
     assert_the_same(every_function_of_gravity, pull, NUMBERS[0], 0.5)
 
 
+@pytest.mark.level3
 @compiled_only
 def test_vectors_are_the_same_compiled():
     assert_the_same(every_function_of_a_vector, *NUMBERS[:2], 0.02)
 
 
+@pytest.mark.level3
 @compiled_only
 @pytest.mark.parametrize("exponent", ["1.0", "1.5"])
 def test_laws_are_the_same_compiled(exponent):
     assert_the_same(every_function_of_a_law, LAWS[exponent], -0.1, 0.3)
 
 
+@pytest.mark.level3
 @compiled_only
 def test_the_power_law_is_nearly_the_same_compiled():
     """`pow` is the one function whose last bit may differ."""
@@ -189,6 +195,7 @@ def test_methods_in_python(thing, answer):
     assert kind_of(thing, 10.0) == answer
 
 
+@pytest.mark.level3
 @compiled_only
 @pytest.mark.parametrize(("thing", "answer"), THINGS, ids=repr)
 def test_methods_in_kernels(thing, answer):
@@ -199,6 +206,7 @@ def select_all(a, b):
     return _jit.select(a > b, a, b), _jit.select(a > b, 1.0, a / (b - b)), _jit.select((a > b) & (a > 0.0), -a, a)
 
 
+@pytest.mark.level3
 @pytest.mark.parametrize("first", [1.0, 3.0])
 def test_select(first):
     """Both sides are evaluated, one is taken; an infinity on the other side has no effect."""
@@ -227,6 +235,7 @@ def used_up_often(rounds):
     return clean
 
 
+@pytest.mark.level3
 def test_scratch_is_zero_each_time():
     """Far more of it than a stack holds, if it were not released."""
     assert used_up_often(10)
@@ -255,6 +264,7 @@ def summed_with_distances(tables):
         tables.second[1, i] = tables.first[2, i] + tables.row[i]
 
 
+@pytest.mark.level3(only=True)
 @compiled_only
 @pytest.mark.parametrize(("function", "known"), [(summed, False), (summed_with_distances, True)])
 def test_distances_of_rows_are_known_to_the_compiler(function, known):
@@ -268,6 +278,7 @@ def test_distances_of_rows_are_known_to_the_compiler(function, known):
     assert ("i64 384" in text) == known
 
 
+@pytest.mark.level3(only=True)
 @compiled_only
 def test_kernels_count_no_references_and_are_vectors(tmp_path):
     """The compiled text of a sphere's kernel: no call that counts, and the square root of a hit for several lanes."""
@@ -293,6 +304,7 @@ def quartered(x):
     return halved(halved(x))
 
 
+@pytest.mark.level3
 @compiled_only
 def test_only_kernels_become_machine_code(monkeypatch, tmp_path):
     made = []
@@ -319,6 +331,7 @@ def calls_python(x):
     return in_object_mode(x)
 
 
+@pytest.mark.level3(only=True)
 @compiled_only
 @pytest.mark.filterwarnings("ignore:Code running in object mode:numba.core.errors.NumbaWarning")
 def test_a_helper_may_call_python(monkeypatch, tmp_path):
@@ -349,6 +362,7 @@ def limit_of_a_script():
     sys.setrecursionlimit(before)
 
 
+@pytest.mark.level3
 @compiled_only
 def test_the_deepest_fold_of_the_most_walls_compiles(limit_of_a_script, monkeypatch, tmp_path):
     """24 walls nest 1500 frames of the compiler; a script has 1000."""
@@ -533,11 +547,11 @@ def imported(parts):
     return [target for target, _names in imported_names(parts)]
 
 
-@pytest.mark.parametrize("parts", modules(), ids=".".join)
-def test_a_module_imports_only_from_below(parts):
-    for target in imported(parts):
-        below = LAYER[target[0]] > LAYER[parts[0]]
-        assert below or (len(target) > 1 and target[0] == parts[0]), f"{'.'.join(parts)} imports {'.'.join(target)}"
+def test_a_module_imports_only_from_below():
+    for parts in modules():
+        with row(".".join(parts)):
+            above = [one for one in imported(parts) if LAYER[one[0]] <= LAYER[parts[0]]]
+            assert [".".join(one) for one in above if len(one) == 1 or one[0] != parts[0]] == []
 
 
 def test_no_imports_go_in_circles():

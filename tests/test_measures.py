@@ -81,6 +81,7 @@ def test_they_are_what_the_engines_own_are_and_stand_beside_them(name, tmp_path)
         assert kinetic(frame) == pytest.approx(frame.observables["kinetic_energy"], rel=1e-13)
 
 
+@pytest.mark.level3
 @pytest.mark.parametrize("keywords", [{"threads": 2}, {"threads": 3, "block_size": 1}, {"compile": "always"}], ids=str)
 def test_they_have_the_same_bits_however_a_run_is_carried_out(keywords):
     one, other = run(OWN, threads=1).observables, run(OWN, **keywords).observables

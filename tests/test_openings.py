@@ -409,6 +409,7 @@ def bits(result):
     return [array.tobytes() for array in (*arrays, *(result.observables[name] for name in ("impacts", "escaped")))]
 
 
+@pytest.mark.level3
 @pytest.mark.parametrize("step", [0.0, rarely(0.01)])
 def test_the_same_bits_compiled_and_for_threads_and_blocks(step):
     scene = swarm.Scene([swarm.Sphere(0.5, openings=[HOLE])])

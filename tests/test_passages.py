@@ -182,6 +182,7 @@ def test_halts_and_sessions_leave_the_bits(tmp_path, gravity):
     require_resumed_is_whole(tmp_path, doorway(gravity), swarm.Impact(), n=100, every=3.0, kind=DoorRun)
 
 
+@pytest.mark.level3
 @pytest.mark.physics
 @pytest.mark.parametrize("gravity", [None, rarely((0.3, 0.1, -1.0))])
 def test_the_same_bits_compiled_and_for_threads(gravity):

@@ -60,6 +60,7 @@ def test_both_tiers_have_the_same_bits_in_every_surface(monkeypatch, name):
     assert_same_bits(monkeypatch, swarm.Scene([SURFACES[name]()]), METHODS["impact"])
 
 
+@pytest.mark.level3
 @compiled_only
 def test_what_is_not_done_in_time_goes_on_compiled(monkeypatch):
     """Here there is next to no time, and the kernels are told to be nowhere."""

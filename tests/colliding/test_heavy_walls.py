@@ -179,6 +179,7 @@ def test_balls_that_are_far_meet_no_wall_before_they_look_again(wall, monkeypatc
     assert seldom[2]["wall_energy"] == pytest.approx(often[2]["wall_energy"], abs=1e-9)
 
 
+@pytest.mark.level3
 def test_compiled_and_plain_agree_with_any_number_of_threads():
     scene, balls = moving(plate(0.5))
     plain = frames(run_of(scene, balls), [0.4])

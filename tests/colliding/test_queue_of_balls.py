@@ -129,6 +129,7 @@ def test_each_event_is_the_first_that_there_is(options):
             assert meets > -1e-12
 
 
+@pytest.mark.level3
 @pytest.mark.skipif(cache.is_disabled(), reason="nothing is compiled here")
 def test_compiled_it_has_the_same_bits():
     scene, start = gas(n=12, restitution=0.9, gravity=(0.0, 0.0, -1.0))

@@ -20,6 +20,7 @@ SCENES = {
 }
 
 
+@pytest.mark.level3
 @pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 @pytest.mark.parametrize("name", ["smooth box", "drum", *map(rarely, ("rough box that shakes", "cell"))])
 def test_compiled_kernels_have_the_same_bits(name):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import gaps_along, rarely
+from conftest import every_pair, gaps_along, rarely
 
 import swarm
 from swarm.kernel.vector import vec
@@ -90,9 +90,7 @@ def require_the_same_run(surfaces, gravity, method, start, until, impacts, withi
         assert kept[1][-1] - kept[1][0] - work == pytest.approx(change, rel=1e-8, abs=1e-9)
 
 
-@pytest.mark.parametrize("gravity", [None, PULL], ids=["straight", "falling"])
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", ["sphere", "box"])
+@every_pair(name=["sphere", "box"], method=list(METHODS), gravity={"straight": None, "falling": PULL})
 def test_a_cavity_in_uniform_motion_is_one_at_rest(name, method, gravity):
     start = swarm.fill(swarm.Scene(CAVITIES[name](None)), 3, speed=1.0, seed=3)
     require_the_same_run(CAVITIES[name], gravity, METHODS[method], start, 2.0, impacts=6)
@@ -135,9 +133,7 @@ def test_the_mean_value_form_in_uniform_motion():
 # --- Work ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("gravity", [None, PULL], ids=["straight", "falling"])
-@pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("name", CAVITIES)
+@every_pair(name=list(CAVITIES), motion=list(MOTIONS), gravity={"straight": None, "falling": PULL})
 def test_penalty_balances_energy_and_work(name, motion, gravity):
     scene = swarm.Scene(CAVITIES[name](MOTIONS[motion]), gravity)
     closed = scene if name != "planes" else swarm.Scene([swarm.Sphere(0.25)])
@@ -207,9 +203,7 @@ def test_what_the_baselines_miss_vanishes_with_the_step(method):
 # --- A step of multipliers -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("acceleration", ["none", "secant", "reflection"])
-@pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("name", ["sphere", "ellipsoid", "planes"])
+@every_pair(name=["sphere", "ellipsoid", "planes"], motion=list(MOTIONS), acceleration=["none", "secant", "reflection"])
 def test_multipliers_from_a_wall_that_moves(name, motion, acceleration):
     """A step that begins on the wall ends on it, where it is then; the energy is that with its work."""
     # At time 0, when no wall has moved yet, but for the sum, whose path has a displacement then.
@@ -282,9 +276,7 @@ def test_stiff_walls_are_rigid(motion):
 # --- No contact is jumped over ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("gravity", [None, PULL], ids=["straight", "falling"])
-@pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("name", CAVITIES)
+@every_pair(name=list(CAVITIES), motion=list(MOTIONS), gravity={"straight": None, "falling": PULL})
 def test_free_steps_are_free(name, motion, gravity):
     """What is jumped over is inside at the end of every step."""
     scene, rng = swarm.Scene(CAVITIES[name](MOTIONS[motion]), gravity), np.random.default_rng(4)

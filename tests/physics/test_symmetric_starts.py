@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bounded import bounded
-from conftest import gaps_along
+from conftest import every_pair, gaps_along
 
 import swarm
 from swarm.motion import pose
@@ -68,9 +68,11 @@ def first_exit(scene, still, poses, fall):
     return high
 
 
-@pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.81), (9.81, 0.0, 0.0), None], ids=["down", "sideways", "none"])
-@pytest.mark.parametrize("surface", SURFACES)
-@pytest.mark.parametrize("motion", MOTIONS)
+@every_pair(
+    motion=list(MOTIONS),
+    surface=list(SURFACES),
+    gravity={"down": (0.0, 0.0, -9.81), "sideways": (9.81, 0.0, 0.0), "none": None},
+)
 def test_a_flight_is_as_long_as_it_is(motion, surface, gravity, monkeypatch):
     scene, still = (swarm.Scene([SURFACES[surface](one)], gravity=gravity) for one in (MOTIONS[motion], None))
     poses, pull = poses_of(motion), np.array(gravity or (0.0, 0.0, 0.0))

@@ -7,7 +7,7 @@ import re
 import mpmath
 import numpy as np
 import pytest
-from conftest import gaps_along
+from conftest import every_pair, gaps_along
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -153,9 +153,11 @@ def poses_of(motion, start, span):
     return [pose(MOTIONS[motion], start + t) for t in moments(span).tolist()]
 
 
-@pytest.mark.parametrize("pull", [(0.0, 0.0, 0.0), (0.3, 0.0, -2.0)], ids=["straight", "falling"])
-@pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("name", [*CAVITIES, *SOLIDS])
+@every_pair(
+    name=[*CAVITIES, *SOLIDS],
+    motion=list(MOTIONS),
+    pull={"straight": (0.0, 0.0, 0.0), "falling": (0.3, 0.0, -2.0)},
+)
 def test_the_first_hit_is_found(name, motion, pull):
     made, still = ((CAVITIES | SOLIDS)[name](one) for one in (MOTIONS[motion], None))
     scene, rest = swarm.Scene([made]), swarm.Scene([still])

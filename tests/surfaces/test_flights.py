@@ -1,5 +1,6 @@
 """The flight at every surface, each answer judged in exact arithmetic: each fact runs over the table of conftest.py."""
 
+import itertools
 import math
 
 import numpy as np
@@ -12,6 +13,7 @@ from conftest import (
     every_quadric_wall,
     every_wall,
     numbers_of,
+    row,
     scales,
     vectors,
     wall_point,
@@ -57,10 +59,14 @@ def test_a_fall_that_is_no_graze_ends_after_a_few_passes(name, point, direction,
 
 
 @every_polynomial_wall
-@pytest.mark.parametrize("off", [-1e-6, -1e-12, 0.0, 1e-12, 1e-6])
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
-def test_a_parabola_that_just_touches(name, off, scale):
+def test_a_parabola_that_just_touches(name):
     """Double roots, missed or crossed by a little: no hit is skipped, and none is invented."""
+    for off, scale in itertools.product([-1e-6, -1e-12, 0.0, 1e-12, 1e-6], [1e-6, 1.0, 1e6]):
+        with row(off, scale):
+            require_a_touch(name, off, scale)
+
+
+def require_a_touch(name, off, scale):
     surface = numbers_of(name, scale)
     wall = wall_point(surface, scale * np.array([0.3, 0.5, -0.4]))
     normal = np.array(call(surface.unit_normal, wall))
@@ -76,35 +82,36 @@ def test_a_parabola_that_just_touches(name, off, scale):
 
 
 @every_wall
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
-@pytest.mark.parametrize("speed", [1e-6, 1.0, 1e6])
-@pytest.mark.parametrize("depth", [1e-9, 1e-3, 0.1])
-def test_head_on_the_hit_is_at_depth_over_speed(name, scale, speed, depth):
+def test_head_on_the_hit_is_at_depth_over_speed(name):
     """No absolute threshold anywhere: the same flight at every scale and speed."""
     point, direction = np.array([0.3, 0.5, -0.4]), np.array([1.0, 0.0, 0.0])
-    surface, position, velocity = start(name, point, direction, depth, 1.0, scale, speed)
-    time, found = call(surface.first_hit, position, velocity)
-    assert found
-    assert time * speed == pytest.approx(depth, rel=1e-12, abs=1e-15)
-    sideways = start(name, point, direction, depth, 0.0, scale, speed)[2]
-    grazing, _found = call(surface.first_hit, position, 1e-4 * velocity + sideways)
-    assert grazing * speed >= 0.9 * depth
+    for scale, speed, depth in itertools.product([1e-6, 1.0, 1e6], [1e-6, 1.0, 1e6], [1e-9, 1e-3, 0.1]):
+        with row(scale, speed, depth):
+            surface, position, velocity = start(name, point, direction, depth, 1.0, scale, speed)
+            time, found = call(surface.first_hit, position, velocity)
+            assert found
+            assert time * speed == pytest.approx(depth, rel=1e-12, abs=1e-15)
+            sideways = start(name, point, direction, depth, 0.0, scale, speed)[2]
+            grazing, _found = call(surface.first_hit, position, 1e-4 * velocity + sideways)
+            assert grazing * speed >= 0.9 * depth
 
 
 # --- On the wall and at rest -----------------------------------------------------------------------------
 
 
 @every_wall
-@pytest.mark.parametrize("depth", [0.0, 2e-16, -2e-16])
-def test_from_the_wall_the_direction_decides(name, depth):
+def test_from_the_wall_the_direction_decides(name):
     """Outward: now. Inward: not now, and not an instant after; gravity changes neither."""
-    surface, position, velocity = start(name, np.array([0.3, 0.5, -0.4]), np.array([1.0, 0, 0]), depth, 0.6, 1.0, 1.0)
-    normal = np.array(call(surface.unit_normal, position))
-    for ask, pull in ((straight, np.zeros(3)), (falling, 0.1 * normal), (falling, -0.1 * normal)):
-        time, found = ask(surface, position, velocity, pull)
-        assert found
-        assert time <= 1e-15
-        assert ask(surface, position, -velocity, pull)[0] > 0.1
+    point, direction = np.array([0.3, 0.5, -0.4]), np.array([1.0, 0, 0])
+    for depth in (0.0, 2e-16, -2e-16):
+        surface, position, velocity = start(name, point, direction, depth, 0.6, 1.0, 1.0)
+        normal = np.array(call(surface.unit_normal, position))
+        for ask, pull in ((straight, np.zeros(3)), (falling, 0.1 * normal), (falling, -0.1 * normal)):
+            with row(depth, ask.__name__, pull):
+                time, found = ask(surface, position, velocity, pull)
+                assert found
+                assert time <= 1e-15
+                assert ask(surface, position, -velocity, pull)[0] > 0.1
 
 
 @every_wall

@@ -1,0 +1,43 @@
+"""Which tests are slow, and how tables and products become tests."""
+
+import itertools
+from pathlib import Path
+
+import durations
+import pytest
+from conftest import _cover, row
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.mark.parametrize("sizes", [(2, 3), (3, 3, 3), (16, 4, 2), (34, 3, 3, 3)], ids=str)
+def test_a_cover_has_every_pair(sizes):
+    rows = list(_cover(sizes))
+    for i, j in itertools.combinations(range(len(sizes)), 2):
+        assert {(one[i], one[j]) for one in rows} == set(itertools.product(range(sizes[i]), range(sizes[j])))
+    largest, second = sorted(sizes)[:-3:-1]
+    assert largest * second <= len(rows) <= 1.2 * largest * second
+
+
+def test_a_failure_names_its_row():
+    with pytest.raises(AssertionError) as caught, row("sphere", 1e-6):
+        raise AssertionError
+    assert caught.value.__notes__ == ["in the row sphere, 1e-06"]
+
+
+def test_the_table_names_tests_that_are_there():
+    seconds, unmeasured = durations.known()
+    for name in seconds:
+        path, *names = name.partition("[")[0].split("::")
+        with row(name):
+            text = (ROOT / path).read_text("utf-8")
+            assert path.startswith("swarm/") or all(f"def {one}(" in text or f"class {one}" in text for one in names)
+    assert [path for path in unmeasured if not (ROOT / path).exists()] == []
+    assert min(seconds.values()) >= durations.SLOW
+
+
+def test_what_is_measured_is_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(durations, "FILE", tmp_path / "durations.json")
+    durations.FILE.write_text('{"a.py": null, "b.py": {"test_x": 0.9, "test_y": 2.0}, "c.py": null}')
+    durations.write({"a.py::test[1]": 0.7, "b.py::test_x": 0.1})
+    assert durations.known() == ({"a.py::test[1]": 0.7, "b.py::test_y": 2.0}, {"c.py"})
