@@ -17,7 +17,6 @@ from .methods import AugmentedLagrangian, Impact, Method, Penalty
 from .methods.base import check_surfaces
 from .particles import Particles
 from .scene import Scene
-from .signature import lined
 from .status import Status
 from .surfaces import flights
 from .surfaces.lowered import lowered
@@ -60,7 +59,6 @@ class ContactHistory:
         return len(self.kinetic_energy)
 
 
-@lined
 def contact_history(
     scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float, method: Method
 ) -> ContactHistory:
