@@ -90,11 +90,23 @@ def ways(name: str, scene: swarm.Scene) -> dict[str, Iterator[tuple[str, Contend
     if name == reference.SOFT:
         return found
     if scene.gravity is None:  # cutting a step at the impact knows no gravity yet
-        found["AugmentedLagrangian"] = soft(
-            swarm.AugmentedLagrangian, _stiff, adaptive=True, acceleration="reflection", on_unconverged="count"
+        uzawa = {"adaptive": True, "acceleration": "reflection", "on_unconverged": "count"}
+        found["AugmentedLagrangian"] = soft(swarm.AugmentedLagrangian, _stiff, **uzawa)
+        found["AugmentedLagrangian, centred"] = soft(
+            swarm.AugmentedLagrangian, _stiff, **uzawa, contact_start="centred"
         )
-    chords = ((_step(h, "contact_step"), Ours(scene, swarm.Impact(contact_step=h))) for h in _CHORDS)
-    return {"Impact": iter([("default", Ours(scene, swarm.Impact()))]), "Impact, contact_step": chords, **found}
+    return {
+        "Impact": iter([("default", Ours(scene, swarm.Impact()))]),
+        "Impact, contact_step": _chords(scene, "impact"),
+        "Impact, contact_step, centred": _chords(scene, "centred"),
+        **found,
+    }
+
+
+def _chords(scene: swarm.Scene, start: str) -> Iterator[tuple[str, Contender]]:
+    """Contact steps that begin at the impact, or half of themselves before it."""
+    for h in _CHORDS:
+        yield _step(h, "contact_step"), Ours(scene, swarm.Impact(contact_step=h, contact_start=start))
 
 
 def _step(size: float, name: str = "dt") -> str:

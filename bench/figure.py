@@ -122,8 +122,12 @@ def accuracy(name: str, found: list[Any], front: list[Any], advice: str, where: 
     for method in dict.fromkeys(p.method for p in found):
         curve = [p for p in found if p.method == method]
         seconds = [p.seconds for p in curve]
+        # Steps that are centred about the impact have the colour of those that begin there.
+        begun = method.removesuffix(", centred")
         mark = {"marker": "*", "markersize": 13} if method == "Impact" else {"marker": "o", "markersize": 4}
-        line = {"color": colours()[_CURVES.index(method)], "linewidth": 1.4, **mark}
+        if method != begun:
+            mark = {"marker": "s", "markersize": 4, "markerfacecolor": "none"}
+        line = {"color": colours()[_CURVES.index(begun)], "linewidth": 1.4, **mark}
         panels[0].plot(seconds, [max(p.energy, _LEAST) for p in curve], **line)
         for k, dash in enumerate((":", "--", "-")):
             faint = {"alpha": 1.0 if dash == "-" else 0.45, "markersize": mark["markersize"] if dash == "-" else 2}

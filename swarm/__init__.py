@@ -121,6 +121,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'swarm' has no attribute {name!r}")
     # No public name is the name of a module: importing that module would hide it.
     value = getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    importlib.import_module(".signature", __name__).show_in_lines(value)
     globals()[name] = value
     return value
 

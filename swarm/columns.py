@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .catalog import components_of
+from .checks import path_of
 from .errors import SceneError
 from .extras import needed_by
 
@@ -85,8 +86,9 @@ def row_of(path: str | Path, number: int) -> int:
 
 def _rows_of(path: str | Path) -> list[tuple[int, list[str]]]:
     """The rows of a CSV file that are not empty, with their numbers, from 1 on."""
+    file = path_of("path", path)
     try:
-        text = Path(path).read_bytes()
+        text = file.read_bytes()
         table = list(csv.reader(io.StringIO(text.decode("utf-8-sig"), newline=""), skipinitialspace=True))
     except UnicodeDecodeError as error:
         row = text[: error.start].count(b"\n") + 1

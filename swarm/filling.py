@@ -9,7 +9,6 @@ from .particles import Particles
 from .placing.sequential import Room, place_balls, require_packing, require_size
 from .placing.shapes import require_shapes
 from .scene import Scene
-from .signature import lined
 from .state import Floats
 
 _BATCH = 1 << 18
@@ -20,7 +19,6 @@ _POINTS = 1 << 18
 _INSTEAD = "the particles as arrays or a CSV file"
 
 
-@lined
 def fill(
     scene: Scene,
     n: int,

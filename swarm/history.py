@@ -19,7 +19,6 @@ from .particles import Particles
 from .run.knows import Asked, require_known
 from .run.options import RunOptions
 from .scene import Scene
-from .signature import lined
 from .status import Status
 from .surfaces import flights
 from .surfaces.lowered import lowered
@@ -62,7 +61,6 @@ class ContactHistory:
         return len(self.kinetic_energy)
 
 
-@lined
 def contact_history(
     scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float, method: Method
 ) -> ContactHistory:

@@ -16,7 +16,6 @@ from .placing.sequential import Room, place_balls, require_size, told
 from .placing.shapes import require_shapes
 from .run.growing import grow
 from .scene import Scene
-from .signature import lined
 from .state import Floats
 from .surfaces.surface import Surface
 from .surfaces.union import Joined, surfaces_of
@@ -34,7 +33,6 @@ _BEGIN, _LESS, _TRIES = {3: 0.2, 2: 0.3}, 0.7, 6
 _CLOSE = 1e-9
 
 
-@lined
 def pack(
     scene: Scene,
     n: int | None = None,

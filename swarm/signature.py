@@ -1,13 +1,14 @@
-"""Signatures that `help` shows in lines of a terminal: a parameter each, with the short names of types."""
+"""Signatures that `help` shows in lines of a terminal: a parameter each, with the short names of types.
+
+Public names get them when they are first used, see `__getattr__` of the package.
+"""
 
 import inspect
 import re
-from collections.abc import Callable
-from typing import Any, TypeVar
+from types import FunctionType
+from typing import Any
 
 from numpy.typing import ArrayLike
-
-Function = TypeVar("Function", bound=Callable[..., Any])
 
 # The columns of a terminal; the modules of a type, before its name.
 _COLUMNS, _MODULES = 80, re.compile(r"\b(?:\w+\.)+(?=[A-Za-z])")
@@ -39,17 +40,19 @@ class Lined(inspect.Signature):
 
 def _short(text: str) -> str:
     """The text of an annotation without modules, and with the names that stand for long ones."""
+    text = re.sub(r"\btyping\.", "", text)
     inner = _ARRAY.removeprefix("typing.").removeprefix("Union[").removesuffix("]")
     for end, name in ((", NoneType]", "ArrayLike | None"), ("]", "ArrayLike")):
         text = text.replace(f"Union[{inner}{end}", name)
     return _MODULES.sub("", text.replace(f"{_ARRAY} | None", "ArrayLike | None").replace(_ARRAY, "ArrayLike"))
 
 
-def lined(function: Function) -> Function:
-    """A function whose signature is shown in lines.
+def show_in_lines(value: Any) -> None:
+    """Show the signature of a function in lines where it is long, of a class those of its methods too.
 
-    >>> @lined
-    ... def function(first: Callable[[int], str] | None = None, *, second: str = "none", third: float = 0.5): ...
+    >>> from collections.abc import Callable
+    >>> def function(first: Callable[[int], str] | None = None, *, second: str = "none", third: float = 0.5): ...
+    >>> show_in_lines(function)
     >>> print(inspect.signature(function))
     (
         first: Callable[[int], str] | None = None,
@@ -58,5 +61,19 @@ def lined(function: Function) -> Function:
         third: float = 0.5,
     )
     """
-    function.__signature__ = Lined.from_callable(function)  # type: ignore[attr-defined]
-    return function
+    if isinstance(value, FunctionType):
+        _line(value)
+    for kind in value.__mro__ if isinstance(value, type) else ():
+        if kind.__module__.partition(".")[0] == value.__module__.partition(".")[0]:
+            for one in vars(kind).values():
+                function = getattr(one, "__func__", one)
+                if isinstance(function, FunctionType):
+                    _line(function)
+
+
+def _line(function: FunctionType) -> None:
+    """Give a function a `Lined` signature, if its own is long."""
+    if "__signature__" not in vars(function):
+        signature = Lined.from_callable(function)
+        if len(inspect.Signature.__str__(signature)) > _COLUMNS:
+            function.__signature__ = signature  # type: ignore[attr-defined]

@@ -42,8 +42,8 @@ _SENTENCES = {
     Status.SENT_WRONG: "one of the laws of a wall gave it no velocity, or one into the wall, or out of the plane",
     Status.WAITS: "one of the laws of a wall lets it wait there, which particles with a radius and Impact do not; let "
     "it leave at once",
-    Status.TOO_DEEP: "the centre of a ball has passed the surface of what it meets: the contact is too soft for the "
-    "speed; use a larger penalty, or a smaller speed",
+    Status.TOO_DEEP: "it has passed the middle of what it meets, or a ball the surface: the contact is too soft for "
+    "the speed; use a larger penalty, or a smaller speed",
     Status.TIMELESS: "it goes from step to step, or from wall to wall, and no time passes; start it elsewhere, or end "
     "the run before; if nothing is special about the place, it is an error of swarm: please report it with the scene",
 }

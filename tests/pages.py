@@ -2,7 +2,7 @@
 
 from html.parser import HTMLParser
 
-VOID = {"meta", "link", "img", "source", "br"}
+VOID = {"meta", "link", "img", "source", "br", "wbr"}
 # What loads something, by the attribute that says what.
 LOADING = {"src", "srcset", "data", "poster", "background"}
 

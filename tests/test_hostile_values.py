@@ -147,6 +147,20 @@ def test_names_that_are_too_long_for_the_system(tmp_path):
             read(name)
 
 
+@pytest.mark.parametrize(
+    "read",
+    [
+        swarm.Mesh, lambda name: swarm.from_mesh(name, 0.1), swarm.Particles.from_csv,
+        lambda name: swarm.Sampled(name, 0.1, (0.0, 0.0, 0.0)),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("suffix", [".stl", ".csv", ".npy", ""])
+def test_names_of_inputs_that_are_too_long_are_cut(read, suffix):
+    with pytest.raises(swarm.SceneError) as failed:
+        read("a" * 3000 + suffix)
+    assert len(str(failed.value)) < 400
+
+
 def test_every_kth_particle_by_an_array_of_one_number(tmp_path):
     swarm.simulate(**CALLS["simulate"], impacts=tmp_path / "log.h5", impact_particles=np.array(2))
     with swarm.load_impacts(tmp_path / "log.h5") as log:

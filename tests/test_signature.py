@@ -7,7 +7,8 @@ import pytest
 
 import swarm
 
-LINED = ["contact_history", "fill", "pack", "rigid", "simulate", "sweep"]
+LINED = ["contact_history", "elastic", "fill", "pack", "place", "rigid", "simulate", "sweep"]
+SHOWN = [name for name in swarm.__all__ if callable(getattr(swarm, name))]
 
 
 @pytest.mark.parametrize("name", LINED)
@@ -38,3 +39,18 @@ def test_the_signature_holds_every_name_and_default(name):
 def test_arguments_are_bound_as_before():
     bound = inspect.signature(swarm.fill).bind("scene", 3, speed=1.0)
     assert bound.arguments == {"scene": "scene", "n": 3, "speed": 1.0}
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_help_has_no_long_line_of_a_signature(name):
+    """Nor of a method; and no module of NumPy in the name of an array."""
+    text = pydoc.plain(pydoc.render_doc(getattr(swarm, name)))
+    assert max(map(len, text.splitlines())) <= 120
+    assert "_array_like" not in text.partition("Data descriptors")[0]
+
+
+def test_classes_are_made_as_before():
+    shown = inspect.signature(swarm.Box)
+    assert list(shown.parameters)[:3] == ["half_widths", "center", "side"]
+    assert shown.bind((1, 1, 1), restitution=0.5).arguments == {"half_widths": (1, 1, 1), "restitution": 0.5}
+    assert swarm.Box((1.0, 1.0, 1.0), side="outside").side == "outside"

@@ -7,7 +7,6 @@ from numpy.typing import ArrayLike
 
 from .. import checks
 from ..errors import SceneError
-from ..signature import lined
 from ..state import Floats
 from . import checked, covering, room
 from .body import Body
@@ -87,7 +86,6 @@ def tetrahedron(edge: float, mass: float) -> Body:
     return Body(_CORNERS * (edge / np.sqrt(8.0)), mass / 4.0, links=_ALL_PAIRS, faces=_OUTWARD)
 
 
-@lined
 def rigid(
     vertices: ArrayLike, density: float, faces: ArrayLike | None = None, contacts: ArrayLike | None = None
 ) -> Body:

@@ -111,7 +111,8 @@ def described(scene: Scene, particles: Particles) -> tuple[Box, Flock]:
     shortest = max(_SHORTEST * epoch_of(scene, particles, grid), 0.0 if loss is None else loss.duration)
     walls = scene.walls(0.0) if scenery is None else scenery.given
     made = Box(walls, laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest)
-    if scene.gravity is not None and (loss is not None or laws.send_off):
+    if scene.gravity is not None:
+        # Also where nothing is lost: balls may start at rest on a floor.
         made = made._replace(repose=repose_of(math.hypot(*scene.gravity), particles.radius))
     return made, flock
 

@@ -15,7 +15,6 @@ from ..extras import needed_by
 from ..output.lock import only_writer
 from ..plugins import checked_modules
 from ..run.options import cores
-from ..signature import lined
 from .plan import Plan, read
 from .pool import Pool
 from .results import TABLES, Results, require_written
@@ -66,7 +65,6 @@ class Outcome:
     wall_time: float
 
 
-@lined
 def sweep(  # noqa: PLR0913  the keywords are the public interface
     path: str | os.PathLike[str],
     folder: str | os.PathLike[str] | None = None,

@@ -150,6 +150,10 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
                 status = Status.STALLED.value
             if status > worst:
                 worst, where = status, i
+    if worst == Status.TOO_DEEP.value:
+        # For the sentence about it.
+        put(share.state.position, 0, lanes.particle[where], lanes.lane(where).r)
+        put(share.state.velocity, 0, lanes.particle[where], lanes.lane(where).v)
     return worst, where
 
 

@@ -1,11 +1,13 @@
 """The common part of methods with a fixed step: whole steps, the jump over free ones, solids that a step could miss."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import checks
+from ..contact import medial
 from ..contact.discrete_gradient import MeanValue
 from ..contact.laws import Moves
 from ..contact.regularisation import regularisation
@@ -53,7 +55,8 @@ class SoftWalls(base.Method):
 
     def record(self, kind: type["SoftNumbers"], scene: Scene, factor: float, form: Any = None) -> "SoftNumbers":
         """The numbers of this description, of a kind that divides such a factor by the mass."""
-        return kind(self.dt, self.law(), longest_step(scene, self.dt), factor, form, moves(scene))
+        longest = longest_step(scene, self.dt)
+        return kind(self.dt, self.law(), longest, factor, form, moves(scene), _half_widths(scene))
 
     def span(self, name: str, duration: float) -> float:
         return whole_steps(name, duration, self.dt)
@@ -107,6 +110,14 @@ def longest_step(scene: Scene, dt: float) -> float | None:
         return None
     thickness, i = _thinnest(scene, dt)
     return thickness - _pace(scene.surfaces[i]) * dt
+
+
+def _half_widths(scene: Scene) -> tuple[float, ...] | None:
+    """Of each wall that of its solid [m], infinite of a cavity; None where no wall has another side."""
+    if not any(surface.may_be_passed() for surface in scene.surfaces):
+        return None
+    owned = [scene.surfaces[i] for i in scene.owners()]
+    return tuple(surface.size() if surface.is_solid() else math.inf for surface in owned)
 
 
 def _pace(surface: Surface) -> float:
@@ -232,6 +243,29 @@ class SoftNumbers(Steps):
     factor: float  # of 1/mass in what a lane keeps
     form: Any  # of the discrete gradient, or None
     moving: Any  # None, or `Moves` where a wall moves
+    half_widths: Any  # of the solid of each wall [m], infinite where it is none; None where no wall has another side
+
+    def passes(self, walls, lane, wall, r, v):
+        """Whether a step that ends so leads a lane through the middle of this wall."""
+        if self.half_widths is None:
+            return False
+        before, over, after = self.times(walls, lane.remaining)
+        way = r - lane.r
+        if self.moving is not None:
+            way = way - over.displacement(wall)
+        return medial.passes((before, lane.r), (after, r), wall, way, self.dt * (lane.v - v), self.half_widths)
+
+    def _passes_any(self, walls, lane, r, v):
+        """The same of all walls that the step is in contact with."""
+        if self.half_widths is None:
+            return False
+        before, _over, after = self.times(walls, lane.remaining)
+        found = False
+        for k in range(len(self.half_widths)):
+            wall = float(k)
+            touched = (before.distance(wall, lane.r) > 0.0) | (after.distance(wall, r) > 0.0)
+            found = found | (touched & self.passes(walls, lane, wall, r, v))
+        return found
 
     def careful_step(self, walls, gravity, lane, impulse, i):
         """The `Careful` step of a lane. Adds impulses to impulse[wall, i], and works to the rows behind those."""
@@ -244,6 +278,8 @@ class SoftNumbers(Steps):
         step = self.careful_step(walls, gravity, lane, lanes.impulse, i)
         new = select(self.before(walls, lane.remaining).outside(-1.0, lane.r), 0.0, 1.0)
         status = Status.DONE.value if step.solved else Status.UNSOLVED.value
+        if self._passes_any(walls, lane, step.r, step.v):
+            return contract.refused(lane, Status.TOO_DEEP.value)
         twice_energy = lane.own.twice_energy + 2.0 * step.work
         return contract.Contact(step.r, step.v, lane.remaining - 1.0, 0.0, 0.0, new, twice_energy, False), status
 

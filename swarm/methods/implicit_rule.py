@@ -149,6 +149,7 @@ class RuleNumbers(fixed_step.SoftNumbers):
         touching = wall >= 0.0
         # Another wall at s, or an equation that is not solved yet: the careful way.
         solved = (not solution.unsolved) & (not there.outside(wall, point))
+        solved = solved & (not self.passes(walls, lane, wall, step.r, step.v))
         # The midpoint rule may end outside before it feels a force.
         inside = not before.outside(-1.0, lane.r)
         new = inside & (touching | after.outside(-1.0, step.r))

@@ -38,7 +38,8 @@ class Penalty(fixed_step.SoftWalls):
     Of bodies the links stay rigid, and walls are springs for their contact points, each alone or in cavities.
     Order: 2 in dt. Cost: free steps are jumped over in one evaluation; a contact step solves one scalar equation. Steps
     look at the gap at their ends only: a solid thinner than |v| dt is refused, but a step can miss a chord through the
-    edge of a solid that is shorter than |v| dt.
+    edge of a solid that is shorter than |v| dt. A particle that gets through the middle of a solid ends the run with an
+    error that names a penalty which holds it.
     Walls may move without turning: the step is that of the frame of each wall, and with the energy less the work of the
     walls it conserves the same. Where walls move in any way but uniformly, free steps are jumped over in several parts.
     Particles with a radius press on one another and on walls by the same law, with the gap R_i + R_j - |r_i - r_j|:
@@ -187,7 +188,7 @@ class PenaltyNumbers(GradientSteps, fixed_step.SoftNumbers):
         end = self.pushed(walls, gravity, lane, wall, self.dt, solution.kappa)
         # A push into another wall, or an equation that is not solved yet: the careful way.
         solved = end.balanced & (not solution.unsolved) & end.over.pushes(wall, solution.kappa)
-        solved = solved & (not end.after.outside(wall, end.r))
+        solved = solved & (not end.after.outside(wall, end.r)) & (not self.passes(walls, lane, wall, end.r, end.v))
         new = (wall >= 0.0) & (not end.over.outside(-1.0, lane.r))
         taken = fixed_step.Taken(end.r, end.v, solved, end.impulse, new, end.work)
         return fixed_step.contact(lane, wall, taken)

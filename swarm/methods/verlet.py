@@ -29,7 +29,7 @@ class Verlet(fixed_step.SoftWalls):
     dt sqrt(alpha/m), whose sign depends on where in a step it begins, and beyond dt sqrt(alpha/m) = 2 it is unstable:
     the energy grows without bound. Order: 2 in dt between contacts, 1 across the corner of the force at the wall. Cost:
     free steps, which it takes exactly, are jumped over in one evaluation; two forces a contact step. Penetration:
-    |v| sqrt(m/alpha), more where it is unstable.
+    |v| sqrt(m/alpha), more where it is unstable; through the middle of a solid it ends the run with an error.
     Walls may move without turning: each force is that of the walls at its time.
     Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, I.1.4.
 
@@ -75,7 +75,8 @@ class VerletNumbers(fixed_step.SoftNumbers):
     def contact(self, walls, gravity, lane, wall, solution):
         step = self.step(walls, gravity, lane)
         new = (wall >= 0.0) & (not self.before(walls, lane.remaining).outside(-1.0, lane.r))
-        taken = fixed_step.Taken(step.r, step.v, True, norm(step.kick), new, step.work)
+        solved = not self.passes(walls, lane, wall, step.r, step.v)
+        taken = fixed_step.Taken(step.r, step.v, solved, norm(step.kick), new, step.work)
         return fixed_step.contact(lane, wall, taken)
 
     def careful_step(self, walls, gravity, lane, impulse, i):

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from .. import tables
 from ..errors import SceneError
 from ..particles import Particles
+from ..version import VERSION
 from .replaced import replaced
 from .sources import DAMAGE, DamagedError, reason
 
@@ -170,25 +171,35 @@ def _shortened(surfaces: NDArray[np.int64]) -> str:
     return ", ".join(map(str, surfaces[:_SHOWN])) + ", ..." * (len(surfaces) > _SHOWN)
 
 
-def require_fit(path: Path, arrays: Arrays, run: Arrays) -> None:
+def require_fit(path: Path, arrays: Arrays, run: Arrays, written: str = VERSION) -> None:
     """Raise a SceneError unless the arrays of a checkpoint have the names, types and shapes of the run's own.
 
     The lanes of a run halted within a frame may hold any number of particles, each once; cells of balls more of them.
+    `written` is the version that wrote it. Checksums are right, so what differs is probably the version; but a list of
+    the entries has no checksum.
     """
+    same = ", perhaps of another commit," if written == VERSION else ""
+    begin = (
+        f"{path} is of another version of swarm, or damaged: version {written}{same} wrote it, and this is {VERSION}; "
+        "expected"
+    )
+    if arrays.keys() != run.keys():
+        lacking, more = (
+            ", ".join(sorted(names)[:_SHOWN]) or "none"
+            for names in (run.keys() - arrays.keys(), arrays.keys() - run.keys())
+        )
+        raise SceneError(f"{begin} the arrays {lacking} too, got {more} in their place; {_ANEW}")
+    # Bodies leave nothing in lanes.
+    left = arrays["halted.particle"].shape[-1:] if "halted.particle" in run else ()
+    for name, mine in run.items():
+        shape = mine.shape[:-1] + left if name.startswith("halted.") else mine.shape
+        # The cells of balls get more room during a run.
+        if name == "room" and arrays[name].ndim == 1 and arrays[name].size >= mine.size:
+            shape = arrays[name].shape
+        if (arrays[name].dtype, arrays[name].shape) != (mine.dtype, shape):
+            came = f"{arrays[name].dtype} {arrays[name].shape}"
+            raise SceneError(f"{begin} {name} as {mine.dtype} of the shape {shape}, got {came}; {_ANEW}")
     with _reading(path):
-        if arrays.keys() != run.keys():
-            raise ValueError(f"expected the arrays {sorted(run)}, got {sorted(arrays)}")
-        # Bodies leave nothing in lanes.
-        left = arrays["halted.particle"].shape[-1:] if "halted.particle" in run else ()
-        for name, mine in run.items():
-            shape = mine.shape[:-1] + left if name.startswith("halted.") else mine.shape
-            # The cells of balls get more room during a run.
-            if name == "room" and arrays[name].ndim == 1 and arrays[name].size >= mine.size:
-                shape = arrays[name].shape
-            if (arrays[name].dtype, arrays[name].shape) != (mine.dtype, shape):
-                raise ValueError(
-                    f"{name} must be {mine.dtype} of the shape {shape}, got {arrays[name].dtype} {arrays[name].shape}"
-                )
         if "halted.particle" in run:
             bounded = np.concatenate([[-1], arrays["halted.particle"], [len(run["mass"])]])
             if (np.diff(bounded) <= 0).any():

@@ -43,6 +43,8 @@ _LABELS = {
 }
 # Units of what is a growth in a second: one value for the time from frame to frame.
 _RATES = ("1/s", "Pa", "N/m", "N", "W")
+# Of these, what particles exert, and below which so few of molecular mass do that no gauge would show it.
+_PRESSES, _MOLECULAR = ("Pa", "N/m", "N"), 1e-12
 # Most curves with a colour each; of more these energies have one.
 _ENERGIES = ("total", *(name for name in ENERGIES if name not in ("work of", "energy of")))
 _MOST = 6
@@ -96,12 +98,19 @@ def lines(axes: Any, view: str, logarithm: bool, drawn: Curves, limit: float | N
     )
     axes.set_xlabel(f"time [{second}]")
     said = _LABELS.get(quantity, quantity)
-    axes.set_ylabel(f"{said} [{written}]" if written else said)
+    axes.set_ylabel(_labelled(said, unit, written, size))
     if logarithm:
         _errors(axes, scaled, None if limit is None else limit * factor, written)
     else:
         _heights(axes, scaled)
     _label(axes, ends)
+
+
+def _labelled(said: str, unit: str, written: str, size: float) -> str:
+    """What an axis says, with its unit: of molecules, what presses is told, for a gas has more than are simulated."""
+    if unit in _PRESSES and 0.0 < size < _MOLECULAR:
+        return f"{said} [{written}]\nof the simulated particles"
+    return f"{said} [{written}]" if written else said
 
 
 def _merged(drawn: Curves) -> Curves:

@@ -39,12 +39,10 @@ class Solids(NamedTuple):
     turns: Floats
 
 
-def solids_of(scene: Scene, time: float, absent: bool = False) -> list[Solids]:
-    """The fields of many solids of a scene, where they are at a time [s]; with `absent` also those that are not."""
+def solids_of(scene: Scene, time: float) -> list[Solids]:
+    """The fields of many solids of a scene that are there at a time [s], where they are then."""
     each = enumerate(zip(scene.surfaces, scene.poses(time), strict=True))
-    return [
-        _placed(i, surface, at) for i, (surface, at) in each if is_many(surface) and (absent or surface.is_there(time))
-    ]
+    return [_placed(i, surface, at) for i, (surface, at) in each if is_many(surface) and surface.is_there(time)]
 
 
 def is_of_solids(surface: Surface) -> bool:

@@ -21,7 +21,7 @@ from . import vtkhdf
 from .exported import Exported
 from .shape import Shape
 from .shapes import shapes_of, since_start
-from .solids import MANY, Solids, solids_of
+from .solids import MANY, Solids, is_many, solids_of
 
 KINDS = ("spheres", "boxes", "cylinders", "capsules", "ellipsoids")
 
@@ -59,37 +59,39 @@ def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
                 points[first : first + len(shape.vertices)] = shape.vertices @ turn.T + way
 
 
+# Of each solid, with the type of a number and how many there are.
+_DATA: dict[str, tuple[Callable[[Solids], Any], Any, tuple[int, ...]]] = {
+    "surface": (lambda one: np.full(len(one.centers), one.surface), np.int64, ()),
+    "kind": (lambda one: np.full(len(one.centers), KINDS.index(one.kind)), np.int64, ()),
+    "radius": (lambda one: np.where(one.kind in ("boxes", "ellipsoids"), np.nan, one.halves[:, 0]), np.float64, ()),
+    "halves": (lambda one: one.halves, np.float64, (3,)),
+    "orientation": (lambda one: one.turns, np.float64, (4,)),
+    "Points": (lambda one: one.centers, np.float64, (3,)),
+}
+# Of a solid that moves.
+_MOVED = ("orientation", "Points")
+
+
 def write_solids(chosen: Exported, path: Path) -> None:
-    """Write the solids of large fields as points."""
+    """Write the solids of large fields as points: in each frame those that are there."""
     scene, times = chosen.trajectory.scene, chosen.times.tolist()
-    first = solids_of(scene, times[0], absent=True)
-    count = sum(len(one.centers) for one in first)
+    come = any(surface.present is not None for surface in scene.surfaces if is_many(surface))
+    frames = len(times) if come or scene.moves() else 1
+    counts = [sum(len(one.centers) for one in solids_of(scene, time)) for time in times[:frames]]
+    firsts = np.cumsum([0, *counts])
+    # As of particles: where their number changes each step has a part of its own.
+    parts = counts if len(set(counts)) > 1 else counts[:1]
     with h5py.File(path, "w") as file:
-        root = vtkhdf.begin(file, {"Vertices": np.arange(count)[:, None]}, [count])
-        names = {
-            "surface": _of_all(first, lambda one: np.full(len(one.centers), one.surface)),
-            "kind": _of_all(first, lambda one: np.full(len(one.centers), KINDS.index(one.kind))),
-            "radius": _of_all(
-                first, lambda one: np.where(one.kind in ("boxes", "ellipsoids"), np.nan, one.halves[:, 0])
-            ),
-            "halves": _of_all(first, lambda one: one.halves),
-        }
-        for name, values in names.items():
-            root[f"PointData/{name}"] = values
-        frames = len(times) if scene.moves() else 1
-        root.create_dataset("Points", (frames * count, 3), np.float64)
-        root.create_dataset("PointData/orientation", (frames * count, 4), np.float64)
-        for k in range(frames):
-            there = solids_of(scene, times[k], absent=True)
-            rows = slice(k * count, (k + 1) * count)
-            root["Points"][rows] = _of_all(there, lambda one: one.centers)
-            root["PointData/orientation"][rows] = _of_all(there, lambda one: one.turns)
-        if scene.moves():
-            steps = vtkhdf.timed(root, chosen, count * np.arange(frames))
-            for name in (*names, "orientation"):
-                moved = count * np.arange(frames) if name == "orientation" else np.zeros(frames, np.int64)
-                steps[f"PointDataOffsets/{name}"] = moved
-
-
-def _of_all(each: list[Solids], values: Callable[[Solids], Any]) -> Any:
-    return np.concatenate([values(one) for one in each])
+        root = vtkhdf.begin(file, {"Vertices": np.arange(max(counts))[:, None]}, parts)
+        steps = vtkhdf.timed(root, chosen, firsts[:-1]) if come or scene.moves() else None
+        for name, (_of_one, kind, width) in _DATA.items():
+            # What does not change is there once.
+            rows = firsts if come or name in _MOVED else firsts[:2]
+            data = root.create_dataset(name if name == "Points" else f"PointData/{name}", (rows[-1], *width), kind)
+            for k in range(len(rows) - 1):
+                there = solids_of(scene, times[k])
+                data[rows[k] : rows[k + 1]] = np.concatenate([np.empty((0, *width)), *map(_of_one, there)])
+            if steps is not None and name != "Points":
+                steps[f"PointDataOffsets/{name}"] = (
+                    firsts[:-1] if come or name in _MOVED else np.zeros(frames, np.int64)
+                )

@@ -13,6 +13,7 @@ from ..scene import Scene
 from ..state import State
 from ..status import Status
 from ..surfaces.wall_law import leave_of, mirrored, said_of, why_wrong
+from . import sinking
 from .state import Seeding
 
 _UNSEEDED = Seeding()
@@ -30,6 +31,8 @@ def of_frame(
         sentence += ": walls that move have closed on it; end the run before"
     if status == Status.TOO_FAST:
         sentence += f", {method.too_fast(scene)}"
+    if status == Status.TOO_DEEP:
+        sentence = f"{_failed(moment)} {first + particle}{sinking.of_passing(scene, method, state, particle, moment)}"
     if status == Status.SENT_WRONG:
         sentence += _of_law(scene, state, particle, moment, seeding)
     multipliers = state.multipliers

@@ -18,7 +18,9 @@ def warn_of_rest(box: Any, clock: Any) -> bool:
         return False
     fall = box.repose.fall
     longer = f"Pairs(contact_duration={_LONGER * fall:.1g})"
-    if box.loss is None:
+    if box.loss is None and not box.laws.send_off:
+        remedy = f"start them elsewhere, or give pairs and walls a restitution below 1, with {longer} or with Penalty"
+    elif box.loss is None:
         remedy = f"give these walls a restitution in place of a law or a temperature, with {longer} or with Penalty"
     else:
         remedy = (

@@ -11,7 +11,6 @@ from ..frames import Frame
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
-from ..signature import lined
 from ..sources.source import Source
 from ..surfaces.counter import Counter
 from ..surfaces.surface import Surface
@@ -22,7 +21,6 @@ from .result import Result
 from .session import Session
 
 
-@lined
 def simulate(  # noqa: PLR0913  the keywords are the public interface
     scene: Scene,
     particles: Particles | Bodies | None,

@@ -10,9 +10,9 @@ from ..methods.base import Method
 from ..pairs import MOST_PRESSED, Pairs
 from ..particles import Particles
 from ..scene import Scene
-from ..state import Floats
+from ..state import Floats, State
 from ..surfaces.drive import drive_of
-from ..surfaces.surface import Surface
+from ..surfaces.surface import Surface, side_sign
 from .options import Task
 
 _LOG = logging.getLogger("swarm")
@@ -146,3 +146,49 @@ def _warn_of_solids(task: Task) -> None:
             k, speeds[k], depth, i, type(thinnest).__name__, thickness,
             _penalty(method, depth, MOST_PRESSED * thickness), method.penalty,  # type: ignore[attr-defined]
         )  # fmt: skip
+
+
+# --- What ended a run -------------------------------------------------------------------------------------
+
+
+def of_passing(scene: Scene, method: Method, state: State, particle: int, moment: float) -> str:
+    """Of a point that goes through the middle of a wall: the state is that at the start of its step."""
+    place, velocity, step = state.position[:, particle], state.velocity[:, particle], float(method.dt)  # type: ignore[attr-defined]
+    ways = place[:, None] + velocity[:, None] * np.linspace(0.0, step, 9)
+    passable = np.array([surface.may_be_passed() for surface in scene.surfaces])
+    outside = np.where(passable[:, None], scene.distances_outside(ways, moment), -np.inf)
+    wall = int(np.argmax(outside.max(axis=1)))
+    surface = scene.surfaces[wall]
+    speed = math.hypot(*velocity) + _pace(surface)
+    energy = 0.5 * float(state.mass[particle]) * speed**2 + _stored(method, surface, place[:, None], moment)
+    # What it would store where it is as deep as is small.
+    entry, inward = _entry(surface, place, velocity, moment)
+    half = surface.size() if surface.is_solid() else float(inward @ (ways[:, 4] - entry))
+    allowed = _stored(method, surface, (entry + 2.0 * MOST_PRESSED * half * inward)[:, None], moment)
+    penalty = float(method.penalty)  # type: ignore[attr-defined]
+    enough = f"{penalty * energy / allowed:.1e} or more" if allowed > 0.0 else "more"
+    thick = f", which is {2.0 * half:.3g} m thick," if surface.is_solid() else ""
+    return (
+        f", at ({', '.join(f'{x:.6g}' for x in place)}) m: with {speed:.3g} m/s it goes through the middle of "
+        f"surfaces[{wall}] ({type(surface).__name__}){thick} to its other side: contacts are too soft for the speed; "
+        f"use a penalty of {enough}, got {penalty:g}, with a dt that fits it, a smaller speed, or Impact"
+    )
+
+
+def _stored(method: Method, surface: Surface, place: Floats, moment: float) -> float:
+    """The energy that a wall stores by a point at this place (3, 1) [J]."""
+    gap = side_sign(getattr(surface, "side", "inside")) * float(surface.phi(place, moment)[0])
+    return float(method.law().stored_energy(gap)) if gap > 0.0 else 0.0
+
+
+def _entry(surface: Surface, place: Floats, velocity: Floats, moment: float) -> tuple[Floats, Floats]:
+    """About where a straight way to a place came through the wall, and the unit normal there that leads in."""
+    side, way = side_sign(getattr(surface, "side", "inside")), velocity / math.hypot(*velocity)
+    # From near to far: it may have begun in the wall.
+    lengths = np.concatenate([[-1.0, 0.0], np.geomspace(1e-4, 10.0, 2000)]) * surface.size()
+    back = place[:, None] - lengths * way[:, None]
+    outside = side * surface.phi(back, moment) <= 0.0
+    entered = np.flatnonzero(~outside[:-1] & outside[1:])
+    at = back[:, [int(entered[0]) if len(entered) else 0]]
+    normal = side * surface.gradient(at, moment)[:, 0]
+    return at[:, 0], normal / np.linalg.norm(normal)

@@ -183,6 +183,13 @@ class Surface:
         """Whether particles are kept out of it rather than in it."""
         return getattr(self, "side", "inside") == "outside"
 
+    # Whether the inner side is convex: then nothing of it is on the other side of its wall.
+    is_convex = False
+
+    def may_be_passed(self) -> bool:
+        """Whether its wall has two sides that particles may be on, as a solid, or a cavity with a bay, has."""
+        return self.is_solid() or not self.is_convex
+
     def extent(self) -> float:
         """Distance from the origin within which the surface, or what is particular about it, lies [m]."""
         raise NotImplementedError

@@ -8,6 +8,7 @@ import threading
 from dataclasses import replace
 from typing import NamedTuple
 
+import h5py
 import numpy as np
 import psutil
 import pytest
@@ -140,6 +141,10 @@ def test_mdanalysis_reads_the_joined_file_and_so_does_swarm_where_it_is_moved(cl
 
     path = tmp_path / "run.h5"
     result = swarm.simulate(*cavity(), until=0.2, every=0.1, compile="never", trajectory=path, cluster=client, shards=3)
+    with h5py.File(path) as file:
+        group = file["particles/all"]
+        units = {name: group[name].attrs["swarm_unit"] for name in ("position/value", "velocity/value", "mass")}
+        assert units == {"position/value": b"m", "velocity/value": b"m/s", "mass": b"kg"}
     there = tmp_path / "elsewhere"
     there.mkdir()
     path.rename(there / "moved.h5")

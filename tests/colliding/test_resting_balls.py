@@ -99,6 +99,17 @@ def test_a_ball_that_rests_is_said(name, caplog):
     assert moment_of(said) == pytest.approx(LIES, abs=0.25 * LIES)
 
 
+@pytest.mark.parametrize("count", [1, 3])
+def test_elastic_balls_that_start_at_rest_are_said(count, caplog):
+    """On a floor, and on one another: nothing is lost, and no time passes from impact to impact."""
+    floor = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0)], gravity=G)
+    position = np.zeros((3, count))
+    position[2] = RADIUS * (1.0 + 2.0 * np.arange(count))
+    said = said_in(caplog, (floor, swarm.Particles(position, 0.0 * position, 5e-3, radius=RADIUS)), 1e-3)
+    assert "start them elsewhere" in said
+    assert moment_of(said) < 1e-3
+
+
 def test_the_moment_is_the_same_in_pieces(tmp_path, caplog):
     """Frames, threads and sessions change no bit of it; a session that goes on behind it says it again, once."""
     said = said_in(caplog, heap(), 0.3)

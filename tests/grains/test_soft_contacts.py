@@ -215,6 +215,92 @@ def test_points_and_thin_solids(exponent, caplog):
     assert said(caplog, scene, start, swarm.Penalty(1e-4, 1.1 * needed, exponent)) == []
 
 
+# --- Points -----------------------------------------------------------------------------------------------
+
+THICK = 0.005
+THIN = {
+    "Slab": swarm.Slab((1.0, 0.0, 0.0), 0.5 * THICK, side="outside"),
+    "Box": plates()["Box"],
+    "Cylinder": swarm.Cylinder(0.1, axis=(1.0, 0.0, 0.0), length=THICK, side="outside"),
+    "Sphere": swarm.Sphere(0.5 * THICK, side="outside"),
+    "Capsule": swarm.Capsule(0.5 * THICK, 0.1, axis=(0.0, 0.0, 1.0), side="outside"),
+    "Ellipsoid": swarm.Ellipsoid((0.5 * THICK, 0.1, 0.1), side="outside"),
+    # A wall between two rooms of one cavity, and a grid of samples
+    "Formula": swarm.Formula("0.00125 - 200 * x**2", bounds=((-1.0,) * 3, (1.0,) * 3)),
+    "Sampled": swarm.Sampled(
+        np.abs(np.arange(-20.0, 21.0))[:, None, None] * np.ones((41, 9, 9)) * 1e-3 - 0.5 * THICK,
+        (1e-3, 0.02, 0.02), (-0.02, -0.08, -0.08), side="outside",
+    ),
+}  # fmt: skip
+
+
+# The gap of an ellipsoid is a number.
+SOFTER = {"Ellipsoid": swarm.Penalty(1e-4, 0.1)}
+CELL = swarm.Box((0.018, 0.07, 0.07))
+
+
+def point(speed, y=3e-4):
+    return swarm.Particles([[-0.5 * THICK - speed * 3.3e-4], [y], [2e-4]], [[speed], [0.0], [0.0]], MASS)
+
+
+@pytest.mark.parametrize("method", [swarm.Penalty, swarm.Verlet, swarm.Midpoint, swarm.Trapezoidal])
+@pytest.mark.parametrize("name", ["Slab", "Sphere"])
+def test_a_point_that_passes_the_middle_of_a_solid_ends_the_run(name, method):
+    for speed in (5.0, 20.0):
+        with pytest.raises(
+            RunError, match=rf"goes through the middle of surfaces\[1\] \({name}\), which is 0\.005 m thick"
+        ):
+            ran(swarm.Scene([ROOM, THIN[name]]), point(speed), method(1e-4, 1e3), 0.01)
+
+
+@pytest.mark.parametrize("name", THIN)
+def test_the_penalty_that_is_named_for_a_point_is_enough(name):
+    scene, start = swarm.Scene([CELL, THIN[name]]), point(5.0)
+    with pytest.raises(RunError, match=rf"the middle of surfaces\[1\] \({name}\).*too soft") as failed:
+        ran(scene, start, SOFTER.get(name, SOFT), 0.01)
+    named = float(str(failed.value).split("use a penalty of ")[1].split()[0])
+    end = ran(scene, start, swarm.Penalty(5e-6, named), 0.002).particles
+    assert end.position[0, 0] < -0.5 * THICK
+    assert end.velocity[0, 0] < 0.0
+
+
+def test_a_box_and_its_samples_agree_on_points():
+    told = []
+    for name in ("Box", "Sampled", "Slab"):
+        with pytest.raises(RunError) as failed:
+            ran(swarm.Scene([CELL, THIN[name]]), point(5.0), SOFT, 0.01)
+        told.append(str(failed.value).replace(name, "Slab"))
+    assert told[0] == told[2]
+    # The spline through the samples is round in the middle.
+    places = [float(one.split("at (")[1].split(",")[0]) for one in told]
+    assert places[1] == pytest.approx(places[0], abs=1e-6)
+
+
+def test_a_point_that_a_moving_solid_passes_ends_the_run():
+    wall = swarm.Slab((1.0, 0.0, 0.0), 0.5 * THICK, side="outside", motion=swarm.Translation((-5.0, 0.0, 0.0)))
+    rest = swarm.Particles([[-0.02], [0.0], [0.0]], np.zeros((3, 1)), MASS)
+    with pytest.raises(RunError, match=r"the middle of surfaces\[1\] \(Slab\)"):
+        ran(swarm.Scene([ROOM, wall]), rest, SOFT, 0.01)
+    named = 3e5
+    end = ran(swarm.Scene([ROOM, wall]), rest, swarm.Penalty(5e-6, named), 0.01).particles
+    assert end.velocity[0, 0] == pytest.approx(-10.0, rel=1e-9)
+
+
+def test_a_point_that_turns_round_in_a_solid_goes_on():
+    """At the edge of a box, deep in it, on a chord through a sphere near its surface, and along a solid."""
+    scene = swarm.Scene(
+        [ROOM, swarm.Box((0.1, 0.1, 0.1), side="outside"), swarm.Sphere(0.1, (1, 0, 0), side="outside")]
+    )
+    start = swarm.Particles(
+        [[-0.11, -0.105, 0.88, 0.9], [0.0, -0.101, 0.0, 0.0995], [0.0] * 4],
+        [[3.0, 4.0, 3.0, 5.0], [0.0, 4.0, 0.0, 0.0], [0.0] * 4], MASS,
+    )  # fmt: skip
+    seen = ran(scene, start, SOFT, 0.05, every=1e-3)
+    assert seen.observables["max_penetration"].max() > 8e-3
+    assert seen.observables["energy_error"].max() < 1e-12
+    assert seen.particles.velocity[0, [0, 2]] == pytest.approx([-3.0, -3.0])
+
+
 def test_an_overlap_is_in_files_and_in_verdicts(tmp_path):
     scene, start = swarm.Scene([ROOM]), two((1.0, -1.0))
     path = tmp_path / "run.h5"

@@ -156,6 +156,17 @@ def test_one_wall_is_in_the_title():
     assert (axes.get_title(), axes.get_ylabel(), texts(axes)) == ("Pressure on the ellipsoid", "pressure [kPa]", [])
 
 
+@pytest.mark.parametrize(("view", "unit"), [("pressure [Pa]", "Pa"), ("force [N]", "N"), ("pressure [N/m]", "N/m")])
+def test_what_few_molecules_exert_is_said_to_be_theirs(view, unit):
+    axes = axes_of(view, False, {"sphere": (TIMES, TIMES * 2e-17)})
+    assert axes.get_ylabel() == f"{view.partition(' ')[0]} [{unit}]\nof the simulated particles"
+    assert "10⁻¹⁷" in axes.yaxis.get_major_formatter()(1e-17)
+    assert "simulated" not in axes_of(view, False, {"sphere": (TIMES, TIMES * 2e-9)}).get_ylabel()
+    assert "simulated" not in axes_of("heat from walls [W]", False, {"sphere": (TIMES, TIMES * 2e-17)}).get_ylabel()
+    # None at all
+    assert "simulated" not in axes_of(view, False, {"sphere": (TIMES, TIMES * 0.0)}).get_ylabel()
+
+
 def test_no_frames_are_words():
     empty = np.zeros(0)
     assert texts(axes_of("impacts [1/s]", False, {"all particles": (empty, empty)})) == ["needs two frames"]

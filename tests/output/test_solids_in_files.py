@@ -83,6 +83,39 @@ def test_vtk_reads_solids_as_points(tmp_path, kind):
         assert np.isnan(held["radius"]).all() == (kind in ("boxes", "moving", "ellipsoids"))
 
 
+@pytest.mark.parametrize("moving", [False, True])
+def test_solids_that_are_not_there_are_in_no_step(tmp_path, moving):
+    """One field leaves when another one comes, and at last there is none."""
+    places = RANDOM.uniform(-0.3, 0.3, (2, N + 7, 3))
+    first = swarm.Spheres(places[0, :N], 1e-3, present=[(0.0, 0.15)])
+    second = swarm.Boxes(places[1], (1e-3, 1e-3, 1e-3), present=[(0.15, 0.35)])
+    gate = [swarm.Sphere(0.01, (0.45, 0.45, 0.45), side="outside", motion=swarm.Translation((0.1, 0.0, 0.0)))] * moving
+    scene = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), first, second, *gate])
+    start = swarm.Particles([-0.45, -0.45, -0.45], [0.0, 0.0, 0.0])
+    path = tmp_path / "run.h5"
+    swarm.simulate(scene, start, swarm.Impact(), until=0.4, every=0.1, compile="never", trajectory=path)
+    with swarm.load(path) as trajectory:
+        files = trajectory.export(tmp_path / "out.vtkhdf")
+        times = trajectory.times
+    reader = vtkHDFReader()
+    reader.SetFileName(str(files[2]))
+    reader.UpdateInformation()
+    assert reader.GetNumberOfSteps() == len(times)
+    for step in (0, 1, 2, 3, 4, 2, 0):
+        reader.SetStep(step)
+        reader.Update()
+        data = reader.GetOutput()
+        expected = solids.solids_of(scene, times[step])
+        count = sum(len(one.centers) for one in expected)
+        assert count == [N, N, N + 7, N + 7, 0][step]
+        assert data.GetNumberOfPoints() == data.GetVerts().GetNumberOfCells() == count
+        if count:
+            np.testing.assert_array_equal(vtk_to_numpy(data.GetPoints().GetData()), expected[0].centers)
+            assert set(vtk_to_numpy(data.GetPointData().GetArray("surface"))) == {expected[0].surface}
+            np.testing.assert_array_equal(vtk_to_numpy(data.GetPointData().GetArray("halves")), expected[0].halves)
+            assert max(map(abs, data.GetBounds())) < 0.5
+
+
 @pytest.mark.parametrize("kind", FIELDS)
 def test_a_recording_has_no_triangle_of_them_and_its_sheet_shows_them(tmp_path, kind):
     with swarm.load(run(tmp_path, kind)) as trajectory:

@@ -2,6 +2,7 @@
 
 import functools
 import html
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -87,4 +88,6 @@ def _environment() -> Any:
     )
     # The page's own style and script, as they are.
     made.globals["own"] = lambda name: Markup((_HERE / name).read_text(encoding="utf-8"))
+    # A name may go on in the next line behind a dot and an underscore.
+    made.globals["breakable"] = lambda name: Markup("<wbr>").join(re.split(r"(?<=[._])", name))
     return made

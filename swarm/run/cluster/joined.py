@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ... import observables
 from ...catalog import CHUNK_SUMS, OBSERVABLES
 from ...lanes.arrays import booked
+from ...output.layout import UNIT, UNITS
 from ...output.sequence import values_of
 from ...output.trajectory import Trajectory, load
 from ...output.writer import TrajectoryWriter
@@ -151,7 +152,9 @@ class JoinedWriter(TrajectoryWriter):
                 layout[:, begin:end] = part[: self._frames, p * some : (p + 1) * some]
         group = self._file.create_group(f"particles/all/{name}")
         group["step"], group["time"] = self._step, self._time
-        group.create_virtual_dataset("value", layout)
+        values = group.create_virtual_dataset("value", layout)
+        if name in UNITS:
+            values.attrs[UNIT] = UNITS[name]
 
 
 def _measured(

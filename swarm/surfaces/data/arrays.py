@@ -25,7 +25,7 @@ def read_samples(path: str | Path) -> Floats:
     Raises:
         SceneError: the file cannot be read, holds no such array, or less than its header says, or more than memory.
     """
-    path = Path(path)
+    path = checks.path_of("path", path)
     try:
         return _of_npy(path) if path.suffix.lower() == ".npy" else _of_hdf5(path)
     except SceneError:

@@ -120,7 +120,7 @@ class Mesh(Surface):
         if isinstance(self.vertices, (str, Path)):
             if self.triangles is not None:
                 raise SceneError("triangles must be None with the path of a file, which holds them; leave them out")
-            path = Path(self.vertices)
+            path = checks.path_of("vertices", self.vertices)
             soup = read_soup(path, scale)
         else:
             soup = given_arrays(self.vertices, self.triangles, self.group, self.names, scale)

@@ -39,6 +39,8 @@ class Box(Surface):
     half_widths: Vector
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
+
+    is_convex = True
     open: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

@@ -46,6 +46,8 @@ class Cone(Revolved):
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
+    is_convex = True
+
     def __post_init__(self) -> None:
         super().__post_init__()
         angle = number("half_angle", self.half_angle, "a finite number of radians")

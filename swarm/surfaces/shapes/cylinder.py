@@ -41,6 +41,8 @@ class Cylinder(Revolved):
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
+    is_convex = True
+
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "radius", checked_length("radius", self.radius))

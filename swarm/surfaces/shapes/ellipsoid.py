@@ -40,6 +40,8 @@ class Ellipsoid(Surface):
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
+    is_convex = True
+
     def __post_init__(self) -> None:
         super().__post_init__()
         axes = vector("semi_axes", self.semi_axes)

@@ -34,6 +34,8 @@ class Paraboloid(Revolved):
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
+    is_convex = True
+
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "focal_length", length("focal_length", self.focal_length))

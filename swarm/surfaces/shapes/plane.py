@@ -32,6 +32,8 @@ class Plane(Surface):
     normal: Vector
     offset: float = 0.0
 
+    is_convex = True
+
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "normal", unit("normal", self.normal))

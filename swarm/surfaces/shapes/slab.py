@@ -40,6 +40,8 @@ class Slab(Surface):
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
+    is_convex = True
+
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "normal", unit("normal", self.normal))

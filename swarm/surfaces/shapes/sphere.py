@@ -35,6 +35,8 @@ class Sphere(Surface):
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
+    is_convex = True
+
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "radius", length("radius", self.radius))
