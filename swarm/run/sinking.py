@@ -166,12 +166,12 @@ def of_passing(scene: Scene, method: Method, state: State, particle: int, moment
     half = surface.size() if surface.is_solid() else float(inward @ (ways[:, 4] - entry))
     allowed = _stored(method, surface, (entry + 2.0 * MOST_PRESSED * half * inward)[:, None], moment)
     penalty = float(method.penalty)  # type: ignore[attr-defined]
-    enough = f"{penalty * energy / allowed:.1e} or more" if allowed > 0.0 else "more"
+    enough = f"a penalty of {penalty * energy / allowed:.1e} or more" if allowed > 0.0 else "a larger penalty"
     thick = f", which is {2.0 * half:.3g} m thick," if surface.is_solid() else ""
     return (
         f", at ({', '.join(f'{x:.6g}' for x in place)}) m: with {speed:.3g} m/s it goes through the middle of "
         f"surfaces[{wall}] ({type(surface).__name__}){thick} to its other side: contacts are too soft for the speed; "
-        f"use a penalty of {enough}, got {penalty:g}, with a dt that fits it, a smaller speed, or Impact"
+        f"use {enough}, got {penalty:g}, with a dt that fits it, a smaller speed, or Impact"
     )
 
 

@@ -341,8 +341,10 @@ def test_a_solid_that_jumps_over_particles_is_refused():
     with pytest.raises(swarm.SceneError, match=r"no particle jumps over a solid.*flies 0\.0255 m, as it moves"):
         swarm.simulate(scene, CENTRE, METHODS["penalty"], until=1.0)
     assert fixed_step.longest_step(scene, 0.002) == pytest.approx(0.02 - 0.002 * 5.0)
-    # A step in which it cannot
-    result = run(scene, CENTRE, swarm.Penalty(1e-3, 1e4), 0.1)
+    # A step in which it cannot; a softer bat passes the particle.
+    with pytest.raises(swarm.RunError, match=r"goes through the middle of surfaces\[1\] \(Sphere\)"):
+        run(scene, CENTRE, swarm.Penalty(1e-3, 1e4), 0.1)
+    result = run(scene, CENTRE, swarm.Penalty(1e-3, 4e6), 0.1)
     assert result.observables["impacts"][-1] == 1
 
 
