@@ -40,10 +40,6 @@ class Outcome(NamedTuple):
     what: str
     said: str = ""
 
-    def short(self) -> str:
-        """As the committed list has it: of a sentence its digest."""
-        return self.what if self.what == "works" else f"{self.what} {digest_of(self.said)}"
-
 
 class Ran(NamedTuple):
     """A cell's run: what it was given, and its result, and how many impacts on walls its log has."""
