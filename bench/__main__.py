@@ -20,6 +20,7 @@ from . import (
     meshes,
     motion,
     order,
+    pairs,
     plane,
     report,
     scenes,
@@ -76,6 +77,7 @@ def main() -> None:
     first.add_argument(
         "--repeats", metavar="N", type=_count, default=compiling.REPEATS, help="of each scene [default: %(default)s]"
     )
+    commands.add_parser("pairs", help="which walls, capabilities and engines go together, each cell by a short run")
     commands.add_parser("sweep", help="many short runs: the wall time beside its parts, the memory of a thousand")
     commands.add_parser("cluster", help="two workers against two threads, and what 200 shards take of a scheduler")
     for command in commands.choices.values():
@@ -97,6 +99,7 @@ def main() -> None:
         "accuracy": accuracy,
         "stability": stability,
         "order": order,
+        "pairs": pairs,
         "bars": bars,
         "peers": race,
         "scenes": scenes,

@@ -23,15 +23,15 @@ def colours() -> tuple[str, ...]:
     return (*style.CURVES, style.ink(), style.GREY)
 
 
-def subplots(count: int, width: float, height: float, **options: Any) -> tuple[Any, Any]:
-    """A picture of so many panels side by side [inches], drawn without a screen."""
+def subplots(count: int, width: float, height: float, rows: int = 1, **options: Any) -> tuple[Any, Any]:
+    """A picture of so many panels side by side [inches], or in so many rows, drawn without a screen."""
     from matplotlib import style as styles
 
     from swarm.output import style
 
     styles.use("swarm.output.look")
     picture = style.picture(width, height)
-    return picture, picture.subplots(1, count, **options)
+    return picture, picture.subplots(rows, count // rows, **options)
 
 
 def save(picture: Any, path: Path) -> None:

@@ -46,6 +46,8 @@ class Pieces(Volume):
 
     # The largest radius of the balls in the scene [m]; None: its particles are points.
     _largest: float | None = None
+    # Whether listed solids of one kind may be a field.
+    _together: bool = True
 
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""
@@ -70,7 +72,7 @@ class Pieces(Volume):
                 ends = np.cumsum([first, *map(len, image.rooms)]).tolist()
                 unions.append(tuple(tuple(range(*ends)) for ends in itertools.pairwise(ends)))
             first += len(surfaces_of(image))
-        return order_of(self.pieces, unions=unions)
+        return order_of(self.pieces, self._together, unions)
 
     @cached_property
     def _groups(self) -> list[Members]:

@@ -20,7 +20,7 @@ from .pieces import Pieces, doorways_of_pieces, volumes_of_pieces, with_reach
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.doors import was_there
-from .surfaces.fields.grouped import order_of, walls_in
+from .surfaces.fields.grouped import walls_in
 from .surfaces.fields.many import Many, in_straight_flights
 from .surfaces.fields.members import Members
 from .surfaces.images import Lengths, images_of, lengths_of
@@ -177,7 +177,8 @@ class Scene(Pieces):
         if not self.order.groups:
             return self
         made = copy.copy(self)
-        made.__dict__.update(order=order_of(self.pieces, False, self.order.unions), _groups=[])
+        made.__dict__.update(_together=False, _groups=[])
+        made.__dict__.pop("order")
         made._require_few_walls(f" with {what}")
         return made
 

@@ -140,6 +140,12 @@ def test_cluster_quick():
     assert "two workers of one thread" in printed("cluster")
 
 
+def test_pairs_quick():
+    told = printed("pairs")
+    assert re.search(r"^points, Impact +4 +0 +0 +100%", told, re.MULTILINE)
+    assert re.search(r"^gravity +x +x$", told, re.MULTILINE)
+
+
 def test_reference_quick():
     assert "sphere: [" in printed("reference")
 

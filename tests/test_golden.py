@@ -13,14 +13,20 @@ from conftest import rarely
 
 _SPEC = importlib.util.spec_from_file_location("golden", Path(__file__).parent / "reference" / "golden.py")
 golden = importlib.util.module_from_spec(_SPEC)
+sys.path.insert(0, str(Path(__file__).parent / "reference"))
 _SPEC.loader.exec_module(golden)
 
-KNOWN = json.loads(golden.FILE.read_text())
+EVERY = json.loads(golden.FILE.read_text())
+KNOWN = {name: known for name, known in EVERY.items() if not name.startswith("cell: ")}
+CELLS = {name: known for name, known in EVERY.items() if name not in KNOWN}
 # Seconds each in plain Python, of which the long ring has the rest.
 SOON = [
     name for name in KNOWN if "falling" not in name and (name.startswith("impact e=1") or name.endswith(", sphere"))
 ]
 
+
+# Each takes half a second or more in plain Python.
+DEAR = ("grains", "bodies", "formula", "sampled", "mesh", "Penalty", "period", "log", "plane")
 
 ROTATED = ("impact e=1, rotated ellipsoid", "impact e=1, box", "impact e=1, bowl")
 DIGESTS = "import golden; print([golden.digest(name) for name in {names}])"
@@ -45,3 +51,43 @@ def test_every_run_is_known():
 @pytest.mark.parametrize("name", [name if name in SOON else rarely(name) for name in KNOWN])
 def test_the_bits_are_as_they_were(name):
     assert golden.digest(name) == KNOWN[name]
+
+
+def test_the_cells_are_those_of_the_list():
+    assert CELLS
+    assert set(CELLS) <= set(golden.cell_names())
+
+
+def test_a_cell_is_exact_or_has_its_end():
+    """On another machine the former have the same digests, the latter the same ends to 1e-9."""
+    for name, known in CELLS.items():
+        assert set(known) in ({"exact"}, {"libm", "end", "machine"}), name
+
+
+@pytest.mark.parametrize("name", [rarely(name) if any(word in name for word in DEAR) else name for name in CELLS])
+def test_a_cell_is_as_it_was(name):
+    assert golden.disagreement(name, CELLS[name]) == ""
+
+
+def test_a_cell_has_the_same_digest_in_another_process_and_with_two_threads(monkeypatch):
+    """Nothing of a digest is the order of a set, the time or the number of threads."""
+    names = [name for name in CELLS if "balls, Impact" in name and not any(word in name for word in DEAR)][:3]
+    told = "import golden; print([golden.run_cell(name)[0] for name in {names}])"
+    done = subprocess.run(
+        [sys.executable, "-c", told.format(names=names)], env={**os.environ, "PYTHONHASHSEED": "12345"},
+        cwd=Path(golden.__file__).parent, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    build = golden.cells.build
+    more = {"threads": 1, "block_size": 1}
+    monkeypatch.setattr(golden.cells, "build", lambda draft: build(draft)._replace(options=build(draft).options | more))
+    assert ast.literal_eval(done.stdout) == [golden.run_cell(name)[0] for name in names]
+
+
+def test_an_end_that_is_near_counts_on_another_machine():
+    name, known = next((name, known) for name, known in CELLS.items() if "end" in known and "points, Impact" in name)
+    near = [x * (1.0 + 1e-11) for x in known["end"]]
+    other = known | {"libm": "another", "end": near}
+    assert golden.disagreement(name, other | {"machine": "another"}) == ""
+    assert "instead of" in golden.disagreement(name, other)
+    far = other | {"machine": "another", "end": [x + 1e-8 for x in near]}
+    assert "the end is off by" in golden.disagreement(name, far)

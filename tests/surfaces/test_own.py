@@ -47,6 +47,27 @@ def ellipsoid(**keywords):
 # --- The surface -----------------------------------------------------------------------------------------
 
 
+def test_a_solid_in_a_cell_that_repeats_is_the_ellipsoid():
+    """What the scene makes of a surface, such as its other side, is made of its fields."""
+    ends = []
+    for make in (ellipsoid, lambda **given: swarm.Ellipsoid((0.3, 0.4, 0.5), **given)):
+        solid = make(center=(1.0, 1.0, 1.0), side="outside")
+        scene = swarm.Scene([solid], period=(2.0, 2.0, 2.0))
+        start = swarm.Particles([[0.3], [0.9], [1.1]], [[1.0], [0.1], [0.2]])
+        result = swarm.simulate(scene, start, swarm.Impact(), until=3.0, compile="never")
+        assert result.observables["impacts"][-1] > 0
+        ends.append(result.particles.position)
+    assert np.abs(ends[0] - ends[1]).max() < 1e-12
+
+
+@pytest.mark.parametrize("missing", ["phi", "gradient", "size"])
+def test_what_is_missing_is_said(missing):
+    given = {"phi": phi, "gradient": gradient, "size": 0.3}
+    del given[missing]
+    with pytest.raises(swarm.SceneError, match=f"needs the argument {missing}, got none"):
+        swarm.OwnSurface(Axes(0.3, 0.4, 0.5), **given)
+
+
 @pytest.mark.parametrize(
     "keywords", [{}, {"curvature": 2.0 / 0.09}, {"bounds": None, "curvature": 30.0}, {"center": (0.1, 0.2, -0.3)}]
 )

@@ -63,15 +63,19 @@ class OwnSurface(FormSurface):
     def __init__(
         self,
         parameters: Any,
-        phi: Callable[..., Any],
-        gradient: Callable[..., Any],
+        phi: Callable[..., Any] | None = None,
+        gradient: Callable[..., Any] | None = None,
         *,
-        size: float,
+        size: float | None = None,
         bounds: ArrayLike | None = None,
         **common: Any,
     ) -> None:
-        functions = {"phi_function": phi, "gradient_function": gradient}
-        self._set(common, parameters=parameters, length=size, box=bounds, **functions)
+        # They have defaults since `dataclasses.replace` gives each by the name of its field.
+        needed = {"phi": ("phi_function", phi), "gradient": ("gradient_function", gradient), "size": ("length", size)}
+        for argument, (name, value) in needed.items():
+            if common.setdefault(name, value) is None:
+                raise SceneError(f"OwnSurface needs the argument {argument}, got none")
+        self._set(common, parameters=parameters, box=bounds)
 
     def __repr__(self) -> str:
         return f"OwnSurface({self.parameters!r}, phi={self.phi_function.__name__}, size={self.length:g})"

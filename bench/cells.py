@@ -1,0 +1,534 @@
+"""Cells of the matrix of pairs: an engine, a kind of wall and a capability, each a run of a few particles.
+
+A run has four particles, or two bodies, so near to their walls that each meets one within a second: in plain Python it
+takes 0.01 to 0.3 s. `CELLS` is the whole matrix. What has no meaning is no cell, and `meaning` says why.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import swarm
+from swarm.kernel.jit import select
+from swarm.kernel.vector import dot
+
+CENTER = (1.0, 1.0, 1.0)
+# Around every solid; it is within the cell of a scene that repeats.
+HALF, PERIOD = 0.95, 2.0
+RADIUS, MASS = 0.04, 1.0
+STEP, STIFFNESS = 5e-3, 4e3
+AXIS = (1.0, -2.0, 3.0)
+TURN = {"axis": AXIS, "angle": 0.7}
+
+Laws = dict[str, Any]
+
+
+class Cell(NamedTuple):
+    """The names of an engine, a kind of wall and a capability."""
+
+    engine: str
+    wall: str
+    capability: str
+
+    def __str__(self) -> str:
+        return " / ".join(self)
+
+
+# --- Starts ----------------------------------------------------------------------------------------------
+
+# Places from the centre [m], velocities [m/s], where a particle may be born, and x of a plane that some pass.
+Start = tuple[np.ndarray, np.ndarray, tuple[float, float, float], float]
+_SPEEDS = np.array([(0.9, 0.4, -0.5), (-0.6, 0.8, 0.3), (0.3, -0.7, 0.8), (-0.5, -0.4, -0.9)])
+_MIDDLE = np.array([(0.12, 0.05, -0.08), (-0.1, 0.11, 0.06), (0.07, -0.13, 0.1), (-0.07, -0.06, -0.12)])
+_RING = np.array([(0.5, 0.1, 0.05), (-0.1, 0.5, -0.05), (-0.5, -0.1, 0.05), (0.1, -0.5, -0.05)])
+_SIDES = np.array([(0.8, 0.2, -0.1), (-0.8, -0.15, 0.2), (0.82, -0.3, 0.1), (-0.78, 0.25, -0.15)])
+_INWARDS = np.array([(-0.9, -0.1, 0.15), (1.0, 0.1, -0.2), (-0.8, 0.2, 0.1), (0.85, -0.15, 0.2)])
+
+STARTS: dict[str, Start] = {
+    "middle": (_MIDDLE, _SPEEDS, (0.0, 0.0, 0.0), 0.2),
+    "ring": (_RING, _SPEEDS, (0.5, 0.0, 0.0), 0.52),
+    "around": (_SIDES, _INWARDS, (0.8, 0.0, 0.6), 0.7),
+}
+
+
+# --- Walls -----------------------------------------------------------------------------------------------
+
+
+class Numbers(NamedTuple):
+    """Of a surface of one's own: its centre and the square of its radius."""
+
+    x: float
+    y: float
+    z: float
+    square: float
+
+
+def own_phi(p, x, y, z):
+    """A ball that is pressed along z."""
+    return (x - p.x) ** 2 + (y - p.y) ** 2 + 1.5 * (z - p.z) ** 2 - p.square
+
+
+def own_gradient(p, x, y, z):
+    """Its gradient."""
+    return 2.0 * (x - p.x), 2.0 * (y - p.y), 3.0 * (z - p.z)
+
+
+def _moved(center: Any, *shift: float) -> tuple[float, ...]:
+    return tuple(a + b for a, b in zip(center, shift, strict=True))
+
+
+def _vessel(center: Any) -> swarm.Box:
+    return swarm.Box((HALF, HALF, HALF), center)
+
+
+def _own(center: Any, side: str, laws: Laws) -> list[Any]:
+    low, high = (_moved(center, d, d, d) for d in (-0.6, 0.6))
+    numbers = Numbers(*map(float, center), 0.25)
+    return [swarm.OwnSurface(numbers, own_phi, own_gradient, size=0.5, bounds=(low, high), side=side, **laws)]
+
+
+def _sampled(center: Any, side: str, laws: Laws) -> list[Any]:
+    ticks = np.linspace(-0.9, 0.9, 10)
+    x, y, z = np.meshgrid(ticks, ticks, ticks, indexing="ij")
+    values = x * x + y * y + 1.2 * z * z - 0.25
+    return [swarm.Sampled(values, 0.2, _moved(center, -0.9, -0.9, -0.9), side=side, **laws)]
+
+
+def _mesh(center: Any, side: str, laws: Laws) -> list[Any]:
+    corners = np.array([(x, y, z) for x in (-0.4, 0.4) for y in (-0.45, 0.45) for z in (-0.5, 0.5)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = [three for a, b, c, d in quads for three in ((a, b, c), (a, c, d))]
+    return [swarm.Mesh(corners, triangles, side, center, **laws)]
+
+
+def _rooms(center: Any, side: str, laws: Laws) -> list[Any]:
+    parts = [swarm.Box((0.35, 0.4, 0.45), _moved(center, x, 0.0, 0.0)) for x in (-0.35, 0.35)]
+    return [swarm.Union(parts, side, **laws)]
+
+
+def _lens(center: Any, side: str, laws: Laws) -> list[Any]:
+    parts = [swarm.Sphere(0.6, _moved(center, x, 0.0, 0.0)) for x in (-0.2, 0.2)]
+    return [swarm.Intersection(parts, side, **laws)]
+
+
+def _cone(center: Any, side: str, laws: Laws) -> list[Any]:
+    apex = _moved(center, 0.0, 0.0, -0.45)
+    return [swarm.Cone(0.7, (0.0, 0.0, 1.0), apex, side, **laws), *_lids(center, side)]
+
+
+def _bowl(center: Any, side: str, laws: Laws) -> list[Any]:
+    apex = _moved(center, 0.0, 0.0, -0.45)
+    return [swarm.Paraboloid(0.125, (0.0, 0.0, 1.0), apex, side, **laws), *_lids(center, side)]
+
+
+def _lids(center: Any, side: str) -> list[Any]:
+    return [swarm.Plane((0.0, 0.0, 1.0), center[2] + 0.4)] if side == "inside" else []
+
+
+def _planes(center: Any, _side: str, laws: Laws) -> list[Any]:
+    x, _y, _z = center
+    return [swarm.Plane((1.0, 0.0, 0.0), x + 0.4, **laws), swarm.Plane((-1.0, 0.0, 0.0), 0.4 - x, **laws)]
+
+
+_PLACES = [(0.2, 0.1, 0.0), (-0.25, -0.1, 0.1), (0.0, 0.3, -0.2)]
+_MORE = [(0.3, -0.35, 0.3), (-0.3, 0.35, 0.3), (0.25, -0.3, -0.4), (-0.25, -0.4, -0.35)]
+
+
+def _field(center: Any, _side: str, laws: Laws) -> list[Any]:
+    return [swarm.Spheres([_moved(center, *place) for place in _PLACES], [0.35, 0.3, 0.25], **laws)]
+
+
+def _listed(center: Any, _side: str, laws: Laws) -> list[Any]:
+    return [swarm.Sphere(0.3, _moved(center, *place), "outside", **laws) for place in (*_PLACES, *_MORE)]
+
+
+def _foam(center: Any, _side: str, laws: Laws) -> list[Any]:
+    places = [_moved(center, x, 0.0, 0.0) for x in (-0.25, 0.25)]
+    return [swarm.Spheres(places, [0.45, 0.5], side="inside", **laws)]
+
+
+def _outline() -> list[tuple[float, ...]]:
+    return [(-0.4, -0.45), (0.45, -0.4), (0.4, 0.3), (0.1, 0.45), (-0.45, 0.4)]
+
+
+class Wall(NamedTuple):
+    """A kind of wall: how it is made of a centre, a side and laws, where particles start, and on which sides."""
+
+    make: Callable[[Any, str, Laws], list[Any]]
+    start: str = "middle"
+    sides: tuple[str, ...] = ("inside", "outside")
+
+
+def _of(make: Callable[..., Any]) -> Callable[[Any, str, Laws], list[Any]]:
+    return lambda center, side, laws: [make(center=center, side=side, **laws)]
+
+
+_DIAGONAL = ((4.0, 0.5, 0.0), (0.5, 5.0, 0.0), (0.0, 0.0, 3.0))
+WALLS: dict[str, Wall] = {
+    "sphere": Wall(_of(lambda **k: swarm.Sphere(0.5, **k))),
+    "ellipsoid": Wall(_of(lambda **k: swarm.Ellipsoid((0.4, 0.5, 0.6), **k))),
+    "torus": Wall(_of(lambda **k: swarm.Torus(0.5, 0.22, **k)), "ring"),
+    "capsule": Wall(_of(lambda **k: swarm.Capsule(0.35, 0.4, **k))),
+    "box": Wall(_of(lambda **k: swarm.Box((0.4, 0.45, 0.5), **k))),
+    "cylinder": Wall(_of(lambda **k: swarm.Cylinder(0.45, length=0.9, **k))),
+    "cone": Wall(_cone),
+    "slab": Wall(_of(lambda **k: swarm.Slab((1.0, 0.0, 0.0), 0.4, **k))),
+    "planes": Wall(_planes, sides=("inside",)),
+    "quadric": Wall(_of(lambda **k: swarm.Quadric(_DIAGONAL, constant=-1.0, **k))),
+    "paraboloid": Wall(_bowl),
+    "formula": Wall(_of(lambda **k: swarm.Formula("x**2/0.2 + y**2/0.25 + z**4/0.05 - 1", **k))),
+    "own surface": Wall(_own),
+    "sampled": Wall(_sampled),
+    "union": Wall(_rooms),
+    "intersection": Wall(_lens),
+    "field": Wall(_field, "around", ("outside",)),
+    "listed solids": Wall(_listed, "around", ("outside",)),
+    "foam": Wall(_foam, sides=("inside",)),
+    "mesh": Wall(_mesh),
+    "polygon": Wall(_of(lambda **k: swarm.Polygon(_outline(), **k))),
+    "stadium": Wall(_of(lambda **k: swarm.Stadium(0.35, 0.3, **k))),
+    "prism": Wall(_of(lambda **k: swarm.Prism(_outline(), 0.9, **k))),
+}
+# Those without an end: particles leave such a scene, and a cell may repeat along them.
+_ENDLESS = {"slab": (None, PERIOD, PERIOD), "planes": (None, PERIOD, PERIOD)}
+# Solids without an end: a cell may repeat across them.
+_UPRIGHT = {"polygon": (PERIOD, PERIOD, None), "stadium": (PERIOD, PERIOD, None)}
+
+
+# --- Drafts ----------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Draft:
+    """What a capability may change of a run."""
+
+    cell: Cell
+    side: str
+    start: str
+    center: tuple[float, float, float] = CENTER
+    laws: Laws = field(default_factory=dict)
+    scene: dict[str, Any] = field(default_factory=dict)
+    method: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict)
+    particles: dict[str, Any] = field(default_factory=dict)
+    vessel: bool = True
+    until: float = 1.0
+
+    def spot(self) -> tuple[float, ...]:
+        """Where particles may be."""
+        return _moved(self.center, *STARTS[self.start][2])
+
+    def surfaces(self) -> list[Any]:
+        """The surfaces of the scene, first the wall of the cell."""
+        made = WALLS[self.cell.wall].make(self.center, self.side, self.laws)
+        return [*made, _vessel(self.center)] if self.side == "outside" and self.vessel else made
+
+
+class Build(NamedTuple):
+    """The arguments of `simulate`."""
+
+    scene: swarm.Scene
+    particles: Any
+    method: Any
+    options: dict[str, Any]
+
+
+def _arrays(draft: Draft) -> tuple[np.ndarray, np.ndarray]:
+    places, speeds, _spot, _x = STARTS[draft.start]
+    places, speeds = places.copy(), speeds.copy()
+    if draft.scene.get("plane") is not None:
+        places[:, 2] = speeds[:, 2] = 0.0
+    if draft.particles.get("meet"):
+        # The second comes towards the first, and both miss each other's centre by a part of a radius.
+        places[1] = places[0] + (0.15, 0.02, 0.0)
+        speeds[0], speeds[1] = (0.8, 0.3, 0.2), (-0.8, -0.2, 0.1)
+    return (places + draft.center).T, speeds.T
+
+
+def _points(draft: Draft) -> swarm.Particles:
+    made = swarm.Particles(*_arrays(draft), MASS)
+    if "spin" in draft.particles:
+        made.spin = np.tile(np.array(draft.particles["spin"])[:, None], len(made))
+    return made
+
+
+def _balls(draft: Draft) -> swarm.Particles:
+    made = _points(draft)
+    made.radius = np.full(len(made), RADIUS)
+    return made
+
+
+def _bodies(draft: Draft) -> swarm.Bodies:
+    body = swarm.tetrahedron(edge=0.08, mass=MASS)
+    places, speeds = _arrays(draft)
+    middle = body.points.mean(axis=0)
+    arms = (body.points - middle).T[:, :, None]
+    some = slice(0, 2)
+    velocity = np.repeat(speeds[:, None, some], len(body), axis=1)
+    velocity = velocity + np.cross(draft.particles.get("spin", (0.0, 0.0, 0.0)), arms, axisb=0, axisc=0)
+    return swarm.Bodies(body, places[:, None, some] + arms, velocity)
+
+
+class Engine(NamedTuple):
+    """Particles or bodies, the method, and what every wall of the cell has."""
+
+    start: Callable[[Draft], Any]
+    method: Callable[..., Any]
+    arguments: dict[str, Any]
+    laws: Laws = {}  # noqa: RUF012  it is not changed
+
+
+_SOFT: dict[str, Any] = {"dt": STEP, "penalty": STIFFNESS}
+_LOOP = {**_SOFT, "adaptive": True, "acceleration": "reflection", "on_unconverged": "impact", "tolerance": 1e-20}
+ENGINES: dict[str, Engine] = {
+    "points, Impact": Engine(_points, swarm.Impact, {}),
+    "balls, Impact": Engine(_balls, swarm.Impact, {}),
+    "bodies, Impact": Engine(_bodies, swarm.Impact, {"dt": 0.02}),
+    "points, Penalty": Engine(_points, swarm.Penalty, _SOFT),
+    "grains, Penalty": Engine(_balls, swarm.Penalty, _SOFT),
+    "points, AugmentedLagrangian": Engine(_points, swarm.AugmentedLagrangian, _LOOP),
+    "points, heavy wall": Engine(_points, swarm.Impact, {}, {"mass": 2.0}),
+    "balls, heavy wall": Engine(_balls, swarm.Impact, {}, {"mass": 2.0}),
+}
+_OF_BALLS = ("balls, Impact", "grains, Penalty", "balls, heavy wall")
+
+
+# --- Capabilities ----------------------------------------------------------------------------------------
+
+
+class Retro(swarm.WallLaw):
+    """Sends some particles back where they came from, others off as a mirror does."""
+
+    probability: float
+
+    def leave(self, v, n, u, random, mass):
+        """Its kernel."""
+        mirror = v - 2.0 * dot(v - u, n) * n
+        return select(random.uniform(0) < self.probability, 2.0 * u - v, mirror)
+
+
+def _law(**laws: Any) -> Callable[[Draft], None]:
+    return lambda draft: draft.laws.update(laws)
+
+
+def _moving(motion: Callable[[Draft], Any]) -> Callable[[Draft], None]:
+    def edit(draft: Draft) -> None:
+        draft.laws["motion"] = motion(draft)
+        if draft.cell.engine == "points, AugmentedLagrangian":
+            draft.method.update(adaptive=False, on_unconverged="count")
+
+    return edit
+
+
+def _turning(draft: Draft) -> Any:
+    # The axis passes beside the centre, so that a ball moves too.
+    return swarm.Rotation(AXIS, 0.4, _moved(draft.center, 0.1, 0.0, 0.0))
+
+
+def _gravity(draft: Draft) -> None:
+    draft.scene["gravity"] = (0.3, -0.2, -1.0) if draft.scene.get("plane") is None else (0.3, -0.9, 0.0)
+    if draft.cell.engine == "points, AugmentedLagrangian":
+        draft.method.update(adaptive=False, on_unconverged="count")
+
+
+def _half_space(draft: Draft) -> swarm.Plane:
+    return swarm.Plane((-1.0, 0.0, 0.0), -draft.center[0] - STARTS[draft.start][3])
+
+
+def _opening(draft: Draft) -> None:
+    draft.laws["openings"] = [_half_space(draft)]
+
+
+def _timed_opening(draft: Draft) -> None:
+    draft.laws["openings"] = [swarm.Opening(_half_space(draft), times=[(0.3, 5.0)])]
+
+
+def _door(draft: Draft) -> None:
+    half = swarm.Plane((0.0, 1.0, 0.0), draft.center[1])
+    draft.laws["openings"] = [swarm.Opening(half, times=[(0.2, 0.5)], between=True)]
+
+
+def _long(draft: Draft) -> None:
+    draft.until = 2.0
+
+
+def _alone(draft: Draft) -> None:
+    """The cell repeats around a solid; around a cavity it has no meaning."""
+    # A capsule is so thin that particles come back later.
+    draft.until = 1.4 if draft.cell.wall == "capsule" else 1.2
+    if draft.cell.wall not in _ENDLESS and "outside" in WALLS[draft.cell.wall].sides:
+        draft.side, draft.start, draft.vessel = "outside", "around", False
+
+
+def _period(draft: Draft) -> None:
+    draft.scene["period"] = {**_ENDLESS, **_UPRIGHT}.get(draft.cell.wall, (PERIOD,) * 3)
+    draft.options["observables"] = {"cells": lambda frame: np.abs(frame.image).sum()}
+
+
+def _other_side(draft: Draft) -> None:
+    draft.side, draft.start = "outside", "around"
+
+
+def _flat(draft: Draft) -> None:
+    draft.scene["plane"] = "z"
+    draft.center = (CENTER[0], CENTER[1], 0.0)
+
+
+def _counters(draft: Draft) -> None:
+    draft.options["counters"] = [swarm.Plane((1.0, 0.0, 0.0), draft.center[0] + STARTS[draft.start][3])]
+
+
+def _source(draft: Draft) -> None:
+    inlet = swarm.Sphere(0.1, draft.spot())
+    draft.options["sources"] = [swarm.Source(inlet, volume=True, times=[0.1, 0.2], speed=1.0, mass=MASS)]
+
+
+def _option(**options: Any) -> Callable[[Draft], None]:
+    return lambda draft: draft.options.update(options)
+
+
+def _method(**arguments: Any) -> Callable[[Draft], None]:
+    return lambda draft: draft.method.update(arguments)
+
+
+def _pairs(**arguments: Any) -> Callable[[Draft], None]:
+    return lambda draft: draft.scene.update(pairs=swarm.Pairs(**arguments))
+
+
+def _meet(draft: Draft) -> None:
+    draft.particles["meet"] = True
+
+
+def _lossy(draft: Draft) -> None:
+    # A ball meets a wall so soon after another ball that it loses nothing there.
+    _meet(draft)
+    draft.laws["restitution"] = 0.7
+    draft.scene["pairs"] = swarm.Pairs(restitution=0.6)
+
+
+def _spin(draft: Draft) -> None:
+    draft.particles["spin"] = (3.0, -5.0, 4.0)
+
+
+def _bounce(draft: Draft) -> None:
+    draft.laws["restitution"] = 0.6
+
+
+def _rough(draft: Draft) -> None:
+    draft.laws["friction"] = 0.3
+
+
+def nothing(_draft: Draft) -> None:
+    """The run as it is."""
+
+
+class Capability(NamedTuple):
+    """What a capability changes of a run, what the run without it has as well, and the observable that shows it.
+
+    The observable is one that is not 0 in a frame after the first; "" where the motion of the particles differs.
+    """
+
+    edit: Callable[[Draft], None]
+    base: Callable[[Draft], None] = nothing
+    shown: str = ""
+
+
+CAPABILITIES: dict[str, Capability] = {
+    "plain": Capability(nothing, shown="impacts"),
+    "gravity": Capability(_gravity, shown="potential_energy"),
+    "restitution": Capability(_law(restitution=0.7), shown="dissipated_energy"),
+    "friction": Capability(_law(friction=0.3), shown="dissipated_energy"),
+    "temperature": Capability(_law(temperature=0.5), shown="wall_heat"),
+    "accommodation": Capability(_law(temperature=0.5, accommodation=0.6), shown="wall_heat"),
+    "Lambert": Capability(_law(laws=[swarm.Lambert(0.7)])),
+    "Absorb": Capability(_law(laws=[swarm.Absorb(0.7)]), shown="absorbed"),
+    "CercignaniLampis": Capability(_law(laws=[swarm.CercignaniLampis(0.5, 0.4, 0.6)]), shown="wall_heat"),
+    "Sticky": Capability(_law(laws=[swarm.Sticky(0.1)])),
+    "own law": Capability(_law(laws=[Retro(0.5)])),
+    "translation": Capability(_moving(lambda _d: swarm.Translation((0.2, 0.1, -0.15))), shown="wall_work"),
+    "oscillation": Capability(_moving(lambda _d: swarm.Oscillation((0.05, 0.03, 0.04), 1.0)), shown="wall_work"),
+    "turning": Capability(_moving(_turning), shown="wall_work"),
+    "path": Capability(
+        _moving(lambda _d: swarm.Path((0.0, 0.5, 2.0), ((0.0, 0.0, 0.0), (0.05, 0.0, 0.02), (0.0, 0.06, 0.0)))),
+        shown="wall_work",
+    ),
+    "mass": Capability(_law(mass=2.0), shown="wall_velocity"),
+    "inertia": Capability(lambda d: d.laws.update(motion=_turning(d), inertia=0.2), shown="wall_spin"),
+    "opening": Capability(_opening, shown="escaped"),
+    "timed opening": Capability(_timed_opening, _long, "escaped"),
+    "door": Capability(_door),
+    "present": Capability(_law(present=[(0.0, 1.0)]), _long),
+    "period": Capability(_period, _alone, "cells"),
+    "rotation": Capability(_law(rotation=TURN)),
+    "side": Capability(_other_side),
+    "plane": Capability(_flat),
+    "counters": Capability(_counters, shown="crossings"),
+    "source": Capability(_source, shown="born"),
+    "log": Capability(_option(impacts="impacts.h5")),
+    "member impacts": Capability(_option(member_impacts=True), shown="member_impacts"),
+    "contact step": Capability(_method(contact_step=1e-2)),
+    "contact start": Capability(_method(contact_start="centred"), lambda d: _centred(d)),
+    "pair restitution": Capability(_pairs(restitution=0.6), _meet, "collisions"),
+    "pair friction": Capability(_pairs(friction=0.3), _meet, "collisions"),
+    "contact duration": Capability(_pairs(restitution=0.6, contact_duration=0.5), _lossy, "collisions"),
+    "spin": Capability(_spin, _rough),
+}
+
+
+# Their observable is not 0 without them either.
+STATIC = ("gravity", "pair restitution", "pair friction", "contact duration", "path")
+
+
+def _centred(draft: Draft) -> None:
+    if ENGINES[draft.cell.engine].method is swarm.Impact:
+        draft.method["contact_step"] = 1e-2
+
+
+def meaning(cell: Cell) -> str | None:
+    """None, or why a combination says nothing, and is no cell."""
+    engine, wall = ENGINES[cell.engine], WALLS[cell.wall]
+    name = cell.capability
+    if name == "mass" and "mass" in engine.laws:
+        return "the engine is that of walls with a mass"
+    if name in ("contact step", "contact start") and engine.method is swarm.Penalty:
+        return "Penalty has no such argument"
+    if name == "contact step" and engine.method is swarm.AugmentedLagrangian:
+        return "AugmentedLagrangian has no such argument"
+    if name == "side" and len(wall.sides) == 1:
+        return "the wall has one side"
+    if name == "rotation" and cell.wall in ("sphere", "listed solids"):
+        return "a ball is the same when it is turned"
+    if name == "side" and wall.start == "around":
+        return "the wall is a solid"
+    return None
+
+
+CELLS: tuple[Cell, ...] = tuple(
+    cell for e in ENGINES for w in WALLS for c in CAPABILITIES if meaning(cell := Cell(e, w, c)) is None
+)
+
+
+def draft_of(cell: Cell, with_capability: bool = True) -> Draft:
+    """The draft of a cell, or of the same run without its capability."""
+    engine, wall, capability = ENGINES[cell.engine], WALLS[cell.wall], CAPABILITIES[cell.capability]
+    side = wall.sides[0]
+    draft = Draft(cell, side, wall.start, laws=dict(engine.laws), method=dict(engine.arguments))
+    capability.base(draft)
+    if with_capability:
+        capability.edit(draft)
+    return draft
+
+
+def build(draft: Draft) -> Build:
+    """The arguments of a run.
+
+    Raises:
+        SceneError: they do not go together.
+    """
+    engine = ENGINES[draft.cell.engine]
+    scene = swarm.Scene(draft.surfaces(), **draft.scene)
+    method = engine.method(**draft.method)
+    options = {"until": draft.until, "every": draft.until / 4.0, "compile": "never", "seed": 1, **draft.options}
+    return Build(scene, engine.start(draft), method, options)

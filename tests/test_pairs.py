@@ -1,0 +1,92 @@
+"""The matrix of pairs: each cell works, or is refused with the sentence of the committed list."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+from bench import cells, outcomes
+from bench.cells import Cell
+
+FOLDER = Path(__file__).parent / "reference"
+_SPEC = importlib.util.spec_from_file_location("pairs", FOLDER / "pairs.py")
+pairs = importlib.util.module_from_spec(_SPEC)
+sys.modules["pairs"] = pairs
+_SPEC.loader.exec_module(pairs)
+
+SOON = pairs.soon()
+
+
+def test_the_list_has_every_cell():
+    assert set(pairs.KNOWN) == {str(cell) for cell in cells.CELLS}
+
+
+# Impacts of balls on a wall with a mass lose energy within the contact duration too: swarm/colliding/striking.py.
+DEFECTS = ("balls, heavy wall", "contact duration")
+
+
+def test_no_cell_has_a_third_outcome_but_known_defects():
+    third = [name.split(" / ") for name, word in pairs.KNOWN.items() if word == "third"]
+    assert {(engine, capability) for engine, _wall, capability in third} == {DEFECTS}
+
+
+def test_every_row_and_column_is_in_the_quick_ring():
+    for names, k in ((cells.ENGINES, 0), (cells.WALLS, 1), (cells.CAPABILITIES, 2)):
+        assert {cell[k] for cell in SOON} == set(names)
+
+
+@pytest.mark.parametrize("cell", SOON, ids=str)
+def test_a_cell_is_as_the_list_says(cell):
+    outcome = outcomes.outcome(cell)
+    assert (outcome.what, outcome.said) == (pairs.KNOWN[str(cell)], outcome.said)
+
+
+ROWS = [(engine, wall) for engine in cells.ENGINES for wall in cells.WALLS]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("engine", "wall"), ROWS, ids=" / ".join)
+def test_all_cells_of_a_row_are_as_the_list_says(engine, wall):
+    row = [cell for cell in cells.CELLS if cell[:2] == (engine, wall) and cell not in SOON]
+    found = {str(cell): outcomes.outcome(cell) for cell in row}
+    assert [(name, *one) for name, one in found.items() if one.what != pairs.KNOWN[name]] == []
+
+
+# --- The judge -------------------------------------------------------------------------------------------
+
+
+def test_a_capability_that_is_ignored_is_a_third_outcome(monkeypatch):
+    ignored = cells.CAPABILITIES["restitution"]._replace(edit=cells.nothing)
+    monkeypatch.setitem(cells.CAPABILITIES, "restitution", ignored)
+    outcome = outcomes.outcome(Cell("points, Impact", "box", "restitution"))
+    assert (outcome.what, outcome.said) == ("third", "ignored: dissipated_energy is 0")
+
+
+def test_a_crash_is_a_third_outcome(monkeypatch):
+    monkeypatch.setitem(cells.WALLS, "box", cells.WALLS["box"]._replace(make=lambda *_given: 1 / 0))
+    assert outcomes.outcome(Cell("points, Impact", "box", "plain")).said == "ZeroDivisionError: division by zero"
+
+
+def test_books_that_do_not_balance_are_a_third_outcome(monkeypatch):
+    run = outcomes.run
+
+    def wrong(*given):
+        done = run(*given)
+        done.result.observables["dissipated_energy"][-1] *= 1.0 + 1e-9
+        return done
+
+    monkeypatch.setattr(outcomes, "run", wrong)
+    assert outcomes.outcome(Cell("points, Impact", "box", "friction")).said.startswith("the energy is off by")
+
+
+def test_a_particle_outside_is_a_third_outcome(monkeypatch):
+    run = outcomes.run
+
+    def wrong(*given):
+        done = run(*given)
+        done.result.particles.position[0, 1] += 1.0
+        return done
+
+    monkeypatch.setattr(outcomes, "run", wrong)
+    assert "outside" in outcomes.outcome(Cell("points, Impact", "sphere", "plain")).said
