@@ -242,8 +242,11 @@ def _arrays(draft: Draft) -> tuple[np.ndarray, np.ndarray]:
         places[:, 2] = speeds[:, 2] = 0.0
     if draft.particles.get("meet"):
         # The second comes towards the first, and both miss each other's centre by a part of a radius.
-        places[1] = places[0] + (0.15, 0.02, 0.0)
-        speeds[0], speeds[1] = (0.8, 0.3, 0.2), (-0.8, -0.2, 0.1)
+        # As far away as the walls leave room.
+        apart = {"cone": -0.15, "field": 0.1, "listed solids": 0.1}.get(draft.cell.wall, 0.15)
+        way = np.sign(apart)
+        places[1] = places[0] + (apart, way * 0.02, 0.0)
+        speeds[0], speeds[1] = (way * 0.8, 0.3, 0.2), (way * -0.8, -0.2, 0.1)
     return (places + draft.center).T, speeds.T
 
 
@@ -334,6 +337,9 @@ def _gravity(draft: Draft) -> None:
 
 
 def _half_space(draft: Draft) -> swarm.Plane:
+    """A volume that reaches each wall of the cell."""
+    if draft.cell.wall in ("planes", "field", "listed solids"):
+        return swarm.Plane((0.0, -1.0, 0.0), -draft.center[1] - (-0.25 if draft.cell.wall == "listed solids" else 0.1))
     return swarm.Plane((-1.0, 0.0, 0.0), -draft.center[0] - STARTS[draft.start][3])
 
 
@@ -348,6 +354,14 @@ def _timed_opening(draft: Draft) -> None:
 def _door(draft: Draft) -> None:
     half = swarm.Plane((0.0, 1.0, 0.0), draft.center[1])
     draft.laws["openings"] = [swarm.Opening(half, times=[(0.2, 0.5)], between=True)]
+
+
+def _rotated(draft: Draft) -> None:
+    # By an angle that leaves the start inside; planes and user-defined surfaces turn about the origin.
+    angle = {"torus": 0.3, "cone": 0.15, "planes": 0.3}.get(draft.cell.wall, TURN["angle"])
+    draft.laws["rotation"] = {"axis": AXIS, "angle": angle}
+    if draft.cell.wall in ("planes", "own surface"):
+        draft.center = (0.0, 0.0, 0.0)
 
 
 def _long(draft: Draft) -> None:
@@ -461,7 +475,7 @@ CAPABILITIES: dict[str, Capability] = {
     "door": Capability(_door),
     "present": Capability(_law(present=[(0.0, 1.0)]), _long),
     "period": Capability(_period, _alone, "cells"),
-    "rotation": Capability(_law(rotation=TURN)),
+    "rotation": Capability(_rotated),
     "side": Capability(_other_side),
     "plane": Capability(_flat),
     "counters": Capability(_counters, shown="crossings"),
@@ -500,6 +514,10 @@ def meaning(cell: Cell) -> str | None:
         return "the wall has one side"
     if name == "rotation" and cell.wall in ("sphere", "listed solids"):
         return "a ball is the same when it is turned"
+    if cell.wall == "listed solids" and name == "opening":
+        return "the volume that reaches each of the solids leaves none that is met"
+    if cell.wall == "listed solids" and name == "contact duration":
+        return "no ball meets a solid so soon after another ball"
     if name == "side" and wall.start == "around":
         return "the wall is a solid"
     return None

@@ -1,6 +1,8 @@
 """The matrix of pairs: each cell works, or is refused with the sentence of the committed list."""
 
 import importlib.util
+import re
+import string
 import sys
 from pathlib import Path
 
@@ -8,6 +10,7 @@ import pytest
 
 from bench import cells, outcomes
 from bench.cells import Cell
+from swarm.run import knows
 
 FOLDER = Path(__file__).parent / "reference"
 _SPEC = importlib.util.spec_from_file_location("pairs", FOLDER / "pairs.py")
@@ -36,10 +39,35 @@ def test_every_row_and_column_is_in_the_quick_ring():
         assert {cell[k] for cell in SOON} == set(names)
 
 
+def pattern(sentence):
+    """A sentence of `knows` as a regular expression, in which anything may stand for a field."""
+    parts = string.Formatter().parse(sentence)
+    return "".join(re.escape(text) + ("" if name is None else ".*") for text, name, _spec, _how in parts)
+
+
+# What a surface, particles or a scene refuse by themselves, before there is a run.
+BY_ITSELF = (
+    "spin must be None without a radius, .*", r"(mass|motion|rotation) must be None for \w+, .*",
+    "motion must be None, a Translation or a Guide where a mass is given, .*", "openings must be of a wall at rest, .*",
+    "motion and openings must be left out for Spheres with side=.*", 'side must be "(inside|outside)" for .*',
+    r"surfaces\[0\].mass and inertia must be None where the scene has a period, .*",
+    r"surfaces\[0\] must be the only surface of a scene without a period, .*",
+    r"surfaces\[\d\]( \(\w+\))? must (stand upright on the plane|be bounded along) .*",
+    r"surfaces\[\d\] must be one that particles with a radius may meet, .*",
+)  # fmt: skip
+DECLARED = [pattern(text) for one in knows.CAPABILITIES for text in one.refused.values()]
+
+
+def is_declared(sentence):
+    """Whether a refusal is a sentence of the table of engines, or of what a run is made of."""
+    return any(re.fullmatch(known, sentence, re.DOTALL) for known in (*DECLARED, *BY_ITSELF))
+
+
 @pytest.mark.parametrize("cell", SOON, ids=str)
 def test_a_cell_is_as_the_list_says(cell):
     outcome = outcomes.outcome(cell)
     assert (outcome.what, outcome.said) == (pairs.KNOWN[str(cell)], outcome.said)
+    assert outcome.what != "refused" or is_declared(outcome.said), outcome.said
 
 
 ROWS = [(engine, wall) for engine in cells.ENGINES for wall in cells.WALLS]
@@ -51,6 +79,8 @@ def test_all_cells_of_a_row_are_as_the_list_says(engine, wall):
     row = [cell for cell in cells.CELLS if cell[:2] == (engine, wall) and cell not in SOON]
     found = {str(cell): outcomes.outcome(cell) for cell in row}
     assert [(name, *one) for name, one in found.items() if one.what != pairs.KNOWN[name]] == []
+    refused = [one.said for one in found.values() if one.what == "refused"]
+    assert [sentence for sentence in refused if not is_declared(sentence)] == []
 
 
 # --- The judge -------------------------------------------------------------------------------------------

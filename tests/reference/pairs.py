@@ -66,7 +66,8 @@ def main():
 
 def write(done):
     """Write the list, in which these cells do what is said of them."""
-    found = {name: LETTERS[word] for name, word in (KNOWN | done).items()}
+    known = {str(cell) for cell in cells.CELLS}
+    found = {name: LETTERS[word] for name, word in (KNOWN | done).items() if name in known}
     KNOWN.update(done)
     table = {"capabilities": ", ".join(cells.CAPABILITIES), "cells": {}}
     for engine in cells.ENGINES:
