@@ -93,17 +93,17 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
     given = {field.metadata.get("key", field.name): getattr(described, field.name) for field in _kept(type(described))}
     table = {key: value for key, value in given.items() if value is not None and not _is_left_out(described, key)}
     table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
-    if table.get("motion") is not None:
-        table["motion"] = motion_table(described.motion)  # type: ignore[union-attr]
     mine = type(described)
     kind = kinds.get(mine, f"{mine.__module__}:{mine.__qualname__}")
     return _with_nested({"kind": kind, **table}, described, arrays)
 
 
 def _with_nested(table: dict[str, Any], described: Surface | Method, arrays: dict[str, Any] | None) -> dict[str, Any]:
-    """The table of a surface, with those of its openings and parts, and the names of laws of one's own."""
+    """The table of a surface, with those of its motion, openings and parts, and the names of laws of one's own."""
     if isinstance(described, Surface):
         del table["openings"], table["laws"]
+        if described.motion is not None:
+            table["motion"] = motion_table(described.motion)
         if described.laws:
             table["laws"] = [table_of_law(law) for law in described.laws]
         if isinstance(table.get("groups"), Mapping):

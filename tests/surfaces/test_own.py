@@ -127,6 +127,16 @@ def test_second_derivatives_are_differences():
     assert (xy, yz, zx) == pytest.approx((0.0, 0.0, 0.0), abs=1e-8)
 
 
+def test_a_trajectory_has_the_motion(tmp_path):
+    scene = swarm.Scene([ellipsoid(motion=swarm.Translation((0.1, 0.0, 0.0)))])
+    start = swarm.Particles([[0.0], [0.0], [0.1]], [[1.0], [0.2], [0.1]])
+    path = tmp_path / "run.h5"
+    swarm.simulate(scene, start, swarm.Impact(), until=1.0, trajectory=path, compile="never")
+    assert tables.table_of(scene.surfaces[0])["motion"] == {"kind": "translation", "velocity": (0.1, 0.0, 0.0)}
+    with swarm.load(path) as trajectory:
+        assert trajectory.times[-1] == 1.0
+
+
 def test_bounds_and_table():
     surface = ellipsoid(center=(1.0, 0.0, 0.0))
     assert surface.bounds() == ((0.69, -0.41, -0.51), (1.31, 0.41, 0.51))
