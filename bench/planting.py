@@ -38,7 +38,7 @@ GROUPS: dict[str, str] = {
     "|series|speeds|storage|stored|superblock|trajectory|vtkhdf|writer|xyz",
     "placing": "",
     "reacting": "",
-    "run": "balls|base|bodies|colliding|counting|doors|energies|engine|faces|grains|growing|heavy|impacts|instants"
+    "run": "balls|base|bodies|colliding|counting|doors|energies|engine|faces|grains|growing|heavy|impacts|knows"
     "|measures|observed|overlaps|passing|present|reacting|resting|result|sinking|soft|state|tally|turns|windows",
     "sources": "",
     "surfaces": "",

@@ -150,15 +150,15 @@ def test_reference_quick():
     assert "sphere: [" in printed("reference")
 
 
-# It reads tables, and has no --quick; its tests are below.
-READ_TABLES = {"compare"}
+# They have no --quick: one reads tables, and its tests are below, the other one is tested in test_faults.py.
+WITHOUT_QUICK = {"compare", "faults"}
 
 
 def test_every_command_of_the_readme_runs():
     told = re.findall(r"^\| `python -m bench[ .](\w+)", (ROOT / "bench" / "README.md").read_text(), re.MULTILINE)
     tested = {name.removeprefix("test_").removesuffix("_quick") for name in globals() if name.endswith("_quick")}
     assert len(told) > 20
-    assert set(told) == tested | READ_TABLES
+    assert set(told) == tested | WITHOUT_QUICK
 
 
 def table(path, **rows):
