@@ -77,3 +77,10 @@ def test_the_first_sentence_is_raised_and_what_is_supported_is_not():
 def test_the_guide_shows_the_table():
     guide = Path(__file__).parents[1] / "examples" / "README.md"
     assert "\n".join(knows.markdown()) in guide.read_text()
+
+
+def test_what_is_a_kind_of_another_capability_is_refused_with_it():
+    assert knows.sentence(knows.BODIES, "rotation") == knows.sentence(knows.BODIES, "motion")
+    assert knows.sentence(knows.POINTS, "contact duration") == knows.sentence(knows.POINTS, "law of pairs")
+    names = {one.name for one in knows.CAPABILITIES}
+    assert {one.within for one in knows.CAPABILITIES} <= {*names, ""}

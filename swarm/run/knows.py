@@ -361,12 +361,14 @@ class Capability(NamedTuple):
         refused: the sentence for each engine that does not support it. Its fields are those of `found`, the `kind` of
             what was found, the name of the `method`, the `whole` method and its contact `step`.
         is_argument: whether it is an argument of a method, which other methods do not have.
+        within: the name of the capability that this is a kind of, or "".
     """
 
     name: str
     found: Callable[[Asked], Found]
     refused: dict[tuple[str, ...], str]
     is_argument: bool = False
+    within: str = ""
 
     def sentence(self, engine: str) -> str | None:
         """The sentence for an engine, with its fields in braces; None if the engine supports this."""
@@ -460,6 +462,8 @@ CAPABILITIES = (
         "particle leaves the cell, got {got}; use Impact() with contact_step = 0",
         _EVERY_BODY: "period must be None with bodies, whose points would be torn apart by the faces, got {got}; use "
         "particles, or a vessel without a period",
+        (MASSIVE, HEAVY): "surfaces[{i}].mass and inertia must be None where the scene has a period, got {got}: "
+        "impacts would move its images",
     }),
     Capability("no wall", _no_walls, {
         _ALONE: "surfaces must hold at least one surface for particles without a radius, which meet nothing else, got "
@@ -473,14 +477,15 @@ CAPABILITIES = (
     Capability("contact duration", _duration, {
         (GRAINS,): "pairs.contact_duration must be None with Penalty, whose contacts last as long as they do, got "
         "{got} s; leave it out, or use Impact",
-    }),
+    }, within="law of pairs"),
     Capability("friction of pairs", _rough_pairs, {
         _RIGID_BALLS: "pairs.friction must be 0 with Impact, which has none between particles, got {got}; use Penalty, "
         "or leave it out",
-    }),
+    }, within="law of pairs"),
     Capability("spin", _spins, {
         _RIGID_BALLS: "spin must be None with Impact, whose impacts turn no ball, got spins; use Penalty, or set spin "
         "to None",
+        _ALONE: "spin must be None without a radius, a point does not turn; give a radius too",
     }),
     Capability("plane", _of_scene("plane"), {
         _EVERY_BODY: 'plane must be None with bodies, which turn in space, got "{got}"; use particles, or leave it out',
@@ -493,7 +498,7 @@ CAPABILITIES = (
         (MASSIVE, HEAVY): "surfaces[{i}].restitution must be 1 under gravity where a wall has a mass, got {got}: "
         "particles would come to rest on walls that move with them; leave gravity out, or give the wall a motion "
         "instead of a mass",
-    }),
+    }, within="restitution"),
     Capability("friction", _of_walls("friction", 0.0), {
         _SOFT_WALLS: _elastic("friction", "0"),
         (CHORDS,): _LOSES,
@@ -501,7 +506,7 @@ CAPABILITIES = (
     Capability("friction of a wall with a mass", _rubs_that_move, {
         (MASSIVE, HEAVY): "surfaces[{i}].friction must be 0 of a wall with a mass, which is pushed along its normals, "
         "got {got}",
-    }),
+    }, within="friction"),
     Capability("temperature", _of_walls("temperature", None), {
         (BODIES,): "surfaces[{i}].temperature must be None with bodies, got {got}",
         _SOFT_WALLS: _elastic("temperature", "None"),
@@ -520,15 +525,15 @@ CAPABILITIES = (
     Capability("laws of groups of a mesh", _groups, {
         (GRAINS,): "surfaces[{i}].groups must be None with particles that have a radius and Penalty, got laws of "
         "{got}; give all of the mesh one law, make two of it, or use Impact",
-    }),
+    }, within="law of a wall"),
     Capability("wait beside walls that move", _waits_beside_motions, {
         (*_RIGID_POINTS, *_RIGID_BALLS): "surfaces[{i}].laws[{k}] must let nobody wait where walls move, which would "
         "carry who waits along, got {got}; leave it out, or the motions",
-    }),
+    }, within="law of a wall"),
     Capability("wait", _sticky, {
         _RIGID_BALLS: "surfaces[{i}].laws[{k}] must let particles that have a radius leave at once with Impact, got "
         "{got!r:.200}; leave it or the radius out",
-    }),
+    }, within="law of a wall"),
     Capability("mass of a wall", _masses, {
         _EVERY_BODY: "surfaces[{i}] must have no mass and no inertia with bodies, got {got}; make it a body, whose "
         "cavities= are walls that it carries",
@@ -546,7 +551,7 @@ CAPABILITIES = (
         (MASSIVE, HEAVY): "surfaces[{i}].openings must be left out where a wall has a mass, got {count}; "
         + _TO_MOTION,
     }),
-    Capability("opening for a time", _doors, {(CHORDS,): _CHANGES, (GRAINS,): _IS_ABSENT}),
+    Capability("opening for a time", _doors, {(CHORDS,): _CHANGES, (GRAINS,): _IS_ABSENT}, within="opening"),
     Capability("present", _of_walls("present", None), {
         (BODIES,): "surfaces[{i}].present must be None with bodies, which a wall that comes would cut, got {got}; use "
         "particles, or leave it out",
@@ -568,11 +573,11 @@ CAPABILITIES = (
         _FIXED_STEPS: "surfaces[{i}].motion must not turn the surface with {method}, got {got}: in the frame of a wall "
         "that turns its step has no solution in closed form; use Impact, a Translation, Oscillation or Path, or a "
         "rotation that leaves the surface as it is",
-    }),
+    }, within="motion"),
     Capability("motion beside a field", _fields_that_rest, {
         (GRAINS,): "surfaces must not move beside a field or a mesh with particles that have a radius and Penalty, got "
         "surfaces[{i}] ({kind}) in a scene with a motion; use Impact, or build it of single surfaces",
-    }),
+    }, within="motion"),
     Capability("gravity at cut steps", _gravity_at_impacts, {
         (PAPER,): "{cut} does not know gravity yet, got gravity={got}; use fixed steps with "
         'on_unconverged="count", Penalty, or gravity=None',
@@ -632,7 +637,8 @@ def sentence(engine: str, capability: str) -> str | None:
     >>> sentence(BALLS, "spin")
     'spin must be None with Impact, whose impacts turn no ball, got spins; use Penalty, or set spin to None'
     """
-    return next(one for one in CAPABILITIES if one.name == capability).sentence(engine)
+    one = next(one for one in CAPABILITIES if one.name == capability)
+    return one.sentence(engine) or (sentence(engine, one.within) if one.within else None)
 
 
 def require_known(asked: Asked) -> None:
@@ -651,5 +657,5 @@ def markdown() -> list[str]:
     kinds = [engine for engine in ENGINES if engine != BASELINE]
     rows = [("", *kinds), ("---",) * (1 + len(kinds))]
     shown = (one for one in CAPABILITIES if not one.is_argument)
-    rows += [(one.name, *("no" if one.sentence(engine) else "yes" for engine in kinds)) for one in shown]
+    rows += [(one.name, *("no" if sentence(engine, one.name) else "yes" for engine in kinds)) for one in shown]
     return [f"| {' | '.join(row)} |" for row in rows]
