@@ -28,7 +28,7 @@ def run(bodies, until, *, dt, gravity, **laws):
     return swarm.simulate(scene, bodies, swarm.Impact(dt=dt), until=until, compile="always", threads=1, progress=False)
 
 
-@pytest.mark.parametrize("restitution", [0.0, 0.9])
+@pytest.mark.parametrize("restitution", [0.0, 0.9, 1.0])
 @pytest.mark.parametrize("velocity", [(1e-3, 0.0, 0.0), (-7e-4, 2e-4, 0.0)])
 def test_a_die_that_slides_slowly_stops_within_a_step(restitution, velocity):
     """It is slower than friction makes it in a step: it loses all its energy and stays where it is, at rest."""

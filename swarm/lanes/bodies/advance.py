@@ -10,7 +10,7 @@ from ...kernel.vector import column
 from ...status import Status
 from . import impact, impact_time, prescribed
 from .arrays import PACES, Held, Lanes, Pace, arrays_of_held, shapes_of_lanes
-from .newton import solve
+from .newton import BRIEF, solve
 from .penalty_contact import SoftContacts
 from .persistent_contact import HardContacts
 
@@ -107,7 +107,9 @@ def _finish(contacts, state, i):
     if action != impact_time.STRIKE_NOW:
         state.steps[number] += 1
         state.work[number] += pace.work[i]
-        pace.stuck[i] = 0
+        # Brief steps do not count: a body at rest on an elastic wall would bounce by round-off, 10^12 times a step.
+        if pace.step[i] >= BRIEF * contacts.rule.dt:
+            pace.stuck[i] = 0
         if contacts.rule.loop:
             state.sweeps[number] += pace.turns[i]
             state.unconverged[number] += pace.loose[i]

@@ -14,7 +14,7 @@ _MOST, _AGAIN = 40, 5
 _SOON = 1
 # In a stage this short, as a part of dt, links turn by less than round-off: what a correction would correct is the
 # round-off of places, over h a velocity.
-_BRIEF = 1e-8
+BRIEF = 1e-8
 
 
 def solve(contacts):
@@ -29,7 +29,7 @@ def solve(contacts):
     contacts.launch()
     is_rigid = (not has_guides) and ties.links == ties.ends.shape[0]
     for i in range(count):
-        brief = is_rigid & (pace.active[i] == 0) & (abs(pace.h[i]) < _BRIEF * rule.dt)
+        brief = is_rigid & (pace.active[i] == 0) & (abs(pace.h[i]) < BRIEF * rule.dt)
         if contacts.touching.is_rough and is_rigid and not pace.done[i]:
             brief = sticking.leave_out(contacts, i)
         pace.brief[i] = brief
