@@ -102,8 +102,9 @@ def touching_of(body: Body, ties: Ties, scene: Scene) -> Touching:
     plain = np.where(single, b.argmax(axis=1), -1).astype(np.int64)
     counts = scene.walls_of_rows()
     surfaces = [scene.surfaces[i] for i in np.repeat(scene.owners(), counts)] + own_surfaces(body)
+    restitution = np.array([surface.restitution for surface in surfaces])
     friction = np.array([surface.friction for surface in surfaces])
     return Touching(
         b, plain, b @ ties.inverse_mass, len(body.contacts), int(counts.sum()), len(body.guides),
-        np.array([surface.restitution for surface in surfaces]), friction, bool((friction > 0.0).any()),
+        restitution, friction, bool(((restitution < 1.0) | (friction > 0.0)).any()),
     )  # fmt: skip

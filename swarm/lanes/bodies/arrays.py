@@ -50,7 +50,7 @@ class Touching(NamedTuple):
     guides: int  # G
     restitution: Any  # (walls + G + C,)
     friction: Any  # (walls + G + C,)
-    is_rough: bool  # whether any wall has friction
+    is_dissipative: bool  # whether any wall is
 
     def place(self, r, k, i):
         """The place of contact point k of a lane, or with velocities its velocity."""
@@ -68,6 +68,17 @@ class Touching(NamedTuple):
         first = 0 if own < 0 else self.walls + own
         last = self.walls if own < 0 else first + (1 if own >= self.guides else 0)
         return first, last
+
+    def dissipates(self, wall):
+        """Whether a wall takes energy: one with friction, or with a restitution below 1."""
+        return self.friction[wall] > 0.0 or self.restitution[wall] < 1.0
+
+    def dissipate(self, name, found):
+        """Whether any of these contacts is at a wall that takes energy."""
+        takes = False
+        for a in range(found):
+            takes = takes or self.dissipates(name[a, 1])
+        return takes
 
     def width(self, name, found):
         """The number of directions of each contact: the normal, or the tangents too, where there is friction."""

@@ -114,7 +114,7 @@ class Contacts(Constrained):
                 active.lost[i] += active.press[i, 3 * a + d] * dot(direction(frame, a, d), away)
             # What a force does over the round-off of a gap; over more it is an error to be seen.
             closer = dot(direction(frame, a, 0), away)
-            if touching.friction[active.name[i, a, 1]] > 0.0 and abs(closer) <= 2.0 * ROOM * self.rule.room:
+            if touching.dissipates(active.name[i, a, 1]) and abs(closer) <= 2.0 * ROOM * self.rule.room:
                 active.lost[i] += press * closer
 
     def is_mixed(self, i):

@@ -95,7 +95,7 @@ def _blow(bodies, state, name, frame, found, i):
     bounces = 0.0 if chatters(touching, state, number) else 1.0
     m, wide = ties.links + touching.guides, touching.width(name, found)
     rows = wide * found
-    lost, elastic = 0.0, bounces == 1.0
+    lost, elastic = 0.0, bounces == 1.0 and not touching.dissipate(name, found)
     blow = Blow(
         bodies, name, frame, wide, scratch((3, m), np.float64), scratch((m, m), np.float64),
         scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
@@ -117,13 +117,12 @@ def _blow(bodies, state, name, frame, found, i):
     is_led = max(ties.led) >= 0
     before = kinetic_of(ties, v, i) if is_led else 0.0
     against = scratch(m, np.float64)
-    if wide > 1:
+    if not elastic:
         # Links whose lengths change give their energy away in the next short step, which takes a change back.
         lost += blow.strain(scratch(m, np.float64), against, i)
     blow.give(p, against, i)
     for a in range(found):
         w = name[a, 1]
-        elastic = elastic and touching.restitution[w] == 1.0 and touching.friction[w] == 0.0
         state.impulse[bodies.walls.row(float(w)), number] += p[wide * a]
         if p[wide * a] > 0.0:
             state.count_impact(number, w)

@@ -43,7 +43,8 @@ def look(bodies, i, larger):
         for j in range(count_at(walls, met, c)):
             w = wall_at(walls, met, j, c)
             gap = walls.distance(float(w), c)
-            worst = max(worst, gap)
+            if not gap <= room or not _rests(bodies, k, w, i):
+                worst = max(worst, gap)
             if not gap <= room and not _stays(bodies, k, w, gap, i):
                 rate = dot(walls.unit_normal(float(w), c), touching.place(lanes.v1, k, i))
                 time = tau - gap / rate if rate > 0.0 else 0.0
@@ -77,9 +78,19 @@ def look(bodies, i, larger):
     return AGAIN
 
 
+def _rests(bodies, k, wall, i):
+    """Whether a contact lasts, so that its gap says nothing of the time at which another one is met."""
+    pace, name, lasts = bodies.pace, bodies.active.name, False
+    if not bodies.touching.dissipates(wall) or (k == pace.point[i] and wall == pace.wall[i]):
+        return False
+    for a in range(pace.active[i]):
+        lasts = lasts or (name[i, a, 0] == k and name[i, a, 1] == wall)
+    return lasts
+
+
 def _stays(bodies, k, wall, gap, i):
     """Whether a contact of a lasting step is as far outside as it was, since short steps do not bring it back."""
-    if bodies.pace.active[i] == 0 or bodies.touching.friction[wall] == 0.0:
+    if bodies.pace.active[i] == 0 or not bodies.touching.dissipates(wall):
         return False
     start = bodies.walls.distance(float(wall), bodies.touching.place(bodies.lanes.r, k, i))
     return gap - start <= bodies.rule.room

@@ -30,7 +30,7 @@ def solve(contacts):
     is_rigid = (not has_guides) and ties.links == ties.ends.shape[0]
     for i in range(count):
         brief = is_rigid & (pace.active[i] == 0) & (abs(pace.h[i]) < BRIEF * rule.dt)
-        if contacts.touching.is_rough and is_rigid and not pace.done[i]:
+        if contacts.touching.is_dissipative and is_rigid and not pace.done[i]:
             brief = sticking.leave_out(contacts, i)
         pace.brief[i] = brief
         pace.done[i] = pace.done[i] | brief

@@ -80,7 +80,7 @@ class HardContacts(Contacts):
         along, across = scratch((rows, m), np.float64), scratch((rows, m), np.float64)
         schur = scratch((rows, rows), np.float64)
         gap, change = scratch(rows, np.float64), scratch(rows, np.float64)
-        error = pace.residue[i]
+        error, eased = pace.residue[i], sticking.is_short(self, i) and touching.dissipate(active.name[i], found)
         for a in range(found):
             k, wall = active.name[i, a, 0], active.name[i, a, 1]
             y0, y1 = touching.place(lanes.ra, k, i), touching.place(lanes.r1, k, i)
@@ -88,7 +88,7 @@ class HardContacts(Contacts):
                 gap[wide * a + d] = dot(direction(active.frame[i], a, d), y1 - y0)
             # Gaps of round-off stay what they are; in a composed stage a contact can also be away from its wall.
             away = self.walls.distance(float(wall), y0)
-            outside = away > 0.0 and (wide == 1 or not sticking.is_short(self, i))
+            outside = away > 0.0 and not eased
             gap[wide * a] += away if outside or away < -NEAR * rule.room else 0.0
             off = abs(gap[wide * a]) if active.press[i, 3 * a] > 0.0 else max(gap[wide * a], 0.0)
             error = max(error, off / rule.room)

@@ -15,7 +15,7 @@ import numpy as np
 from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.vector import column, dot, norm, square
-from .contacts import MOST_CONTACTS, direction, missing, put_frame, sweep
+from .contacts import MOST_CONTACTS, direction, missing, put_direction, put_frame, sweep
 from .impact import ROUND_OFF, SHORT, SWEEPS, Blow, kinetic_of
 
 
@@ -50,18 +50,19 @@ def leave_out(bodies, i):
 
 @outlined
 def stop(bodies, state, i):
-    """End a step of contacts of which one sticks, or a short one with friction, with velocities that they permit.
+    """End a step of contacts of which one sticks, or a short one that loses energy, with velocities that they permit.
 
     The impulses of the step change by what is missing, within the cones of friction; what is lost is booked.
     """
     ties, touching, lanes, active = bodies.ties, bodies.touching, bodies.lanes, bodies.active
     number, found = bodies.pace.body[i], bodies.pace.active[i]
-    if not (_sticks(bodies, i) or (is_short(bodies, i) and touching.width(active.name[i], found) > 1)):
+    if not (_sticks(bodies, i) or (is_short(bodies, i) and touching.dissipate(active.name[i], found))):
         return
-    m, rows = ties.links + touching.guides, 3 * found
+    m, wide = ties.links + touching.guides, touching.width(active.name[i], found)
+    rows = wide * found
     name, frame = scratch((MOST_CONTACTS, 2), np.int64), scratch((MOST_CONTACTS, 3, 3), np.float64)
     blow = Blow(
-        bodies, name, frame, 3, scratch((3, m), np.float64), scratch((m, m), np.float64),
+        bodies, name, frame, wide, scratch((3, m), np.float64), scratch((m, m), np.float64),
         scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
     )  # fmt: skip
     rate, p, change = scratch(rows, np.float64), scratch(rows, np.float64), scratch(rows, np.float64)
@@ -70,20 +71,22 @@ def stop(bodies, state, i):
         k, wall, press = active.name[i, a, 0], active.name[i, a, 1], active.press[i, 3 * a]
         name[a, 0], name[a, 1] = k, wall
         n = bodies.walls.unit_normal(float(wall), touching.place(lanes.r, k, i))
-        t = direction(active.frame[i], a, 1)
-        t = t - dot(t, n) * n
-        put_frame(frame, a, n, t / norm(t))
+        put_direction(frame, a, 0, n)
+        if wide > 1:
+            t = direction(active.frame[i], a, 1)
+            t = t - dot(t, n) * n
+            put_frame(frame, a, n, t / norm(t))
         if press > 0.0 and active.impulse[i, a] > 0.0:
-            for d in range(3):
-                p[3 * a + d] = active.impulse[i, a] * (active.press[i, 3 * a + d] / press)
+            for d in range(wide):
+                p[wide * a + d] = active.impulse[i, a] * (active.press[i, 3 * a + d] / press)
     blow.hold(i)
     blow.respond()
     lost = blow.strain(strain, against, i)
     for a in range(rows):
-        rate[a] = dot(blow.direction(a), touching.place(lanes.v, name[a // 3, 0], i))
+        rate[a] = dot(blow.direction(a), touching.place(lanes.v, name[a // wide, 0], i))
         for row in range(m):
             rate[a] -= blow.answer[a, row] * strain[row]
-    sweep(touching, (name, p, 3, 3), blow.schur, rate, change, SWEEPS)
+    sweep(touching, (name, p, wide, wide), blow.schur, rate, change, SWEEPS)
     for a in range(rows):
         # As of a blow: the change of p times the mean of the rates before and after.
         lost += 0.5 * change[a] * (rate[a] + missing(blow.schur, a, rate[a], change))
