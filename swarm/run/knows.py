@@ -148,24 +148,8 @@ def _sticky(asked: Asked) -> Found:
         yield from ({"i": i, "k": k, "got": law} for k, law in enumerate(surface.laws) if isinstance(law, Sticky))
 
 
-def _energy_changes(asked: Asked) -> Found:
-    if asked.scene.laws() is not None:
-        yield {}
-
-
-def _sends(asked: Asked) -> Found:
-    laws = asked.scene.laws()
-    if laws is not None and laws.send_off:
-        yield {}
-
-
 def _doors(asked: Asked) -> Found:
     if asked.scene.has_doors():
-        yield {}
-
-
-def _absences(asked: Asked) -> Found:
-    if asked.scene.has_doors() or asked.scene.openings() is not None:
         yield {}
 
 

@@ -1,4 +1,4 @@
-"""Contacts with friction that stick: velocities at the end of a step, and steps too short for forces.
+"""Contacts that stick or come to rest at walls that take energy: their velocities, and steps too short for forces.
 
 A step that keeps the place of a contact turns its rate round, v1 = -v0, and that of a link at rest too: an error of
 second order in the length of the step that no force of a later step can damp. So a step in which a contact sticks ends

@@ -6,25 +6,18 @@ import numpy as np
 
 from ...kernel.vector import Vec, dot, norm, square
 from ..contract import Smooth
-from ..frames import Framed
+from ..frames import Unturned
 from ..shapes.plane import PlaneNumbers
 from ..shapes.quadratic import QuadricNumbers
 
 _TINY = float(np.finfo(np.float64).tiny)
 
 
-class Unturned(Framed):
-    """A surface, the field `body`, in the frame of the scene."""
+class OfTip(Unturned):
+    """A surface at the tip of a cone that balls are in."""
 
     if TYPE_CHECKING:
         body: Any
-
-    def same(self, given):
-        """What is the same in both frames."""
-        return given
-
-    place_in = end_in = velocity_in = way_in = vector_in = gravity_in = same
-    place_out = end_out = normal_out = vector_out = same
 
     holds_balls = True
 
@@ -32,7 +25,7 @@ class Unturned(Framed):
         return self.body.flat_normal()
 
 
-class TipPlane(Unturned):
+class TipPlane(OfTip):
     """The plane through the tip, across the axis."""
 
     body: PlaneNumbers
@@ -42,7 +35,7 @@ class TipPlane(Unturned):
         return self._replace(body=self.body._replace(offset=self.body.offset - radius * self.lift))
 
 
-class Nappes(Unturned):
+class Nappes(OfTip):
     """Both nappes of the cone: flights are those to the quadric `body`; phi, the inner function, is the distance."""
 
     body: QuadricNumbers

@@ -8,7 +8,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, dot, norm, square, times
 from ..course import Fall, Quartic, close, rise_time, under_way
 from ..fields.members import Members, member
-from ..frames import Framed
+from ..frames import Unturned
 from ..patched import Patched
 from ..rotation import Rotated
 from ..shapes.quadratic import QuadricNumbers, form
@@ -17,7 +17,7 @@ from ..shapes.quadratic import QuadricNumbers, form
 _CROSSINGS = 12
 
 
-class Side(Framed):
+class Side(Unturned):
     """One side: a quadric of curvature k that goes through its start, where that is within the side.
 
     The level of the quadric, n.d + k/2 |d|^2 with d = r - start, is the distance to first order.
@@ -34,13 +34,6 @@ class Side(Framed):
     thickness: float  # of what is behind it, at the least [m]
     joined_before: float  # the number of the side that joins it smoothly at its start, or -1
     joined_after: float  # and at its end
-
-    def same(self, a):
-        """What is the same in the frame of the quadric, which has none of its own."""
-        return a
-
-    place_in = end_in = velocity_in = way_in = vector_in = gravity_in = same
-    place_out = end_out = normal_out = vector_out = same
 
     holds_balls = False
 
