@@ -82,8 +82,8 @@ def test_the_work_of_walls_is_told(tmp_path, path):
 def test_pictures_show_sliding_where_there_is_some(path, monkeypatch):
     """And the heat of each thermal surface as a power, where it gives any."""
     drawn = {}
-    monkeypatch.setattr(series, "VIEWS", {name: (name, log) for name, (_title, log) in series.VIEWS.items()})
-    monkeypatch.setattr(graphs, "lines", lambda axes, view, logarithm, curves, limit=0: drawn.update({view: curves}))
+    names = {graph: name for name, graph in series.GRAPHS.items()}
+    monkeypatch.setattr(graphs, "lines", lambda axes, graph, curves, limit=0: drawn.update({names[graph]: curves}))
     made = path.with_suffix(".rrd")
     for values in ({}, LASTING):
         observed(path, **values)

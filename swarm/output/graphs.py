@@ -16,34 +16,7 @@ from .verdicts import ROUND_OFF
 Curves = dict[str, tuple[Floats, Floats]]
 End = tuple[float, str, str]
 
-# What is said above a plot, by what its axis says.
-_TITLES = {
-    "energy": "energy of all",
-    "worst relative energy error": "energy error, worst particle",
-    "worst relative error of a link's length": "length error, worst link",
-    "largest penetration": "depth in the walls",
-    "largest overlap": "overlap of balls",
-    "particles": "who is there",
-    "impacts": "impacts per second",
-    "force": "force on the walls",
-    "pressure": "pressure on the walls",
-    "crossings": "crossings of counters",
-    "net flow": "net flow through counters",
-    "particles that slide or rest": "sliding and resting",
-    "displacement": "where walls are moved to",
-}
-# What an axis says where the words above it say the rest.
-_LABELS = {
-    "worst relative energy error": "relative error",
-    "worst relative error of a link's length": "relative error",
-    "largest penetration": "depth",
-    "largest overlap": "overlap",
-    "particles that slide or rest": "particles",
-    "heat from walls": "heat",
-}
-# Units of what is a growth in a second: one value for the time from frame to frame.
-_RATES = ("1/s", "Pa", "N/m", "N", "W")
-# Of these, what particles exert, and below which so few of molecular mass do that no gauge would show it.
+# Units of what particles exert, and below which so few of molecular mass do that no gauge would show it.
 _PRESSES, _MOLECULAR = ("Pa", "N/m", "N"), 1e-12
 # Most curves with a colour each; of more these energies have one.
 _ENERGIES = ("total", *(name for name in ENERGIES if name not in ("work of", "energy of")))
@@ -63,22 +36,20 @@ def rows_of(count: int, width: float) -> list[int]:
     return [count // rows + (k >= rows - count % rows) for k in range(rows)]
 
 
-def lines(axes: Any, view: str, logarithm: bool, drawn: Curves, limit: float | None = ROUND_OFF) -> None:
-    """The time series of one plot, by their names: (times [s], values). Rates have no value at the first frame.
+def lines(axes: Any, graph: series.Graph, drawn: Curves, limit: float | None = ROUND_OFF) -> None:
+    """Draw the time series of one graph, by their names: (times [s], values). Rates have no value at the first frame.
 
     Args:
         axes: what they are drawn in.
-        view: what the axis says, with the unit, as "energy [J]".
-        logarithm: whether the values are logarithms of errors, `series.NOTHING` of none.
+        graph: what they show.
         drawn: the curves.
         limit: of errors what round-off explains; None: nothing is round-off.
     """
-    quantity, _, unit = view.rstrip("]").partition(" [")
-    axes.set_title(_titled(quantity, drawn))
+    axes.set_title(_titled(graph, drawn))
     if not any(len(times) for times, _values in drawn.values()):
         _words(axes, "needs two frames")
         return
-    if logarithm:
+    if graph.is_error:
         drawn = {name: (times, _error(values)) for name, (times, values) in drawn.items()}
         if not any(values.any() for _times, values in drawn.values()):
             _words(axes, "none in any frame")
@@ -86,31 +57,30 @@ def lines(axes: Any, view: str, logarithm: bool, drawn: Curves, limit: float | N
     drawn = _merged(drawn)
     size = max(float(np.abs(values).max()) for _times, values in drawn.values() if len(values))
     # Errors without a unit keep their powers of ten.
-    factor, written = prefixed(size, unit) if unit else (1.0, "")
+    factor, written = prefixed(size, graph.unit) if graph.unit else (1.0, "")
     duration = max(float(times[-1]) for times, _values in drawn.values() if len(times))
     scale, second = prefixed(duration, "s")
     if len(drawn) == 1 and "total, all kinetic" in drawn:
         axes.set_title("Energy of all, kinetic")
     scaled = {name: (times * scale, values * factor) for name, (times, values) in drawn.items()}
-    ends = _curves(axes, scaled, unit in _RATES)
+    ends = _curves(axes, scaled, graph.is_rate)
     axes.set_xlim(
         min(0.0, *(float(times[0]) for times, _values in scaled.values() if len(times))), duration * scale or 1.0
     )
     axes.set_xlabel(f"time [{second}]")
-    said = _LABELS.get(quantity, quantity)
-    axes.set_ylabel(_labelled(said, unit, written, size))
-    if logarithm:
+    axes.set_ylabel(_labelled(graph, written, size))
+    if graph.is_error:
         _errors(axes, scaled, None if limit is None else limit * factor, written)
     else:
         _heights(axes, scaled)
     _label(axes, ends)
 
 
-def _labelled(said: str, unit: str, written: str, size: float) -> str:
-    """What an axis says, with its unit: of molecules, what presses is told, for a gas has more than are simulated."""
-    if unit in _PRESSES and 0.0 < size < _MOLECULAR:
-        return f"{said} [{written}]\nof the simulated particles"
-    return f"{said} [{written}]" if written else said
+def _labelled(graph: series.Graph, written: str, size: float) -> str:
+    """The label of an axis with its unit. Of molecules it names whose pressure it is: a gas has more than are run."""
+    label = f"{graph.label or graph.quantity} [{written}]" if written else graph.label or graph.quantity
+    is_molecular = graph.unit in _PRESSES and 0.0 < size < _MOLECULAR
+    return f"{label}\nof the simulated particles" if is_molecular else label
 
 
 def _merged(drawn: Curves) -> Curves:
@@ -132,15 +102,15 @@ def _error(values: Floats) -> Floats:
     return np.where(values <= series.NOTHING, 0.0, 10.0**values)
 
 
-def _titled(quantity: str, drawn: Curves) -> str:
-    """The words above a plot: of one surface its name."""
-    title = _TITLES.get(quantity, quantity)
+def _titled(graph: series.Graph, drawn: Curves) -> str:
+    """The title of a graph: of one surface with its name."""
+    title = graph.title
     (first, *others) = drawn
     if not others and first == "virial":
         return "Pressure of the balls"
-    if not others and quantity in ("pressure", "force", "heat from walls"):
+    if not others and "walls" in title and graph.is_rate:
         title = title.replace("the walls", f"the {first}").replace("walls", f"the {first}")
-    if quantity.startswith("worst relative energy") and "body" in first:
+    if graph.is_error and "body" in first:
         title = title.replace("particle", "body")
     return title[:1].upper() + title[1:]
 

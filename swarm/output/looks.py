@@ -88,9 +88,9 @@ def blueprint(lines: list[series.Line], noun: str, eye: Any = None, plane: str |
     )
     views, plots = series.views_of(lines), []
     for group in sorted(views, key=lambda group: _FIRST.index(group) if group in _FIRST else len(_FIRST)):
-        view, logarithm = series.title_of(group, plane)
+        graph = series.GRAPHS[group].across(plane)
         legend = rrb.PlotLegend(rrb.Corner2D.RightTop, visible=len(views[group]) > 1)
-        name = f"{view}, log10" if logarithm else view
+        name = f"{graph.name}, log10" if graph.is_error else graph.name
         paths = [line.path for line in views[group]]
         plots.append(rrb.TimeSeriesView(origin="/", contents=paths, name=name, plot_legend=legend))
     seen, rest = rrb.Vertical(*plots[:_SEEN], name="graphs"), rrb.Vertical(*plots[_SEEN:], name="more graphs")

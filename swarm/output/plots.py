@@ -106,8 +106,8 @@ def _series(cells: list[Any], content: Content, plots: dict[str, graphs.Curves],
     limits = {"penetration": None if soft else verdicts.penetration_limit(content), "overlap": None}
     errors = verdicts.energy_limit(content)
     for k, (group, curves) in enumerate(plots.items()):
-        view = series.title_of(group, content.scene.plane)
-        graphs.lines(cells[k], *view, curves, limit=limits.get(group, errors))
+        graph = series.GRAPHS[group].across(content.scene.plane)
+        graphs.lines(cells[k], graph, curves, limit=limits.get(group, errors))
         if k < len(plots) - last:
             cells[k].set_xlabel("")
 
@@ -177,7 +177,7 @@ def graphs_of(content: Content, shapes: list[Shape]) -> list[tuple[str, Callable
     """The graphs that say something: what each shows, and the function that draws it in axes."""
     shown: list[tuple[str, Callable[[Any], None]]] = []
     for group, curves in _shown(content, shapes).items():
-        title = series.title_of(group, content.scene.plane)[0]
+        title = series.GRAPHS[group].across(content.scene.plane).name
         shown.append((title, functools.partial(_one, content=content, plot={group: curves})))
     if spread := speeds.of_frames(content):
         shown.append(("speeds", functools.partial(speeds.draw, content=content, spread=spread)))

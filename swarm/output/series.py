@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,25 +20,60 @@ from .shape import Shape
 # Stands for the logarithm of zero.
 NOTHING = -18.0
 
-# Of each plot, by the first part of the entities on it: what its axis says, and whether the values are a log10.
-VIEWS = {
-    "energy": ("energy [J]", False),
-    "energy_error": ("worst relative energy error", True),
-    "link_error": ("worst relative error of a link's length", True),
-    "penetration": ("largest penetration [m]", True),
-    "overlap": ("largest overlap [m]", True),
-    "number": ("particles", False),
-    "impacts": ("impacts [1/s]", False),
-    "pressure": ("pressure [Pa]", False),
-    "force": ("force [N]", False),
-    "crossings": ("crossings [1/s]", False),
-    "flow": ("net flow [1/s]", False),
-    "sliding": ("particles that slide or rest", False),
-    "heat": ("heat from walls [W]", False),
-    "position": ("displacement [m]", False),
+
+@dataclass(frozen=True)
+class Graph:
+    """A graph of time series: what it shows, and how.
+
+    Attributes:
+        quantity: its name.
+        unit: of its values; "" of numbers and relative errors.
+        title: of the graph.
+        label: of its axis, below a title that says the rest; None: the quantity.
+        is_error: the values are log10 of errors, `NOTHING` of none.
+        is_rare: pictures leave it out where all values are 0.
+        is_rate: the values are growths in a second, one for the time from frame to frame.
+    """
+
+    quantity: str
+    unit: str
+    title: str
+    label: str | None = None
+    is_error: bool = False
+    is_rare: bool = False
+    is_rate: bool = False
+
+    @property
+    def name(self) -> str:
+        """The quantity with its unit."""
+        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+
+    def across(self, plane: str | None) -> "Graph":
+        """The graph of a scene of two dimensions, in which pressures are per length."""
+        return self if plane is None or self.unit != "Pa" else replace(self, unit="N/m")
+
+
+# By the first part of the entities that a graph shows.
+GRAPHS = {
+    "energy": Graph("energy", "J", "energy of all"),
+    "energy_error": Graph(
+        "worst relative energy error", "", "energy error, worst particle", "relative error", is_error=True
+    ),
+    "link_error": Graph(
+        "worst relative error of a link's length", "", "length error, worst link", "relative error", is_error=True
+    ),
+    "penetration": Graph("largest penetration", "m", "depth in the walls", "depth", is_error=True),
+    "overlap": Graph("largest overlap", "m", "overlap of balls", "overlap", is_error=True),
+    "number": Graph("particles", "", "particles in the scene"),
+    "impacts": Graph("impacts", "1/s", "impacts per second", is_rate=True),
+    "pressure": Graph("pressure", "Pa", "pressure on the walls", is_rate=True),
+    "force": Graph("force", "N", "force on the walls", is_rate=True),
+    "crossings": Graph("crossings", "1/s", "crossings of counters", is_rare=True, is_rate=True),
+    "flow": Graph("net flow", "1/s", "net flow through counters", is_rare=True, is_rate=True),
+    "sliding": Graph("particles that slide or rest", "", "sliding and resting", "particles", is_rare=True),
+    "heat": Graph("heat from walls", "W", "heat from walls", "heat", is_rare=True, is_rate=True),
+    "position": Graph("displacement", "m", "displacement of walls", is_rare=True),
 }
-# Views that pictures leave out where all values are 0.
-_RARE = ("sliding", "heat", "position", "crossings", "flow")
 _ENERGIES = ("total", "kinetic", "rotational", "potential", "contact", "dissipated", "elastic", "work")
 
 
@@ -73,14 +108,8 @@ class Line:
         return np.diff(column, prepend=np.nan) / (np.diff(times, prepend=np.nan) * self.per)
 
 
-def title_of(group: str, plane: str | None) -> tuple[str, bool]:
-    """The entry of `VIEWS` of a plot; in a scene of two dimensions pressures are per length."""
-    title, logarithm = VIEWS[group]
-    return (title if plane is None else title.replace("[Pa]", "[N/m]")), logarithm
-
-
 def group_of(path: str) -> str:
-    """The key in `VIEWS` of an entity."""
+    """The key in `GRAPHS` of an entity."""
     return path.split("/")[1]
 
 
@@ -211,16 +240,16 @@ def _lines_of_walls(scene: Scene, shapes: list[Shape]) -> list[Line]:
 
 
 def plots_of(curves: Mapping[str, tuple[str, Floats, Floats]]) -> dict[str, dict[str, tuple[Floats, Floats]]]:
-    """The curves of each plot of a picture, (times [s], values) by their names, by the key in `VIEWS`.
+    """The curves of each plot of a picture, (times [s], values) by their names, by the key in `GRAPHS`.
 
     They are given by their entities, as (name, times, values). In every picture they have the same order, and so the
     same colours.
     """
     plots: dict[str, dict[str, tuple[Floats, Floats]]] = {}
     # Recordings of other versions may have others.
-    for path in sorted((path for path in curves if group_of(path) in VIEWS), key=_place):
+    for path in sorted((path for path in curves if group_of(path) in GRAPHS), key=_place):
         name, times, values = curves[path]
-        if group_of(path) not in _RARE or values.any():
+        if not GRAPHS[group_of(path)].is_rare or values.any():
             plots.setdefault(group_of(path), {})[name] = times, values
     return plots
 
@@ -230,18 +259,18 @@ def says_nothing(group: str, curves: Mapping[str, tuple[Floats, Floats]]) -> boo
     values = [values for _times, values in curves.values()]
     if not any(len(column) for column in values):
         return True
-    return VIEWS[group][1] and all(bool((column <= NOTHING).all()) for column in values)
+    return GRAPHS[group].is_error and all(bool((column <= NOTHING).all()) for column in values)
 
 
 def _place(path: str) -> tuple[int, ...]:
     """The order of an entity: of its plot, of an energy, and of a surface by its number."""
     group, name = group_of(path), path.rpartition("/")[2]
     energy = _ENERGIES.index(name) if name in _ENERGIES else len(_ENERGIES)
-    return list(VIEWS).index(group), energy, *map(int, re.findall(r"\d+", name))
+    return list(GRAPHS).index(group), energy, *map(int, re.findall(r"\d+", name))
 
 
 def views_of(lines: list[Line]) -> dict[str, list[Line]]:
-    """The lines of each plot, by the key in `VIEWS`."""
+    """The lines of each plot, by the key in `GRAPHS`."""
     views: dict[str, list[Line]] = {}
     for line in lines:
         views.setdefault(group_of(line.path), []).append(line)

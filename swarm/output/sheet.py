@@ -97,7 +97,7 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     for part, number in zip(middle.subfigures(len(rows), 1, squeeze=False).ravel(), rows, strict=True):
         cells += list(part.subplots(1, number, squeeze=False).ravel()) if number else []
     for axes, (group, curves) in zip(cells, plots.items(), strict=True):
-        graphs.lines(axes, *series.title_of(group, plane), curves)
+        graphs.lines(axes, series.GRAPHS[group].across(plane), curves)
     sentences.write_below(bottom, told, heights[-1])
     return picture
 

@@ -335,8 +335,8 @@ def test_energy_errors_of_points_are_no_colours(run, tmp_path):
 def test_pictures_show_bodies_and_the_error_of_links(run, tmp_path, monkeypatch):
     path, frames = run
     body, drawn = frames[0].body, {}
-    monkeypatch.setattr(series, "VIEWS", {name: (name, log) for name, (_title, log) in series.VIEWS.items()})
-    monkeypatch.setattr(graphs, "lines", lambda axes, view, logarithm, curves, limit=0: drawn.update({view: curves}))
+    names = {graph: name for name, graph in series.GRAPHS.items()}
+    monkeypatch.setattr(graphs, "lines", lambda axes, graph, curves, limit=0: drawn.update({names[graph]: curves}))
     cells, ties, draw = [], [], drawing.frame
     monkeypatch.setattr(drawing, "frame", lambda *given: ties.append(given[4:6]) or draw(*given))
     monkeypatch.setattr(drawing, "colour_bar", lambda picture, axes, *meaning: cells.append(axes))

@@ -12,10 +12,10 @@ TIMES = np.linspace(0.0, 1.0, 11)
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 
 
-def axes_of(*arguments, **keywords):
+def axes_of(graph, curves, plane=None, **keywords):
     with style.applied():
         axes = style.picture(4.0, 3.0).subplots()
-        graphs.lines(axes, *arguments, **keywords)
+        graphs.lines(axes, series.GRAPHS[graph].across(plane), curves, **keywords)
     return axes
 
 
@@ -44,7 +44,7 @@ def drawn(content):
 def test_round_off_is_on_a_linear_axis_in_a_band(worst):
     """From 0, with the largest in words; the band covers all of it."""
     errors = np.log10(np.maximum(np.linspace(0.0, worst, 11), 1e-18))
-    axes = axes_of("worst relative energy error", True, {"of a particle": (TIMES, errors)})
+    axes = axes_of("energy_error", {"of a particle": (TIMES, errors)})
     assert axes.get_yscale() == "linear"
     low, high = axes.get_ylim()
     assert low == 0.0
@@ -57,14 +57,14 @@ def test_round_off_is_on_a_linear_axis_in_a_band(worst):
 
 
 def test_errors_that_are_none_are_words():
-    axes = axes_of("largest penetration [m]", True, {"of a particle": (TIMES, np.full(11, series.NOTHING))})
+    axes = axes_of("penetration", {"of a particle": (TIMES, np.full(11, series.NOTHING))})
     assert texts(axes) == ["none in any frame"]
     assert not axes.lines
 
 
 def test_decades_above_round_off_are_logarithmic_without_a_zero():
     errors = np.array([series.NOTHING, *np.linspace(-13.0, -3.0, 10)])
-    axes = axes_of("worst relative energy error", True, {"of a particle": (TIMES, errors)})
+    axes = axes_of("energy_error", {"of a particle": (TIMES, errors)})
     assert axes.get_yscale() == "log"
     assert axes.get_ylim()[0] > 1e-15
     assert not any(text.endswith("round-off") and "at most" in text for text in texts(axes))
@@ -79,7 +79,7 @@ def test_a_drift_of_verlet_is_linear_and_no_round_off():
 
 def test_an_axis_is_bounded_by_its_round_off():
     """Where the limit is within the axis the band ends there."""
-    axes = axes_of("largest penetration [m]", True, {"of a particle": (TIMES, np.full(11, -6.0))}, limit=5e-7)
+    axes = axes_of("penetration", {"of a particle": (TIMES, np.full(11, -6.0))}, limit=5e-7)
     assert axes.get_ylabel() == "depth [µm]"
     (band,) = axes.patches
     assert band.get_height() == pytest.approx(0.5)
@@ -91,7 +91,7 @@ def test_an_axis_is_bounded_by_its_round_off():
 def test_a_constant_energy_is_seen_to_be():
     """From 0, with the unit that readers expect, and once where all of it is kinetic."""
     total = np.full(11, 2.4e-3) * (1.0 + 1e-15 * np.arange(11))
-    axes = axes_of("energy [J]", False, {"total": (TIMES, total), "kinetic": (TIMES, total)})
+    axes = axes_of("energy", {"total": (TIMES, total), "kinetic": (TIMES, total)})
     low, high = axes.get_ylim()
     assert low == 0.0
     assert high < 3.0
@@ -105,7 +105,7 @@ def test_energies_have_one_colour_everywhere():
     expected = {name: to_hex(colour) for name, colour in colours.ENERGIES.items()}
     for some in (list(curves), ["total", "potential"], ["dissipated", "kinetic", "total"]):
         found = {line.get_label(): to_hex(line.get_color()) for line in
-                 axes_of("energy [J]", False, {name: curves[name] for name in some}).lines}  # fmt: skip
+                 axes_of("energy", {name: curves[name] for name in some}).lines}  # fmt: skip
         assert {name: found[name] for name in some if name in expected and name in found} == {
             name: expected[name] for name in some if name in expected and name in found
         }
@@ -129,22 +129,22 @@ def test_recordings_have_the_same_colours():
 
 
 def test_rates_are_steps_from_the_start():
-    axes = axes_of("impacts [1/s]", False, {"all particles": (TIMES[1:], np.arange(1.0, 11.0) * 2e4)})
+    axes = axes_of("impacts", {"all particles": (TIMES[1:], np.arange(1.0, 11.0) * 2e4)})
     (line,) = axes.lines
     assert line.get_drawstyle() == "steps-pre"
     assert line.get_xdata()[0] == pytest.approx(0.0)
     assert axes.yaxis.get_major_formatter()(1e5) == "100 k"
-    assert axes_of("impacts [1/s]", False, {"a": (TIMES, TIMES * 2e4)}).yaxis.get_major_formatter()(1e4) == "10 000"
+    assert axes_of("impacts", {"a": (TIMES, TIMES * 2e4)}).yaxis.get_major_formatter()(1e4) == "10 000"
 
 
 def test_many_walls_are_one_mean():
     """And the colours of many are not used twice; a few have their names at their ends."""
     many = {f"plane {k}": (TIMES, np.full(11, float(k))) for k in range(24)}
-    axes = axes_of("pressure [Pa]", False, many)
+    axes = axes_of("pressure", many)
     assert texts(axes) == ["mean of 24"]
     np.testing.assert_allclose(axes.lines[-1].get_ydata(), 11.5)
     assert {to_hex(line.get_color()) for line in axes.lines[:-1]} == {style.GREY.lower()}
-    few = axes_of("pressure [Pa]", False, dict(list(many.items())[:5]))
+    few = axes_of("pressure", dict(list(many.items())[:5]))
     assert texts(few) == [f"plane {k}" for k in range(5)]
     heights = [text.get_position()[1] for text in few.texts]
     assert np.diff(heights).min() > 0.08
@@ -152,24 +152,26 @@ def test_many_walls_are_one_mean():
 
 
 def test_one_wall_is_in_the_title():
-    axes = axes_of("pressure [Pa]", False, {"ellipsoid": (TIMES, TIMES * 2e3)})
+    axes = axes_of("pressure", {"ellipsoid": (TIMES, TIMES * 2e3)})
     assert (axes.get_title(), axes.get_ylabel(), texts(axes)) == ("Pressure on the ellipsoid", "pressure [kPa]", [])
 
 
-@pytest.mark.parametrize(("view", "unit"), [("pressure [Pa]", "Pa"), ("force [N]", "N"), ("pressure [N/m]", "N/m")])
-def test_what_few_molecules_exert_is_said_to_be_theirs(view, unit):
-    axes = axes_of(view, False, {"sphere": (TIMES, TIMES * 2e-17)})
-    assert axes.get_ylabel() == f"{view.partition(' ')[0]} [{unit}]\nof the simulated particles"
+@pytest.mark.parametrize(
+    ("graph", "plane", "unit"), [("pressure", None, "Pa"), ("force", None, "N"), ("pressure", "z", "N/m")]
+)
+def test_the_pressure_of_few_molecules_is_labelled_as_theirs(graph, plane, unit):
+    axes = axes_of(graph, {"sphere": (TIMES, TIMES * 2e-17)}, plane)
+    assert axes.get_ylabel() == f"{graph} [{unit}]\nof the simulated particles"
     assert "10⁻¹⁷" in axes.yaxis.get_major_formatter()(1e-17)
-    assert "simulated" not in axes_of(view, False, {"sphere": (TIMES, TIMES * 2e-9)}).get_ylabel()
-    assert "simulated" not in axes_of("heat from walls [W]", False, {"sphere": (TIMES, TIMES * 2e-17)}).get_ylabel()
+    assert "simulated" not in axes_of(graph, {"sphere": (TIMES, TIMES * 2e-9)}).get_ylabel()
+    assert "simulated" not in axes_of("heat", {"sphere": (TIMES, TIMES * 2e-17)}).get_ylabel()
     # None at all
-    assert "simulated" not in axes_of(view, False, {"sphere": (TIMES, TIMES * 0.0)}).get_ylabel()
+    assert "simulated" not in axes_of(graph, {"sphere": (TIMES, TIMES * 0.0)}).get_ylabel()
 
 
 def test_no_frames_are_words():
     empty = np.zeros(0)
-    assert texts(axes_of("impacts [1/s]", False, {"all particles": (empty, empty)})) == ["needs two frames"]
+    assert texts(axes_of("impacts", {"all particles": (empty, empty)})) == ["needs two frames"]
 
 
 # --- All of a run ---------------------------------------------------------------------------------------------

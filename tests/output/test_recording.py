@@ -50,8 +50,8 @@ def test_an_energy_has_one_colour_in_every_picture(tmp_path, monkeypatch):
     monkeypatch.setattr(
         graphs,
         "lines",
-        lambda axes, view, log, curves, **more: (
-            draw(axes, view, log, curves, **more) or drawn.update({view: list(curves)})
+        lambda axes, graph, curves, **more: (
+            draw(axes, graph, curves, **more) or drawn.update({graph.name: list(curves)})
         ),
     )
     held = playback.Playback(tmp_path / "run.rrd")
@@ -62,7 +62,7 @@ def test_an_energy_has_one_colour_in_every_picture(tmp_path, monkeypatch):
     with swarm.load(tmp_path / "run.h5") as trajectory:
         plots.draw_plot(trajectory, tmp_path / "plot.png")
     # What nobody was outside of is a sentence there, and no plot.
-    assert drawn == {view: curves for view, curves in in_sheet.items() if view in drawn}
+    assert drawn == {name: curves for name, curves in in_sheet.items() if name in drawn}
     assert set(in_sheet) - set(drawn) <= {"largest penetration [m]", "worst relative energy error"}
     assert drawn["energy [J]"] == ["total", "kinetic", "potential", "dissipated"]
 

@@ -33,7 +33,9 @@ def older(monkeypatch):
 def texts(held, monkeypatch, folder):
     """All words of a sheet, and its graphs."""
     found, drawn, draw = [], [], graphs.lines
-    monkeypatch.setattr(graphs, "lines", lambda axes, view, *rest: drawn.append(view) or draw(axes, view, *rest))
+    monkeypatch.setattr(
+        graphs, "lines", lambda axes, graph, *rest: drawn.append(graph.name) or draw(axes, graph, *rest)
+    )
     save = sheet.style.picture
 
     def kept(*size):
