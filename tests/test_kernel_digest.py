@@ -1,5 +1,6 @@
 """Kernels on disk are found by what they trace: an edit of that compiles again, and no other edit does."""
 
+import copy
 import dis
 import os
 import shutil
@@ -78,6 +79,20 @@ def another(*given):
 def test_an_edit_of_what_a_kernel_traces_changes_its_digest(cavity, as_it_is, monkeypatch, owner, name, value):
     monkeypatch.setattr(owner, name, value, raising=False)
     assert code_of(*cavity) != as_it_is
+
+
+def test_what_tools_write_into_a_class_is_not_in_a_digest(monkeypatch):
+    """A copied or pickled object leaves a list in its class: kernels on disk would not be found again."""
+    (sphere,), digests = swarm.Sphere(0.5).walls(), []
+    monkeypatch.delattr(type(sphere), "__slotnames__", raising=False)
+    for _ in range(2):
+        found = Frozen(package="")
+        found.value(type(sphere))
+        assert found.is_known
+        digests.append(found.digest())
+        copy.copy(sphere)
+    assert isinstance(vars(type(sphere))["__slotnames__"], list)
+    assert digests[0] == digests[1]
 
 
 def test_no_other_edit_changes_it(cavity, as_it_is, monkeypatch):

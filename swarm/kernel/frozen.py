@@ -43,8 +43,6 @@ _NAMED_TUPLES = ("collections", "namedtuple_")
 _ONE: Any = collections.namedtuple("_ONE", "field")
 # Fields and slots of a class, which are in its `_fields`.
 _DESCRIPTORS = (types.MemberDescriptorType, types.GetSetDescriptorType, type(_ONE.field))
-# What Python writes into a class for people and tools: kernels do not read it.
-_FOR_READERS = ("__annotations__", "__doc__", "__firstlineno__", "__match_args__", "__static_attributes__")
 
 
 class Frozen:
@@ -179,7 +177,9 @@ class Frozen:
         is_own = _root(parent) == _PACKAGE
         is_function = isinstance(given, types.FunctionType)
         is_of_tuples = _module_of(given).startswith(_NAMED_TUPLES) if is_function else name in _NAMED_TUPLE
-        if is_of_tuples or (is_own and name in _FOR_READERS):
+        # Python and tools write such data into a class, `copyreg` for one when an object of it is copied or pickled.
+        is_for_tools = is_own and not is_function and name.startswith("__") and name.endswith("__")
+        if is_of_tuples or is_for_tools:
             return
         if is_function or isinstance(given, _PLAIN):
             self.add("definition", name)
