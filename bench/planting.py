@@ -34,7 +34,7 @@ GROUPS: dict[str, str] = {
     "lanes": "",
     "methods": "",
     "motion": "",
-    "output": "appended|checkpoint|checksums|cut|impact_log|impacts|kept|obj|parts|ply|recorded|replaced|sequence"
+    "output": "appended|checkpoint|checksums|cut|impact_log|impacts|obj|parts|ply|recorded|replaced|sequence"
     "|series|speeds|storage|stored|superblock|trajectory|vtkhdf|writer|xyz",
     "placing": "",
     "reacting": "",

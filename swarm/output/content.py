@@ -6,10 +6,11 @@ from typing import Any
 from numpy.typing import NDArray
 
 from ..bodies.body import Body
+from ..errors import SceneError
 from ..methods import Method
 from ..particles import Particles
 from ..scene import Scene
-from .gone import Gone, gone_at, without
+from .gone import Gone, gone_at, gone_of, without
 
 
 @dataclass(frozen=True)
@@ -55,3 +56,20 @@ def content_of(trajectory: Any) -> Content:
         {name: trajectory.frame(k) for name, k in numbers.items()},
         {name: one for name, one in left.items() if one is not None},
     )
+
+
+def content_of_result(result: Any, what: str) -> Content:
+    """The part of a `Result` that a picture shows; `what` needs it, for the sentence of an error."""
+    if result.scene is None or result.method is None:
+        raise SceneError(f"{what} needs a Result that knows its scene and its method, got one without them")
+    body = None if result.bodies is None else result.bodies.body
+    name, frames = "", {}
+    if result.trajectory is not None and result.trajectory.is_file():
+        from .trajectory import load
+
+        name = result.trajectory.name
+        with load(result.trajectory) as written:
+            frames = {"start": written.frame(0)} if written.has_particles() else {}
+    frames["end"] = result.particles
+    left = {"end": gone_of((result.escape_time, result.absorbed_time))} if body is None else {}
+    return Content(name, result.scene, result.method, body, len(result.particles), result.observables, frames, left)

@@ -19,12 +19,6 @@ from .triad import INK
 LIGHT = INK
 
 
-def view(figure: Any, across: int | None, *place: int) -> Any:
-    """Axes for particles among their walls, or those of a plane across an axis, seen from above."""
-    del across
-    return figure.add_subplot(*place)
-
-
 def frame(
     axes: Any,
     points: Floats,
@@ -38,7 +32,7 @@ def frame(
     """A frame: particles (N, 3) of colours 0xRRGGBBAA, which bodies with faces do not show, and their ties.
 
     Lines (S, 2, 3) have colours (S,), triangles (T, 3, 3) those of their corners (T, 3). `across` is the axis across
-    the plane of a scene of two dimensions, whose axes are `view`s of it; `radius` of balls (n,) [m].
+    the plane of a scene of two dimensions; `radius` of balls (n,) [m].
     """
     if across is not None:
         flat.flat(axes, across, points, red_green_blue(packed), shapes, radius=radius)

@@ -159,7 +159,7 @@ class _Film:
         self.picture.set_dpi(dpi)
         self._canvas: Any = FigureCanvasAgg(self.picture)
         self._across = across = self._scene.across()
-        self._axes = drawing.view(self.picture, across)
+        self._axes = self.picture.add_subplot()
         self._title = self.picture.suptitle("t", fontsize=10, color=drawing.LIGHT)
         found = self._found(numbers)
         self._scenery: Scenery | None = None

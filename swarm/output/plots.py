@@ -44,6 +44,11 @@ def draw_plot(trajectory: Any, target: Path) -> None:
         figure.savefig(part, metadata=marks.of_picture(part))
 
 
+def figure_of_trajectory(trajectory: Any, figsize: Any, particles: int) -> style.Picture:
+    """The picture of a `Trajectory`; see `figure_of`."""
+    return figure_of(content_of(trajectory), figsize, particles)
+
+
 def figure_of(content: Content, figsize: Any, particles: int) -> style.Picture:
     """The picture, in which at most so many particles are drawn; as high as its plots need where no size is given."""
     most = checks.count("particles", particles)
@@ -143,7 +148,7 @@ def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most:
     scale, values = colours.colouring("speed", content.scene, content.method, start)
     position, packed, tints = drawn.coloured(end, scale, values)
     across = content.scene.across()
-    axes = drawing.view(figure, across)
+    axes = figure.add_subplot()
     drawing.frame(
         axes,
         position.T,

@@ -12,13 +12,9 @@ from .replaced import named_when_whole
 _AT_ONCE = 10  # frames of the trajectory
 
 
-def show(trajectory: Any, settings: Settings) -> None:
-    """Show a trajectory in the viewer that is `live`, or else in the notebook that is running."""
-    stream = record(trajectory, None, settings)
-    if not settings.live:
-        from . import widget
-
-        widget.display_below(stream)
+def show(trajectory: Any, particles: int, color: str, megabytes: float) -> None:
+    """Show a `Trajectory` in a window on this machine; see `Trajectory.show`."""
+    record(trajectory, None, Settings(particles, color, megabytes, live=True))
 
 
 def record(trajectory: Any, path: Path | None, settings: Settings, overwrite: bool = False) -> Any:

@@ -108,7 +108,7 @@ def _frames(top: Any, playback: Playback, frames: list[int], found: list[Any] | 
     across, cells, packed = across_of(about.get("plane") or None), [], []
     for place, k in enumerate(frames):
         at = -(-len(frames) // _COLUMNS), min(_COLUMNS, len(frames)), place + 1
-        cells.append(top.add_subplot(*at) if found else drawing.view(top, across, *at))
+        cells.append(top.add_subplot(*at))
         cells[-1].set_title(
             f"t = {playback.times[k]:.6g} s  (frame {playback.numbers[k]})", fontsize=10, color=drawing.LIGHT
         )

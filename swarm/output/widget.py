@@ -6,6 +6,8 @@ import os
 import socket
 from typing import Any
 
+from ..extras import needed_by
+
 # Where the browser gets the viewer from: by default from this server.
 _ASSET, _SERVER = "RERUN_NOTEBOOK_ASSET", ("app.rerun.io", 443)
 _PATIENCE = 3.0  # [s]
@@ -14,6 +16,14 @@ _HEIGHT = 600
 
 # What is shown, as long as the kernel lives: a viewer that nobody refers to is closed before its browser has begun.
 _shown: list[Any] = []
+
+
+def show(trajectory: Any, particles: int, color: str, megabytes: float) -> None:
+    """Show a `Trajectory` below the cell that runs; see `Trajectory.show`."""
+    with needed_by("a viewer", "notebook"):
+        bring_widget()
+        from . import recorded, recording
+    display_below(recorded.record(trajectory, None, recording.Settings(particles, color, megabytes)))
 
 
 def bring_widget() -> None:

@@ -2,18 +2,17 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks, notebook
+from .. import notebook
 from ..bodies.state import Bodies
 from ..columns import frame_of
 from ..errors import SceneError
-from ..extras import needed_by
 from ..methods.base import Method
-from ..output import facts
+from ..output.views import view
 from ..particles import Particles
 from ..scene import Scene
 from ..state import Multipliers
@@ -105,6 +104,7 @@ class Result:
         what = {"particles": f"{len(self.particles)}"} if self.bodies is None else {"bodies": repr(self.bodies)}
         times = self.observables["time"]
         rows = what | {"frames": f"{len(times)}, {times[0]:g} s to {times[-1]:g} s"}
+        facts = view("facts")
         rows |= facts.of_meshes(self.scene) | facts.of_run(self.observables, self.particles.radius)
         rows |= {"wall time": f"{self.wall_time:.2f} s", "trajectory": str(self.trajectory or "none")}
         return notebook.table("Result", rows.items())
@@ -200,9 +200,7 @@ class Result:
         >>> result.plot().get_suptitle()
         '10 particles in a sphere: Impact, 2 s'
         """
-        with needed_by("a plot", "plot"):
-            from ..output import plots
-        return plots.figure_of(self.content("plot"), figsize, particles)
+        return cast("Figure", view("plot").figure_of(self.content("plot"), figsize, particles))
 
     def report(self, path: str | Path | None = None, *, overwrite: bool = False) -> "Page":
         """A page of the run, one file in HTML, which a notebook shows; see `Trajectory.report`.
@@ -225,36 +223,14 @@ class Result:
         >>> page.title, page.html[:15]
         ('10 particles in a sphere: Impact, 2 s', '<!DOCTYPE html>')
         """
-        checks.flag("overwrite", overwrite)
-        with needed_by("a report", "report"):
-            from ..output.page import html, run
         if self.trajectory is not None and self.trajectory.is_file():
             from ..output.trajectory import load
 
             with load(self.trajectory) as written:
                 return written.report(path, overwrite=overwrite)
-        if path is not None:
-            html.checked_target(path, overwrite, ())
-        page = run.of_content(self.content("report"), self.wall_time)
-        if path is not None:
-            page.save(path, overwrite=overwrite)
-        return page
+        pages = view("report")
+        return cast("Page", pages.report_of_content(self.content("report"), self.wall_time, path, overwrite))
 
     def content(self, what: str) -> "Content":
         """The part of the run that pictures and verdicts are made of; `what` needs it, for the sentence of an error."""
-        from ..output.content import Content
-        from ..output.gone import gone_of
-
-        if self.scene is None or self.method is None:
-            raise SceneError(f"{what} needs a Result that knows its scene and its method, got one without them")
-        body = None if self.bodies is None else self.bodies.body
-        name, frames = "", {}
-        if self.trajectory is not None and self.trajectory.is_file():
-            from ..output.trajectory import load
-
-            name = self.trajectory.name
-            with load(self.trajectory) as written:
-                frames = {"start": written.frame(0)} if written.has_particles() else {}
-        frames["end"] = self.particles
-        left = {"end": gone_of((self.escape_time, self.absorbed_time))} if body is None else {}
-        return Content(name, self.scene, self.method, body, len(self.particles), self.observables, frames, left)
+        return cast("Content", view("content").content_of_result(self, what))

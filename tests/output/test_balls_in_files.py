@@ -204,7 +204,7 @@ def test_discs_and_balls_are_as_large_as_they_are(run):
 
 def test_a_near_ball_hides_a_far_one():
     figure = style.picture(4.0, 4.0)
-    axes = drawing.view(figure, None)
+    axes = figure.add_subplot()
     room = shapes_of(swarm.Scene([swarm.Sphere(1.0)]), np.zeros((3, 1)))
     eye = framed.eye_of(room, [room[0].vertices]).near
     points, radius = np.array([0.5 * eye, -0.5 * eye]), np.array([0.2, 0.2])

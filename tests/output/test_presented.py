@@ -330,6 +330,6 @@ def test_a_notebook_shows_the_recording(run, tmp_path, monkeypatch):
 
 def test_elsewhere_the_viewer_is_a_window(run, monkeypatch):
     settings = []
-    monkeypatch.setattr(recorded, "show", lambda _trajectory, chosen: settings.append(chosen))
+    monkeypatch.setattr(recorded, "record", lambda _trajectory, _path, chosen: settings.append(chosen))
     run[1].show(color="speed")
     assert settings == [recording.Settings(5000, "speed", 100.0, live=True)]

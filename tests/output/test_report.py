@@ -304,7 +304,7 @@ def test_a_cavity_is_dark_on_a_dark_page():
     for dark in (False, True):
         with style.applied(dark):
             figure = style.picture(2.0, 2.0)
-            axes = drawing.view(figure, None)
+            axes = figure.add_subplot()
             drawing.frame(axes, np.empty((0, 3)), np.empty(0, np.uint32), shapes_of(scene, np.zeros((3, 1))))
             canvas = FigureCanvasAgg(figure)
             canvas.draw()

@@ -34,7 +34,7 @@ def drawn(scene, points, figsize=(5.0, 4.0), **more):
     """The axes and the scenery of points, all in red."""
     with style.applied():
         figure = style.picture(*figsize)
-        axes = drawing.view(figure, None)
+        axes = figure.add_subplot()
         shapes = shapes_of(scene, np.asarray(points).T)
         scenery = drawing.frame(axes, np.asarray(points), np.full(len(points), RED, np.uint32), shapes, **more)
         canvas = FigureCanvasAgg(figure)
@@ -156,7 +156,7 @@ def test_lengths_are_round():
 def test_in_a_plane_what_closed_walls_enclose_is_filled():
     scene = swarm.Scene([swarm.Box((1.0, 0.5, 0.1)), swarm.Sphere(0.1, side="outside")], plane="z")
     figure = style.picture(4.0, 3.0)
-    axes = drawing.view(figure, 2)
+    axes = figure.add_subplot()
     shapes = shapes_of(scene, NOWHERE)
     flat.flat(axes, 2, np.array([[0.3, 0.0, 0.0]]), "red", shapes)
     areas = [sum(area(loop) for loop in patch.get_path().to_polygons()) for patch in axes.patches]
@@ -172,7 +172,7 @@ def test_where_all_have_one_speed_there_are_words_and_no_bar():
     with style.applied():
         for colours, bars in (([RED, RED], 1), ([RED, 0x0000FFFF], 2)):
             figure = style.picture(4.0, 4.0)
-            axes = drawing.view(figure, None)
+            axes = figure.add_subplot()
             drawing.colour_bar(figure, axes, "speed [m/s]", 0.0, 2.0, [np.array(colours, np.uint32)])
             assert len(figure.axes) == bars
             words = figure._supxlabel.get_text() if figure._supxlabel else ""
@@ -184,7 +184,7 @@ def words_below(quantity, low, high, values=None, shown=()):
     scale = colours.Scale(quantity, low, high)
     packed = scale.colours(np.asarray(shown if values is None else values, np.float64))
     figure = style.picture(4.0, 4.0)
-    axes = drawing.view(figure, None)
+    axes = figure.add_subplot()
     drawing.colour_bar(figure, axes, quantity, low, high, [packed], None if values is None else np.array(values))
     assert len(figure.axes) == 1
     return figure.get_supxlabel()
@@ -225,7 +225,7 @@ def test_a_picture_of_a_run_at_rest_names_no_speed(tmp_path):
 def test_a_scenery_without_walls():
     with style.applied():
         figure = style.picture(3.0, 3.0)
-        axes = drawing.view(figure, None)
+        axes = figure.add_subplot()
         assert isinstance(drawing.frame(axes, np.empty((0, 3)), np.empty(0, np.uint32), []), Scenery)
 
 
@@ -248,7 +248,7 @@ def a_channel(width, hole):
 @pytest.mark.parametrize(("width", "hole"), [(1.0, 0.2), (0.5, 0.3)])
 def test_in_a_plane_it_is_filled_across_an_opening(width, hole):
     scene, inside = a_channel(width, hole)
-    axes = drawing.view(style.picture(4.0, 3.0), 2)
+    axes = style.picture(4.0, 3.0).add_subplot()
     flat.flat(axes, 2, np.array([[0.3, 0.1, 0.0]]), "red", shapes_of(scene, NOWHERE))
     (patch,) = axes.patches
     assert sum(area(loop) for loop in patch.get_path().to_polygons()) == pytest.approx(inside, rel=0.01)
@@ -267,7 +267,7 @@ def test_what_is_open_far_and_wide_is_not_filled():
 def test_in_an_open_plane_who_is_far_away_is_counted():
     points = np.random.default_rng(1).normal(size=(200, 3))
     points[:3] *= 1e4
-    axes = drawing.view(style.picture(4.0, 3.0), 2)
+    axes = style.picture(4.0, 3.0).add_subplot()
     flat.flat(axes, 2, points, "red", shapes_of(swarm.Scene([swarm.Sphere(0.5, side="outside")], plane="z"), NOWHERE))
     assert np.ptp(axes.get_xlim()) < 20.0
     assert "3 are beyond this picture" in [text.get_text() for text in axes.texts]

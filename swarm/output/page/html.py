@@ -3,6 +3,7 @@
 import functools
 import html
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -68,6 +69,17 @@ def checked_target(path: Any, overwrite: bool, sources: tuple[Path, ...]) -> Pat
     paths.check_distinct({"report": target}, dict.fromkeys(("file that it is of", "file"), None) | _named(sources))
     marks.check_target(target, overwrite, "report")
     return target
+
+
+def written(made: Callable[[], Page], path: Any, overwrite: bool, sources: tuple[Path, ...]) -> Page:
+    """The page that is made, and written where a path is given, which is checked first."""
+    flag("overwrite", overwrite)
+    if path is not None:
+        checked_target(path, overwrite, sources)
+    page = made()
+    if path is not None:
+        page.save(path, overwrite=overwrite)
+    return page
 
 
 def _named(sources: tuple[Path, ...]) -> dict[str, Path | None]:

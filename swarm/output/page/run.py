@@ -1,6 +1,7 @@
 """The report of one run."""
 
 import datetime
+import functools
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -8,7 +9,7 @@ from ...errors import SceneError
 from .. import facts, paths, verdicts, words
 from ..amounts import amount, many
 from ..content import Content, content_of
-from . import pictures, reproduce
+from . import html, pictures, reproduce
 from .html import Page, filled
 
 
@@ -21,6 +22,16 @@ class Note(NamedTuple):
 
 # Rows of `facts` that a page shows in other places.
 _ELSEWHERE = ("surfaces", "gravity", "method", "verdicts")
+
+
+def report(trajectory: Any, path: Any, overwrite: bool) -> Page:
+    """The report of a `Trajectory`, which is written where a path is given; see `Trajectory.report`."""
+    return html.written(functools.partial(of_trajectory, trajectory), path, overwrite, (trajectory.path,))
+
+
+def report_of_content(content: Content, wall_time: float, path: Any, overwrite: bool) -> Page:
+    """The report of a run that wrote no trajectory, which is written where a path is given."""
+    return html.written(functools.partial(of_content, content, wall_time), path, overwrite, ())
 
 
 def of_trajectory(trajectory: Any) -> Page:
