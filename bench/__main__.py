@@ -118,7 +118,9 @@ def main() -> None:
         "grains": grains,
         "endurance": endurance,
     }
-    if not arguments.quick:
+    if arguments.quick:
+        report.be_quick()
+    else:
         report.write_to(arguments.o)
     before = report.stolen()
     options = {name: value for name, value in vars(arguments).items() if name not in ("command", "o")}

@@ -20,7 +20,7 @@ import swarm
 from swarm.run.engine import Run
 
 from . import yardstick
-from .report import ROOT, Row, as_usual, child, in_turn, repeated, show, write
+from .report import ROOT, Row, as_usual, child, in_turn, repeated, show, tier, write
 
 SPHERE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 ELLIPSOID = swarm.Scene(surfaces=[swarm.Ellipsoid(semi_axes=(0.3, 0.3, 0.6))])
@@ -49,7 +49,7 @@ def advance_of(
     span = method.span("until", until)
 
     def measure() -> tuple[float, int]:
-        with Run(scene, particles.copy(), method, threads, None) as run:
+        with Run(scene, particles.copy(), method, threads, None, tier()) as run:
             run.advance(0.0, 0.0)  # compiles, and touches the arrays
             start = time.perf_counter()
             run.advance(span, until)
@@ -64,7 +64,7 @@ def per_impact(measure: Callable[[], tuple[float, int]]) -> float:
     return seconds / count
 
 
-def impacts(n: int, repeats: int) -> list[Row]:
+def impacts(n: int, until: float, repeats: int) -> list[Row]:
     """Nanoseconds per impact, beside those of a bare loop in C and of one that does all that a lane of ours does."""
     cases = [
         ("Impact, sphere", SPHERE, swarm.Impact(), "4"),
@@ -76,7 +76,7 @@ def impacts(n: int, repeats: int) -> list[Row]:
     ]
     if n < 10_000:  # a quick run: every scene compiles kernels of its own
         cases = cases[:1]
-    measures = {what: advance_seconds(scene, method, n, until=100.0) for what, scene, method, _bar in cases}
+    measures = {what: advance_seconds(scene, method, n, until) for what, scene, method, _bar in cases}
     turns: dict[str, Callable[[], float]] = {
         what: lambda one=one: per_impact(one) * 1e9 for what, one in measures.items()
     }
@@ -97,7 +97,7 @@ def impacts(n: int, repeats: int) -> list[Row]:
     return rows
 
 
-def multipliers(n: int, repeats: int) -> list[Row]:
+def multipliers(n: int, until: float, repeats: int) -> list[Row]:
     """The augmented Lagrangian in State I: particles through the centre of a sphere, whose contacts are all alike."""
     random = np.random.default_rng(1)
     directions = random.standard_normal((3, n))
@@ -105,14 +105,14 @@ def multipliers(n: int, repeats: int) -> list[Row]:
     particles = swarm.Particles(0.2 * directions, SPEED * directions)
     rows = []
     cases = [("none", 1e-10, "400"), ("secant", 1e-10, ""), ("reflection", 1e-10, "100"), ("none", 1e-28, "")]
-    until, dt = 40.0, 0.025
+    dt = 0.025
     for acceleration, tolerance, bar in cases:
         method = swarm.AugmentedLagrangian(
             dt=dt, penalty=1e4, tolerance=tolerance, adaptive=True, acceleration=acceleration
         )
         times, sweeps = [], 0.0
         for _ in range(repeats):
-            with Run(SPHERE, particles.copy(), method, 1, None) as run:
+            with Run(SPHERE, particles.copy(), method, 1, None, tier()) as run:
                 run.advance(0.0, 0.0)
                 start = time.perf_counter()
                 run.advance(until, until)
@@ -129,11 +129,11 @@ def multipliers(n: int, repeats: int) -> list[Row]:
     return rows
 
 
-def two_threads(n: int, repeats: int) -> list[Row]:
+def two_threads(n: int, until: float, repeats: int) -> list[Row]:
     """Speed of two threads over one, alternating in one run; and of two bare loops in C at once over one."""
     rows = []
     for name, scene in (("sphere", SPHERE), ("sphere with gravity", FALL))[: 1 if n < 10_000 else 2]:
-        one, two = (advance_seconds(scene, swarm.Impact(), n, until=100.0, threads=k) for k in (1, 2))
+        one, two = (advance_seconds(scene, swarm.Impact(), n, until, threads=k) for k in (1, 2))
         pairs = [(one()[0], two()[0]) for _ in range(repeats)]
         ratio = min(a for a, _ in pairs) / min(b for _, b in pairs)
         median = statistics.median(a / b for a, b in pairs)
@@ -187,7 +187,7 @@ def overhead(n: int, frames: int, repeats: int) -> list[Row]:
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
 
     def seconds() -> tuple[float, float]:
-        with Run(SPHERE, particles.copy(), swarm.Impact(), 1, None) as run:
+        with Run(SPHERE, particles.copy(), swarm.Impact(), 1, None, tier()) as run:
             run.advance(every, every)
             start = time.perf_counter()
             for _ in range(frames):
@@ -206,14 +206,14 @@ def overhead(n: int, frames: int, repeats: int) -> list[Row]:
     return rows
 
 
-def recording(frames: int, repeats: int) -> list[Row]:
-    """The speed of a run of 10 000 particles with a recording over that without, and the recording's size and seconds.
+def recording(n: int, frames: int, repeats: int) -> list[Row]:
+    """The speed of a run of so many particles with a recording over that without, and the recording's size and seconds.
 
-    All particles are recorded, then half of them (`record_particles = 5000`, the default).
+    All particles are recorded, then half of them: of 10 000 that is `record_particles = 5000`, the default.
     """
     from swarm.output.recording import RecordingWriter, Settings
 
-    n, crossing = 10_000, 4.0 / 3.0 * 0.5 / SPEED
+    crossing = 4.0 / 3.0 * 0.5 / SPEED
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
     # Of a run: a recording ends with verdicts, which read whatever observables they judge by.
     whole = swarm.simulate(SPHERE, particles, swarm.Impact(), until=crossing).observables
@@ -239,7 +239,7 @@ def recording(frames: int, repeats: int) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.rrd"
         run(crossing, path, n)
-        for impacts, shown in itertools.product((10, 30, 100), (n, n // 2)):
+        for impacts, shown in itertools.product((10, 30, 100) if n == 10_000 else (10,), (n, n // 2)):
             every = impacts * crossing
             cases = {"none": lambda e=every: run(e, None, 1), "recorded": lambda e=every, s=shown: run(e, path, s)}
             (none, none2), (recorded, recorded2) = in_turn(cases, repeats).values()
@@ -252,11 +252,11 @@ def recording(frames: int, repeats: int) -> list[Row]:
     return rows
 
 
-def output(frames: int, repeats: int) -> list[Row]:
-    """A run that writes 10 000 particles every 10 impacts each, over one that writes nothing, and over h5py alone."""
+def output(n: int, frames: int, repeats: int) -> list[Row]:
+    """A run that writes so many particles every 10 impacts each, over one that writes nothing, and over h5py alone."""
     import h5py
 
-    n, every = 10_000, 10.0 * 4.0 / 3.0 * 0.5 / SPEED
+    every = 10.0 * 4.0 / 3.0 * 0.5 / SPEED
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
 
     def run(trajectory: Path | None) -> float:
@@ -268,7 +268,7 @@ def output(frames: int, repeats: int) -> list[Row]:
         rows = np.ascontiguousarray(particles.position.T)
         start = time.perf_counter()
         with h5py.File(path, "w") as file:
-            shape, chunks = (0, n, 3), (10, 1000, 3)
+            shape, chunks = (0, n, 3), (10, min(n, 1000), 3)
             values = [
                 file.create_dataset(k, shape, np.float64, maxshape=(None, n, 3), chunks=chunks) for k in ("r", "v")
             ]
@@ -392,40 +392,41 @@ def _help() -> float:
     return time.perf_counter() - start
 
 
-def accuracy(many: float) -> list[Row]:
+def accuracy(n: int, many: float, frames: int) -> list[Row]:
     """Energy and penetration of Impact after many impacts each."""
     rows = []
     scenes = (("sphere", SPHERE), ("ellipsoid", ELLIPSOID), ("sphere and two planes", SLICE))
     for name, scene in scenes[: 1 if many < 1e3 else 3]:
-        particles = swarm.fill(scene, 100, speed=SPEED, seed=2)
-        one = swarm.simulate(scene, particles, swarm.Impact(), until=100.0).observables["impacts"][-1] / 100 / 100.0
+        particles = swarm.fill(scene, n, speed=SPEED, seed=2)
+        one = swarm.simulate(scene, particles, swarm.Impact(), until=100.0).observables["impacts"][-1] / n / 100.0
         until = many / one
-        seen = swarm.simulate(scene, particles, swarm.Impact(), until=until, every=until / 1000).observables
-        mean = seen["impacts"][-1] / 100
+        seen = swarm.simulate(scene, particles, swarm.Impact(), until=until, every=until / frames).observables
+        mean = seen["impacts"][-1] / n
         worst = float(seen["energy_error"].max())
         ulps = float(seen["max_penetration"].max()) / np.spacing(scene.size())
         rows.append(Row(f"energy, Impact, {name}, {mean:.3g} impacts each", worst, worst, "relative", "1e-12"))
-        rows.append(Row(f"  largest penetration at 1001 frames, {name}", ulps, ulps, "ulp of the size", "4"))
+        rows.append(Row(f"  largest penetration at {frames + 1} frames, {name}", ulps, ulps, "ulp of the size", "4"))
     return rows
 
 
 def main(quick: bool) -> None:
     """Measure, print and, unless quick, write bars-MACHINE.csv."""
-    repeats = 2 if quick else 7
-    n = 5_000 if quick else 100_000
-    rows = impacts(n, repeats)
-    rows += multipliers(n // 5, repeats)
-    rows += two_threads(n, 3 * repeats)
-    rows += penalty(1_000 if quick else 20_000, 1_000 if quick else 10_000, repeats)
-    rows += overhead(1_000, 50 if quick else 1_000, repeats)
-    rows += overhead(10_000, 50 if quick else 1_000, repeats)
-    rows += scale(1_000 if quick else 100_000, 10_000 if quick else 10_000_000)
-    rows += output(20 if quick else 500, repeats)
-    rows += recording(20 if quick else 500, repeats if quick else 3)
-    rows += set_up(10_000 if quick else 1_000_000, repeats)
-    rows += memory(100_000 if quick else 10_000_000)
-    rows += start_up(1 if quick else 7)
-    rows += accuracy(1e2 if quick else 1e5)
+    repeats = 1 if quick else 7
+    n, until = (10, 10.0) if quick else (100_000, 100.0)
+    frames = 20 if quick else 1_000
+    rows = impacts(n, until, repeats)
+    rows += multipliers(n // 5, 1.0 if quick else 40.0, repeats)
+    rows += two_threads(n, until, 3 * repeats)
+    rows += penalty(2 if quick else 20_000, 100 if quick else 10_000, repeats)
+    rows += overhead(n // 5 if quick else 1_000, frames, repeats)
+    rows += overhead(n if quick else 10_000, frames, repeats)
+    rows += scale(n, 2 * n if quick else 10_000_000)
+    rows += output(n if quick else 10_000, 5 if quick else 500, repeats)
+    rows += recording(n if quick else 10_000, 2 if quick else 500, 1 if quick else 3)
+    rows += set_up(n if quick else 1_000_000, repeats)
+    rows += memory(2_000 if quick else 10_000_000)
+    rows += start_up(repeats)
+    rows += accuracy(*((10, 10.0, frames) if quick else (100, 1e5, 1_000)))
     show(rows)
     if not quick:
         write(rows, "bars")

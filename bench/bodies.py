@@ -8,7 +8,7 @@ import numpy as np
 import swarm
 
 from .peers import mujoco
-from .report import Row, in_turn, show, write
+from .report import Row, in_turn, show, tier, write
 
 WALLS = (0.5, 0.4, 0.3)
 COUNT, DT, SPEED, SPIN = 10_000, 5e-3, 0.5, 2.0
@@ -36,7 +36,7 @@ def _start(body: swarm.Body, radius: float, count: int) -> tuple[swarm.Scene, sw
 
 def _run(scene: swarm.Scene, bodies: swarm.Bodies, until: float, threads: int, order: int = 2) -> swarm.Result:
     method = swarm.Impact(dt=DT, order=order)
-    return swarm.simulate(scene, bodies, method, until=until, threads=threads, progress=False, compile="always")
+    return swarm.simulate(scene, bodies, method, until=until, threads=threads, progress=False, compile=tier())
 
 
 def _nanoseconds(scene: swarm.Scene, bodies: swarm.Bodies, steps: int, threads: int, order: int) -> Callable[[], float]:
@@ -55,7 +55,7 @@ def _nanoseconds(scene: swarm.Scene, bodies: swarm.Bodies, steps: int, threads: 
 
 def steps(name: str, quick: bool) -> list[Row]:
     """A step without contact, with one thread and two, and composed."""
-    count = 64 if quick else COUNT
+    count = 2 if quick else COUNT
     scene, bodies = _start(makers()[name](), _FAR, count)
     _run(scene, bodies, DT, 1)
     _run(scene, bodies, DT, 1, 4)
@@ -74,7 +74,7 @@ def steps(name: str, quick: bool) -> list[Row]:
 
 def impacts(name: str, quick: bool) -> list[Row]:
     """What an impact costs beyond the steps, and what a long run with impacts conserves."""
-    count, until = (16, 1.0) if quick else (1_000, _LONG)
+    count, until = (2, 0.5) if quick else (1_000, _LONG)
     body = makers()[name]()
     (near, bodies), (far, apart) = _start(body, _NEAR, count), _start(body, _FAR, count)
     whole = round(until / DT)
@@ -122,7 +122,7 @@ def leaning() -> dict[str, tuple[swarm.Body, np.ndarray]]:
 
 def contacts(name: str, quick: bool) -> list[Row]:
     """A step with a contact that lasts: a corner slides on a floor, and the same body far above it."""
-    count = 32 if quick else 2_000
+    count = 2 if quick else 2_000
     body, velocity = leaning()[name]
     start = swarm.Bodies(body, *(np.repeat(part.T[:, :, None], count, axis=2) for part in (body.points, velocity)))
     ways = {}
@@ -142,7 +142,7 @@ def contacts(name: str, quick: bool) -> list[Row]:
 
 def beside(quick: bool) -> list[Row]:
     """A tetrahedron in a box here and in MuJoCo: energy error, and microseconds for a second of its motion."""
-    until, count = (1.0, 16) if quick else (10.0, 1_000)
+    until, count = (0.2, 2) if quick else (10.0, 1_000)
     scene = swarm.Scene([swarm.Box(WALLS)])
     start = swarm.place(scene, makers()["tetrahedron"](), count, speed=SPEED, spin=SPIN, seed=0)
     _run(scene, start, DT, 1)

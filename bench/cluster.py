@@ -8,7 +8,7 @@ from pathlib import Path
 import swarm
 from swarm.run.cluster import local, shards
 
-from .report import Row, in_turn, show, write
+from .report import Row, in_turn, show, tier, write
 
 # Impacts of each particle, and the time between two of them in these cavities at this speed [s].
 _IMPACTS, _SPEED = 200, 1.0
@@ -28,7 +28,7 @@ def main(quick: bool) -> None:
     """Print the report."""
     from distributed import Client
 
-    n = 5_000 if quick else 1_000_000
+    n = 256 if quick else 1_000_000
     rows: list[Row] = []
     began = time.perf_counter()
     with (
@@ -41,7 +41,7 @@ def main(quick: bool) -> None:
         rows.append(Row("start of a local cluster of two workers", started, started, "s"))
         for name, (scene, until) in scenes().items():
             start = swarm.fill(scene, n, speed=_SPEED, seed=1)
-            until = until / 100.0 if quick else until
+            until = until / 1000.0 if quick else until
 
             def timed(path: str, scene: swarm.Scene = scene, start: swarm.Particles = start, until: float = until,
                       **where: object) -> Callable[[], float]:  # fmt: skip
@@ -49,7 +49,7 @@ def main(quick: bool) -> None:
                     began = time.perf_counter()
                     swarm.simulate(
                         scene, start, swarm.Impact(), until=until, every=until / 2, trajectory=Path(folder) / path,
-                        overwrite=True, compile="always", **where,  # type: ignore[arg-type]
+                        overwrite=True, compile=tier(), **where,  # type: ignore[arg-type]
                     )  # fmt: skip
                     return time.perf_counter() - began
 

@@ -13,7 +13,7 @@ from swarm.run.colliding import CollidingRun
 from swarm.run.state import Seeding
 from swarm.run.tally import Watched
 
-from .report import Row, child, in_turn, show, write
+from .report import Row, child, in_turn, show, tier, write
 
 # (name, balls, packing, whether the cell repeats, the microseconds that a collision may take)
 SPEEDS = [
@@ -34,7 +34,9 @@ print(time.process_time() - began)
 # VmHWM and not ru_maxrss, which a process inherits from the one that started it.
 _MEMORY = """
 import re, sys
-from bench import collisions
+from bench import collisions, report
+if sys.argv[2] == "never":
+    report.be_quick()
 run = collisions.running(int(sys.argv[1]), 0.3, False)
 with run:
     run.observe()
@@ -63,7 +65,7 @@ def running(n: int, packing: float, repeats: bool) -> CollidingRun:
     image = np.zeros(position.shape, np.int64) if repeats else None
     start = swarm.Particles(position, velocity, image=image, radius=radius)
     scene = swarm.Scene(walls, period=period)
-    return CollidingRun(scene, start, swarm.Impact(), 1, None, "always", Seeding(), Watched())
+    return CollidingRun(scene, start, swarm.Impact(), 1, None, tier(), Seeding(), Watched())
 
 
 def rate_of(n: int, packing: float) -> float:
@@ -97,10 +99,10 @@ def deepest(position: Any, radius: float, lengths: Any) -> float:
     return float(2.0 * radius - distance[:, 1].min())
 
 
-def _exact(collisions: float, frames: int) -> list[Row]:
+def _exact(n: int, collisions: float, frames: int) -> list[Row]:
     """Energy, momentum along the cell, and overlaps of a long run."""
-    packing, run = 0.3, running(1000, 0.3, True)
-    _position, side, radius = lattice(1000, packing)
+    packing, run = 0.3, running(n, 0.3, True)
+    _position, side, radius = lattice(n, packing)
     span, depth = collisions / rate_of(len(run.state.mass), packing) / frames, -math.inf
     scale, wrong = float(np.abs(run.state.velocity).sum()), 0.0
     with run:
@@ -130,10 +132,10 @@ def main(quick: bool = False) -> None:
     }
     found = in_turn(runs, 1 if quick else 5)
     rows = [Row(f"{name}, a collision", *found[name], "us", f"{bar:g}") for name, *_rest, bar in SPEEDS]
-    small, large = (float(child(_MEMORY, str(k))) for k in ((100, 8000) if quick else (1000, 1_000_000)))
-    each = (large - small) / (8000 if quick else 1_000_000)
+    small, large = (float(child(_MEMORY, str(k), tier())) for k in ((8, 64) if quick else (1000, 1_000_000)))
+    each = (large - small) / (64 if quick else 1_000_000)
     rows.append(Row("memory, packing 0.3", each, each, "bytes/particle", "250"))
-    rows += _exact(*((1e3, 5) if quick else (1e8, 1000)))
+    rows += _exact(*((27, 100.0, 5) if quick else (1000, 1e8, 1000)))
     if not quick:
         with tempfile.TemporaryDirectory() as folder:
             cold = [float(child(_COLD, NUMBA_CACHE_DIR=f"{folder}/{k}")) for k in range(3)]

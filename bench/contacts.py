@@ -20,7 +20,7 @@ from swarm.methods.base import Method
 from swarm.run.engine import Run
 from swarm.surfaces import Surface
 
-from .report import ROOT, Row, in_turn, repeated, show, write
+from .report import ROOT, Row, in_turn, repeated, show, tier, write
 
 GRAVITY = (0.0, 0.0, -9.81)
 SPEED = 1.0
@@ -36,6 +36,8 @@ _SETTLED = 10.0
 _PI_DIGITS = (3, 31, 314, 3141, 31415)
 # Composed steps of each lane that are timed together; before them come those of particles that begin to slide.
 _STEPS, _BEGIN = 1_000, 100
+# Of a quick run: particles, and seconds.
+_FEW, _SHORT = 2, 0.4
 _THREADS = 2
 
 
@@ -50,7 +52,7 @@ class Case:
 
     def particles(self, quick: bool) -> swarm.Particles:
         """At random places; of a quick run a few."""
-        return swarm.fill(self.scene, 20 if quick else self.count, speed=SPEED, seed=0)
+        return swarm.fill(self.scene, _FEW if quick else self.count, speed=SPEED, seed=0)
 
 
 def _lossy(surfaces: list[Surface], restitution: float = 0.5) -> swarm.Scene:
@@ -85,7 +87,7 @@ def cases() -> dict[str, Case]:
 
 def _run(scene: swarm.Scene, particles: swarm.Particles, method: Method, until: float) -> swarm.Result:
     """The end alone, compiled."""
-    return swarm.simulate(scene, particles, method, until=until, threads=_THREADS, progress=False, compile="always")
+    return swarm.simulate(scene, particles, method, until=until, threads=_THREADS, progress=False, compile=tier())
 
 
 def _seconds(scene: swarm.Scene, particles: swarm.Particles, method: Method, until: float) -> Callable[[], float]:
@@ -107,7 +109,7 @@ def _error(one: swarm.Result, other: swarm.Result) -> float:
 
 def lasting(name: str, case: Case, quick: bool) -> list[Row]:
     """One scene: its time and those of the soft walls, what happened in it, and its error."""
-    particles = case.particles(quick)
+    particles, until = case.particles(quick), _SHORT if quick else case.until
     elastic = _with(case.scene, restitution=1.0)
     ways: dict[str, tuple[swarm.Scene, Method]] = {
         name: (case.scene, _impact()),
@@ -121,11 +123,11 @@ def lasting(name: str, case: Case, quick: bool) -> list[Row]:
         except swarm.SwarmError as refused:  # what soft walls do not do is a row too
             rows.append(Row(f"{what}: {refused}"[:100], math.nan, math.nan, "s"))
         else:
-            measures[what] = _seconds(scene, particles, method, case.until)
+            measures[what] = _seconds(scene, particles, method, until)
     figures = in_turn(measures, 1 if quick else 5)
     rows += [Row(what, *figures[what], "s", case.bar if what == name else "") for what in measures]
-    end = _run(case.scene, particles, _impact(), case.until)
-    refined = _run(case.scene, particles, _impact(sliding_tolerance=_REFINED), case.until)
+    end = _run(case.scene, particles, _impact(), until)
+    refined = _run(case.scene, particles, _impact(sliding_tolerance=_REFINED), until)
     told = {
         "impacts of a particle": (end.observables["impacts"][-1] / len(particles), ""),
         "sliding time of a particle": (end.observables["sliding_time"][-1] / len(particles), "s"),
@@ -138,19 +140,19 @@ def lasting(name: str, case: Case, quick: bool) -> list[Row]:
 def at_rest(quick: bool) -> list[Row]:
     """The hopper with friction until all rest; and a frame of ten thousand grains that do."""
     hopper = scene_file.read(HOPPER).scene
-    grains = swarm.fill(hopper, 20 if quick else 5_000, speed=SPEED, seed=0)
-    figures = in_turn({"settling": _seconds(hopper, grains, _impact(), _SETTLED)}, 1 if quick else 3)
-    end = _run(hopper, grains, _impact(), _SETTLED)
+    grains, until = swarm.fill(hopper, _FEW if quick else 5_000, speed=SPEED, seed=0), _SHORT if quick else _SETTLED
+    figures = in_turn({"settling": _seconds(hopper, grains, _impact(), until)}, 1 if quick else 3)
+    end = _run(hopper, grains, _impact(), until)
     moving = float(np.any(end.particles.velocity != 0.0, axis=0).sum())
-    what = f"hopper, friction {hopper.surfaces[0].friction:g}, {_SETTLED:g} s"
+    what = f"hopper, friction {hopper.surfaces[0].friction:g}, {until:g} s"
     rows = [Row(what, *figures["settling"], "s", "5"), Row("  still moving", moving, moving, "particles", "0")]
     box = swarm.Scene([dataclasses.replace(swarm.Box((0.5, 0.5, 0.5)), restitution=0.5)], GRAVITY)
     box = _with(box, friction=FRICTION)
-    count, method, frame = (20 if quick else 10_000), _impact(), 0.01
-    with Run(box, swarm.fill(box, count, speed=SPEED, seed=0), method, 1, None) as run:
+    count, method, frame = (_FEW if quick else 10_000), _impact(), 0.01
+    with Run(box, swarm.fill(box, count, speed=SPEED, seed=0), method, 1, None, tier()) as run:
         run.advance(0.0, 0.0)
-        run.advance(method.span("until", _SETTLED), _SETTLED)
-        moments = iter(_SETTLED + frame * k for k in range(1, 1_000))
+        run.advance(method.span("until", until), until)
+        moments = iter(until + frame * k for k in range(1, 1_000))
 
         def measure() -> float:
             start = time.perf_counter()
@@ -207,10 +209,11 @@ def sliding(quick: bool) -> list[Row]:
     """What a composed step costs: of as many particles as two threads have lanes, halted after so many passes."""
     rows, method, forever = [], _impact(), 1e3
     for threads in (1, _THREADS):
-        count, steps, rounds = threads * LANES, 20 if quick else _STEPS, 2 if quick else 20
+        lanes = 1 if quick else LANES
+        count, steps, rounds = threads * lanes, 20 if quick else _STEPS, 2 if quick else 20
         for name, (surface, particles) in launches(count).items():
             scene = swarm.Scene([surface], GRAVITY)
-            with Run(scene, particles, method, threads, LANES) as run:
+            with Run(scene, particles, method, threads, lanes, tier()) as run:
                 run.advance(0.0, 0.0)
 
                 def measure(run: Run = run, passes: int = steps, count: int = count) -> float:

@@ -13,6 +13,7 @@ from swarm.methods.base import Method
 from swarm.run.engine import Run
 
 from . import yardstick
+from .report import tier
 
 
 class Contender(Protocol):
@@ -36,7 +37,7 @@ class Ours:
     method: Method
 
     def seconds(self, particles: swarm.Particles, until: float) -> float:
-        with Run(self.scene, particles.copy(), self.method, 1, None) as run:
+        with Run(self.scene, particles.copy(), self.method, 1, None, tier()) as run:
             run.advance(0.0, 0.0)
             start = time.perf_counter()
             run.advance(self.method.span("until", until), until)

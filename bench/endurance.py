@@ -14,7 +14,7 @@ from swarm.run.engine import Run
 from swarm.state import State
 
 from .bars import SPEED, SPHERE
-from .report import Row, repeated, show, write
+from .report import Row, repeated, show, tier, write
 
 
 def checkpoints(n: int, repeats: int, folder: Path) -> list[Row]:
@@ -22,7 +22,7 @@ def checkpoints(n: int, repeats: int, folder: Path) -> list[Row]:
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
     job = checkpoint.Job("", "", "", "", n, "")
     path = folder / "run.h5.checkpoint"
-    with Run(SPHERE, particles.copy(), swarm.Impact(), 1, None) as run:
+    with Run(SPHERE, particles.copy(), swarm.Impact(), 1, None, tier()) as run:
         run.observe()
 
         def milliseconds() -> float:
@@ -31,7 +31,7 @@ def checkpoints(n: int, repeats: int, folder: Path) -> list[Row]:
             return 1e3 * (time.perf_counter() - start)
 
         best, median = repeated(milliseconds, repeats)
-        restored = Run(SPHERE, particles.copy(), swarm.Impact(), 1, None)
+        restored = Run(SPHERE, particles.copy(), swarm.Impact(), 1, None, tier())
 
         def back() -> float:
             start = time.perf_counter()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import swarm
 
 from . import impact_log, sampled
-from .report import ROOT, Row, in_turn, show, write
+from .report import ROOT, Row, in_turn, show, tier, write
 
 Floats = NDArray[np.float64]
 COUNT, FILLED, BLUR = 20_000, 0.4, 0.999
@@ -123,7 +123,7 @@ def _nanoseconds(scene: swarm.Scene, start: swarm.Particles, until: float, threa
         seconds, impacts = [], 0.0
         for span in (1e-3 * until, until):
             began = time.perf_counter()
-            end = swarm.simulate(scene, start, swarm.Impact(), until=span, threads=threads, compile="always")
+            end = swarm.simulate(scene, start, swarm.Impact(), until=span, threads=threads, compile=tier())
             seconds.append(time.perf_counter() - began)
             impacts = float(end.observables["impacts"][-1])
         return 1e9 * (seconds[1] - seconds[0]) / impacts
@@ -142,7 +142,7 @@ def speed(quick: bool) -> list[Row]:
         scene = swarm.Scene([swarm.Spheres(places, radius)], period=(1.0, 1.0, 1.0))
         scene.walls()
         built = time.perf_counter() - began
-        start = swarm.fill(scene, 200 if quick else COUNT, speed=1.0, seed=2)
+        start = swarm.fill(scene, 4 if quick else COUNT, speed=1.0, seed=2)
         until = 4.0 * radius * (2.0 if quick else _IMPACTS)
         measures = {
             "one": _nanoseconds(scene, start, until, 1),
@@ -162,20 +162,20 @@ def speed(quick: bool) -> list[Row]:
 
 def packing(quick: bool) -> list[Row]:
     """Balls at random that overlap, in a box: nothing gets into one, and the energy is kept."""
-    random, n = np.random.default_rng(3), 1000
+    random, n = np.random.default_rng(3), 100 if quick else 1000
     field = swarm.Spheres(random.uniform(-0.5, 0.5, (n, 3)), random.uniform(0.01, 0.05, n))
     scene = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), field])
-    start = swarm.fill(scene, 100 if quick else COUNT, speed=1.0, seed=4)
+    start = swarm.fill(scene, 4 if quick else COUNT, speed=1.0, seed=4)
     until = 1.0 if quick else 100.0
     # The first call compiles.
-    swarm.simulate(scene, start, swarm.Impact(), until=1e-3 * until, threads=2, compile="always")
+    swarm.simulate(scene, start, swarm.Impact(), until=1e-3 * until, threads=2, compile=tier())
     began = time.perf_counter()
-    end = swarm.simulate(scene, start, swarm.Impact(), until=until, every=until / 4.0, threads=2, compile="always")
+    end = swarm.simulate(scene, start, swarm.Impact(), until=until, every=until / 4.0, threads=2, compile=tier())
     seconds, seen = time.perf_counter() - began, end.observables
     hits = float(seen["impacts"][-1])
     outside = float((field.phi(end.particles.position) < -1e-12).sum())
     return [
-        Row("packing of 1000 balls that overlap, impacts", hits, hits, ""),
+        Row(f"packing of {n} balls that overlap, impacts", hits, hits, ""),
         Row("  an impact, two threads, frames and all", 1e9 * seconds / hits, 1e9 * seconds / hits, "ns"),
         Row("  energy error of a particle", *2 * [float(seen["energy_error"].max())], ""),
         Row("  largest penetration", *2 * [float(seen["max_penetration"].max())], "m"),

@@ -6,7 +6,7 @@ import numpy as np
 
 import swarm
 
-from .report import Row, repeated, show, write
+from .report import Row, repeated, show, tier, write
 
 G, DIAMETER = 9.81, 0.01
 MASS = 2500.0 * np.pi / 6.0 * DIAMETER**3
@@ -41,25 +41,26 @@ def _seconds(
     for count in (1, 1, steps):
         began = time.process_time()
         until = count * method.dt
-        result = swarm.simulate(scene, start, method, until=until, every=until, threads=1, compile="always")
+        result = swarm.simulate(scene, start, method, until=until, every=until, threads=1, compile=tier())
         spent.append(time.process_time() - began)
     return spent[2] - spent[1], result
 
 
 def speed(quick: bool) -> list[Row]:
     """A pile as it falls and at rest."""
-    n, across = (500, 6) if quick else (10_000, 18)
+    n, across = (8, 2) if quick else (10_000, 18)
     method, rows = swarm.Penalty(1e-4, 6e4, 1.5), []
     for name, friction in (("smooth", 0.0), ("rough, mu = 0.5", 0.5)):
         scene, start = hopper(n, across, friction)
-        steps = 200 if quick else 1000
+        steps = 10 if quick else 1000
         taken, result = _seconds(scene, start, method, steps)
         rows.append(_one(f"{n} {name} grains that fall, a grain and step", taken / n / steps * 1e6, "us"))
-        until = 0.3 if quick else 3.0
-        rest = swarm.simulate(scene, result.particles, method, until=until, every=until, compile="always").particles
-        least, median = repeated(lambda: _seconds(scene, rest, method, 200)[0] / n / 200 * 1e6, 1 if quick else 3)  # noqa: B023
+        until, at_rest = (0.003, 10) if quick else (3.0, 200)
+        rest = swarm.simulate(scene, result.particles, method, until=until, every=until, compile=tier()).particles
+        each = 1e6 / n / at_rest
+        least, median = repeated(lambda: _seconds(scene, rest, method, at_rest)[0] * each, 1 if quick else 3)  # noqa: B023
         rows.append(Row("  at rest, a grain and step", least, median, "us", "1.5"))
-        result = _seconds(scene, rest, method, 200)[1]
+        result = _seconds(scene, rest, method, at_rest)[1]
         moving = float(result.observables["kinetic_energy"][-1]) / n
         rows.append(_one("  their kinetic energy, a grain", moving, "J", "1e-20"))
     return rows
@@ -67,7 +68,7 @@ def speed(quick: bool) -> list[Row]:
 
 def exactness(quick: bool) -> list[Row]:
     """A gas of soft balls in a box, and in a cell that repeats."""
-    n, across, steps = (216, 6, 200) if quick else (10_000, 22, 10_000)
+    n, across, steps = (27, 3, 20) if quick else (10_000, 22, 10_000)
     velocity, dt = np.random.default_rng(1).normal(size=(3, n)), 5e-4
     places = lattice(n, across, 2.0 / across) - np.array([[0.0], [0.0], [1.0]])
     box, cell = swarm.Scene([swarm.Box((1.0, 1.0, 1.0))]), swarm.Scene([], period=(2.0, 2.0, 2.0))
@@ -75,7 +76,7 @@ def exactness(quick: bool) -> list[Row]:
     for name, scene, shift in (("box", box, 0.0), ("cell that repeats", cell, 1.0)):
         start = swarm.Particles(0.98 * places + shift, velocity, 1.0, radius=0.66 / across)
         result = swarm.simulate(
-            scene, start, swarm.Penalty(dt, 1e6, 1.5), until=steps * dt, every=steps * dt / 10, compile="always"
+            scene, start, swarm.Penalty(dt, 1e6, 1.5), until=steps * dt, every=steps * dt / 10, compile=tier()
         )
         seen, end = result.observables, result.particles
         rows.append(
@@ -101,7 +102,7 @@ def impact(quick: bool) -> list[Row]:
             radius=0.5 * DIAMETER,
         )  # fmt: skip
         method = swarm.Penalty(duration / steps, alpha, 1.5)
-        end = swarm.simulate(room, start, method, until=duration, every=duration, compile="always")
+        end = swarm.simulate(room, start, method, until=duration, every=duration, compile=tier())
         x = end.particles.position[0]
         errors.append(abs(DIAMETER - (x[1] - x[0])) / deepest)
     return [

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import swarm
 
-from .report import Row, in_turn
+from .report import Row, in_turn, tier
 
 COUNT, FRAMES = 10_000, 10
 _BARS = {"float64": 5.0, "float32": 10.0}
@@ -16,7 +16,7 @@ _BARS = {"float64": 5.0, "float32": 10.0}
 def rows(quick: bool) -> list[Row]:
     """Million impacts a second of all particles in a sphere, frames and file and all, two threads."""
     scene, until = swarm.Scene([swarm.Sphere(0.5)]), 2.0 if quick else 600.0
-    start = swarm.fill(scene, COUNT // 100 if quick else COUNT, speed=1.0, seed=1)
+    start = swarm.fill(scene, COUNT // 1000 if quick else COUNT, speed=1.0, seed=1)
     hits = [0.0]
     with tempfile.TemporaryDirectory() as folder:
 
@@ -29,7 +29,7 @@ def rows(quick: bool) -> list[Row]:
                 began = time.perf_counter()
                 end = swarm.simulate(
                     scene, start, swarm.Impact(), until=until, every=until / FRAMES, impacts=log, threads=2,
-                    precision=precision or "float64", compile="always",
+                    precision=precision or "float64", compile=tier(),
                 )  # fmt: skip
                 hits[0] = float(end.observables["impacts"][-1])
                 return time.perf_counter() - began

@@ -10,10 +10,10 @@ from swarm.kernel.jit import select
 from swarm.kernel.vector import either, norm
 from swarm.observables import drift
 
-from .report import Row, child, in_turn, show, write
+from .report import Row, child, in_turn, show, tier, write
 
 # Impacts of a particle in a run that is timed, about.
-_IMPACTS = 400.0
+_IMPACTS, _QUICK = 400.0, 4.0
 _COLD = """
 import sys, time, swarm
 from bench import laws
@@ -62,16 +62,14 @@ COUNTED: dict[str, swarm.Sphere | swarm.Plane | swarm.Box] = {
 _FIRST_CALLS = "none", "Lambert", "CercignaniLampis", "one's own Lambert"
 
 
-def _impact(walls: list[Any], count: int, **keywords: Any) -> Callable[[], float]:
+def _impact(walls: list[Any], count: int, impacts: float, **keywords: Any) -> Callable[[], float]:
     """Nanoseconds of processor time an impact, on one thread."""
     scene = swarm.Scene(walls)
     start = swarm.fill(scene, count, speed=1.0, seed=1)
 
     def measure() -> float:
         began = time.process_time()
-        run = swarm.simulate(
-            scene, start, swarm.Impact(), until=0.7 * _IMPACTS, compile="always", threads=1, **keywords
-        )
+        run = swarm.simulate(scene, start, swarm.Impact(), until=0.7 * impacts, compile=tier(), threads=1, **keywords)
         return (time.process_time() - began) / float(run.observables["impacts"][-1]) * 1e9
 
     return measure
@@ -88,11 +86,11 @@ def _unbooked(count: int, until: float) -> tuple[float, float]:
 
 def main(quick: bool = False) -> None:
     """Measure and report."""
-    count, rounds = (20, 1) if quick else (4000, 7)
-    runs = {name: _impact([swarm.Sphere(0.5, **wall)], count) for name, (wall, _bar) in LAWS.items()}
+    count, rounds, impacts = (2, 1, _QUICK) if quick else (4000, 7, _IMPACTS)
+    runs = {name: _impact([swarm.Sphere(0.5, **wall)], count, impacts) for name, (wall, _bar) in LAWS.items()}
     for name, surface in COUNTED.items():
-        runs[f"a {name} that is a wall"] = _impact([swarm.Sphere(0.5), surface], count)
-        runs[f"a {name} that counts"] = _impact([swarm.Sphere(0.5)], count, counters=[surface])
+        runs[f"a {name} that is a wall"] = _impact([swarm.Sphere(0.5), surface], count, impacts)
+        runs[f"a {name} that counts"] = _impact([swarm.Sphere(0.5)], count, impacts, counters=[surface])
     found = in_turn(runs, rounds)
     rows: list[Row] = []
     for name, (_wall, bar) in LAWS.items():
@@ -111,8 +109,8 @@ def main(quick: bool = False) -> None:
                 found[counter][0] / found[wall][0],
             )
         )
-    impacts, unbooked = _unbooked(count, 10.0 if quick else 2.2e4)
-    rows.append(Row(f"energy that no book has, {impacts:.2g} impacts", unbooked, unbooked, "of all", "1e-13"))
+    hits, unbooked = _unbooked(count, 10.0 if quick else 2.2e4)
+    rows.append(Row(f"energy that no book has, {hits:.2g} impacts", unbooked, unbooked, "of all", "1e-13"))
     for name in () if quick else _FIRST_CALLS:
         with tempfile.TemporaryDirectory() as folder:
             cold = [float(child(_COLD, name, NUMBA_CACHE_DIR=f"{folder}/{k}")) for k in range(3)]

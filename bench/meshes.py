@@ -11,7 +11,7 @@ import numpy as np
 
 import swarm
 
-from .report import ROOT, Row, in_turn, show, write
+from .report import ROOT, Row, in_turn, show, tier, write
 
 DOWN = (0.0, 0.0, -1.0)
 # About 1e5 triangles, as the bars have it.
@@ -82,7 +82,7 @@ def _nanoseconds(scene: swarm.Scene, start: swarm.Particles, until: float) -> An
         seconds, impacts = [], 0.0
         for span in (1e-3 * until, until):
             began = time.process_time()
-            end = swarm.simulate(scene, start, swarm.Impact(), until=span, threads=1, compile="always")
+            end = swarm.simulate(scene, start, swarm.Impact(), until=span, threads=1, compile=tier())
             seconds.append(time.process_time() - began)
             impacts = float(end.observables["impacts"][-1])
         return 1e9 * (seconds[1] - seconds[0]) / impacts
@@ -93,7 +93,7 @@ def _nanoseconds(scene: swarm.Scene, start: swarm.Particles, until: float) -> An
 def main(quick: bool) -> None:
     """Measure all of it."""
     rows = []
-    for name, made in (("ball", ball(20 if quick else _SPHERE)), ("bottle", vessel(5 if quick else _VESSEL))):
+    for name, made in (("ball", ball(6 if quick else _SPHERE)), ("bottle", vessel(2 if quick else _VESSEL))):
         # The first mesh compiles what makes the cells.
         scene_of(*ball(10))
         began = time.perf_counter()
@@ -101,7 +101,7 @@ def main(quick: bool) -> None:
         seconds = time.perf_counter() - began
         mesh: Any = scene.surfaces[0]
         falls = scene_of(*made, DOWN)
-        start = swarm.fill(scene, 200 if quick else 2000, speed=1.0, seed=1)
+        start = swarm.fill(scene, 2 if quick else 2000, speed=1.0, seed=1)
         until = 1.0 if quick else 100.0
         measures = {"straight": _nanoseconds(scene, start, until), "falling": _nanoseconds(falls, start, until)}
         figures = in_turn(measures, 1 if quick else 5)

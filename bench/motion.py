@@ -9,7 +9,7 @@ import numpy as np
 import swarm
 from examples import fermi, heavy_piston, piston
 
-from .report import Row, in_turn, show, write
+from .report import Row, in_turn, show, tier, write
 
 UP = (0.0, 0.0, 1.0)
 COUNT = 10_000
@@ -25,7 +25,7 @@ def _one(what: str, value: float, unit: str = "", bar: str = "") -> Row:
 
 
 def _run(scene: swarm.Scene, particles: swarm.Particles, until: float, threads: int = 1) -> swarm.Result:
-    return swarm.simulate(scene, particles, swarm.Impact(), until=until, threads=threads, compile="always")
+    return swarm.simulate(scene, particles, swarm.Impact(), until=until, threads=threads, compile=tier())
 
 
 # --- Given motions ---------------------------------------------------------------------------------------
@@ -33,7 +33,7 @@ def _run(scene: swarm.Scene, particles: swarm.Particles, until: float, threads: 
 
 def pistons(quick: bool) -> list[Row]:
     """A gas that a slow piston compresses."""
-    count, speed = (200, 0.02) if quick else (4_000, 0.001)
+    count, speed = (10, 0.2) if quick else (4_000, 0.001)
     mixed, straight = (piston.run(count, speed, balls=balls) for balls in (True, False))
     off = mixed.temperature[-1] * mixed.volume[-1] ** (2.0 / 3.0) - 1.0
     error = mixed.error[-1] / mixed.temperature[-1]
@@ -56,7 +56,7 @@ def accelerator(quick: bool) -> list[Row]:
     # Just before it is back at the wall at rest
     last = _run(swarm.Scene(walls), start, until - 1e-3)
     speeds = np.linspace(0.05, 2.0, 40)
-    largest = np.abs(fermi.run(speeds, 50 if quick else 2000)[1]).max(axis=0)
+    largest = np.abs(fermi.run(speeds, 5 if quick else 2000)[1]).max(axis=0)
     return [
         _one("Fermi-Ulam, impacts", float(last.observables["impacts"][-1]), "", "1000"),
         _one("  speed, relative to 50 digits", abs(-last.particles.velocity[0, 0] / wanted - 1.0), "", "1e-9"),
@@ -73,8 +73,8 @@ def uniform(quick: bool) -> list[Row]:
     }
     shift = np.array(DRIFT.velocity)[:, None]
     for name, made in cavities.items():
-        start = swarm.fill(made(None), 20, speed=1.0, seed=3)
-        until = 5.0 if quick else 36.0
+        count, until = (2, 5.0) if quick else (20, 36.0)
+        start = swarm.fill(made(None), count, speed=1.0, seed=3)
         here = _run(made(None), start, until)
         there = _run(made(DRIFT), swarm.Particles(start.position, start.velocity + shift), until)
         off = np.abs(there.particles.position - until * shift - here.particles.position).max()
@@ -85,7 +85,7 @@ def uniform(quick: bool) -> list[Row]:
 
 def rotating(quick: bool) -> list[Row]:
     """A sphere that turns does nothing, a box heats its gas."""
-    count, until = (20, 5.0) if quick else (500, 100.0)
+    count, until = (4, 5.0) if quick else (500, 100.0)
     turn = swarm.Rotation((0.0, 0.3, 1.0), 1.0, (0.0, 0.0, 0.0))
     sphere, box = swarm.Sphere(0.5, motion=turn), swarm.Box((0.5, 0.4, 0.3), motion=turn)
     rows = []
@@ -116,7 +116,7 @@ def vessel(mass: float) -> swarm.Scene:
 
 def reacting(quick: bool) -> list[Row]:
     """A heavy piston between two gases, and Galperin's counts."""
-    count, until = (200, 5.0) if quick else (COUNT, 60.0)
+    count, until = (10, 5.0) if quick else (COUNT, 60.0)
     mass, scene = 1000.0, vessel(1000.0)
     gas = swarm.fill(scene, count, temperature=1.0, seed=1)
     start = swarm.Particles(gas.position, gas.velocity * np.where(gas.position[2] > 0.0, 1.5, 0.7))
@@ -127,7 +127,7 @@ def reacting(quick: bool) -> list[Row]:
     along = seen["momentum"][:, 2] + mass * seen["wall_velocity"][:, 4, 2]
     along += seen["impulse"][:, 3] - seen["impulse"][:, 2]
     whole, hits = float(seen["impulse"][-1, 2:4].sum()), float(seen["impacts"][-1])
-    shared = heavy_piston.run(*((60, 5.0, 40.0) if quick else (2_000, 50.0, 800.0)))
+    shared = heavy_piston.run(*((10, 5.0, 10.0) if quick else (2_000, 50.0, 800.0)), compile=tier())
     difference, error = heavy_piston.late_difference(shared)
     rows = [
         _one("heavy piston, impacts", hits, "", "1e6"),
@@ -138,7 +138,7 @@ def reacting(quick: bool) -> list[Row]:
         _one("  in standard errors", abs(difference) / error, "", "3"),
         _one("  energy, relative", shared.balance, "", "1e-13"),
     ]
-    for digits, counted in enumerate((3, 31, 314, 3141, 31415)):
+    for digits, counted in enumerate((3, 31, 314, 3141, 31415)[: 3 if quick else None]):
         found = _run(*galperin(digits), 20.0).observables["impacts"][-1]
         rows.append(_one(f"Galperin, 100^{digits} kg", float(found), "impacts", str(counted)))
     return rows
@@ -161,7 +161,7 @@ def _nanoseconds(scene: swarm.Scene, start: swarm.Particles, until: float) -> Ca
 
 def speed(quick: bool) -> list[Row]:
     """Nanoseconds an impact, one thread, all ways in turn."""
-    count, until = (100, 0.5) if quick else (COUNT, _TIMED)
+    count, until = (4, 2.0) if quick else (COUNT, _TIMED)
     rows = []
     for name, made in {
         "sphere": lambda motion: swarm.Sphere(0.5, motion=motion),

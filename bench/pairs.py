@@ -8,7 +8,7 @@ from .cells import Cell
 from .outcomes import Outcome, outcome
 
 # Of each engine the first walls and capabilities, to see that it runs.
-_FEW = 2
+_FEW = 1, 2
 _MARKS = {"works": "x", "refused": ".", "third": "!"}
 
 
@@ -16,7 +16,7 @@ def main(quick: bool) -> None:
     """Carry out the cells, print the matrix, and write the table and the picture."""
     walls, capabilities = list(cells.WALLS), list(cells.CAPABILITIES)
     if quick:
-        walls, capabilities = walls[:_FEW], capabilities[:_FEW]
+        walls, capabilities = walls[: _FEW[0]], capabilities[: _FEW[1]]
     wanted = [cell for cell in cells.CELLS if cell.wall in walls and cell.capability in capabilities]
     found = {cell: outcome(cell) for cell in wanted}
     for engine in cells.ENGINES:

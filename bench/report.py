@@ -15,6 +15,19 @@ ROOT = Path(__file__).parents[1]
 # Where tables and pictures are written unless `-o` says otherwise: Git ignores it.
 OUT = Path("out") / "bench"
 _folder = OUT
+# A quick report shows that it runs: nothing is compiled, and nothing is measured twice.
+_is_quick = False
+
+
+def be_quick() -> None:
+    """The reports of this process are quick ones."""
+    global _is_quick
+    _is_quick = True
+
+
+def tier() -> str:
+    """`compile` of the runs of a report."""
+    return "never" if _is_quick else "always"
 
 
 @dataclass
@@ -36,9 +49,15 @@ def repeated(measure: Callable[[], float], repeats: int) -> tuple[float, float]:
 
 
 def in_turn(measures: dict[str, Callable[[], float]], rounds: int) -> dict[str, tuple[float, float]]:
-    """Minimum and median of each, measured in turn: a shared machine is slower for seconds at a time."""
-    for measure in measures.values():
-        measure()
+    """Minimum and median of each, measured in turn: a shared machine is slower for seconds at a time.
+
+    Before that each is called once, to warm up. Of a quick report each is called once in all.
+    """
+    if _is_quick:
+        rounds = 1
+    else:
+        for measure in measures.values():
+            measure()
     values = [{name: measure() for name, measure in measures.items()} for _ in range(rounds)]
     return {name: (min(v), statistics.median(v)) for name in measures for v in [[one[name] for one in values]]}
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import psutil
 
-from .report import ROOT, Row, show, write
+from .report import ROOT, Row, show, tier, write
 
 # The bar: a sweep of short runs takes at most so much more than the compilation and the runs on all cores.
 BAR = 1.3
@@ -45,7 +45,7 @@ def seconds(job, number):
     began = time.perf_counter()
     swarm.simulate(
         job.scene, job.start(), job.method, until=job.run.until, every=job.run.every, frames="none", threads=1,
-        compile="always", trajectory=sys.argv[2] + f"/{number}.h5", overwrite=True,
+        compile=sys.argv[3], trajectory=sys.argv[2] + f"/{number}.h5", overwrite=True,
     )
     return time.perf_counter() - began
 
@@ -79,28 +79,30 @@ def _sweep(path: Path, folder: Path, cache: Path) -> tuple[float, list[tuple[flo
     return time.perf_counter() - began, seen
 
 
-def _short_runs(folder: Path, seeds: int, count: int, until: float) -> list[Row]:
+def _short_runs(folder: Path, seeds: int, count: int, until: float, quick: bool) -> list[Row]:
     """The wall time of short runs of one scene, nothing compiled before, beside its parts."""
     path = folder / "short.toml"
     path.write_text(_SCENE.format(count=count, until=until, seeds=seeds))
     (folder / "alone").mkdir()
     done = subprocess.run(
-        [sys.executable, "-c", _ALONE, str(path), str(folder / "alone")],
+        [sys.executable, "-c", _ALONE, str(path), str(folder / "alone"), tier()],
         env=_environment(folder / "cold"), capture_output=True, text=True, check=True,
     )  # fmt: skip
     compiling, own = map(float, done.stdout.split())
     cores = len(os.sched_getaffinity(0))
     wall, _memory = _sweep(path, folder / "short", folder / "colder")
-    warm, _memory = _sweep(path, folder / "again", folder / "colder")
     least = compiling + own / cores
     runs = f"{5 * seeds} runs"
-    return [
+    rows = [
         Row(f"{runs}: compile once", compiling, compiling, "s"),
         Row(f"{runs}: their own time, one after the other", own, own, "s"),
         Row(f"{runs}: the two, of the second a share for each core", least, least, "s"),
         Row(f"{runs}: swarm sweep, nothing compiled before", wall, wall, "s", f"<={BAR}", wall / least),
-        Row(f"{runs}: swarm sweep, once more", warm, warm, "s", "", warm / (own / cores)),
     ]
+    if quick:
+        return rows
+    warm, _memory = _sweep(path, folder / "again", folder / "colder")
+    return [*rows, Row(f"{runs}: swarm sweep, once more", warm, warm, "s", "", warm / (own / cores))]
 
 
 def _many_runs(folder: Path, seeds: int) -> list[Row]:
@@ -127,8 +129,8 @@ def main(quick: bool = False) -> None:
     """Print the report."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        rows = _short_runs(folder, *((1, 20, 0.1) if quick else (10, 2000, 4.0)))
-        rows += _many_runs(folder, 2 if quick else 200)
+        rows = _short_runs(folder, *((1, 20, 0.1) if quick else (10, 2000, 4.0)), quick)
+        rows += _many_runs(folder, 1 if quick else 200)
     show(rows)
     if not quick:
         write(rows, "sweep")

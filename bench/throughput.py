@@ -32,6 +32,7 @@ SCENES = {
 _FLIGHTS = 10.0
 # Steps of a frame, for methods of fixed step.
 _STEPS = 100
+_QUICK = 10
 _PARTICLES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 # Files of more than a million particles measure the disk, and ten million in every scene the patience.
 _MOST_WRITTEN = 1_000_000
@@ -93,8 +94,8 @@ def cases(quick: bool) -> Iterator[Case]:
     """All of them; a quick run has one of each kind."""
     outputs = _OUTPUTS if importlib.util.find_spec("rerun") else _OUTPUTS[:2]
     if quick:
-        yield from (Case("Impact", "sphere", 1_000, threads, kind) for threads in (1, 2) for kind in outputs)
-        yield Case("Penalty, dt=0.025", "sphere", 1_000, 1, "none")
+        yield from (Case("Impact", "sphere", _QUICK, threads, kind) for threads in (1, 2) for kind in outputs)
+        yield Case("Penalty, dt=0.025", "sphere", _QUICK, 1, "none")
         return
     for method, scene, n, threads, kind in itertools.product(METHODS, SCENES, _PARTICLES, (1, 2), outputs):
         if (method, scene) in _REFUSED:
@@ -134,9 +135,10 @@ def measure(some: list[Case], particles: swarm.Particles, folder: Path, quick: b
             break
         pilot *= 4
     frames = pilot if quick else max(2, min(_MOST_FRAMES, round(pilot * _SECONDS / seconds)))
+    repeats = 1 if quick else _REPEATS
     return {
         case: values
-        for rounds in [[{case: run(case, particles, frames, folder)[1] for case in some} for _ in range(_REPEATS)]]
+        for rounds in [[{case: run(case, particles, frames, folder)[1] for case in some} for _ in range(repeats)]]
         for case in some
         for values in [[one[case] for one in rounds]]
     }
@@ -165,7 +167,7 @@ def yardsticks(quick: bool) -> dict[str, list[float]]:
         return (time.perf_counter() - start) / (n * steps) * 1e9
 
     verlet()
-    found["plain Verlet in Numba, sphere"] = [verlet() for _ in range(3 if quick else 7)]
+    found["plain Verlet in Numba, sphere"] = [verlet() for _ in range(1 if quick else 7)]
     both = yardstick.bare("impact", processes=2)
     if both:
         found["bare loop in C, two at once"] = both

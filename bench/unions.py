@@ -9,7 +9,7 @@ import swarm
 from .report import Row, child, in_turn, show, write
 
 # Impacts of a particle in a run that is timed, about.
-_IMPACTS = 400.0
+_IMPACTS, _QUICK = 400.0, 4.0
 _GRAVITY = (0.0, 0.0, -9.81)
 BALLS = [swarm.Sphere(0.5, (-0.3, 0.0, 0.0)), swarm.Sphere(0.5, (0.3, 0.0, 0.0))]
 BOX = swarm.Box((0.5, 0.5, 0.5), (-1.0, 0.0, 0.0))
@@ -37,7 +37,7 @@ SCENES = {
 
 
 def _impact(
-    surfaces: list[swarm.surfaces.Surface], gravity: tuple[float, ...] | None, count: int
+    surfaces: list[swarm.surfaces.Surface], gravity: tuple[float, ...] | None, count: int, impacts: float
 ) -> Callable[[], float]:
     """Nanoseconds of processor time an impact, on one thread."""
     scene = swarm.Scene(surfaces, gravity)
@@ -45,7 +45,7 @@ def _impact(
 
     def measure() -> float:
         began = time.process_time()
-        run = swarm.simulate(scene, start, swarm.Impact(), until=_IMPACTS, every=_IMPACTS, threads=1)
+        run = swarm.simulate(scene, start, swarm.Impact(), until=impacts, every=impacts, threads=1)
         return (time.process_time() - began) / float(run.observables["impacts"][-1]) * 1e9
 
     return measure
@@ -53,10 +53,10 @@ def _impact(
 
 def main(quick: bool = False) -> None:
     """Measure and report."""
-    count, rounds = (20, 1) if quick else (4000, 7)
+    count, rounds, impacts = (4, 1, _QUICK) if quick else (4000, 7, _IMPACTS)
     rows: list[Row] = []
     for k, (name, gravity) in enumerate((("", None), (" under gravity", _GRAVITY))):
-        measures = {what: _impact(surfaces, gravity, count) for what, (surfaces, _of, _bars) in SCENES.items()}
+        measures = {what: _impact(surfaces, gravity, count, impacts) for what, (surfaces, _of, _bars) in SCENES.items()}
         found = in_turn(measures, rounds)
         for what, (_surfaces, one, bars) in SCENES.items():
             best, median = found[what]

@@ -52,14 +52,14 @@ def gases(scene: swarm.Scene, count: int) -> swarm.Particles:
     return swarm.Particles(made.position, made.velocity * np.sqrt(temperature))
 
 
-def run(count: int, mass: float, until: float, frames: int = 100) -> Shared:
+def run(count: int, mass: float, until: float, frames: int = 100, compile: str = "always") -> Shared:
     """The two gases and the piston between them until a time [s]."""
     scene = vessel(mass)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "piston.h5"
         swarm.simulate(
             scene, gases(scene, count), swarm.Impact(), until=until, every=until / frames, trajectory=file,
-            compile="always",
+            compile=compile,
         )  # fmt: skip
         with swarm.load(file) as trajectory:
             seen, below, above = trajectory.observables, [], []

@@ -100,7 +100,7 @@ def solvers() -> tuple[dict[str, Solver], list[str]]:
 
 def main(quick: bool) -> None:
     """Measure, print, and write the CSV of this machine."""
-    n = 100 if quick else 10_000
+    n = 2 if quick else 10_000
     scene = swarm.Scene([swarm.Sphere(RADIUS)])
     start = swarm.fill(scene, n, speed=SPEED, seed=1)
     print(f"{n} points, sphere of radius {RADIUS:g} m, {SPEED:g} m/s, {UNTIL:g} s, one thread; {machine()}")

@@ -14,6 +14,7 @@ import swarm
 from swarm.run.engine import Run
 
 from .. import figure, reference
+from ..report import tier
 from . import picture
 from .picture import Cell
 
@@ -37,12 +38,12 @@ def cell(angle: float, shortest: float, count: int) -> Cell:
     """Wall time and errors of one angle and one shortest flight, a part of the crossing time."""
     particles, crossing = launch(angle, count), RADIUS / SPEED
     method, until = swarm.Impact(shortest_flight=shortest * crossing), CROSSINGS * crossing
-    with Run(SCENE, particles.copy(), method, 1, None) as run:
+    with Run(SCENE, particles.copy(), method, 1, None, tier()) as run:
         run.advance(0.0, 0.0)
         before = time.perf_counter()
         run.advance(until, until)
         seconds = time.perf_counter() - before
-    result = swarm.simulate(SCENE, particles, method, until=until, threads=1)
+    result = swarm.simulate(SCENE, particles, method, until=until, threads=1, compile=tier())
     ends = [
         reference.in_a_sphere(r, v, RADIUS, until, None)
         for r, v in zip(particles.position.T, particles.velocity.T, strict=True)
@@ -60,8 +61,9 @@ def cell(angle: float, shortest: float, count: int) -> Cell:
 def measure(quick: bool) -> list[Cell]:
     """Every angle and shortest flight; quick: two of each."""
     angles, shortest = (_ANGLES[::9], _SHORTEST[2:4]) if quick else (_ANGLES, _SHORTEST)
-    cell(1e-12, 1e-2, 1)  # compiles what slides
-    return [cell(angle, one, 2 if quick else _PARTICLES) for one in shortest for angle in angles]
+    if not quick:
+        cell(1e-12, 1e-2, 1)  # compiles what slides
+    return [cell(angle, one, 1 if quick else _PARTICLES) for one in shortest for angle in angles]
 
 
 def told(cells: Sequence[Cell]) -> list[str]:

@@ -56,9 +56,10 @@ def measure(quick: bool) -> list[Cell]:
     found = []
     numbers = _IMPACTS[:3] if quick else _IMPACTS
     for name, scene in list(SCENES.items())[: 1 if quick else 2]:
-        particles = swarm.fill(scene, PARTICLES, speed=SPEED, seed=11)
+        count = 10 if quick else PARTICLES
+        particles = swarm.fill(scene, count, speed=SPEED, seed=11)
         pilot = swarm.simulate(scene, particles, swarm.Impact(), until=20.0, threads=2)
-        rate = pilot.observables["impacts"][-1] / PARTICLES / 20.0
+        rate = pilot.observables["impacts"][-1] / count / 20.0
         for impacts in numbers:
             end = swarm.simulate(scene, particles, swarm.Impact(), until=impacts / rate, threads=2).particles
             error = _error(particles.velocity, end.velocity)
