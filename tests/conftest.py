@@ -57,6 +57,12 @@ SPENT, tiers.spent = tiers.spent, lambda kinds: 0.0
 EPSILON = float(np.finfo(np.float64).eps)
 
 
+@pytest.fixture
+def compiled_at_once(monkeypatch):
+    """Runs are compiled from the start: those that plain Python would not end before it is out of patience."""
+    monkeypatch.setattr(tiers, "_PATIENCE", 0.0)
+
+
 def pytest_ignore_collect(collection_path, config):
     """Files of the long ring take seconds to import: not where `-m` excludes it and no file is named."""
     is_long = collection_path.name == "long" and "not long" in config.option.markexpr

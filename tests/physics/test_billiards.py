@@ -56,7 +56,7 @@ def flown(half, r, v, until):
     return r, v / np.hypot(*v)
 
 
-def test_the_exponent_of_the_stadium_is_that_of_neighbours_without_swarm():
+def test_the_exponent_of_the_stadium_is_that_of_neighbours_without_swarm(compiled_at_once):
     value, error = stadium.measure(2.0, 600, 300.0)
     found = by_hand(2.0, 600, 300, 5)
     other, its_error = found.mean(), found.std() / math.sqrt(len(found))
@@ -77,8 +77,8 @@ def test_who_stays_in_the_mushroom_is_known_one_by_one():
     assert abs(stays.mean() - mushroom.STAYS) < 3.0 * error
 
 
-def test_the_maze_lets_out_through_its_exit_alone():
-    scene, result = maze.run(2000, 300.0)
+def test_the_maze_lets_out_through_its_exit_alone(compiled_at_once):
+    scene, result = maze.run(300, 300.0)
     gone = ~np.isnan(result.escape_time)
     assert 0.2 < gone.mean() < 0.6
     x, y, _z = result.particles.position[:, gone]

@@ -9,7 +9,7 @@ from examples import vessel_from_stl as example
 pytestmark = pytest.mark.physics
 
 
-def test_heights_in_a_warm_vase_obey_the_barometric_law():
+def test_heights_in_a_warm_vase_obey_the_barometric_law(compiled_at_once):
     gas = example.run(300, 6.0, spacing=0.025, frames=12)
     assert 1e-4 < gas.surface.mesh_error < 0.025
     seen = gas.result.observables
