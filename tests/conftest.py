@@ -17,6 +17,7 @@ import durations
 import numba
 import numpy as np
 import pytest
+from _pytest.doctest import DoctestModule
 from hypothesis import HealthCheck, Phase, reject, settings
 from hypothesis import strategies as st
 from hypothesis.internal.conjecture import providers
@@ -64,9 +65,24 @@ def compiled_at_once(monkeypatch):
 
 
 def pytest_ignore_collect(collection_path, config):
-    """Files of the long ring take seconds to import: not where `-m` excludes it and no file is named."""
-    is_long = collection_path.name == "long" and "not long" in config.option.markexpr
-    return True if is_long and not any("long" in argument for argument in config.args) else None
+    """Files of the long ring take seconds to import: not where `-m` excludes it and no file is named.
+
+    Nor are those imported where only tests marked `level3` run, and none in them is.
+    """
+    wanted = config.option.markexpr
+    if collection_path.name == "long" and "not long" in wanted:
+        return None if any("long" in argument for argument in config.args) else True
+    if collection_path.suffix == ".py" and wanted.startswith("level3 and"):
+        return None if "level3" in collection_path.read_text("utf-8") else True
+    return None
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path):
+    """The docstrings of a file of tests are searched for examples where it holds one."""
+    collectors = yield
+    is_without = file_path.suffix == ".py" and ">>> " not in file_path.read_text("utf-8")
+    return [one for one in collectors if not (is_without and isinstance(one, DoctestModule))]
 
 
 @pytest.hookimpl(tryfirst=True)
