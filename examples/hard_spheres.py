@@ -73,9 +73,9 @@ def measure(packing: float, collisions: int, side: int = SIDE) -> Measured:
     """Z from so many collisions, and its standard error from the spread of the frames."""
     scene, n = cell_of(packing, side), side**3
     start, one = lattice(scene, side), collision_time(packing)
-    mixed = swarm.simulate(scene, start, swarm.Impact(), until=BEFORE * one).particles
+    mixed = swarm.simulate(scene, start, swarm.Impact(), until=BEFORE * one, compile="always").particles
     span = 2.0 * collisions / n * one
-    result = swarm.simulate(scene, mixed, swarm.Impact(), until=span, every=span / FRAMES)
+    result = swarm.simulate(scene, mixed, swarm.Impact(), until=span, every=span / FRAMES, compile="always")
     seen = result.observables
     # With the momentum at rest there are 3 (N - 1) degrees of freedom: k T = 2 K/(3 (N - 1)).
     twice = 2.0 * seen["kinetic_energy"][1:]

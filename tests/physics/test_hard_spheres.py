@@ -39,7 +39,8 @@ def mixed(packing, side=10, collisions=60, pairs=None, seed=1):
 @pytest.mark.parametrize("packing", [0.1, rarely(0.2), 0.3, rarely(0.4), 0.49])
 def test_pressure_by_the_virial(packing):
     """Within 0.3 % of simulations, as Kolafa's equation has them, and 0.5 % of Carnahan's and Starling's."""
-    found = hard_spheres.measure(packing, 1_000_000)
+    # In a gas the pressure of few collisions is known as well.
+    found = hard_spheres.measure(packing, {0.1: 100_000, 0.3: 400_000}.get(packing, 1_000_000))
     assert found.error < 1.5e-3 * found.compressibility
     assert found.compressibility == pytest.approx(kolafa(packing), rel=3e-3, abs=2.0 * found.error)
     assert found.compressibility == pytest.approx(carnahan_starling(packing), rel=5e-3, abs=2.0 * found.error)
@@ -54,7 +55,7 @@ def test_pressure_by_the_virial_of_many(packing):
     assert found.compressibility == pytest.approx(kolafa(packing), rel=2e-3)
 
 
-def between_plates(packing, side=10, layers=24, seed=3):
+def between_plates(packing, layers, side=10, seed=3):
     """(scene, balls): a slab of balls between two plates, repeated along them, with this packing all over."""
     step = (math.pi / 6.0 / packing) ** (1.0 / 3.0)
     # The centres are half a diameter from the plates.
@@ -72,13 +73,15 @@ def between_plates(packing, side=10, layers=24, seed=3):
 @pytest.mark.parametrize("packing", [0.1, rarely(0.2), 0.3, rarely(0.4), rarely(0.48)])
 def test_pressure_at_the_walls(packing, tmp_path):
     """The force on a plate is the pressure of a fluid as dense as that is in the middle, far from both."""
-    scene, start, (x, y, z) = between_plates(packing)
+    # Up to 0.3 the layers at a plate end two diameters from it, and plates that are closer are hit more often.
+    few = {0.1: (10, 400_000, 200), 0.3: (12, 600_000, 240)}
+    layers, collisions, frames = few.get(packing, (24, 2_000_000, 1000))
+    scene, start, (x, y, z) = between_plates(packing, layers)
     n, one = len(start), collision_time(packing)
     start = run(scene, start, 60 * one, 1).particles
-    collisions, frames = 2_000_000, 1000
     span = 2.0 * collisions / n * one
     result = run(scene, start, span, frames, trajectory=tmp_path / "plates.h5")
-    seen, low, high = result.observables, 0.35 * z, 0.65 * z
+    seen, low, high = result.observables, 0.3 * z, 0.7 * z
     with swarm.load(tmp_path / "plates.h5") as trajectory:
         heights = [trajectory.frame(k).position[2] for k in range(1, frames + 1)]
     counts = np.array([np.count_nonzero((low < h) & (h < high)) for h in heights]) / (x * y * (high - low))
@@ -141,7 +144,7 @@ def test_the_gas_of_tonks_in_a_tube():
 
 def test_unequal_balls_in_a_tube():
     """p = n k T/(1 - n sigma) of any masses, here 1 and 3 kg by turns: within three standard errors."""
-    n, radius, time = 20, 0.02, 20_000.0
+    n, radius, time = 20, 0.02, 1000.0
     scene, start = in_a_tube(n, np.tile([1.0, 3.0], n // 2), np.random.default_rng(2).normal(size=n), radius)
     seen = run(scene, start, time, 50).observables
     temperature = 2.0 * seen["kinetic_energy"][0] / n
@@ -158,7 +161,8 @@ def test_mean_free_path(packing):
     """Mean speed over the rate of collisions: 1/(sqrt(2) pi n sigma^2 g)."""
     scene, start = mixed(packing)
     n = len(start)
-    result = run(scene, start, 2.0 * 400_000 / n * collision_time(packing))
+    collisions = 100_000 if packing < 0.1 else 400_000
+    result = run(scene, start, 2.0 * collisions / n * collision_time(packing))
     seen = result.observables
     rates = 2.0 * seen["collision_rate"][1:] / n
     assert seen["collision_rate"][1:] == pytest.approx(np.diff(seen["collisions"]) / np.diff(seen["time"]))
@@ -251,7 +255,7 @@ def test_self_diffusion(packing, tmp_path):
 def test_a_gas_that_cools():
     """Haff's law with e = 0.9: T = T0/(1 + t/tau)^2, 1/tau = (1 - e^2) w/6 with w collisions a ball and second."""
     e, packing = 0.9, 0.05
-    scene, start = mixed(packing, side=20, collisions=20, pairs=swarm.Pairs(restitution=e))
+    scene, start = mixed(packing, side=12, collisions=20, pairs=swarm.Pairs(restitution=e))
     rate = 1.0 / collision_time(packing)
     # Velocities are no Maxwellian's any more: van Noije and Ernst, Granular Matter 1, 1998.
     a2 = 16.0 * (1.0 - e) * (1.0 - 2.0 * e * e) / (81.0 - 17.0 * e + 30.0 * e * e * (1.0 - e))
@@ -312,8 +316,8 @@ def conserved(side, packing, collisions):
     assert seen["overlap"].max() <= 4.0 * np.spacing(scene.period[0])
 
 
-def test_two_million_collisions_keep_energy_and_momentum():
-    conserved(12, 0.4, 2_000_000)
+def test_half_a_million_collisions_keep_energy_and_momentum():
+    conserved(8, 0.4, 500_000)
 
 
 @pytest.mark.long
