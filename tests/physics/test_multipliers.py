@@ -108,7 +108,7 @@ def test_a_cusp_and_a_thin_cap_end(acceleration):
     cap = [swarm.Sphere(0.5), swarm.Sphere(0.2, (0.0, 0.0, 0.65), side="outside")]
     for surfaces, aim in ((ball, [0.5, 0.0, 0.0]), (cap, [0.25, 0.0, 0.43])):
         scene = swarm.Scene(surfaces)
-        start = swarm.fill(scene, 20, speed=1.0, seed=8)
+        start = swarm.fill(scene, 6, speed=1.0, seed=8)
         towards = np.array(aim)[:, None] - start.position
         aimed = swarm.Particles(start.position, towards / np.linalg.norm(towards, axis=0))
         result = run(scene, aimed, method_of(tolerance=1e-28, acceleration=acceleration), 5.0, 0.5, "never")

@@ -54,7 +54,7 @@ def test_half_period_of_the_linear_spring():
     start = swarm.Particles([-np.array(close), zeros, zeros], [SPEED + zeros, zeros, zeros])
     position, velocity = np.array([exact(distance) for distance in close]).T
     errors = []
-    for n in (240, 480, 960, 1920):
+    for n in (120, 240, 480):
         end = run(FLOOR, start, swarm.Penalty(until / n, STIFFNESS), until, compile="never").particles
         errors.append(
             [np.sqrt(np.mean((end.position[0] - position) ** 2)), np.sqrt(np.mean((end.velocity[0] - velocity) ** 2))]
@@ -68,7 +68,7 @@ def test_half_period_of_the_linear_spring():
 def test_bounce_off_the_soft_wall(exponent):
     """After the bounce the time spent inside shows in the position: order 2; the speed is exact whatever the step."""
     until = 2.0
-    errors = _errors((1000, 2000, 4000), until, exponent, lambda d: wall_bounce(d, SPEED, until, STIFFNESS, exponent))
+    errors = _errors((500, 1000, 2000), until, exponent, lambda d: wall_bounce(d, SPEED, until, STIFFNESS, exponent))
     slopes = _slopes(errors[:, 0])
     assert (slopes >= 1.8).all(), slopes
     assert (slopes <= 2.2).all(), slopes
@@ -96,7 +96,7 @@ def test_hertz_against_runge_kutta():
     exact, _ = wall_bounce(0.0, SPEED, 0.4, k, 1.5)
     assert depth == pytest.approx(exact, abs=1e-9)
     start = swarm.Particles([0.0, 0.0, 0.0], [SPEED, 0.0, 0.0])
-    end = run(FLOOR, start, swarm.Penalty(2e-5, k, 1.5), 0.4, compile="never").particles
+    end = run(FLOOR, start, swarm.Penalty(5e-5, k, 1.5), 0.4, compile="never").particles
     assert end.position[0, 0] == pytest.approx(depth, abs=1e-7)
 
 

@@ -138,7 +138,7 @@ def test_penalty_balances_energy_and_work(name, motion, gravity):
     scene = swarm.Scene(CAVITIES[name](MOTIONS[motion]), gravity)
     closed = scene if name != "planes" else swarm.Scene([swarm.Sphere(0.25)])
     for method in BALANCED[: 1 if name == "torus" else None]:
-        start = swarm.fill(closed, 3, speed=1.0, mass=np.array([0.5, 1.0, 2.0]), seed=2)
+        start = swarm.fill(closed, 2, speed=1.0, mass=np.array([0.5, 2.0]), seed=2)
         result = run(scene, start, METHODS[method], 2.0, frames=8)
         assert result.observables["impacts"][-1] >= 2
         assert imbalance(result) <= 1e-12
@@ -162,7 +162,7 @@ def test_late_frames_have_the_round_off_of_the_time():
         [swarm.Plane((0, 0, -1), 0.0, motion=swarm.Oscillation((0.0, 0.0, 0.4), 0.5))], (0.0, 0.0, -9.81)
     )
     start = swarm.Particles([0.0, 0.0, 0.5], [0.0, 0.0, 0.0], 1.0)
-    result = run(scene, start, swarm.Penalty(0.05, 50.0), 250.0, frames=2500)
+    result = run(scene, start, swarm.Penalty(0.05, 50.0), 150.0, frames=1500)
     assert result.observables["impacts"][-1] > 100
     assert imbalance(result) <= 1e-12
 
@@ -193,7 +193,7 @@ def test_what_the_baselines_miss_vanishes_with_the_step(method):
     scene = swarm.Scene(CAVITIES["box"](SWING), PULL)
     start = swarm.fill(scene, 3, speed=1.0, seed=2)
     misses = []
-    for k in (1, 8):
+    for k in (1, 4):
         result = run(scene, start, type(METHODS[method])(DT / k, 1e3), 0.6)
         assert abs(result.observables["wall_work"][-1]).max() > 0.01
         misses.append(imbalance(result))
@@ -247,7 +247,7 @@ def test_second_order_in_a_wall_that_swings(method):
     start = swarm.Particles([0.0, 0.0, 0.0], [0.2, 0.1, -0.6], 1.0)
     made, until = METHODS[method], 0.16
     ends = []
-    for steps in (16, 32, 64, 1024):
+    for steps in (16, 32, 64, 512):
         found = run(scene, start, type(made)(until / steps, 150.0, made.exponent), until)
         assert found.observables["contact_energy"][-1] > 0.01
         ends.append(np.concatenate([found.particles.position[:, 0], found.particles.velocity[:, 0]]))

@@ -98,7 +98,7 @@ def holds(seed, count, folder, **options):
 @pytest.mark.parametrize("seed", range(10))
 def test_flights_end_where_brute_force_says(seed, tmp_path):
     """In ten random unions, with holes."""
-    holds(seed, 100, tmp_path, compile="never")
+    holds(seed, 30, tmp_path, compile="never")
 
 
 @pytest.mark.long
@@ -113,22 +113,23 @@ def test_the_mean_free_path_is_four_volumes_an_area(seed):
     """Of balls and boxes at random, whose area is known by points on each that are in no other."""
     random = np.random.default_rng([43, seed])
     parts = []
-    for _part in range(random.integers(2, 6)):
+    # A ball and a box, or two and three: two kinds.
+    for is_ball in ((True, False), (True, False, False, True, False))[seed % 2]:
         center = tuple(random.uniform(-0.4, 0.4, 3).tolist())
-        if random.random() < 0.5:
+        if is_ball:
             parts.append(swarm.Sphere(float(random.uniform(0.3, 0.5)), center))
         else:
             parts.append(swarm.Box(tuple(random.uniform(0.2, 0.5, 3).tolist()), center))
     hole = swarm.Sphere(0.1, parts[0].center, side="outside")
     union = swarm.Intersection([swarm.Union(parts), hole])
     scene = swarm.Scene([union])
-    start = swarm.fill(scene, 4000, speed=1.0, seed=seed)
+    start = swarm.fill(scene, 2500, speed=1.0, seed=seed)
     until = 200.0
     result = swarm.simulate(scene, start, swarm.Impact(), until=until, every=until, threads=1)
     impacts = result.impacts_per_particle
     area, spread = _area(parts, hole, random)
     low, high = (np.array(corner)[:, None] for corner in union.bounds())
-    points = low + (high - low) * random.random((3, 1_000_000))
+    points = low + (high - low) * random.random((3, 200_000))
     part = (union.phi(points) <= 0.0).mean()
     volume = np.prod(high - low) * part
     expected, found = area / (4.0 * volume), impacts.mean() / until
@@ -143,7 +144,7 @@ def test_the_mean_free_path_is_four_volumes_an_area(seed):
     assert result.observables["max_penetration"].max() <= 1e-13
 
 
-def _area(parts, hole, random, n=200_000):
+def _area(parts, hole, random, n=100_000):
     """(area, its standard error) of the parts as far as they are in no other, and of the hole."""
     area, variance = 0.0, 0.0
     for one in (*parts, hole):
@@ -250,9 +251,11 @@ def test_a_hopper_empties_and_what_was_in_it_rests(tmp_path):
     law = {"friction": 0.05, "restitution": 0.5}
     hopper = swarm.Union([swarm.Sphere(0.5), swarm.Cylinder(0.1, (0.0, 0.0, 1.0), 1.0, (0.0, 0.0, -0.8))], **law)
     scene = swarm.Scene([hopper], (0.0, 0.0, -9.81))
-    start = swarm.fill(scene, 30, speed=1.0, seed=3)
+    start = swarm.fill(scene, 5, speed=1.0, seed=3)
     path = tmp_path / "run.h5"
-    result = swarm.simulate(scene, start, swarm.Impact(), until=30.0, every=5.0, trajectory=path, threads=1)
+    result = swarm.simulate(
+        scene, start, swarm.Impact(), until=30.0, every=5.0, trajectory=path, threads=1, compile="never"
+    )
     assert result.particles.position[2] == pytest.approx(-1.3, abs=1e-9)
     assert np.abs(result.particles.velocity).max() <= 1e-9
     seen = result.observables
@@ -317,7 +320,7 @@ def test_an_opening_is_in_the_wall_of_a_part():
     tube = swarm.Cylinder(0.2, (1.0, 0.0, 0.0), 2.0, (1.0, 0.0, 0.0), openings=[hole])
     scene = swarm.Scene([swarm.Union([swarm.Sphere(0.5), tube])])
     start = swarm.fill(scene, 100, speed=1.0, seed=1)
-    result = swarm.simulate(scene, start, swarm.Impact(), until=200.0, every=200.0, threads=1)
+    result = swarm.simulate(scene, start, swarm.Impact(), until=200.0, every=200.0, threads=1, compile="always")
     gone = ~np.isnan(result.escape_time)
     assert gone.sum() > 30
     assert result.particles.position[0, gone] == pytest.approx(2.0, abs=0.03)

@@ -56,7 +56,8 @@ SOLIDS = {
 
 def run(scene, particles, until, frames=1, method=None, **options):
     method = method or swarm.Impact()
-    return swarm.simulate(scene, particles, method, until=until, every=until / frames, compile="never", **options)
+    options = {"compile": "never", **options}
+    return swarm.simulate(scene, particles, method, until=until, every=until / frames, **options)
 
 
 def imbalance(result):
@@ -223,7 +224,7 @@ def test_a_rotating_sphere_does_nothing_and_a_rotating_box_heats():
     assert np.abs(here.particles.position - there.particles.position).max() <= 1e-13
     assert abs(there.observables["wall_work"][-1]).max() <= 1e-14
     box = swarm.Scene([swarm.Box((0.5, 0.5, 0.5), motion=spin)])
-    result = run(box, swarm.fill(box, 20, speed=0.2, seed=4), 20.0)
+    result = run(box, swarm.fill(box, 8, speed=0.2, seed=4), 20.0)
     seen = result.observables
     assert seen["total_energy"][-1] > 4.0 * seen["total_energy"][0]
     assert imbalance(result) <= 1e-14
@@ -308,10 +309,11 @@ def test_sliding_in_a_bowl_in_uniform_motion(friction):
     places = 0.5 * (1.0 - 1e-15) * np.array([np.sin(angle), 0.0 * angle, -np.cos(angle)])
     speeds = np.array([0.0 * angle, 0.3 + 0.0 * angle, 0.0 * angle])
     shift = np.array(VELOCITY)[:, None]
-    here = run(rest, swarm.Particles(places, speeds, [1.0, 1.0]), 2.0)
-    there = run(moving, swarm.Particles(places, speeds + shift, [1.0, 1.0]), 2.0)
+    until = 0.8
+    here = run(rest, swarm.Particles(places, speeds, [1.0, 1.0]), until)
+    there = run(moving, swarm.Particles(places, speeds + shift, [1.0, 1.0]), until)
     assert here.observables["sliding"][-1] == there.observables["sliding"][-1] == 2
-    assert np.abs(there.particles.position - 2.0 * shift - here.particles.position).max() <= 1e-8
+    assert np.abs(there.particles.position - until * shift - here.particles.position).max() <= 1e-8
     assert imbalance(there) <= 1e-14
     lost = here.observables["dissipated_energy"][-1]
     assert there.observables["dissipated_energy"][-1] == pytest.approx(lost, abs=1e-7)
@@ -330,7 +332,7 @@ def test_sliding_in_a_bowl_that_swings(friction):
         drag = friction * press * np.sign(turn)
         return [turn, -(down * math.sin(angle) + a[0] * math.cos(angle) + drag) / radius]
 
-    until = 0.25 if friction else 1.0
+    until = 0.25 if friction else 0.5
     angle, turn = 0.6, 0.5
     end = solve_ivp(course, (0.0, until), [angle, turn], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     swing = swarm.Oscillation(tuple(amplitude), frequency, phase)
@@ -398,7 +400,7 @@ def test_a_drum_lifts_a_grain_to_the_angle_of_friction():
     # It rests on the drum, and turns with it.
     assert math.atan2(x, -z) == pytest.approx(0.9 * slips, rel=1e-12)
     assert before.observables["dissipated_energy"][-1] == 0.0
-    after = run(scene, start, 3.0 * slips / rate, frames=30)
+    after = run(scene, start, 1.8 * slips / rate, frames=18)
     x, _y, z = after.particles.position[:, 0]
     assert abs(math.atan2(x, -z) - slips) <= 1.1 * rate * math.sqrt(radius / G)
     assert after.observables["dissipated_energy"][-1] > 0.0
@@ -416,18 +418,19 @@ def test_frames_cut_nothing():
     assert np.abs(one.particles.position - many.particles.position).max() <= 1e-11
 
 
-@pytest.mark.parametrize("motion", ["oscillation", "rotation"])
-def test_threads_and_blocks_change_no_bit(motion):
-    scene = swarm.Scene([CAVITIES["box"](MOTIONS[motion])], gravity=(0.0, 0.0, -1.0))
+def test_threads_and_blocks_change_no_bit():
+    """Where walls swing and turn at once: one kind."""
+    scene = swarm.Scene([CAVITIES["box"](MOTIONS["sum"])], gravity=(0.0, 0.0, -1.0))
     start = swarm.fill(scene, 600, speed=1.0, seed=8)
     results = [
-        swarm.simulate(scene, start, swarm.Impact(), until=2.0, every=1.0, threads=threads, block_size=size)
+        run(scene, start, 2.0, 2, compile="always", threads=threads, block_size=size)
         for threads, size in ((1, None), (2, 256))
     ]
     assert np.array_equal(results[0].particles.position, results[1].particles.position)
     assert np.array_equal(results[0].observables["wall_work"], results[1].observables["wall_work"])
-    plain = run(scene, start, 2.0, frames=2) if motion == "rotation" else results[0]
-    assert np.abs(plain.particles.position - results[0].particles.position).max() <= 1e-9
+    few = swarm.Particles(start.position[:, :12], start.velocity[:, :12], start.mass[:12])
+    plain = run(scene, few, 2.0, frames=2)
+    assert np.abs(plain.particles.position - results[0].particles.position[:, :12]).max() <= 1e-9
 
 
 def test_the_walls_of_a_chain_at_an_instant():

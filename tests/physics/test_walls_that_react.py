@@ -1,5 +1,6 @@
 """Walls that impacts move: counts and trajectories in closed form, energy and momentum, the same bits."""
 
+import functools
 import itertools
 import math
 
@@ -65,6 +66,13 @@ def run(scene, particles, until, frames=1, **options):
     return swarm.simulate(scene, particles, swarm.Impact(), until=until, every=until / frames, **options)
 
 
+@functools.cache
+def gas(name, gravity):
+    """Twenty particles in a scene of the table, for 4 s."""
+    scene = SCENES[name](gravity)
+    return run(scene, swarm.fill(scene, 20, speed=1.0, seed=3), 4.0, frames=4)
+
+
 def imbalance(result):
     """Relative to what the energy is the sum of."""
     seen = result.observables
@@ -78,14 +86,17 @@ def imbalance(result):
 
 def galperin(digits):
     """A ball of 1 kg at rest between a wall and a piston of 100^digits kg that comes."""
-    wall = swarm.Plane((-1.0, 0.0, 0.0), 0.0)
-    heavy = swarm.Plane((1.0, 0.0, 0.0), 1.0, mass=100.0**digits, motion=swarm.Guide((1.0, 0.0, 0.0), speed=-1.0))
+    guide = swarm.Guide((1.0, 0.0, 0.0), speed=-1.0)
+    # Slabs, of which the second face of each is met by nothing: the kind of the light piston below.
+    wall = swarm.Slab((1.0, 0.0, 0.0), 100.0, center=(100.0, 0.0, 0.0))
+    heavy = swarm.Slab((1.0, 0.0, 0.0), 0.5, (1.5, 0.0, 0.0), "outside", mass=100.0**digits, motion=guide)
     return swarm.Scene([wall, heavy]), swarm.Particles([0.5, 0.0, 0.0], [0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(("digits", "impacts"), [(0, 3), (1, 31), (2, 314), (3, 3141), (4, 31415)])
 def test_impacts_count_the_digits_of_pi(digits, impacts):
-    result = run(*galperin(digits), until=20.0)
+    # Impacts by the ten thousand are sooner done by a kernel.
+    result = run(*galperin(digits), until=20.0, compile="never" if digits < 4 else "always")
     assert result.observables["impacts"][-1] == impacts
     assert result.observables["energy_error"].max() <= 1e-14
 
@@ -205,8 +216,7 @@ def test_an_infinite_mass_is_a_given_motion():
 @pytest.mark.parametrize("gravity", [None, DOWN], ids=["straight", "falling"])
 @pytest.mark.parametrize("name", SCENES)
 def test_energy(name, gravity):
-    scene = SCENES[name](gravity)
-    result = run(scene, swarm.fill(scene, 20, speed=1.0, seed=3), 4.0, frames=4)
+    result = gas(name, gravity)
     assert result.observables["impacts"][-1] > 40
     assert imbalance(result) <= 4e-15
     assert result.observables["energy_error"].max() <= 1e-14
@@ -216,17 +226,14 @@ def test_energy(name, gravity):
 
 @pytest.mark.parametrize("name", ["shell", "moving shell", "crate"])
 def test_momentum_of_a_free_shell(name):
-    scene = SCENES[name](None)
-    start = swarm.fill(scene, 20, speed=1.0, seed=3)
-    seen = run(scene, start, 4.0, frames=4).observables
+    seen = gas(name, None).observables
     whole = seen["momentum"] + 5.0 * seen["wall_velocity"][:, 0]
     assert np.abs(whole - whole[0]).max() <= 1e-13 * 20.0
 
 
 def test_angular_momentum_of_a_drum():
     """About its axis: particles and wall together."""
-    scene = SCENES["drum"](None)
-    seen = run(scene, swarm.fill(scene, 20, speed=1.0, seed=3), 4.0, frames=4).observables
+    seen = gas("drum", None).observables
     whole = seen["angular_momentum"][:, 2] + seen["wall_spin"][:, 0, 2]
     assert np.abs(whole - whole[0]).max() <= 1e-12
 
@@ -253,11 +260,11 @@ def test_a_light_piston_takes_its_share():
     scene = swarm.Scene([swarm.Slab((1.0, 0.0, 0.0), 1.0), plate])
     kinetic = []
     result = run(
-        scene, start, 40_000.0, frames=4_000, compile="always",
+        scene, start, 6_000.0, frames=1_200, compile="always",
         progress=lambda frame: kinetic.append(float(frame.observables["wall_energy"][1])),
     )  # fmt: skip
     energy = result.observables["total_energy"][0]
-    blocks = np.array(kinetic[401:]).reshape(40, -1).mean(axis=1)
+    blocks = np.array(kinetic[121:]).reshape(40, -1).mean(axis=1)
     mean, error = blocks.mean(), blocks.std(ddof=1) / math.sqrt(len(blocks))
     assert abs(mean - energy / (count + 1)) <= 3.0 * error
     assert error <= 0.05 * mean
@@ -284,10 +291,10 @@ def states(result):
 @pytest.mark.parametrize("name", ["piston", "ball", "drum"])
 def test_threads_and_tiers_change_no_bit(name):
     scene = SCENES[name](None)
-    start = swarm.fill(scene, 6000, speed=1.0, seed=4)
+    start = swarm.fill(scene, 2000, speed=1.0, seed=4)
     one, two = (run(scene, start, 0.2, 2, compile="always", threads=n) for n in (1, 2))
     assert all(np.array_equal(a, b) for a, b in zip(states(one), states(two), strict=True))
-    few = swarm.fill(scene, 30, speed=1.0, seed=4)
+    few = swarm.fill(scene, 10, speed=1.0, seed=4)
     plain, compiled = (run(scene, few, 1.0, 2, compile=tier) for tier in ("never", "always"))
     assert all(np.array_equal(a, b) for a, b in zip(states(plain), states(compiled), strict=True))
 
