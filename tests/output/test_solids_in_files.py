@@ -86,7 +86,7 @@ def test_vtk_reads_solids_as_points(tmp_path, kind):
 @pytest.mark.parametrize("moving", [False, True])
 def test_solids_that_are_not_there_are_in_no_step(tmp_path, moving):
     """One field leaves when another one comes, and at last there is none."""
-    places = RANDOM.uniform(-0.3, 0.3, (2, N + 7, 3))
+    places = np.random.default_rng(3).uniform(-0.3, 0.3, (2, N + 7, 3))
     first = swarm.Spheres(places[0, :N], 1e-3, present=[(0.0, 0.15)])
     second = swarm.Boxes(places[1], (1e-3, 1e-3, 1e-3), present=[(0.15, 0.35)])
     gate = [swarm.Sphere(0.01, (0.45, 0.45, 0.45), side="outside", motion=swarm.Translation((0.1, 0.0, 0.0)))] * moving
@@ -137,7 +137,7 @@ def test_a_recording_has_no_triangle_of_them_and_its_sheet_shows_them(tmp_path, 
 
 
 def test_of_a_million_some_curves_are_drawn():
-    many = swarm.Spheres(RANDOM.uniform(-1.0, 1.0, (50_000, 3)), 0.001)
+    many = swarm.Spheres(np.random.default_rng(3).uniform(-1.0, 1.0, (50_000, 3)), 0.001)
     (found,) = solids.solids_of(swarm.Scene([many]), 0.0)
     curves = solids.curves(found, 2000)
     assert len(curves) == 3 * 2000

@@ -10,19 +10,17 @@ from scipy.interpolate import make_interp_spline
 from swarm.kernel.vector import Vec, vec
 from swarm.surfaces.data import spline
 
-RANDOM = np.random.default_rng(5)
 
-
-def points_in(surface, n):
+def points_in(surface, n, random):
     """Random points of the grid, (3, n)."""
     low = np.array(surface.origin)[:, None]
     wide = (np.array(surface.values.shape) - 1.0) * surface.spacing
-    return low + wide[:, None] * RANDOM.random((3, n))
+    return low + wide[:, None] * random.random((3, n))
 
 
 def test_it_is_the_spline_of_scipy():
     # Whose default ends are the same, "not a knot".
-    surface, points = bumpy(), points_in(bumpy(), 20)
+    surface, points = bumpy(), points_in(bumpy(), 20, np.random.default_rng(5))
     for point in points.T:
         made = surface.values
         for k, coordinate in enumerate(point):
@@ -53,13 +51,15 @@ def test_few_samples_of_a_cubic_are_that_cubic(least):
 
 
 def test_the_error_is_of_order_four():
-    # Where the distance is smooth: not at the middle
-    points = RANDOM.normal(size=(3, 2000))
-    points *= RANDOM.uniform(0.3, 0.55, 2000) / np.sqrt((points**2).sum(axis=0))
+    # Where the distance is smooth: not at the middle. So many points that the largest error of any of them is that of
+    # space: of another 2000, orders are 3.7 to 4.2. Most are near 0.3, where the error is largest.
+    random, n = np.random.default_rng(5), 20_000
+    points = random.normal(size=(3, n))
+    points *= (0.3 + 0.25 * random.random(n) ** 3) / np.sqrt((points**2).sum(axis=0))
     exact = np.sqrt((points**2).sum(axis=0))
     errors, slopes = [], []
-    for n in (17, 33, 65):
-        surface = ball(n)
+    for samples in (17, 33, 65):
+        surface = ball(samples)
         errors.append(np.abs(surface.phi(points) - (exact - 0.5)).max())
         slopes.append(np.abs(surface.gradient(points) - points / exact).max())
     assert np.log2(errors[1] / errors[2]) > 3.8
@@ -69,7 +69,7 @@ def test_the_error_is_of_order_four():
 def test_derivatives_are_those_of_phi():
     surface, step = bumpy(), 1e-5
     (numbers,) = surface.walls()
-    for point in points_in(surface, 20).T * 0.98:
+    for point in points_in(surface, 20, np.random.default_rng(5)).T * 0.98:
         shifts = step * np.eye(3)
         differences = [(surface.phi(point + one) - surface.phi(point - one)) / (2.0 * step) for one in shifts]
         assert np.allclose(call(numbers.gradient, point), differences, atol=1e-8)
@@ -84,8 +84,9 @@ def test_differences_do_not_cancel(length):
     (numbers,) = surface.walls()
     exactly = spline_of(numbers)
     low, inverse = np.array(numbers.spline.low), np.array(numbers.spline.inverse)
-    for point in points_in(surface, 20).T * 0.5:
-        other = point + length * RANDOM.normal(size=3)
+    random = np.random.default_rng(5)
+    for point in points_in(surface, 20, random).T * 0.5:
+        other = point + length * random.normal(size=3)
         error = abs(float(call(numbers.difference, point, other) - (exactly(other) - exactly(point))))
         crosses = (np.floor((point - low) * inverse) != np.floor((other - low) * inverse)).any()
         assert error <= 4.0 * EPSILON * (1.0 if crosses else 20.0 * np.abs(other - point).max())
