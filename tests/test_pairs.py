@@ -25,13 +25,8 @@ def test_the_list_has_every_cell():
     assert set(pairs.KNOWN) == {str(cell) for cell in cells.CELLS}
 
 
-# Impacts of balls on a wall with a mass lose energy within the contact duration too: swarm/colliding/striking.py.
-DEFECTS = ("balls, heavy wall", "contact duration")
-
-
-def test_no_cell_has_a_third_outcome_but_known_defects():
-    third = [name.split(" / ") for name, word in pairs.KNOWN.items() if word == "third"]
-    assert {(engine, capability) for engine, _wall, capability in third} == {DEFECTS}
+def test_no_cell_has_a_third_outcome():
+    assert [name for name, word in pairs.KNOWN.items() if word == "third"] == []
 
 
 def test_every_row_and_column_is_in_the_quick_ring():

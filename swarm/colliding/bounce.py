@@ -104,7 +104,7 @@ def _turned(box, flock, books, walls, wall, ball):
     twice = flock.kept.at(i, flock.stamp(i), square(v) + fall)
     energy = Energy(twice, select(twice > 0.0, 0.5 / select(twice > 0.0, twice, 1.0), 0.0))
     hit = exact(box.laws, walls, box.pull, wall, r, v, energy)
-    if flock.last is not None and now - flock.last[index(i)] < box.loss.duration:
+    if box.loss is not None and box.loss.spares(flock, i, now):
         hit = exact(box.laws._replace(restitution=None), walls, box.pull, wall, r, v, energy)
     v1 = squared(hit.v, hit.twice_energy - fall)
     turned = Turned(v1, hit.impulse, twice - (hit.twice_energy - hit.work), 0.0, hit.work, 0.0, hit.twice_energy)

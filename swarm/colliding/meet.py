@@ -19,7 +19,11 @@ class Loss(Record):
     """The loss of energy in collisions."""
 
     restitution: float
-    duration: float  # t_c [s]: who met another ball less than this before keeps its energy
+    duration: float  # t_c [s]: a ball that met another ball less than this before loses no energy
+
+    def spares(self, flock, i, now):
+        """Whether a ball loses no energy now, neither to a ball nor to a wall."""
+        return now - flock.last[index(i)] < self.duration
 
 
 class Met(Record):
@@ -68,8 +72,8 @@ def met(box, flock, one, two, now):
     closing, distance2 = dot(b, u), square(b)
     restitution: Any = None
     if box.loss is not None:
-        recent = max(flock.last[index(i)], flock.last[index(j)])
-        restitution = select(now - recent < box.loss.duration, 1.0, box.loss.restitution)
+        spares = box.loss.spares(flock, i, now) | box.loss.spares(flock, j, now)
+        restitution = select(spares, 1.0, box.loss.restitution)
     after, lost = turned(u, b, closing, distance2, restitution)
     if box.growth is not None:
         after = box.growth.turned(u, b, closing, distance2, now)

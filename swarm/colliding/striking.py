@@ -28,6 +28,9 @@ def strike_heavy(box, flock, books, clock, i, now):
     wall = flock.event[index(FLOATS * i + WALL)] - first_number(box)
     r, v = flock.at(box.pull, i, now)
     walls = heavy.grown(box.kinds.radius_of(i))
+    if box.loss is not None:
+        spares = box.loss.spares(flock, i, now)
+        walls = tuple(one._replace(restitution=select(spares, 1.0, one.restitution)) for one in walls)
     twice = flock.kept.at(i, flock.stamp(i), square(v) + 2.0 * potential(box.pull, r))
     blow = strike(walls, wall, heavy.freedoms, Flight(r, v, ZERO, now, 0.0), m)
     # The energy decides the speed: round-off of the impulse has a bias.

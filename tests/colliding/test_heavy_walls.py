@@ -113,6 +113,25 @@ def test_a_ball_and_a_piston_in_line(restitution):
     assert seen["energy_error"] < 1e-14
 
 
+@pytest.mark.parametrize("duration", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize(
+    "wall", [plate(2.0, restitution=0.4), swarm.Sphere(0.02, side="outside", mass=2.0, restitution=0.4)],
+    ids=["piston", "sphere"],
+)  # fmt: skip
+def test_a_ball_loses_nothing_to_a_heavy_wall_so_soon_after_a_collision(wall, duration):
+    # The first ball meets the second at 0.1 s and stops; the second meets the wall 0.2 s later.
+    balls = swarm.Particles([(-0.62, -0.32), (0.0, 0.0), (0.0, 0.0)], [(1.0, 0.0), (0.0, 0.0), (0.0, 0.0)], radius=0.1)
+    scene = swarm.Scene([BOX, wall], pairs=swarm.Pairs(contact_duration=duration))
+    _position, velocity, seen = frames(run_of(scene, balls), [0.35])
+    restitution = 1.0 if duration > 0.2 else 0.4
+    push = (1.0 + restitution) / (1.0 + 1.0 / 2.0)
+    assert velocity[0] == pytest.approx([0.0, 1.0 - push], abs=1e-14)
+    assert seen["wall_velocity"][1, 0] == pytest.approx(push / 2.0, rel=1e-13)
+    lost = 0.5 * (1.0 - restitution**2) / (1.0 + 1.0 / 2.0)
+    assert seen["dissipated_energy"] == pytest.approx(lost, rel=1e-13)
+    assert seen["energy_error"] < 1e-14
+
+
 @pytest.mark.parametrize("wall", [plate(0.5), hanging()], ids=["piston", "pendulum"])
 def test_frames_change_no_flight(wall):
     scene, balls = moving(wall, gravity=DOWN)
