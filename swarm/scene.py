@@ -35,9 +35,9 @@ from .surfaces.walls import Walls
 # Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
 MOST_WALLS = 24
 # Of a field, and of a union of rooms, in a scene in which impacts move a surface.
-BESIDE_MASS = (
-    "surfaces[{i}] must not be {kind} where impacts move a surface, got {got}; give that surface a motion instead of a "
-    f"mass and an inertia, or list the bodies one by one, at most {MOST_WALLS} walls in all"
+BESIDE_MASS = "surfaces[{i}] must not be {kind} where a wall has a mass or an inertia, got {got}"
+INSTEAD_OF_MASS = (
+    f"give that wall a motion instead, or list the solids of a field one by one, at most {MOST_WALLS} walls in all"
 )
 
 
@@ -118,7 +118,8 @@ class Scene(Pieces):
         self._require_few_walls("")
         require_few(self.openings() or ())
         for i in (*self.fields(), *self.unions()) if self.reacts() else ():
-            raise SceneError(BESIDE_MASS.format(i=i, kind=type(surfaces[i]).__name__, got=surfaces[i]))
+            said = BESIDE_MASS.format(i=i, kind=type(surfaces[i]).__name__, got=surfaces[i])
+            raise SceneError(f"{said}; {INSTEAD_OF_MASS}")
         checks.assign(self, gravity=pull if pull is not None and any(pull) else None)
         if plane is not None:
             planes.require_all(plane, surfaces, pull, lengths)

@@ -413,16 +413,16 @@ def test_a_volume_must_be_one():
 def test_methods_and_walls_that_know_none_are_refused():
     start = swarm.fill(SPHERE, 3, speed=1.0, seed=1)
     for method, sentence in (
-        (Penalty(dt=1e-2, penalty=1e4), "of flights by Impact, not of the steps of Penalty; use Impact"),
-        (swarm.Impact(contact_step=1e-3), "of flights, got a contact_step of 0.001"),
+        (Penalty(dt=1e-2, penalty=1e4), r"Penalty, got 1: a counter follows flights, not steps; use Impact\(\)"),
+        (swarm.Impact(contact_step=1e-3), "a contact_step of 0.001, got 1; leave contact_step out"),
     ):
-        with pytest.raises(swarm.SceneError, match=rf"counters must be left out here, they are {sentence}"):
+        with pytest.raises(swarm.SceneError, match=rf"counters must be left out with {sentence}"):
             swarm.simulate(SPHERE, start, method, until=1.0, counters=[swarm.Sphere(0.1)])
     bodies = swarm.place(SPHERE, swarm.dumbbell(length=0.1, mass=1.0), 2, seed=1)
-    with pytest.raises(swarm.SceneError, match=r"counters must be left out here, they are of particles, not of bodies"):
+    with pytest.raises(swarm.SceneError, match=r"counters must be left out with bodies, got 1; use particles"):
         swarm.simulate(SPHERE, bodies, swarm.Impact(dt=1e-2), until=1.0, counters=[swarm.Sphere(0.1)])
     heavy = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.1, side="outside", mass=1.0)])
-    with pytest.raises(swarm.SceneError, match=r"they are of walls that impacts do not move"):
+    with pytest.raises(swarm.SceneError, match=r"counters must be left out where a wall has a mass"):
         swarm.simulate(heavy, swarm.fill(heavy, 2, speed=1.0, seed=1), swarm.Impact(), until=1.0, counters=SHAPES[:1])
     fast = one([0.5, 0.4, 0.3], [1e9, 0.0, 0.0])
     with pytest.raises(

@@ -1,5 +1,6 @@
 """What each engine supports is declared once: engines are told apart, and each sentence is complete."""
 
+import re
 import string
 from pathlib import Path
 
@@ -40,16 +41,53 @@ def test_a_run_has_one_engine(scene, particles, method, engine):
     assert knows.engine_of(asked(scene, particles, method)) == engine
 
 
+REFUSALS = [
+    (capability.name, engines, one) for capability in knows.CAPABILITIES for engines, one in capability.refused.items()
+]
+
+
 def test_each_sentence_names_only_fields_that_runs_have():
-    """And says at its end what to use, or what came."""
     fields = {"i", "k", "got", "count", "name", "value", "cut", "kind", "method", "whole", "step"}
-    for capability in knows.CAPABILITIES:
-        for engines, text in capability.refused.items():
-            named = {name for _text, name, _spec, _how in string.Formatter().parse(text) if name}
-            assert named <= fields, text
-            assert set(engines) <= {*knows.ENGINES, knows.OTHER_POINTS, knows.OTHER_BALLS, knows.OTHER_BODIES}
-            assert any(part in text for part in ("; ", "got", ": ")), text
-            assert not text.endswith("."), text
+    for _capability, engines, one in REFUSALS:
+        named = {name for _text, name, _spec, _how in string.Formatter().parse(one.sentence()) if name}
+        assert named <= fields, one
+        assert set(engines) <= {*knows.ENGINES, knows.OTHER_POINTS, knows.OTHER_BALLS, knows.OTHER_BODIES}
+
+
+def test_each_sentence_says_what_is_not_supported_what_came_and_what_to_use_instead():
+    """What came is told before the reason; the remedy is an instruction, and the sentence is one line."""
+    verbs = ("use", "give", "leave", "make", "move", "run", "heat")
+    for _capability, _engines, one in REFUSALS:
+        assert re.fullmatch(r"[^;]+ (must|need) [^;]+, got [^;]+", one.said), one.said
+        assert one.remedy.split()[0] in verbs, one.remedy
+        assert not re.search(r"[;.\n]$|\bgot\b", one.remedy), one.remedy
+        assert one.sentence() == f"{one.said}; {one.remedy}"
+
+
+METHODS = {
+    "Impact": (knows.POINTS, knows.BALLS, knows.BODIES),
+    "Penalty": (knows.SOFT, knows.GRAINS, knows.SOFT_BODIES),
+}
+
+
+def offered(engine, remedy):
+    """The engines that a remedy names."""
+    kind = ("points", "balls", "bodies").index(engine.split()[0])
+    if re.search("use particles(?! with a)|without a radius|radius out", remedy):
+        kind = 0
+    elif re.search("give the particles a radius|particles with a radius", remedy):
+        kind = 1
+    named = [METHODS[name][kind] for name in METHODS if re.search(rf"\b{name}\b", remedy)]
+    if not named and re.search("instead of a mass|contact_step out|use particles", remedy):
+        named = [METHODS["Impact"][kind]]
+    return [one for one in named if one != engine]
+
+
+def test_what_a_remedy_names_supports_the_capability():
+    for capability, engines, one in REFUSALS:
+        for engine in engines:
+            others = offered(engine, one.remedy)
+            assert not others or None in [knows.sentence(other, capability) for other in others], (engine, one)
 
 
 def test_an_engine_has_one_sentence_for_a_capability():
@@ -67,10 +105,12 @@ def test_the_first_sentence_is_raised_and_what_is_supported_is_not():
     warm = swarm.Scene([swarm.Sphere(0.5, temperature=300.0)])
     knows.require_known(asked(warm, POINT, IMPACT))
     with pytest.raises(
-        swarm.SceneError, match=r"^surfaces\[0\].temperature must be None with Penalty, .* got 300; use"
+        swarm.SceneError, match=r"^surfaces\[0\].temperature must be None with Penalty, got 300; use Impact$"
     ):
         knows.require_known(asked(warm, POINT, PENALTY))
-    with pytest.raises(swarm.SceneError, match=r"^surfaces must have no temperature .* with Penalty"):
+    with pytest.raises(
+        swarm.SceneError, match=r"^surfaces\[0\].temperature .* with particles that have a radius and Penalty"
+    ):
         knows.require_known(asked(warm, BALL, PENALTY))
 
 

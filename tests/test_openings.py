@@ -493,7 +493,9 @@ def test_bad_openings(message):
 @pytest.mark.parametrize("name", ["Penalty", "AugmentedLagrangian", "Verlet"])
 def test_methods_that_know_no_openings(name):
     scene = swarm.Scene([swarm.Sphere(0.5, openings=[HOLE])])
-    with pytest.raises(swarm.SceneError, match=rf"surfaces\[0\].openings must be \(\) with {name}"):
+    with pytest.raises(
+        swarm.SceneError, match=rf"surfaces\[0\].openings must be left out with {name}, got 1; use Impact"
+    ):
         run(scene, swarm.fill(scene, 2, speed=1.0, seed=1), method=getattr(swarm, name)(dt=0.01, penalty=1e4))
 
 

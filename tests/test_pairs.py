@@ -51,7 +51,7 @@ BY_ITSELF = (
     r"surfaces\[\d\]( \(\w+\))? must (stand upright on the plane|be bounded along) .*",
     r"surfaces\[\d\] must be one that particles with a radius may meet, .*",
 )  # fmt: skip
-DECLARED = [pattern(text) for one in knows.CAPABILITIES for text in one.refused.values()]
+DECLARED = [pattern(text.sentence()) for one in knows.CAPABILITIES for text in one.refused.values()]
 
 
 def is_declared(sentence):

@@ -1,8 +1,8 @@
-"""What each engine supports, and the sentence that says what to use instead of what it does not.
+"""What each engine supports, and what to use instead of what it does not support.
 
 A run has one engine, by its particles, its method and whether impacts move a wall. A capability is something that a run
-may ask for: a law of a wall, a source, a period. `CAPABILITIES` has the sentence for each pair that is not
-supported; every other pair is. `require_known` raises the first sentence that applies, before anything is compiled.
+may ask for: a law of a wall, a source, a period. `CAPABILITIES` has a `Refusal` for each pair that is not supported;
+every other pair is. `require_known` raises the first one that applies, before anything is compiled.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,10 +14,11 @@ from ..methods import AugmentedLagrangian, Impact, Penalty
 from ..methods.base import Method
 from ..methods.fixed_step import SoftWalls
 from ..particles import Particles
-from ..scene import BESIDE_MASS, MOST_WALLS, Scene
+from ..scene import BESIDE_MASS, INSTEAD_OF_MASS, MOST_WALLS, Scene
 from ..surfaces.drive import drive_of
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many
+from ..surfaces.images import MASS_AND_PERIOD, WITHOUT_PERIOD
 from ..surfaces.laws.sticky import Sticky
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.surface import Surface
@@ -280,8 +281,9 @@ def _no_trajectory(asked: Asked) -> Found:
 
 
 def _recorded(asked: Asked) -> Found:
-    if asked.options.recording is not None or asked.options.live:
-        yield {}
+    options = asked.options
+    if options.recording is not None or options.live:
+        yield {"got": f"live={options.live!r:.50}" if options.live else f"recording={str(options.recording)!r:.200}"}
 
 
 def _measured_in_part(asked: Asked) -> Found:
@@ -292,47 +294,58 @@ def _measured_in_part(asked: Asked) -> Found:
 
 # --- The table -------------------------------------------------------------------------------------------
 
+
+class Refusal(NamedTuple):
+    """What an engine does not support, with what was given, and what to use instead."""
+
+    said: str
+    remedy: str
+
+    def sentence(self) -> str:
+        """The sentence of the error, with its fields in braces."""
+        return f"{self.said}; {self.remedy}"
+
+
 _TO_MOTION = "give that wall a motion instead of a mass"
-_LOSES = (
-    "contact_step must be 0 where a surface has a restitution below 1, friction, a temperature or a motion, got "
-    "{step:g}: the contact step conserves the energy"
+_TO_POINTS = "use particles without a radius"
+_TO_EXACT = "use Impact() with contact_step = 0"
+_NO_STEP = "leave contact_step out"
+_WITH_PENALTY = "particles that have a radius and Penalty"
+_NO_METHOD = Refusal(
+    "bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {whole}",
+    "use Impact(dt=...), with dt in seconds",
 )
-_CHANGES = (
-    "contact_step must be 0 where a wall is present, or an opening open, for some times only, got {step:g}: a contact "
-    "step would last while they change"
+_LOSES = Refusal(
+    "contact_step must be 0 where a surface has a restitution below 1, friction, a temperature, laws, a motion or a "
+    "mass, got {step:g}: a contact step conserves the energy",
+    _NO_STEP,
 )
-_SENDS = (
-    "surfaces must have no temperature and no laws of their own with Penalty, got a scene with them; use restitution "
-    "and friction, or Impact"
+_CHANGES = Refusal(
+    "contact_step must be 0 where a wall is present, or an opening open, for some times only, got {step:g}", _NO_STEP
 )
-_IS_ABSENT = (
-    "surfaces must have no openings and always be present with particles that have a radius and Penalty, got a scene "
-    "with them; build the wall of parts that leave the opening, such as solid boxes"
+_CLOSES = Refusal(
+    f"surfaces[{{i}}].openings must be left out with {_WITH_PENALTY}, got {{count}}",
+    "use Impact, or build the wall of parts that leave the opening free, such as solid boxes",
 )
-_OF_POINTS = (
-    "must be left out where particles have a radius, got {got!r:.100}; it is of points, which do not meet one another"
-)
-_SOFT_WALLS = (*_FIXED_STEPS, SOFT_BODIES, PAPER_BODIES)
 
 
-def _elastic(name: str, without: str) -> str:
-    return (
-        f"surfaces[{{i}}].{name} must be {without} with {{method}}, which knows elastic walls only, got {{got}}; use "
-        "Impact"
-    )
+def _with_method(name: str, without: str, got: str = "got") -> Refusal:
+    """Of a law of a wall that methods of fixed steps do not have."""
+    return Refusal(f"surfaces[{{i}}].{name} must be {without} with {{method}}, got {{{got}}}", "use Impact")
 
 
-def _of_one_room(what: str) -> str:
-    return (
-        f"surfaces[{{i}}] must not be a {{kind}} of several rooms with {what}, got {{got!r:.200}}; use Impact with "
-        "contact_step = 0, for particles"
-    )
+def _with_bodies(name: str, without: str, remedy: str = "use particles") -> Refusal:
+    return Refusal(f"surfaces[{{i}}].{name} must be {without} with bodies, got {{got}}", remedy)
 
 
-def _alone(what: str) -> str:
-    return (
-        f"surfaces[{{i}}] must not be {{kind}} with {what}, got {{got}}; use Impact with contact_step = 0, or list its "
-        f"bodies one by one, at most {MOST_WALLS} walls"
+def _of_one_room(what: str, remedy: str) -> Refusal:
+    return Refusal(f"surfaces[{{i}}] must not be a {{kind}} of several rooms with {what}, got {{got!r:.200}}", remedy)
+
+
+def _listed(what: str, remedy: str) -> Refusal:
+    return Refusal(
+        f"surfaces[{{i}}] must not be {{kind}} with {what}, got {{got}}",
+        f"{remedy}, or list its solids one by one, at most {MOST_WALLS} walls in all",
     )
 
 
@@ -342,273 +355,369 @@ class Capability(NamedTuple):
     Attributes:
         name: what it is.
         found: where a run asks for it.
-        refused: the sentence for each engine that does not support it. Its fields are those of `found`, the `kind` of
-            what was found, the name of the `method`, the `whole` method and its contact `step`.
+        refused: what is said for each engine that does not support it. The fields in braces are those of `found`, the
+            `kind` of what was found, the name of the `method`, the `whole` method and its contact `step`.
         is_argument: whether it is an argument of a method, which other methods do not have.
         within: the name of the capability that this is a kind of, or "".
     """
 
     name: str
     found: Callable[[Asked], Found]
-    refused: dict[tuple[str, ...], str]
+    refused: dict[tuple[str, ...], Refusal]
     is_argument: bool = False
     within: str = ""
 
     def sentence(self, engine: str) -> str | None:
         """The sentence for an engine, with its fields in braces; None if the engine supports this."""
-        return next((text for engines, text in self.refused.items() if engine in engines), None)
+        return next((one.sentence() for engines, one in self.refused.items() if engine in engines), None)
 
 
 # In the order in which they are looked for.
 CAPABILITIES = (
     Capability("method", _any, {
-        (OTHER_BODIES,): "bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {whole}; give "
-        "Impact(dt=...) [s]",
-        (OTHER_BALLS,): "radius of the particles must be None with {method}, got radii; Impact and Penalty know "
-        "particles that meet",
+        (OTHER_BODIES,): _NO_METHOD,
+        (OTHER_BALLS,): Refusal(
+            "radius of the particles must be None with {method}, got radii", "use Impact or Penalty"
+        ),
     }, True),
-    Capability("no step", _no_step, {
-        (BODIES,): "bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {whole}; give "
-        "Impact(dt=...) [s]",
-    }, True),
+    Capability("no step", _no_step, {(BODIES,): _NO_METHOD}, True),
     Capability("source", _option("sources"), {
-        _EVERY_BODY: "sources must be left out here, particles come during a run of particles, not of bodies; use "
-        "particles",
-        (CHORDS, *_FIXED_STEPS, OTHER_POINTS, GRAINS): "sources must be left out here, particles come during a run "
-        "with Impact() with contact_step = 0, whose flights may begin at any time, got {whole!r:.200}",
-        (MASSIVE, HEAVY): "sources must be left out here, particles come during a run where impacts move no wall, got "
-        "a scene with a mass or an inertia; give that wall a motion",
-        (BALLS,): f"sources {_OF_POINTS}",
+        _EVERY_BODY: Refusal("sources must be left out with bodies, got {count}", "use particles"),
+        _EVERY_BALL: Refusal(
+            "sources must be left out where particles have a radius, got {count}", f"{_TO_POINTS}, and Impact()"
+        ),
+        (CHORDS, *_FIXED_STEPS, OTHER_POINTS): Refusal(
+            "sources must be left out with {whole!r:.200}, got {count}: particles are born at any time, not at the end "
+            "of a step", _TO_EXACT,
+        ),
+        (MASSIVE,): Refusal("sources must be left out where a wall has a mass, got {count}", _TO_MOTION),
     }),
     Capability("log of impacts", _option("impacts"), {
-        _EVERY_BODY: "impacts must be None here, a log of impacts is of particles, not of bodies, whose points meet "
-        "walls together; got {got}",
-        (*_FIXED_STEPS, GRAINS, OTHER_POINTS): "impacts must be None here, a log of impacts is of Impact, whose "
-        "impacts have an instant, not of {method}; use Impact; got {got}",
-        (MASSIVE, HEAVY): "impacts must be None here, a log of impacts is of walls that impacts do not move; give them "
-        "a motion instead of a mass; got {got}",
+        _EVERY_BODY: Refusal(
+            "impacts must be None with bodies, got {got}: several points of a body meet a wall at once", "use particles"
+        ),
+        (*_FIXED_STEPS, GRAINS, OTHER_POINTS): Refusal(
+            "impacts must be None with {method}, got {got}: its contacts last for a time", "use Impact"
+        ),
+        (MASSIVE, HEAVY): Refusal("impacts must be None where a wall has a mass, got {got}", _TO_MOTION),
     }),
     Capability("counter", _option("counters"), {
-        _EVERY_BODY: "counters must be left out here, they are of particles, not of bodies, whose points are tied to "
-        "one another; got {count}",
-        _EVERY_BALL: f"counters {_OF_POINTS}",
-        (*_FIXED_STEPS, OTHER_POINTS): "counters must be left out here, they are of flights by Impact, not of the "
-        "steps of {method}; use Impact; got {count}",
-        (CHORDS,): "counters must be left out here, they are of flights, got a contact_step of {step:g}; use Impact(); "
-        "got {count}",
-        (MASSIVE,): "counters must be left out here, they are of walls that impacts do not move; give them a motion "
-        "instead of a mass; got {count}",
+        _EVERY_BODY: Refusal("counters must be left out with bodies, got {count}", "use particles"),
+        _EVERY_BALL: Refusal(
+            "counters must be left out where particles have a radius, got {count}", f"{_TO_POINTS}, and Impact()"
+        ),
+        (*_FIXED_STEPS, OTHER_POINTS): Refusal(
+            "counters must be left out with {method}, got {count}: a counter follows flights, not steps", "use Impact()"
+        ),
+        (CHORDS,): Refusal("counters must be left out with a contact_step of {step:g}, got {count}", _NO_STEP),
+        (MASSIVE,): Refusal("counters must be left out where a wall has a mass, got {count}", _TO_MOTION),
     }),
     Capability("union", _rooms, {
-        _EVERY_BODY: _of_one_room("bodies"),
-        (GRAINS,): _of_one_room("Penalty"),
-        (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}"),
-        (CHORDS,): _of_one_room("a contact_step"),
-        (MASSIVE, HEAVY): BESIDE_MASS,
+        _EVERY_BODY: _of_one_room("bodies", "use particles and Impact()"),
+        (GRAINS,): _of_one_room("Penalty", f"{_TO_POINTS}, and Impact()"),
+        (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
+        (CHORDS,): _of_one_room("a contact_step", _NO_STEP),
+        (MASSIVE, HEAVY): Refusal(BESIDE_MASS, INSTEAD_OF_MASS),
     }),
     Capability("field", _fields, {
-        (SOFT_BODIES, PAPER_BODIES): _alone("bodies and soft walls"),
-        (*_FIXED_STEPS, OTHER_POINTS): _alone("{method}"),
-        (CHORDS,): _alone("a contact_step"),
-        (MASSIVE, HEAVY): BESIDE_MASS,
+        (SOFT_BODIES, PAPER_BODIES): _listed("bodies and soft walls", "use Impact(dt=...)"),
+        (*_FIXED_STEPS, OTHER_POINTS): _listed("{method}", _TO_EXACT),
+        (CHORDS,): _listed("a contact_step", _NO_STEP),
+        (MASSIVE, HEAVY): Refusal(BESIDE_MASS, INSTEAD_OF_MASS),
     }),
     Capability("dt of Impact", _argument("dt", None), {
-        (*_RIGID_POINTS, *_RIGID_BALLS): "dt of Impact is the step of bodies, got {got} for particles, which need "
-        "none; leave it out",
+        (*_RIGID_POINTS, *_RIGID_BALLS): Refusal(
+            "dt of Impact must be left out with particles, got {got}: it is the step of bodies", "leave it out"
+        ),
     }, True),
     Capability("contact_step", _argument("contact_step", 0.0), {
-        (BODIES,): "contact_step must be 0 with bodies, whose blows are exact, got {got}",
-        _RIGID_BALLS: "contact_step must be 0 where particles have a radius, got {got}; leave it out",
+        (BODIES,): Refusal("contact_step must be 0 with bodies, got {got}: their impacts are exact", "leave it out"),
+        _RIGID_BALLS: Refusal("contact_step must be 0 where particles have a radius, got {got}", "leave it out"),
     }, True),
     Capability("gradient", _argument("gradient", "composite"), {
-        (SOFT_BODIES, PAPER_BODIES): 'gradient of {method} must be "composite" with bodies, got "{got}"',
-        (GRAINS,): 'gradient must be "composite" where particles have a radius, got "{got}"; leave it out',
+        (SOFT_BODIES, PAPER_BODIES): Refusal(
+            'gradient of {method} must be "composite" with bodies, got "{got}"', "leave it out"
+        ),
+        (GRAINS,): Refusal('gradient must be "composite" where particles have a radius, got "{got}"', "leave it out"),
     }, True),
     Capability("acceleration", _argument("acceleration", "none"), {
-        (PAPER_BODIES,): 'acceleration of {method} must be "none" with bodies, got "{got}"',
+        (PAPER_BODIES,): Refusal('acceleration of {method} must be "none" with bodies, got "{got}"', "leave it out"),
     }, True),
     Capability("contact_start", _argument("contact_start", "impact"), {
-        (PAPER_BODIES,): 'contact_start of {method} must be "impact" with bodies, got "{got}"',
+        (PAPER_BODIES,): Refusal('contact_start of {method} must be "impact" with bodies, got "{got}"', "leave it out"),
     }, True),
     Capability("exponent of multipliers", _argument("exponent", 1.0), {
-        (PAPER_BODIES,): "exponent of AugmentedLagrangian must be 1 with bodies, got {got}: its loop has no limit for "
-        "others; such walls are for Penalty",
+        (PAPER_BODIES,): Refusal(
+            "exponent of AugmentedLagrangian must be 1 with bodies, got {got}: its loop does not converge for another "
+            "one", "leave it out, or use Penalty",
+        ),
     }, True),
     Capability("fixed steps of multipliers", _argument("adaptive", True), {
-        (PAPER_BODIES,): "adaptive of AugmentedLagrangian must be True with bodies, got {got}: a loop that does not "
-        "start from the wall has no limit, and its multiplier would tear the links",
+        (PAPER_BODIES,): Refusal(
+            "adaptive of AugmentedLagrangian must be True with bodies, got {got}: a loop that does not start from the "
+            "wall does not converge", "give adaptive=True, or use Penalty",
+        ),
     }, True),
     Capability("impacts of what did not converge", _argument("on_unconverged", "raise", "count"), {
-        (PAPER_BODIES,): 'on_unconverged must be "raise" or "count" with bodies, got "{got}"; use Impact(dt=...)',
+        (PAPER_BODIES,): Refusal(
+            'on_unconverged must be "raise" or "count" with bodies, got "{got}"', "leave it out, or use Impact(dt=...)"
+        ),
     }, True),
     Capability("period", _period, {
-        (CHORDS, *_FIXED_STEPS, OTHER_POINTS): "period must be None with {whole}, whose steps do not end where a "
-        "particle leaves the cell, got {got}; use Impact() with contact_step = 0",
-        _EVERY_BODY: "period must be None with bodies, whose points would be torn apart by the faces, got {got}; use "
-        "particles, or a vessel without a period",
-        (MASSIVE, HEAVY): "surfaces[{i}].mass and inertia must be None where the scene has a period, got {got}: "
-        "impacts would move its images",
+        (CHORDS, *_FIXED_STEPS, OTHER_POINTS): Refusal(
+            "period must be None with {whole}, got {got}: its steps do not end where a particle leaves the cell",
+            _TO_EXACT,
+        ),
+        _EVERY_BODY: Refusal(
+            "period must be None with bodies, got {got}: a body may lie across a face of the cell",
+            "use particles, or a vessel without a period",
+        ),
+        (MASSIVE, HEAVY): Refusal(f"surfaces[{{i}}].{MASS_AND_PERIOD}", WITHOUT_PERIOD),
     }),
     Capability("no wall", _no_walls, {
-        _ALONE: "surfaces must hold at least one surface for particles without a radius, which meet nothing else, got "
-        "none; give the walls, or give the particles a radius, by which they meet one another in free space",
+        _ALONE: Refusal(
+            "surfaces must hold at least one surface for particles without a radius, got none: such particles do not "
+            "meet one another", "give walls, or give the particles a radius",
+        ),
     }, True),
     Capability("law of pairs", _of_scene("pairs"), {
-        _ALONE: "pairs must be None where particles have no radius, points do not meet one another, got {got}; give "
-        "the particles a radius, or leave pairs out",
-        _EVERY_BODY: "pairs must be None with bodies, which do not meet one another, got {got}",
+        _ALONE: Refusal(
+            "pairs must be None where particles have no radius, got {got}: points do not meet one another",
+            "give the particles a radius, or leave pairs out",
+        ),
+        _EVERY_BODY: Refusal(
+            "pairs must be None with bodies, got {got}: bodies do not meet one another",
+            "leave it out, or use particles with a radius",
+        ),
     }),
     Capability("contact duration", _duration, {
-        (GRAINS,): "pairs.contact_duration must be None with Penalty, whose contacts last as long as they do, got "
-        "{got} s; leave it out, or use Impact",
+        (GRAINS,): Refusal(
+            "pairs.contact_duration must be None with Penalty, got {got} s: its contacts last as long as particles "
+            "overlap", "leave it out, or use Impact",
+        ),
     }, within="law of pairs"),
     Capability("friction of pairs", _rough_pairs, {
-        _RIGID_BALLS: "pairs.friction must be 0 with Impact, which has none between particles, got {got}; use Penalty, "
-        "or leave it out",
+        _RIGID_BALLS: Refusal(
+            "pairs.friction must be 0 with Impact, got {got}: its collisions are without friction",
+            "use Penalty, or leave it out",
+        ),
     }, within="law of pairs"),
     Capability("spin", _spins, {
-        _RIGID_BALLS: "spin must be None with Impact, whose impacts turn no ball, got spins; use Penalty, or set spin "
-        "to None",
-        _ALONE: "spin must be None without a radius, a point does not turn; give a radius too",
+        _RIGID_BALLS: Refusal(
+            "spin must be None with Impact, got spins: its impacts turn no ball", "use Penalty, or leave spin out"
+        ),
+        _ALONE: Refusal(
+            "spin must be None without a radius, got spins: a point does not turn",
+            "give the particles a radius, and use Penalty",
+        ),
     }),
     Capability("plane", _of_scene("plane"), {
-        _EVERY_BODY: 'plane must be None with bodies, which turn in space, got "{got}"; use particles, or leave it out',
+        _EVERY_BODY: Refusal(
+            'plane must be None with bodies, got "{got}": bodies turn in space', "use particles, or leave it out"
+        ),
     }),
     Capability("restitution", _of_walls("restitution", 1.0), {
-        _SOFT_WALLS: _elastic("restitution", "1"),
+        _FIXED_STEPS: _with_method("restitution", "1"),
+        (SOFT_BODIES, PAPER_BODIES): _with_method("restitution", "1"),
         (CHORDS,): _LOSES,
     }),
     Capability("restitution under gravity", _losses_that_fall, {
-        (MASSIVE, HEAVY): "surfaces[{i}].restitution must be 1 under gravity where a wall has a mass, got {got}: "
-        "particles would come to rest on walls that move with them; leave gravity out, or give the wall a motion "
-        "instead of a mass",
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].restitution must be 1 under gravity where a wall has a mass, got {got}: particles would "
+            "come to rest on a wall that moves with them",
+            "leave gravity out, or give the wall a motion instead of a mass",
+        ),
     }, within="restitution"),
     Capability("friction", _of_walls("friction", 0.0), {
-        _SOFT_WALLS: _elastic("friction", "0"),
+        _FIXED_STEPS: _with_method("friction", "0"),
+        (SOFT_BODIES, PAPER_BODIES): _with_method("friction", "0"),
         (CHORDS,): _LOSES,
     }),
     Capability("friction of a wall with a mass", _rubs_that_move, {
-        (MASSIVE, HEAVY): "surfaces[{i}].friction must be 0 of a wall with a mass, which is pushed along its normals, "
-        "got {got}",
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].friction must be 0 where that wall has a mass, got {got}: impacts push it along its normal "
+            "alone", f"leave it out, or {_TO_MOTION}",
+        ),
     }, within="friction"),
     Capability("temperature", _of_walls("temperature", None), {
-        (BODIES,): "surfaces[{i}].temperature must be None with bodies, got {got}",
-        _SOFT_WALLS: _elastic("temperature", "None"),
+        _EVERY_BODY: _with_bodies("temperature", "None"),
+        _FIXED_STEPS: _with_method("temperature", "None"),
         (CHORDS,): _LOSES,
-        (GRAINS,): _SENDS,
-        (MASSIVE, HEAVY): "surfaces[{i}].temperature must be None where a wall has a mass, got {got}; heat the "
-        "particles at the start, or give the wall a motion instead of a mass",
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}].temperature must be None with {_WITH_PENALTY}, got {{got}}", "use Impact"
+        ),
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].temperature must be None where a wall has a mass, got {got}",
+            "heat the particles at the start, or give the wall a motion instead of a mass",
+        ),
     }),
     Capability("law of a wall", _of_walls("laws", ()), {
-        (BODIES,): "surfaces[{i}].laws must be left out with bodies, got {got}",
-        _SOFT_WALLS: _elastic("laws", "()"),
+        _EVERY_BODY: _with_bodies("laws", "left out"),
+        _FIXED_STEPS: _with_method("laws", "left out"),
         (CHORDS,): _LOSES,
-        (GRAINS,): _SENDS,
-        (MASSIVE, HEAVY): f"surfaces[{{i}}].laws must be left out where a wall has a mass, got {{got}}; {_TO_MOTION}",
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}].laws must be left out with {_WITH_PENALTY}, got {{got}}",
+            "use restitution and friction, or Impact",
+        ),
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].laws must be left out where a wall has a mass, got {got}",
+            "give the wall a motion instead of a mass",
+        ),
     }),
     Capability("laws of groups of a mesh", _groups, {
-        (GRAINS,): "surfaces[{i}].groups must be None with particles that have a radius and Penalty, got laws of "
-        "{got}; give all of the mesh one law, make two of it, or use Impact",
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}].groups must be None with {_WITH_PENALTY}, got laws of {{got}}",
+            "give the whole mesh one law, or use Impact",
+        ),
     }, within="law of a wall"),
     Capability("wait beside walls that move", _waits_beside_motions, {
-        (*_RIGID_POINTS, *_RIGID_BALLS): "surfaces[{i}].laws[{k}] must let nobody wait where walls move, which would "
-        "carry who waits along, got {got}; leave it out, or the motions",
+        (*_RIGID_POINTS, *_RIGID_BALLS): Refusal(
+            "surfaces[{i}].laws[{k}] must not let particles wait where a wall moves, got {got}: a particle that waits "
+            "would have to move with its wall", "leave that law out, or the motions",
+        ),
     }, within="law of a wall"),
     Capability("wait", _sticky, {
-        _RIGID_BALLS: "surfaces[{i}].laws[{k}] must let particles that have a radius leave at once with Impact, got "
-        "{got!r:.200}; leave it or the radius out",
+        _RIGID_BALLS: Refusal(
+            "surfaces[{i}].laws[{k}] must not let particles with a radius wait, got {got!r:.200}",
+            "use a law without a wait, such as Lambert, or leave the radius out",
+        ),
     }, within="law of a wall"),
     Capability("mass of a wall", _masses, {
-        _EVERY_BODY: "surfaces[{i}] must have no mass and no inertia with bodies, got {got}; make it a body, whose "
-        "cavities= are walls that it carries",
-        _FIXED_STEPS: "surfaces[{i}].{name} must be None with {method}, which knows elastic walls only, got {value}; "
-        "use Impact",
+        _EVERY_BODY: Refusal(
+            "surfaces[{i}] must have no mass and no inertia with bodies, got {got}",
+            "make it a body, whose cavities= are walls that move with it",
+        ),
+        _FIXED_STEPS: _with_method("{name}", "None", "value"),
         (CHORDS,): _LOSES,
-        (GRAINS,): "surfaces must have no mass and no inertia with particles that have a radius and Penalty, got a "
-        "scene in which impacts move one; give it a motion instead",
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}].{{name}} must be None with {_WITH_PENALTY}, got {{value}}",
+            f"{_TO_MOTION}, or use Impact",
+        ),
     }),
     Capability("opening", _of_walls("openings", ()), {
-        (BODIES,): "surfaces[{i}].openings must be left out with bodies, which escape through none, got {count}; use "
-        "particles, or a box with an open face",
-        _SOFT_WALLS: _elastic("openings", "()"),
-        (GRAINS,): _IS_ABSENT,
-        (MASSIVE, HEAVY): "surfaces[{i}].openings must be left out where a wall has a mass, got {count}; "
-        + _TO_MOTION,
+        _EVERY_BODY: Refusal(
+            "surfaces[{i}].openings must be left out with bodies, got {count}",
+            "use particles, or a box with an open face",
+        ),
+        _FIXED_STEPS: _with_method("openings", "left out", "count"),
+        (GRAINS,): _CLOSES,
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].openings must be left out where a wall has a mass, got {count}",
+            "give the wall a motion instead of a mass",
+        ),
     }),
-    Capability("opening for a time", _doors, {(CHORDS,): _CHANGES, (GRAINS,): _IS_ABSENT}, within="opening"),
-    Capability("present", _of_walls("present", None), {
-        (BODIES,): "surfaces[{i}].present must be None with bodies, which a wall that comes would cut, got {got}; use "
-        "particles, or leave it out",
-        _SOFT_WALLS: _elastic("present", "None"),
+    Capability("opening for a time", _doors, {
         (CHORDS,): _CHANGES,
-        (GRAINS,): _IS_ABSENT,
-        (MASSIVE, HEAVY): f"surfaces[{{i}}].present must be None where a wall has a mass, got {{got}}; {_TO_MOTION}",
+    }, within="opening"),
+    Capability("present", _of_walls("present", None), {
+        _EVERY_BODY: _with_bodies("present", "None", "use particles, or leave it out"),
+        _FIXED_STEPS: _with_method("present", "None"),
+        (CHORDS,): _CHANGES,
+        (GRAINS,): Refusal(f"surfaces[{{i}}].present must be None with {_WITH_PENALTY}, got {{got}}", "use Impact"),
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].present must be None where a wall has a mass, got {got}",
+            "give the wall a motion instead of a mass",
+        ),
     }),
     Capability("motion", _of_walls("motion", None), {
-        _EVERY_BODY: "surfaces[{i}].motion must be None with bodies, got {got}; lead a point of the body, by anchors, "
-        "in the frame of the wall",
+        _EVERY_BODY: _with_bodies("motion", "None", "move a point of the body by an anchor, in the frame of the wall"),
         (CHORDS,): _LOSES,
     }),
     Capability("motion at cut steps", _motions_at_impacts, {
-        (PAPER,): "surfaces[{i}].motion must be None with {cut}, whose impacts are with walls at rest, got {got}; use "
-        'fixed steps with on_unconverged="count", Penalty, or Impact',
+        (PAPER,): Refusal(
+            "surfaces[{i}].motion must be None with {cut}, got {got}: its steps are cut at impacts on walls at rest",
+            'use fixed steps with on_unconverged="count", Penalty, or Impact',
+        ),
     }, True),
     Capability("rotation", _rotations, {
-        _FIXED_STEPS: "surfaces[{i}].motion must not turn the surface with {method}, got {got}: in the frame of a wall "
-        "that turns its step has no solution in closed form; use Impact, a Translation, Oscillation or Path, or a "
-        "rotation that leaves the surface as it is",
+        _FIXED_STEPS: Refusal(
+            "surfaces[{i}].motion must not turn the surface with {method}, got {got}: its step has no closed form in "
+            "the frame of a wall that turns",
+            "use Impact, a Translation, Oscillation or Path, or a rotation that leaves the surface as it is",
+        ),
     }, within="motion"),
     Capability("motion beside a field", _fields_that_rest, {
-        (GRAINS,): "surfaces must not move beside a field or a mesh with particles that have a radius and Penalty, got "
-        "surfaces[{i}] ({kind}) in a scene with a motion; use Impact, or build it of single surfaces",
+        (GRAINS,): Refusal(
+            f"surfaces must not move beside a field or a mesh with {_WITH_PENALTY}, got a motion beside "
+            "surfaces[{i}] ({kind})", "use Impact, or build the field or mesh of single surfaces",
+        ),
     }, within="motion"),
     Capability("gravity at cut steps", _gravity_at_impacts, {
-        (PAPER,): "{cut} does not know gravity yet, got gravity={got}; use fixed steps with "
-        'on_unconverged="count", Penalty, or gravity=None',
+        (PAPER,): Refusal(
+            "gravity must be None with {cut}, got {got}",
+            'use fixed steps with on_unconverged="count", Penalty, or Impact',
+        ),
     }, True),
     Capability("mesh or outline", _faces, {
-        _EVERY_BODY: "surfaces[{i}] must not be {kind} with bodies, got {got!r:.200}; use particles, or from_mesh with "
-        "a spacing for a vessel of bodies",
+        _EVERY_BODY: Refusal(
+            "surfaces[{i}] must not be {kind} with bodies, got {got!r:.200}",
+            "use particles, or from_mesh with a spacing",
+        ),
     }),
     Capability("cavity with losses", _lossy_cavities, {
-        (SOFT_BODIES, PAPER_BODIES): "cavities[{k}] must be elastic with {method}, got {got}; use Impact(dt=...)",
+        (SOFT_BODIES, PAPER_BODIES): Refusal(
+            "cavities[{k}] must be elastic with {method}, got {got}", "use Impact(dt=...)"
+        ),
     }),
     Capability("impacts on members", _option("member_impacts"), {
-        (HEAVY,): "member_impacts must be False where particles have a radius and impacts move a surface, got True; "
-        "leave it out, or give that surface a motion instead of a mass",
-        (GRAINS,): f"member_impacts {_OF_POINTS}",
+        (HEAVY,): Refusal(
+            "member_impacts must be False where particles have a radius and a wall has a mass, got True",
+            f"leave it out, or {_TO_MOTION}",
+        ),
+        (GRAINS,): Refusal(
+            f"member_impacts must be False with {_WITH_PENALTY}, got True", "leave it out, or use Impact"
+        ),
     }),
     Capability("impacts on members beside cavities", _members_beside_cavities, {
-        _EVERY_BODY: "member_impacts must be False with bodies that carry cavities, which are no surfaces of the "
-        "scene, got True",
+        _EVERY_BODY: Refusal(
+            "member_impacts must be False with bodies that have cavities, got True: a cavity is no surface of the "
+            "scene", "leave it out",
+        ),
     }),
     Capability("impacts on members in fixed steps", _members_in_fixed_steps, {
-        (PAPER,): 'member_impacts must be False with on_unconverged = "impact" in fixed steps, one of which may have '
-        'impacts on several walls, got True; use adaptive=True, or on_unconverged = "count"',
+        (PAPER,): Refusal(
+            'member_impacts must be False with on_unconverged = "impact" in fixed steps, got True: such a step may '
+            "have impacts on several walls", 'use adaptive=True, or on_unconverged="count"',
+        ),
     }, True),
     Capability("frames of some particles", _part_of_particles, {
-        _EVERY_BODY: 'frames must be "all" or "none" with bodies, so that none is torn apart, got {got}',
+        _EVERY_BODY: Refusal(
+            'frames must be "all" or "none" with bodies, got {got}: a body is written as a whole', 'give frames="all"'
+        ),
     }),
-    Capability("cluster", _option("cluster"), {_EVERY_BALL: f"cluster {_OF_POINTS}"}),
+    Capability("cluster", _option("cluster"), {
+        _EVERY_BALL: Refusal(
+            "cluster must be left out where particles have a radius, got {got!r:.100}: particles that meet one another "
+            "cannot be in different shards", "run without a cluster",
+        ),
+    }),
     Capability("cluster and mass of a wall", _on_cluster(_masses), {
-        (MASSIVE,): "surfaces[{i}] must not react with a cluster: through a wall that has a mass or an inertia every "
-        "particle depends on all others, so that they cannot be shards; give the wall a motion in place of it, or run "
-        "without a cluster",
+        (MASSIVE,): Refusal(
+            "surfaces[{i}] must have no mass and no inertia with a cluster, got {got}: through such a wall each "
+            "particle depends on all others", f"{_TO_MOTION}, or run without a cluster",
+        ),
     }),
     Capability("cluster without a trajectory", _on_cluster(_no_trajectory), {
-        ENGINES: "trajectory must be given with a cluster, whose shards it joins, got none; add trajectory=",
+        ENGINES: Refusal(
+            "trajectory must be given with a cluster, got none: it joins the files of the shards", "give trajectory="
+        ),
     }),
     Capability("cluster and recording", _on_cluster(_recorded), {
-        ENGINES: "recording and live must be left out with a cluster; make the recording from the trajectory "
-        "afterwards: swarm record RUN.h5 -o OUT.rrd",
+        ENGINES: Refusal(
+            "recording and live must be left out with a cluster, got {got}",
+            "make the recording from the trajectory: swarm record RUN.h5 -o OUT.rrd",
+        ),
     }),
     Capability("cluster and log of impacts", _on_cluster(_option("impacts")), {
-        ENGINES: "impacts must be None with a cluster, whose shards keep no common log, got {got}; run without a "
-        "cluster",
+        ENGINES: Refusal(
+            "impacts must be None with a cluster, got {got}: its shards keep no common log", "run without a cluster"
+        ),
     }),
     Capability("cluster and observables of some particles", _on_cluster(_measured_in_part), {
-        ENGINES: "observables need all particles with a cluster, which are read from the files of its shards: frames "
-        'must be "all" and precision "float64", got {got}; or run without a cluster',
+        ENGINES: Refusal(
+            'observables need frames = "all" and precision = "float64" with a cluster, got {got}: they are computed '
+            "from the files of its shards", "leave frames and precision out, or run without a cluster",
+        ),
     }),
 )  # fmt: skip
 
@@ -619,7 +728,7 @@ def sentence(engine: str, capability: str) -> str | None:
     >>> sentence(POINTS, "source") is None
     True
     >>> sentence(BALLS, "spin")
-    'spin must be None with Impact, whose impacts turn no ball, got spins; use Penalty, or set spin to None'
+    'spin must be None with Impact, got spins: its impacts turn no ball; use Penalty, or leave spin out'
     """
     one = next(one for one in CAPABILITIES if one.name == capability)
     return one.sentence(engine) or (sentence(engine, one.within) if one.within else None)

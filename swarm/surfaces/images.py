@@ -24,6 +24,11 @@ _NEAR = 1e-3
 _POINTS, _NO_SLOPE = 256, 1e-14
 # Of the period, the part by which a cavity may be outside of the cell: round-off.
 _ROUND_OFF = 1e-12
+# Of a surface with a mass in such a cell.
+MASS_AND_PERIOD = (
+    "mass and inertia must be None where the scene has a period, got {got}: an impact would move all of its images"
+)
+WITHOUT_PERIOD = "give it a motion instead of a mass, or leave the period out"
 
 
 def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0) -> list[Surface]:
@@ -154,10 +159,7 @@ def is_same_along(surface: Surface, k: int, period: Lengths, least: float = _NO_
 def _require_place(surface: Surface, period: Lengths, name: str) -> None:
     """Raise a `SceneError` if a surface does not stay where it is along the period, or what it is."""
     if surface.reacts():
-        raise SceneError(
-            f"{name}.mass and inertia must be None where the scene has a period, got {surface}: impacts would move it "
-            "in every cell at once; give it a motion instead"
-        )
+        raise SceneError(f"{name}.{MASS_AND_PERIOD.format(got=surface)}; {WITHOUT_PERIOD}")
     for one in parts_of(surface.motion):
         for k, length in enumerate(period):
             if length is not None and _moves_along(one, k, surface, period):

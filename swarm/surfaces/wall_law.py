@@ -151,7 +151,7 @@ def why_wrong(given: Any, v: Vec, n: Vec, u: Vec, moves: bool = False) -> str:
     if not is_known:
         return "must return a Leave whose stays is True or False, and whose wait is 0 or more [s]"
     if moves and stays and wait > 0.0:
-        return "must let nobody wait where walls move"
+        return "must not let particles wait where a wall moves"
     is_finite = isinstance(after, tuple) and len(after) == 3 and all(map(math.isfinite, after))
     if stays and not is_finite:
         return "must return a velocity, three finite numbers, or a swarm.Leave"

@@ -281,8 +281,8 @@ REFUSED = {
     "no trajectory": ({"trajectory": None}, "trajectory must be given with a cluster"),
     "a recording": ({"recording": "run.rrd"}, "recording and live must be left out with a cluster"),
     "a log": ({"impacts": "log.h5"}, "impacts must be None with a cluster"),
-    "float32": ({"observables": {"one": lambda frame: 1.0}, "precision": "float32"}, "observables need all particles"),
-    "some frames": ({"observables": {"one": lambda frame: 1.0}, "frames": 2}, "observables need all particles"),
+    "float32": ({"observables": {"one": lambda frame: 1.0}, "precision": "float32"}, "observables need frames"),
+    "some frames": ({"observables": {"one": lambda frame: 1.0}, "frames": 2}, "observables need frames"),
     "a function": ({"observables": {"one": lambda frame: "1"}}, r"observables\['one'\] must return a number"),
     "no cluster": ({"cluster": "local:0"}, "cluster must be"),
     "another type": ({"cluster": 4}, "cluster must be"),
@@ -303,7 +303,7 @@ def test_what_cannot_be_is_refused_before_anything_is_written(name, tmp_path, mo
 
 def test_walls_that_react_are_refused(tmp_path):
     scene = swarm.Scene([swarm.Sphere(0.5, mass=10.0)])
-    with pytest.raises(swarm.SceneError, match="must not react with a cluster"):
+    with pytest.raises(swarm.SceneError, match="must have no mass and no inertia with a cluster"):
         swarm.simulate(
             scene, swarm.fill(scene, 10, speed=1.0), swarm.Impact(), until=1.0, trajectory=tmp_path / "run.h5",
             cluster="local:1",

@@ -151,7 +151,7 @@ class Waits(swarm.WallLaw):
 
 def test_who_would_wait_on_a_wall_is_told():
     start = swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), radius=0.1)
-    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws\[0\] must let particles that have a radius leave"):
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws\[0\] must not let particles with a radius wait"):
         swarm.simulate(swarm.Scene([swarm.Box((1.0,) * 3, laws=[swarm.Sticky(0.1)])]), start, swarm.Impact(), until=1.0)
     scene = swarm.Scene([swarm.Box((1.0,) * 3, laws=[Waits(0.1)])])
     with pytest.raises(swarm.RunError, match="particle 0: one of the laws of a wall lets it wait there"):

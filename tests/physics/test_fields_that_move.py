@@ -138,5 +138,5 @@ def test_across_a_period():
 def test_impacts_move_none():
     with pytest.raises(SceneError, match="mass must be None for Spheres"):
         swarm.Spheres(places(3), 0.1, mass=1.0)
-    with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres where impacts move a surface"):
+    with pytest.raises(SceneError, match=r"surfaces\[1\] must not be Spheres where a wall has a mass"):
         swarm.Scene([swarm.Box(BOX, mass=1.0), swarm.Spheres(places(3), 0.1)])

@@ -492,7 +492,7 @@ def test_laws_that_nobody_meets_are_refused():
 def test_nobody_waits_where_walls_move():
     wall = swarm.Sphere(0.5, laws=[swarm.Sticky(1.0)], motion=swarm.Oscillation((0, 0, 0.1), 1.0))
     start = swarm.Particles((0, 0, 0), (1, 0, 0))
-    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws\[0\] must let nobody wait where walls move"):
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws\[0\] must not let particles wait where a"):
         swarm.simulate(swarm.Scene([wall]), start, swarm.Impact(), until=1.0)
 
 
@@ -510,7 +510,7 @@ class Waiting(swarm.WallLaw):
     ("time", "motion", "sentence"),
     [
         (-1.0, None, r"particle 0: .*surfaces\[0\].laws\[0\] must return a Leave whose stays .* wait is 0 or more"),
-        (1.0, swarm.Translation((0.0, 0.0, 0.1)), r"surfaces\[0\].laws\[0\] must let nobody wait where walls move"),
+        (1.0, swarm.Translation((0.0, 0.0, 0.1)), r"surfaces\[0\].laws\[0\] must not let particles wait where a"),
     ],
 )
 def test_what_a_law_returns_is_looked_at_in_runs(tier, time, motion, sentence):

@@ -346,7 +346,7 @@ WRONG = [
     ),
     (
         lambda: run(swarm.Scene([swarm.Sphere(0.5, friction=0.3, mass=1.0)]), ONE, 1.0),
-        r"surfaces\[0\].friction must be 0 of a wall with a mass",
+        r"surfaces\[0\].friction must be 0 where that wall has a mass",
     ),
     (
         lambda: run(swarm.Scene([swarm.Sphere(0.5, restitution=0.3, mass=1.0)], DOWN), ONE, 1.0),
