@@ -15,8 +15,10 @@ from .errors import SceneError
 
 _ALLOWED: ContextVar[tuple[str, ...]] = ContextVar("_ALLOWED", default=())
 _MODULE = r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*"
-# Those that were imported: workers of a cluster are sent their code.
+# The names of the modules that were imported.
 imported: set[str] = set()
+# Folders that packages are installed in.
+_INSTALLED = {"site-packages", "dist-packages"}
 _NAMED = re.compile(rf"({_MODULE}):([A-Za-z_]\w*)")
 
 
@@ -83,6 +85,14 @@ def files() -> dict[str, Path]:
     """The files of the modules that were imported, by their names."""
     found = {name: getattr(sys.modules.get(name), "__file__", None) for name in sorted(imported)}
     return {name: Path(file) for name, file in found.items() if file is not None}
+
+
+def not_installed() -> list[str]:
+    """The names of the imported modules that are neither installed nor part of Python or of this package."""
+    apart = {*sys.stdlib_module_names, __package__}
+    return [
+        name for name, file in files().items() if name.partition(".")[0] not in apart and not _INSTALLED & {*file.parts}
+    ]
 
 
 def is_named(text: Any) -> bool:

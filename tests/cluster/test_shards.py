@@ -7,6 +7,7 @@ import pytest
 from children import python
 
 import swarm
+from swarm import plugins, scene_file
 from swarm.output import paths
 from swarm.run import machine
 from swarm.run.admission import task_of
@@ -110,6 +111,24 @@ CASES = {
     "bodies": (bodies, {"until": 0.1, "every": 0.05, "observables": OWN, "member_impacts": True}),
 }
 
+PLUGINS = """
+[particles]
+count = 520
+speed = 1.0
+seed = 1
+
+[[surface]]
+kind = "examples.own_surface:Superellipsoid"
+semi_axes = [0.3, 0.4, 0.5]
+
+[method]
+kind = "impact"
+
+[run]
+until = 0.4
+observables = { rank = "numpy:ndim" }
+"""
+
 
 @pytest.fixture
 def on_a_cluster(monkeypatch):
@@ -183,6 +202,23 @@ def test_any_number_of_shards_gives_the_same_bits(name, count, alone, on_a_clust
     if end.particles.image is not None:
         assert the_same(end.particles.image, other.particles.image)
     require_same_file(path, path_of_shards)
+
+
+def test_workers_are_sent_the_modules_that_are_not_installed(on_a_cluster, tmp_path, monkeypatch):
+    """A surface of a module in the current folder, and a function of an installed package, as a scene file has them."""
+    monkeypatch.setattr(plugins, "imported", set())
+    path = tmp_path / "scene.toml"
+    path.write_text(PLUGINS)
+    job = scene_file.read(path, ["examples.own_surface", "numpy"])
+    assert plugins.not_installed() == ["examples.own_surface"]
+    keywords = {"until": 0.4, "every": 0.2, "compile": "never", "observables": job.run.observables}
+    shown = on_a_cluster(job.scene, job.start(), job.method, 2, **keywords, trajectory=tmp_path / "run.h5")
+    alone = swarm.simulate(job.scene, job.start(), job.method, **keywords)
+    assert the_same(shown.particles.position, alone.particles.position)
+    assert the_same(shown.observables["rank"], alone.observables["rank"])
+    assert int(shown.impacts.sum()) > 20
+    # NumPy is not sent: scenes of this kind hold its numbers, which would be pickled with their classes.
+    assert on_a_cluster(*periodic(), 2, until=0.4, every=0.2, compile="never", trajectory=tmp_path / "cell.h5")
 
 
 def require_same_file(one, other):

@@ -80,8 +80,14 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     """Write what is run, and its start."""
     import cloudpickle
 
-    for name in sorted(plugins.imported):
-        cloudpickle.register_pickle_by_value(sys.modules[name])
+    # Workers have what is installed, and are sent the code of other modules.
+    for name in plugins.not_installed():
+        module = sys.modules[name]
+        cloudpickle.register_pickle_by_value(module)
+        for kind in vars(module).values():
+            # msgspec keeps there what it knows of a class that it made objects of, which cannot be pickled.
+            if isinstance(kind, type) and kind.__module__ == name and "__msgspec_cache__" in vars(kind):
+                del kind.__msgspec_cache__  # type: ignore[attr-defined]
     body = None if task.bodies is None else task.bodies.body
     options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None, observables=None)
     whole = Whole(task.scene, task.method, options, body, bounds, start, scales_of(task))
