@@ -12,7 +12,7 @@ pytestmark = pytest.mark.physics
 SCENES = Path(__file__).parents[2] / "examples" / "scenes"
 
 
-def test_the_lorentz_gas_diffuses_as_it_does():
+def test_the_lorentz_gas_diffuses_as_it_does(compiled_at_once):
     """The free path is exact; D is that of hops, with their memory."""
     for gap, low, high in ((0.05, 0.86, 0.94), (0.3, 1.35, 1.5)):
         found = lorentz_gas.measure(gap, 1000, windows=16)
@@ -53,7 +53,7 @@ def test_the_scene_file_of_the_board_is_that_of_the_script():
 
 
 @pytest.mark.parametrize("rough", [False, True], ids=["smooth", "rough"])
-def test_the_mean_free_path_in_a_bed_is_exact(rough):
+def test_the_mean_free_path_in_a_bed_is_exact(rough, compiled_at_once):
     """1/(n pi a^2), half of the volume among balls that overlap."""
     found = packed_bed.run(0.5, rough, balls=500, count=20, flights=20.0)
     assert abs(found.porosity[0] - 0.5) <= 4.0 * found.porosity[1] <= 0.03

@@ -52,7 +52,7 @@ def test_neutrons_stay_in_a_bottle_by_their_energy():
 
 @pytest.fixture(scope="module")
 def gas():
-    return vacuum_chamber.run(40_000)
+    return vacuum_chamber.run(15_000)
 
 
 def test_a_pump_takes_what_a_source_gives(gas):
