@@ -1,13 +1,15 @@
 """Processes of their own for tests, each a copy of one that has imported the libraries.
 
-Two thirds of the second that `swarm` takes to begin are NumPy's, Numba's and HDF5's, and tests begin it a hundred
-times. A copy is a process like any other, with signals, limits and an exit code of its own. It imports `swarm` itself,
-by its own environment. A test of how Python begins, or of what is imported for what, starts Python.
+Of the two seconds that a command of `swarm` takes most are imports, and tests begin it a hundred times. A copy is a
+process like any other, with signals, limits and an exit code of its own. Where its environment is not that of the
+tests, it imports `swarm` itself. A test of how Python begins, or of what is imported for what, starts Python.
 """
 
 import atexit
+import contextlib
 import ctypes
 import functools
+import importlib
 import json
 import os
 import resource
@@ -22,17 +24,17 @@ import types
 from pathlib import Path
 
 
-def python(*arguments, cwd=None, env=None, timeout=600, file_size=None):
+def python(*arguments, cwd=None, env=None, timeout=600, file_size=None, bare=False):
     """As `subprocess.run` of Python with its output as text: of "-c" and code, "-m" and a module, or a file.
 
-    No file grows beyond `file_size`, as on a full disk.
+    No file grows beyond `file_size`, as on a full disk. A process that is `bare` imports `swarm` itself.
     """
     with tempfile.NamedTemporaryFile("r") as out, tempfile.NamedTemporaryFile("r") as err:
         request = {
             "arguments": list(map(str, arguments)), "cwd": os.path.abspath(cwd or "."), "env": env or dict(os.environ),
             "out": out.name, "err": err.name, "file_size": file_size,
         }  # fmt: skip
-        asked = _starter()
+        asked = _starter(bare or _environment(request["env"]) != _AT_START)
         asked.stdin.write(json.dumps(request) + "\n")
         asked.stdin.flush()
         pid = int(asked.stdout.readline())
@@ -42,9 +44,19 @@ def python(*arguments, cwd=None, env=None, timeout=600, file_size=None):
         return subprocess.CompletedProcess(arguments, int(asked.stdout.readline()), out.read(), err.read())
 
 
+def _environment(env):
+    """What an import looks at: settings of Python and of Numba, but for the folder of kernels."""
+    read = {name: value for name, value in env.items() if name.startswith(("PYTHON", "NUMBA_"))}
+    return {name: value for name, value in read.items() if name != "NUMBA_CACHE_DIR"}
+
+
+_AT_START = _environment(os.environ)
+
+
 @functools.cache
-def _starter():
-    starter = subprocess.Popen([sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+def _starter(is_bare):
+    words = [sys.executable, __file__, *([] if is_bare else ["swarm"])]
+    starter = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
     def end():
         starter.stdin.close()
@@ -53,6 +65,26 @@ def _starter():
 
     atexit.register(end)
     return starter
+
+
+def _import_swarm():
+    """What commands import to run a scene, and to read and write its files."""
+    import filelock  # noqa: F401
+    import psutil  # noqa: F401
+
+    import swarm.output.exported
+    import swarm.output.trajectory
+    import swarm.output.writer
+    import swarm.run.machine
+    import swarm.run.session
+    import swarm.scene_file
+    import swarm.summary
+    from swarm import cli  # noqa: F401
+
+    for name in swarm.__all__:
+        getattr(swarm, name)
+    with contextlib.suppress(ImportError):  # newer versions of typer import it with the first option
+        importlib.import_module("typer._adapters")
 
 
 def _serve():
@@ -125,6 +157,8 @@ if __name__ == "__main__":
     import typer  # noqa: F401
 
     numba.njit(lambda x: x + 1.0)(1.0)  # the compiler begins
+    if "swarm" in sys.argv:
+        _import_swarm()
     request = _serve()
     _become(request)
     how = None

@@ -204,7 +204,7 @@ def test_an_edit_on_disk_compiles_what_it_is_in(tmp_path, monkeypatch):
         path.write_text(path.read_text().replace(old, new, 1))
         long_ago = path.stat().st_mtime - 10.0 * len(seen)
         os.utime(path, (long_ago, long_ago))  # bytecode knows an edit by the second
-        done = python("-c", EDITED.format(root=str(tmp_path)), env={**os.environ, "PYTHONPATH": "", "NUMBA_OPT": "0"})
+        done = python("-c", EDITED.format(root=str(tmp_path)), bare=True)
         assert done.returncode == 0, done.stderr
         seen.append((float(done.stdout), done.stderr.count("once: observe")))
     assert seen == [(0.5, 1), (0.5, 0), (0.5, 0), (1.5, 1)]

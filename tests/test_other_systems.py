@@ -56,7 +56,7 @@ OTHER = """
 
 def elsewhere(folder, code):
     program = textwrap.dedent(OTHER) + textwrap.dedent(code)
-    return python("-c", program, cwd=folder)
+    return python("-c", program, cwd=folder, bare=True)
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="what is open is looked up in /proc")

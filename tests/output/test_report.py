@@ -1,13 +1,13 @@
 """Reports of runs: what a page says, that it needs nothing besides itself, and that runs can be reproduced by it."""
 
 import re
-import subprocess
-import sys
 from dataclasses import replace
 
+import filelock
 import h5py
 import numpy as np
 import pytest
+from children import python
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pages import Read
 
@@ -58,6 +58,19 @@ def page(folder):
     return swarm.report(folder / "<b>run.h5")
 
 
+@pytest.fixture
+def words(monkeypatch):
+    """Pages without pictures, which take three seconds: for tests of what they say."""
+    monkeypatch.setattr(pictures, "of_series", lambda content: [])
+    monkeypatch.setattr(pictures, "of_places", lambda content: [])
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Pages whose pictures have few pixels."""
+    monkeypatch.setattr(pictures, "_DPI", 30)
+
+
 def test_a_page_has_its_sections_and_needs_nothing_besides_itself(page):
     read = Read(page.html)
     assert [name for name in read.ids if not re.match(r"g[0-9a-f]{12}-", name)] == SECTIONS
@@ -85,7 +98,7 @@ def test_names_are_escaped(page):
     assert "&lt;b&gt;run.h5" in page.html
 
 
-def test_texts_of_a_scene_file_are_escaped(tmp_path):
+def test_texts_of_a_scene_file_are_escaped(tmp_path, words):
     evil = SCENE + "# </pre><script>alert(1)</script>\n"
     run(tmp_path / "run.h5", scene_text=evil)
     page = swarm.report(tmp_path / "run.h5")
@@ -93,15 +106,20 @@ def test_texts_of_a_scene_file_are_escaped(tmp_path):
     assert "<script>alert(1)</script>" in Read(page.html).texts["reproduce"]
 
 
-def test_it_is_written_where_it_may_be(folder, page, tmp_path):
+def test_it_is_written_where_it_may_be(folder, page, tmp_path, monkeypatch):
     target = tmp_path / "page.html"
     with swarm.load(folder / "<b>run.h5") as trajectory:
-        assert trajectory.report(target).title == page.title
+        with monkeypatch.context() as graphs_alone:
+            graphs_alone.setattr(pictures, "of_places", lambda content: [])
+            assert trajectory.report(target).title == page.title
         before = target.read_text()
+        assert Read(before).ids == Read(page.html).ids
         with pytest.raises(swarm.SceneError, match=r"report: .*page.html exists"):
             trajectory.report(target)
+        monkeypatch.setattr(pictures, "of_series", lambda content: [])
+        monkeypatch.setattr(pictures, "of_places", lambda content: [])
         trajectory.report(target, overwrite=True)
-    assert Read(before).ids == Read(target.read_text()).ids
+    assert Read(target.read_text()).ids == SECTIONS != Read(before).ids
     with pytest.raises(swarm.SceneError, match=r"ends in \.html, got .*page\.pdf"):
         page.save(tmp_path / "page.pdf")
     with pytest.raises(swarm.SceneError, match="does not exist; create it first"):
@@ -117,7 +135,7 @@ def test_a_notebook_shows_it(page):
     assert "&lt;!DOCTYPE html&gt;" in shown
 
 
-def test_a_result_without_a_trajectory_has_one_too(tmp_path):
+def test_a_result_without_a_trajectory_has_one_too(tmp_path, coarse):
     scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
     result = swarm.simulate(scene, swarm.fill(scene, 5, speed=1.0), swarm.Impact(), until=1.0, compile="never")
     read = Read(result.report(tmp_path / "page.html").html)
@@ -148,19 +166,18 @@ def reproduce(page, folder):
 
 def test_the_lines_of_python_give_the_same_bits(folder, page, tmp_path):
     lines = reproduce(page, folder).split("In Python")[1]
-    done = subprocess.run([sys.executable, "-c", lines], cwd=folder, capture_output=True, text=True, check=False)
+    done = python("-c", lines, cwd=folder)
     assert done.stderr == ""
     assert (last(folder / "again.h5") == last(folder / "<b>run.h5")).all()
 
 
-def test_a_run_of_python_gets_a_scene_file(tmp_path):
+def test_a_run_of_python_gets_a_scene_file(tmp_path, words):
     run(tmp_path / "run.h5", seed=4)
     told = reproduce(swarm.report(tmp_path / "run.h5"), tmp_path)
     assert "only this file holds" in told
     text = told[told.index("gravity = ") : told.index("In Python")]
     (tmp_path / "again.toml").write_text(text)
-    swarm_run = [sys.executable, "-m", "swarm", "run", "again.toml", "-o", "again.h5", "--quiet"]
-    done = subprocess.run(swarm_run, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = python("-m", "swarm", "run", "again.toml", "-o", "again.h5", "--quiet", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert (last(tmp_path / "again.h5") == last(tmp_path / "run.h5")).all()
 
@@ -174,7 +191,7 @@ def test_a_run_of_python_gets_a_scene_file(tmp_path):
     ],
     ids=str,
 )
-def test_what_cannot_be_reproduced_is_said(options, told, tmp_path):
+def test_what_cannot_be_reproduced_is_said(options, told, tmp_path, words):
     run(tmp_path / "run.h5", **options)
     assert told in reproduce(swarm.report(tmp_path / "run.h5"), tmp_path)
 
@@ -193,22 +210,20 @@ def cut(path):
         run(path, progress=stop)
 
 
-def test_a_run_that_was_cut_says_so(tmp_path):
+def test_a_run_that_was_cut_says_so(tmp_path, words):
     cut(tmp_path / "run.h5")
     told = Read(swarm.report(tmp_path / "run.h5").html).texts[""]
     assert "This run is not complete: it was stopped at" in told
     assert "of 1 s" in told
 
 
-def test_a_run_that_goes_on_says_so(folder, monkeypatch, tmp_path):
-    run(tmp_path / "run.h5")
-    import filelock
-
-    with filelock.FileLock(paths.lock_of(tmp_path / "run.h5")):
-        assert "A run writes this file now" in Read(swarm.report(tmp_path / "run.h5").html).texts[""]
+def test_a_run_that_goes_on_says_so(folder, words):
+    path = folder / "<b>run.h5"
+    with filelock.FileLock(paths.lock_of(path)):
+        assert "A run writes this file now" in Read(swarm.report(path).html).texts[""]
 
 
-def test_files_of_older_versions_have_one(tmp_path):
+def test_files_of_older_versions_have_one(tmp_path, words):
     run(tmp_path / "run.h5")
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         for name in ("until", "threads", "wall_time", "checksums"):
@@ -248,7 +263,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_of_run_has_one(kind, tmp_path):
+def test_every_kind_of_run_has_one(kind, tmp_path, coarse):
     scene, start, options = KINDS[kind]()
     path = tmp_path / "run.h5"
     method = swarm.Impact(dt=0.01) if kind == "bodies" else swarm.Impact()
@@ -276,15 +291,17 @@ def test_bad_input_is_a_sentence(folder, tmp_path):
         swarm.report(tmp_path / "bad.h5")
 
 
-def test_very_many_frames_are_pixels(monkeypatch, folder):
+def test_very_many_frames_are_pixels(monkeypatch, folder, coarse):
     monkeypatch.setattr(pictures, "_LARGEST", 1000)
+    monkeypatch.setattr(pictures, "of_places", lambda content: [])
     read = Read(swarm.report(folder / "<b>run.h5").html)
     assert "svg" not in read.tags
 
 
-def test_a_picture_says_how_many_of_the_particles_it_draws(folder, monkeypatch):
-    assert "are drawn" not in swarm.report(folder / "<b>run.h5").html
+def test_a_picture_says_how_many_of_the_particles_it_draws(folder, page, monkeypatch, coarse):
+    assert "are drawn" not in page.html
     monkeypatch.setattr(pictures, "_SHOWN", 7)
+    monkeypatch.setattr(pictures, "of_series", lambda content: [])
     page = swarm.report(folder / "<b>run.h5").html
     assert page.count(": 7 of 20 particles are drawn") == 2
 
