@@ -13,8 +13,8 @@ from physics.ball_walls import Walls
 
 import swarm
 
-# Between two looks at the gap of a ball that is near a wall [s].
-STEP = 1e-3
+# Between two looks at the gap of a ball that is near a wall [s], so that it turns at most once within.
+STEP = 4e-3
 # A flight from a wall back to it that is shorter [s] is the beginning of a contact that lasts.
 SHORTEST = 1e-5
 # A gap that comes so near to 0 and grows again [m]: whether it is an impact is round-off.
@@ -24,6 +24,7 @@ ROUND_OFF = 1e-12
 # An impact in which so little of the velocity is along the normal is known to as few digits less.
 SLOW = 1e-3
 WALL = -1
+UNTURNED = np.eye(3)
 
 
 class Followed(NamedTuple):
@@ -233,6 +234,8 @@ class _Loop:
     def _as_given(self, wall, r, time):
         """A point in the frame in which a wall is given, the turn of that frame, and the velocity of the wall there."""
         shift, rate = 0 * r, 0 * r
+        if not wall.parts:
+            return r, UNTURNED, rate
         turn, k, omega, center = np.eye(3), np.array([0.0, 0.0, 1.0]), 0.0, np.zeros(3)
         sin, cos = self.module.sin, self.module.cos
         for part in wall.parts:

@@ -196,8 +196,18 @@ class Walls:
         """By the foot of the normal, of points that are nearer to the wall than its smallest radius of curvature."""
         turn, c, a = self._turn(one.rotation), self._vector(one.center), self._vector(one.semi_axes)
 
+        last = [None, None]
+
         def foot(x):
-            """The root t of sum (a x/(a^2 + t))^2 = 1, above -min(a)^2: its foot is a^2 x/(a^2 + t)."""
+            """The root t of sum (a x/(a^2 + t))^2 = 1, above -min(a)^2: its foot is a^2 x/(a^2 + t).
+
+            The distance and the normal of a point are asked for one after the other.
+            """
+            if last[0] is None or (last[0] != x).any():
+                last[:] = x, found(x)
+            return last[1]
+
+        def found(x):
             low = -min(one * one for one in a)
             high = self._length(x) * max(a) + 1
             t = 0 * x[0]
