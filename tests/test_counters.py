@@ -18,6 +18,8 @@ from swarm.surfaces.instant import side_of
 
 PULL = (0.3, 0.1, -2.0)
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
+# What slides takes a third of the steps of the default.
+METHOD = swarm.Impact(sliding_tolerance=1e-7)
 SHAPES = [
     swarm.Plane((1.0, 0.0, 0.0), 0.1), swarm.Sphere(0.2), swarm.Sphere(0.15, (0.1, 0.0, 0.0), side="outside"),
     swarm.Box((0.1, 0.2, 0.1)), swarm.Cylinder(0.1), swarm.Torus(0.2, 0.05), swarm.Capsule(0.1, 0.2),
@@ -35,13 +37,16 @@ SCENES = {
     "open": swarm.Scene([swarm.Sphere(0.5, openings=[swarm.Sphere(0.2, (0.0, 0.0, -0.5))])]),
     "rooms": swarm.Scene([swarm.Union([swarm.Sphere(0.4), swarm.Sphere(0.3, (0.5, 0.0, 0.0))])]),
     "thermal": swarm.Scene([swarm.Sphere(0.5, temperature=0.3)]),
+    "restless and open": swarm.Scene(
+        [swarm.Sphere(0.5, restitution=0.3, friction=0.05, openings=[swarm.Sphere(0.2, (0.0, 0.0, -0.5))])], PULL
+    ),
 }
 
 
-def run(scene, counters, n=12, until=1.0, seed=1, **keywords):
+def run(scene, counters, n=10, until=1.0, seed=1, **keywords):
     keywords = {"compile": "never", "threads": 1, "every": until / 2.0, **keywords}
     start = keywords.pop("start", None) or swarm.fill(scene, n, temperature=0.3, seed=seed)
-    return start, swarm.simulate(scene, start, swarm.Impact(), until=until, counters=counters, **keywords)
+    return start, swarm.simulate(scene, start, METHOD, until=until, counters=counters, **keywords)
 
 
 @functools.cache
@@ -73,7 +78,7 @@ def require_same(result, other):
 # --- Of any scene ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "restless and open"])
 def test_they_change_no_bit_and_count_who_is_outside(name):
     start, result = run_of(name)
     _start, alone = run(SCENES[name], ())
@@ -95,8 +100,9 @@ def test_they_change_no_bit_and_count_who_is_outside(name):
 @pytest.mark.parametrize("name", ["fall", "restless", "moving"])
 def test_each_is_a_change_of_side_in_frames_that_are_close(name, tmp_path):
     scene, shapes = SCENES[name], SHAPES[:7]
-    start, result = run(scene, shapes, until=0.7)
-    run(scene, (), start=start, until=0.7, every=1e-3, trajectory=tmp_path / "fine.h5")
+    start, result = run(scene, shapes, 8, 0.6)
+    run(scene, (), start=start, until=0.6, every=1e-3, trajectory=tmp_path / "fine.h5")
+    assert result.observables["crossings"][-1].sum() > 5
     with swarm.load(tmp_path / "fine.h5") as fine:
         places = [fine.frame(k).position for k in range(len(fine))]
     for k, surface in enumerate(shapes):
@@ -156,20 +162,22 @@ def test_any_threads_and_blocks_count_the_same(name):
 
 @pytest.mark.level3
 @pytest.mark.physics
-@pytest.mark.parametrize("name", ["box", rarely("fall"), "restless", rarely("moving"), "open"])
+@pytest.mark.parametrize("name", ["box", *map(rarely, ("fall", "restless", "moving", "open")), "restless and open"])
 def test_kernels_that_are_compiled_count_the_same(name, tmp_path):
-    _start, compiled = run(SCENES[name], SHAPES[:5], 40, compile="always", threads=2)
-    require_same(run(SCENES[name], SHAPES[:5], 40, impacts=tmp_path / "i.h5")[1], compiled)
+    """All kinds of counters in a box, and two of them where particles slide and escape."""
+    shapes = SHAPES[:2] if name == "restless and open" else SHAPES[:5]
+    _start, compiled = run(SCENES[name], shapes, 20, compile="always", threads=2)
+    require_same(run(SCENES[name], shapes, 20, impacts=tmp_path / "i.h5")[1], compiled)
 
 
 @pytest.mark.parametrize("name", ["box", "restless", "open"])
 def test_halts_and_sessions_lose_and_repeat_none(name):
     scene, shapes = SCENES[name], SHAPES[:4]
-    start, whole = run(scene, shapes, 12)
+    start, whole = run(scene, shapes, 6)
 
     def begun():
         watched = Watched(None, None, checked_counters(shapes))
-        return Run(scene, start.copy(), swarm.Impact(), 1, None, "never", Seeding(), watched)
+        return Run(scene, start.copy(), METHOD, 1, None, "never", Seeding(), watched)
 
     halts, run_of = 0, begun()
     for moment in (0.5, 1.0):
