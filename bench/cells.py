@@ -14,6 +14,8 @@ import swarm
 from swarm.kernel.jit import select
 from swarm.kernel.vector import dot
 
+from . import shards
+
 CENTER = (1.0, 1.0, 1.0)
 # Around every solid; it is within the cell of a scene that repeats.
 HALF, PERIOD = 0.95, 2.0
@@ -53,6 +55,10 @@ STARTS: dict[str, Start] = {
 }
 
 
+# So high above the centre is a ceiling within a cavity [m].
+CEILING = {"middle": 0.25, "ring": 0.14}
+
+
 # --- Walls -----------------------------------------------------------------------------------------------
 
 
@@ -79,8 +85,12 @@ def _moved(center: Any, *shift: float) -> tuple[float, ...]:
     return tuple(a + b for a, b in zip(center, shift, strict=True))
 
 
-def _vessel(center: Any) -> swarm.Box:
-    return swarm.Box((HALF, HALF, HALF), center)
+def _vessel(center: Any, laws: Laws) -> swarm.Box:
+    return swarm.Box((HALF, HALF, HALF), center, **laws)
+
+
+def _ceiling(draft: "Draft", laws: Laws) -> swarm.Plane:
+    return swarm.Plane((0.0, 0.0, 1.0), draft.center[2] + CEILING[draft.start], **laws)
 
 
 def _own(center: Any, side: str, laws: Laws) -> list[Any]:
@@ -154,24 +164,27 @@ def _outline() -> list[tuple[float, ...]]:
 
 
 class Wall(NamedTuple):
-    """A kind of wall: how it is made of a centre, a side and laws, where particles start, and on which sides."""
+    """A kind of wall: how it is made of a centre, a side and laws, where particles start, on which sides, and how."""
 
     make: Callable[[Any, str, Laws], list[Any]]
     start: str = "middle"
     sides: tuple[str, ...] = ("inside", "outside")
+    options: dict[str, Any] = {}  # noqa: RUF012  it is not changed
 
 
 def _of(make: Callable[..., Any]) -> Callable[[Any, str, Laws], list[Any]]:
     return lambda center, side, laws: [make(center=center, side=side, **laws)]
 
 
+ON_A_CLUSTER = "box on a cluster"
+_box = _of(lambda **k: swarm.Box((0.4, 0.45, 0.5), **k))
 _DIAGONAL = ((4.0, 0.5, 0.0), (0.5, 5.0, 0.0), (0.0, 0.0, 3.0))
 WALLS: dict[str, Wall] = {
     "sphere": Wall(_of(lambda **k: swarm.Sphere(0.5, **k))),
     "ellipsoid": Wall(_of(lambda **k: swarm.Ellipsoid((0.4, 0.5, 0.6), **k))),
     "torus": Wall(_of(lambda **k: swarm.Torus(0.5, 0.22, **k)), "ring"),
     "capsule": Wall(_of(lambda **k: swarm.Capsule(0.35, 0.4, **k))),
-    "box": Wall(_of(lambda **k: swarm.Box((0.4, 0.45, 0.5), **k))),
+    "box": Wall(_box),
     "cylinder": Wall(_of(lambda **k: swarm.Cylinder(0.45, length=0.9, **k))),
     "cone": Wall(_cone),
     "slab": Wall(_of(lambda **k: swarm.Slab((1.0, 0.0, 0.0), 0.4, **k))),
@@ -190,7 +203,10 @@ WALLS: dict[str, Wall] = {
     "polygon": Wall(_of(lambda **k: swarm.Polygon(_outline(), **k))),
     "stadium": Wall(_of(lambda **k: swarm.Stadium(0.35, 0.3, **k))),
     "prism": Wall(_of(lambda **k: swarm.Prism(_outline(), 0.9, **k))),
+    # With every capability, whose results are compared with those of one process.
+    ON_A_CLUSTER: Wall(_box, options=shards.OPTIONS),
 }
+SHAPES = [name for name, wall in WALLS.items() if not wall.options]
 # Those without an end: particles leave such a scene, and a cell may repeat along them.
 _ENDLESS = {"slab": (None, PERIOD, PERIOD), "planes": (None, PERIOD, PERIOD)}
 # Solids without an end: a cell may repeat across them.
@@ -214,6 +230,7 @@ class Draft:
     options: dict[str, Any] = field(default_factory=dict)
     particles: dict[str, Any] = field(default_factory=dict)
     vessel: bool = True
+    beside: Any = None  # the motion of a wall beside that of the cell
     until: float = 1.0
 
     def spot(self) -> tuple[float, ...]:
@@ -223,7 +240,10 @@ class Draft:
     def surfaces(self) -> list[Any]:
         """The surfaces of the scene, first the wall of the cell."""
         made = WALLS[self.cell.wall].make(self.center, self.side, self.laws)
-        return [*made, _vessel(self.center)] if self.side == "outside" and self.vessel else made
+        moving = {} if self.beside is None else {"motion": self.beside}
+        if self.side == "outside" and self.vessel:
+            return [*made, _vessel(self.center, moving)]
+        return [*made, _ceiling(self, moving)] if moving else made
 
 
 class Build(NamedTuple):
@@ -316,11 +336,16 @@ def _law(**laws: Any) -> Callable[[Draft], None]:
     return lambda draft: draft.laws.update(laws)
 
 
+def _in_fixed_steps(draft: Draft) -> None:
+    """Steps of the loop are cut at impacts on walls at rest without gravity only."""
+    if draft.cell.engine == "points, AugmentedLagrangian":
+        draft.method.update(adaptive=False, on_unconverged="count")
+
+
 def _moving(motion: Callable[[Draft], Any]) -> Callable[[Draft], None]:
     def edit(draft: Draft) -> None:
         draft.laws["motion"] = motion(draft)
-        if draft.cell.engine == "points, AugmentedLagrangian":
-            draft.method.update(adaptive=False, on_unconverged="count")
+        _in_fixed_steps(draft)
 
     return edit
 
@@ -332,8 +357,7 @@ def _turning(draft: Draft) -> Any:
 
 def _gravity(draft: Draft) -> None:
     draft.scene["gravity"] = (0.3, -0.2, -1.0) if draft.scene.get("plane") is None else (0.3, -0.9, 0.0)
-    if draft.cell.engine == "points, AugmentedLagrangian":
-        draft.method.update(adaptive=False, on_unconverged="count")
+    _in_fixed_steps(draft)
 
 
 def _half_space(draft: Draft) -> swarm.Plane:
@@ -379,6 +403,13 @@ def _alone(draft: Draft) -> None:
 def _period(draft: Draft) -> None:
     draft.scene["period"] = {**_ENDLESS, **_UPRIGHT}.get(draft.cell.wall, (PERIOD,) * 3)
     draft.options["observables"] = {"cells": lambda frame: np.abs(frame.image).sum()}
+
+
+def _beside(draft: Draft) -> None:
+    draft.beside = swarm.Oscillation((0.02, -0.01, 0.03), 1.0)
+    # From among solids particles come later to the vessel.
+    draft.until = 1.0 if draft.start != "around" else 2.0
+    _in_fixed_steps(draft)
 
 
 def _other_side(draft: Draft) -> None:
@@ -488,6 +519,8 @@ CAPABILITIES: dict[str, Capability] = {
     "pair friction": Capability(_pairs(friction=0.3), _meet, "collisions"),
     "contact duration": Capability(_pairs(restitution=0.6, contact_duration=0.5), _lossy, "collisions"),
     "spin": Capability(_spin, _rough),
+    "motion beside": Capability(_beside, shown="wall_work"),
+    "cluster": Capability(_option(**shards.OPTIONS), shown="impacts"),
 }
 
 
@@ -498,6 +531,16 @@ STATIC = ("gravity", "pair restitution", "pair friction", "contact duration", "p
 def _centred(draft: Draft) -> None:
     if ENGINES[draft.cell.engine].method is swarm.Impact:
         draft.method["contact_step"] = 1e-2
+
+
+_WITHOUT_MEANING = {
+    ("sphere", "rotation"): "a ball is the same when it is turned",
+    ("listed solids", "rotation"): "a ball is the same when it is turned",
+    ("listed solids", "opening"): "the volume that reaches each of the solids leaves none that is met",
+    ("listed solids", "contact duration"): "no ball meets a solid so soon after another ball",
+    ("foam", "motion beside"): "a foam is alone in its scene",
+    (ON_A_CLUSTER, "cluster"): "it is on a cluster",
+}
 
 
 def meaning(cell: Cell) -> str | None:
@@ -512,15 +555,9 @@ def meaning(cell: Cell) -> str | None:
         return "AugmentedLagrangian has no such argument"
     if name == "side" and len(wall.sides) == 1:
         return "the wall has one side"
-    if name == "rotation" and cell.wall in ("sphere", "listed solids"):
-        return "a ball is the same when it is turned"
-    if cell.wall == "listed solids" and name == "opening":
-        return "the volume that reaches each of the solids leaves none that is met"
-    if cell.wall == "listed solids" and name == "contact duration":
-        return "no ball meets a solid so soon after another ball"
     if name == "side" and wall.start == "around":
         return "the wall is a solid"
-    return None
+    return _WITHOUT_MEANING.get((cell.wall, name))
 
 
 CELLS: tuple[Cell, ...] = tuple(
@@ -532,7 +569,9 @@ def draft_of(cell: Cell, with_capability: bool = True) -> Draft:
     """The draft of a cell, or of the same run without its capability."""
     engine, wall, capability = ENGINES[cell.engine], WALLS[cell.wall], CAPABILITIES[cell.capability]
     side = wall.sides[0]
-    draft = Draft(cell, side, wall.start, laws=dict(engine.laws), method=dict(engine.arguments))
+    draft = Draft(
+        cell, side, wall.start, laws=dict(engine.laws), method=dict(engine.arguments), options=dict(wall.options)
+    )
     capability.base(draft)
     if with_capability:
         capability.edit(draft)

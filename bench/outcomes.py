@@ -1,9 +1,10 @@
 """What a cell of the matrix of pairs does: it works, is refused, or does a third thing.
 
 It works where its run shows the capability: the observable that tells of it is not 0, or the motion differs from that
-of the run without it; where its books balance; and where nothing is farther outside than the method allows. It is
-refused where a `SceneError` says so before the run. Everything else is a third outcome: another error, no end, a
-capability that is ignored, books that do not balance, a particle outside.
+of the run without it; where its books balance; where nothing is farther outside than the method allows; and, on a
+cluster, where each bit is that of the same run in one process. It is refused where a `SceneError` says so before the
+run. Everything else is a third outcome: another error, no end, a capability that is ignored, books that do not balance,
+a particle outside, other bits.
 """
 
 import contextlib
@@ -23,7 +24,7 @@ import swarm
 from swarm.surfaces.doors import is_there
 from swarm.surfaces.instant import side_of
 
-from . import cells
+from . import cells, shards
 from .cells import Cell
 
 # Books that balance to round-off: of the largest energy of a run.
@@ -75,12 +76,15 @@ def run(draft: cells.Draft, trajectory: str | None = None) -> Ran:
     """
     with quiet() as folder:
         given = cells.build(draft)
-        options = dict(given.options)
+        options = dict(given.options) | {"trajectory": trajectory, "walltime": WALL_TIME}
         if "impacts" in options:
             options["impacts"] = os.path.join(folder, options["impacts"])
-        result = swarm.simulate(
-            given.scene, given.particles, given.method, trajectory=trajectory, walltime=WALL_TIME, **options
-        )
+        with contextlib.ExitStack() as stack:
+            if "cluster" in options:
+                options["trajectory"] = trajectory or os.path.join(folder, "run.h5")
+                stack.enter_context(shards.here())
+                stack.enter_context(shards.of_single_particles())
+            result = swarm.simulate(given.scene, given.particles, given.method, **options)
         if "impacts" not in options:
             return Ran(given, result, 0)
         table = swarm.load_impacts(options["impacts"]).table()
@@ -108,7 +112,7 @@ def outcome(cell: Cell) -> Outcome:
         return Outcome("third", f"the run fails: {type(error).__name__}: {error}")
     except Exception as error:
         return Outcome("third", f"{type(error).__name__}: {error}")
-    said = "; ".join(filter(None, (one(cell, done) for one in (_ignored, _unbalanced, _outside))))
+    said = "; ".join(filter(None, (one(cell, done) for one in (_ignored, _unbalanced, _outside, _other_bits))))
     return Outcome("third", said) if said else Outcome("works")
 
 
@@ -129,7 +133,7 @@ def _ignored(cell: Cell, done: Ran) -> str:
         return f"members have {seen['member_impacts'][-1].sum()} of {int(seen['impacts'][-1])} impacts"
     if not seen["impacts"][-1] and not seen.get("collisions", [0])[-1]:
         return "ignored: there is no impact"
-    if cell.capability in ("plain", "counters", "log", "member impacts"):
+    if cell.capability in ("plain", "counters", "log", "member impacts", "cluster"):
         return ""
     # The capability is that of the other run too where the first surface of both is the same.
     if shown and capability.base is cells.nothing and cell.capability not in cells.STATIC:
@@ -241,3 +245,19 @@ def _allowed(done: Ran) -> float:
     if isinstance(method, swarm.Penalty) or not method.adaptive:
         return math.sqrt(2.0 * energy / method.penalty)
     return OUTSIDE
+
+
+# --- Has a run on a cluster the same bits? ---------------------------------------------------------------
+
+
+def _other_bits(cell: Cell, done: Ran) -> str:
+    """What of a run in shards is not as in one process."""
+    if "cluster" not in done.given.options:
+        return ""
+    draft = cells.draft_of(cell)
+    for name in shards.OPTIONS:
+        del draft.options[name]
+    with shards.of_single_particles():
+        alone = run(draft).result
+    other = shards.difference(done.result, alone)
+    return f"on a cluster {other} differ" if other else ""

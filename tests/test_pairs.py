@@ -1,5 +1,6 @@
 """The matrix of pairs: each cell works, or is refused with the sentence of the committed list."""
 
+import dataclasses
 import importlib.util
 import re
 import string
@@ -11,6 +12,7 @@ import pytest
 from bench import cells, outcomes
 from bench.cells import Cell
 from swarm.run import knows
+from swarm.run.cluster import Sharded, shards
 
 FOLDER = Path(__file__).parent / "reference"
 _SPEC = importlib.util.spec_from_file_location("pairs", FOLDER / "pairs.py")
@@ -70,7 +72,7 @@ ROWS = [(engine, wall) for engine in cells.ENGINES for wall in cells.WALLS]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("engine", "wall"), ROWS, ids=" / ".join)
+@pytest.mark.parametrize(("engine", "wall"), ROWS, ids=map(" / ".join, ROWS))
 def test_all_cells_of_a_row_are_as_the_list_says(engine, wall):
     row = [cell for cell in cells.CELLS if cell[:2] == (engine, wall) and cell not in SOON]
     found = {str(cell): outcomes.outcome(cell) for cell in row}
@@ -116,3 +118,24 @@ def test_a_particle_outside_is_a_third_outcome(monkeypatch):
 
     monkeypatch.setattr(outcomes, "run", wrong)
     assert "outside" in outcomes.outcome(Cell("points, Impact", "sphere", "plain")).said
+
+
+def test_a_run_in_shards_has_two_and_other_bits_are_a_third_outcome(monkeypatch):
+    """The random numbers of a shard are those of its own particles: of the first ones they are others."""
+    cell, begin, counts = Cell("points, Impact", cells.ON_A_CLUSTER, "temperature"), Sharded.begin, []
+
+    def counted(*given):
+        folder, bounds = begin(*given)
+        counts.append(len(bounds) - 1)
+        return folder, bounds
+
+    monkeypatch.setattr(Sharded, "begin", counted)
+    assert outcomes.outcome(cell) == ("works", "")
+    assert counts == [2]
+    task_of = shards.task_of
+    monkeypatch.setattr(
+        shards,
+        "task_of",
+        lambda folder, k: (dataclasses.replace(task_of(folder, k)[0], first=0), task_of(folder, k)[1]),
+    )
+    assert outcomes.outcome(cell).said.startswith("on a cluster ")

@@ -7,12 +7,13 @@ import pytest
 from children import python
 
 import swarm
+from bench.shards import carry_out
+from bench.shards import same as the_same
 from swarm import plugins, scene_file
 from swarm.output import paths
 from swarm.run import machine
 from swarm.run.admission import task_of
-from swarm.run.cluster import Sharded, joined, shards, worker
-from swarm.run.measures import Measures
+from swarm.run.cluster import Sharded
 from swarm.run.options import RunOptions
 from swarm.run.session import Session
 
@@ -131,33 +132,18 @@ observables = { rank = "numpy:ndim" }
 
 
 @pytest.fixture
-def on_a_cluster(monkeypatch):
+def on_a_cluster():
     """A function that runs so many shards of a run here."""
 
     def carried(scene, start, method, count, **keywords):
-        options = RunOptions(cluster="local:1", shards=count, checkpoint=60.0, **keywords)
-        session = Sharded(options)
-        task = task_of(scene, start, method, options)
-        with session:
-            session.prepare_shards(task)
-            folder, bounds = session.begin(task, count)
-            for k in range(len(bounds) - 1):
-                assert worker.advance(folder, k) == ("complete", "")
-            measures = Measures(options.observables, options.until)
-            observables = joined.join(folder, task, bounds, session.identity, measures)
-            end = shards.joined_end(folder, task, bounds)
-            session.finish()
+        options = RunOptions(cluster="local:1", shards=count, **keywords)
+        end = carry_out(task_of(scene, start, method, options), Sharded(options))
         written = machine.read_back(options.trajectory)
-        assert list(observables) == list(written)
-        assert all(the_same(values, written[name]) for name, values in observables.items())
-        return end._replace(observables=observables)
+        assert list(end.observables) == list(written)
+        assert all(the_same(values, written[name]) for name, values in end.observables.items())
+        return end
 
     return carried
-
-
-def the_same(one, other):
-    one, other = np.asarray(one), np.asarray(other)
-    return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
 
 
 @pytest.fixture(scope="module")

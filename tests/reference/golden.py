@@ -179,7 +179,7 @@ def cell_names():
     """The golden cells: for each engine and capability a wall with which it works, each in its turn."""
     from pairs import KNOWN
 
-    made, walls = [], list(cells.WALLS)
+    made, walls = [], cells.SHAPES
     for e, engine in enumerate(cells.ENGINES):
         for c, capability in enumerate(cells.CAPABILITIES):
             first = 5 * e + 3 * c

@@ -34,7 +34,7 @@ def soon():
 
     One that works says more than one that is refused, and scenes of a formula, a spline or triangles take seconds.
     """
-    chosen, walls = {}, [name for name in cells.WALLS if name not in ("formula", "sampled", "mesh")]
+    chosen, walls = {}, [name for name in cells.SHAPES if name not in ("formula", "sampled", "mesh")]
     for e, engine in enumerate(cells.ENGINES):
         for c, capability in enumerate(cells.CAPABILITIES):
             first = (7 * e + c) % len(walls)
@@ -42,6 +42,7 @@ def soon():
             known = [cell for cell in turn if str(cell) in KNOWN]
             chosen |= dict.fromkeys(sorted(known, key=lambda cell: KNOWN[str(cell)] != "works")[:1])
     chosen |= dict.fromkeys(Cell("points, Impact", wall, "plain") for wall in cells.WALLS)
+    chosen |= dict.fromkeys(Cell("points, Impact", cells.ON_A_CLUSTER, one) for one in ("temperature", "source"))
     return list(chosen)
 
 
