@@ -25,7 +25,7 @@ _DISPLAY = re.compile(
 _RAISING = re.compile(r"(Error|Warning|warn|Refused|getLogger|debug|info)$")
 # Folders of swarm/, and for some of them the only modules that hold mathematics or the logic of files.
 GROUPS: dict[str, str] = {
-    "": r"ball_numbers|columns|filling|history|observables|packing|particles|volume|state",
+    "": r"ball_numbers|columns|filling|history|observables|packing|particles|scene|state",
     "bodies": "",
     "colliding": "",
     "contact": "",

@@ -505,7 +505,6 @@ LAYERS = [
     ["ball_numbers", "methods"],
     ["scene"],
     ["pairs", "pieces"],
-    ["volume"],
     ["particles"],
     ["plane"],
     ["contact"],
