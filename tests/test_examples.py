@@ -9,7 +9,7 @@ from pathlib import Path
 import numba
 import pytest
 from children import python
-from conftest import METHODS, SURFACES, every_surface
+from conftest import METHODS, SURFACES, every_surface, row
 
 import swarm
 from swarm.kernel.vector import Vec
@@ -34,19 +34,18 @@ from own_surface import Superellipsoid
 
 np.seterr(all="ignore")
 axes = (0.3, 0.4, 0.5)
-start = swarm.fill(swarm.Scene([swarm.Ellipsoid(axes)]), 3, speed=1.0, seed=1)
-for case, pull in {gravity!r}.items():
-    for name, method in METHODS.items():
-        if pull is not None and name == "augmented Lagrangian":
-            # Steps that are cut at the impact know no gravity.
-            method = dataclasses.replace(method, adaptive=False, on_unconverged="count")
-        four, two, ellipsoid = (
-            swarm.simulate(swarm.Scene([surface], gravity=pull), start, method, until=2.0, every=0.5, threads=1)
-            for surface in (Superellipsoid(axes), Superellipsoid(axes, n=2.0), swarm.Ellipsoid(axes))
-        )
-        off = np.abs(two.particles.position - ellipsoid.particles.position).max()
-        seen = four.observables
-        print(case, name, seen["impacts"][-1], seen["energy_error"].max(), seen["max_penetration"].max(), off, sep=";")
+start = swarm.fill(swarm.Scene([swarm.Ellipsoid(axes)]), 2, speed=1.0, seed=3)
+for name, method in METHODS.items():
+    if {gravity!r} is not None and name == "augmented Lagrangian":
+        # Steps that are cut at the impact are not supported with gravity. Not every step of a fixed length converges.
+        method = dataclasses.replace(method, adaptive=False, on_unconverged="count", max_sweeps=10)
+    four, two, ellipsoid = (
+        swarm.simulate(swarm.Scene([surface], gravity={gravity!r}), start, method, until=2.2, every=0.55, threads=1)
+        for surface in (Superellipsoid(axes), Superellipsoid(axes, n=2.0), swarm.Ellipsoid(axes))
+    )
+    off = np.abs(two.particles.position - ellipsoid.particles.position).max()
+    seen = four.observables
+    print(name, seen["impacts"][-1], seen["energy_error"].max(), seen["max_penetration"].max(), off, sep=";")
 """
 
 
@@ -58,27 +57,28 @@ def in_plain_python(*arguments):
     return done.stdout
 
 
-@pytest.fixture(scope="module")
-def runs():
-    """Impacts, energy drift, penetration, and how far the positions for n = 2 are from those in the ellipsoid."""
-    script = SCRIPT.format(paths=[str(FILE.parent), str(ROOT / "tests")], gravity=GRAVITY)
+def runs(pull):
+    """Method -> impacts, energy drift, penetration, and how far the positions for n = 2 are from the ellipsoid's."""
+    script = SCRIPT.format(paths=[str(FILE.parent), str(ROOT / "tests")], gravity=pull)
     rows = (line.split(";") for line in in_plain_python("-c", script).splitlines())
-    return {(case, name): tuple(map(float, values)) for case, name, *values in rows}
+    return {name: tuple(map(float, values)) for name, *values in rows}
 
 
 @pytest.mark.parametrize("case", GRAVITY)
-@pytest.mark.parametrize("name", METHODS)
-def test_the_superellipsoid_runs_with_every_method(runs, case, name):
-    impacts, drift, outside, off = runs[case, name]
-    assert impacts >= 8
-    assert outside < 2e-3
-    if (case, name) == ("gravity", "augmented Lagrangian"):
-        # Not every step of a fixed length converges, which is counted.
-        return
-    assert off < 1e-8
-    if name in CONSERVING:
-        assert drift < 1e-14
-        assert outside < 1e-14
+def test_the_superellipsoid_runs_with_every_method(case):
+    found = runs(GRAVITY[case])
+    assert list(found) == list(METHODS)
+    for name, (impacts, drift, outside, off) in found.items():
+        with row(name):
+            assert impacts >= 8
+            assert outside < 2e-3
+            if (case, name) == ("gravity", "augmented Lagrangian"):
+                # Not every step of a fixed length converges, which is counted.
+                continue
+            assert off < 1e-8
+            if name in CONSERVING:
+                assert drift < 1e-14
+                assert outside < 1e-14
 
 
 def test_it_prints_energy_drift_and_impacts():
