@@ -2,6 +2,7 @@
 
 import csv
 import itertools
+import os
 import re
 import runpy
 import shutil
@@ -128,7 +129,7 @@ def test_the_python_runs_from_top_to_bottom(tmp_path, monkeypatch, capsys):
 # What the words of a command stand for.
 NAMES = {
     "SCENE.toml": "scene.toml", "SWEEP.toml": "sweep.toml", "RUN.h5": "scene.h5", "OUT.h5": "out.h5",
-    "OUT.rrd": "out.rrd", "N": "2",
+    "OUT.rrd": "out.rrd", "N": "2", "local:2": "local:1",
 }  # fmt: skip
 SCENE = re.search(r"```toml\n(.*?)```", README, re.DOTALL)[1]
 
@@ -156,7 +157,9 @@ def settings():
 
 
 @pytest.mark.physics
-def test_the_commands_run_in_their_order(tmp_path):
+def test_the_commands_run_in_their_order(tmp_path, monkeypatch):
+    # Each process of a sweep takes two seconds to begin.
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _process: {0})
     copy_examples(tmp_path, 1)
     (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "sweep.toml").write_text(f'{SCENE}\n[sweep]\n"particles.seed" = [1, 2]\n')
