@@ -15,7 +15,6 @@ import pytest
 from children import python
 
 from bench import bars, collisions, compare, compiling, reference, report
-from bench.__main__ import main
 from swarm.kernel import cache
 
 pytestmark = pytest.mark.physics
@@ -40,7 +39,7 @@ def printed(monkeypatch, capsys):
 
     def of(name):
         monkeypatch.setattr(sys, "argv", ["bench", name, "--quick"])
-        main()
+        runpy.run_module("bench", run_name="__main__")
         return capsys.readouterr().out
 
     return of
