@@ -80,7 +80,7 @@ def require_same(one, other, paths):
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory):
     path = tmp_path_factory.mktemp("alone") / "run.h5"
-    return swarm.simulate(*cavity(), until=8.0, every=0.5, trajectory=path, compile="never"), path
+    return swarm.simulate(*cavity(), until=2.0, every=0.5, trajectory=path, compile="never"), path
 
 
 @pytest.fixture
@@ -127,7 +127,7 @@ def test_a_worker_that_is_killed_changes_no_bit(client, alone, kept, tmp_path):
                 os.kill(pid, signal.SIGKILL)
 
     client.subscribe_topic("kept", kill)
-    options = {"until": 8.0, "every": 0.5, "compile": "never", "checkpoint": 0.01, "trajectory": tmp_path / "run.h5"}
+    options = {"until": 2.0, "every": 0.5, "compile": "never", "checkpoint": 0.01, "trajectory": tmp_path / "run.h5"}
     result = swarm.simulate(*cavity(), **options, cluster=client)
     client.unsubscribe_topic("kept")
     assert len(killed) == 2
@@ -203,7 +203,7 @@ def held(client):
 def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, held, tmp_path):
     address = client.scheduler.address
     scene, output = tmp_path / "scene.toml", tmp_path / "run.h5"
-    scene.write_text(SCENE.replace("UNTIL", "8.0"))
+    scene.write_text(SCENE.replace("UNTIL", "2.0"))
     words = ["run", str(scene), "-o", str(output), "--cluster", address]
     reached = threading.Event()
 
@@ -343,7 +343,7 @@ def test_functions_of_frames_are_given_the_particles_of_all_shards(client, tmp_p
     for where, path in ((None, tmp_path / "one.h5"), (client, tmp_path / "many.h5")):
         ends.append(
             swarm.simulate(
-                *cavity(), until=2.0, every=0.5, compile="never", trajectory=path, cluster=where,
+                *cavity(), until=1.0, every=0.25, compile="never", trajectory=path, cluster=where,
                 observables={"spread": spread}, progress=lambda frame: shown.append(spread(frame)),
             )
         )  # fmt: skip
@@ -375,12 +375,12 @@ def test_code_that_a_file_names_reaches_the_workers(client, tmp_path, monkeypatc
 
 def test_lines_of_progress_come_from_a_cluster_too(client, tmp_path, capsys):
     swarm.simulate(
-        *cavity(), until=4.0, every=0.5, compile="never", trajectory=tmp_path / "run.h5", cluster=client,
+        *cavity(), until=1.0, every=0.25, compile="never", trajectory=tmp_path / "run.h5", cluster=client,
         progress=lines(0.0),
     )  # fmt: skip
     told = capsys.readouterr().err.splitlines()
     assert told
-    assert all("%  " in line and "/4 s" in line for line in told)
+    assert all("%  " in line and "/1 s" in line for line in told)
 
 
 def test_what_a_worker_compiles_is_told(tmp_path, monkeypatch):

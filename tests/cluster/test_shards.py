@@ -18,6 +18,7 @@ from swarm.run.options import RunOptions
 from swarm.run.session import Session
 
 N = 520  # three chunks, the last one not whole
+TIMES = {"until": 0.2, "every": 0.1, "compile": "never"}
 
 
 def sphere():
@@ -61,7 +62,7 @@ def fed():
     return scene, swarm.fill(scene, 100, speed=1.0, seed=5), swarm.Impact()
 
 
-SOURCES = [swarm.Source(0, rate=2000.0, temperature=1.0), swarm.Source(0, volume=True, count=100, stop=0.4, speed=1.0)]
+SOURCES = [swarm.Source(0, rate=2000.0, temperature=1.0), swarm.Source(0, volume=True, count=100, stop=0.2, speed=1.0)]
 
 
 def periodic():
@@ -97,7 +98,7 @@ CASES = {
     "every seventh in float32": (sphere, {"frames": 7, "precision": "float32", "compression": "gzip"}),
     "few of them": (sphere, {"frames": 300}),
     "no particles": (sphere, {"frames": "none"}),
-    "members": (periodic, {"member_impacts": True}),
+    "members": (periodic, {"until": 0.4, "member_impacts": True}),
     "thermal": (thermal, {"seed": 2**64 - 3, "member_impacts": True}),
     "sliding": (sliding, {}),
     "members on which they slide": (sliding, {"member_impacts": True}),
@@ -107,7 +108,7 @@ CASES = {
     "counters": (openings, {"counters": [swarm.Plane((0.0, 0.0, 1.0)), swarm.Sphere(0.2)]}),
     "sources": (fed, {"sources": SOURCES, "observables": OWN, "member_impacts": True}),
     "sources, every third": (fed, {"sources": SOURCES, "frames": 3}),
-    "a cell": (periodic, {"observables": OWN}),
+    "a cell": (periodic, {"until": 0.4, "observables": OWN}),
     "moving": (moving, {}),
     "bodies": (bodies, {"until": 0.1, "every": 0.05, "observables": OWN, "member_impacts": True}),
 }
@@ -156,7 +157,7 @@ def alone(tmp_path_factory):
             make, keywords = CASES[name]
             path = tmp_path_factory.mktemp("alone") / "run.h5"
             scene, start, method = make()
-            options = RunOptions(**{"until": 0.4, "every": 0.2, "compile": "never"} | keywords, trajectory=path)
+            options = RunOptions(**TIMES | keywords, trajectory=path)
             task = task_of(scene, start, method, options)
             known[name] = machine.carry_out_task(task, Session(options)), path
         return known[name]
@@ -171,7 +172,7 @@ def test_any_number_of_shards_gives_the_same_bits(name, count, alone, on_a_clust
     make, keywords = CASES[name]
     end, path = alone(name)
     path_of_shards = tmp_path / "run.h5"
-    keywords = {"until": 0.4, "every": 0.2, "compile": "never"} | keywords
+    keywords = TIMES | keywords
     other = on_a_cluster(*make(), count, **keywords, trajectory=path_of_shards)
     assert end.observables.keys() == other.observables.keys()
     for key, values in end.observables.items():
@@ -232,9 +233,7 @@ def require_same_file(one, other):
 @pytest.mark.parametrize("case", ["sphere", "bodies"])
 def test_a_flipped_bit_of_a_shard_is_told(case, on_a_cluster, tmp_path):
     make, keywords = CASES[case]
-    on_a_cluster(
-        *make(), 3, **{"until": 0.4, "every": 0.2, "compile": "never"} | keywords, trajectory=tmp_path / "run.h5"
-    )
+    on_a_cluster(*make(), 3, **TIMES | keywords, trajectory=tmp_path / "run.h5")
     with swarm.load(tmp_path / "run.h5") as trajectory:
         trajectory.require_intact()
         frame = trajectory.frame(1)
