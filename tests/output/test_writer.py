@@ -43,14 +43,14 @@ def require_frames(path, least, n=None):
         assert trajectory.times.tolist() == list(range(count))
         if count:
             expected = np.arange(count) * np.ones((3, 1))
-            for i in (0, N - 1):
-                position, velocity = trajectory.particle(i)
-                assert np.array_equal(position, expected)
-                assert np.array_equal(velocity, -expected)
-            assert trajectory.observables["impacts"].tolist() == list(range(count))
+            position, velocity = trajectory.particle(count % N)
+            assert np.array_equal(position, expected)
+            assert np.array_equal(velocity, -expected)
+            seen = trajectory.observables
+            assert seen["impacts"].tolist() == list(range(count))
+            assert np.array_equal(seen["momentum"].T, expected)
             for k in {0, count // 2, count - 1}:
                 assert trajectory.impacts(k).tolist() == [k] * N
-            assert np.array_equal(trajectory.observables["momentum"].T, expected)
     return count
 
 
@@ -86,7 +86,7 @@ def test_every_prefix_of_the_writes_is_a_whole_file(tmp_path, monkeypatch, compr
     """A kill stops HDF5 between two of its writes: here between any two, and the run goes on from what is left.
 
     So many chunks that the index of chunks grows several times: in HDF5's ordinary mode a kill in the middle of that
-    loses half of them.
+    loses half of them. What is written behind the end is in no index yet: every fourth of these writes is a case.
     """
     path, image, batch, frames = tmp_path / "run.h5", tmp_path / "image.h5", 7, 420 if compression == "none" else 84
     logs, real = [], h5py.File
@@ -111,9 +111,11 @@ def test_every_prefix_of_the_writes_is_a_whole_file(tmp_path, monkeypatch, compr
     monkeypatch.undo()
     assert require_frames(path, frames) == frames
     image.touch()
-    done, cases = 0, 0
+    done, cases, size, behind = 0, 0, 0, 0
     with open(image, "r+b") as file:
         for k, (place, data) in enumerate(logs[0].notes):
+            behind = behind + 1 if data is None or place >= size else 0
+            size = place if data is None else max(size, place + len(data))
             if data is None:
                 file.truncate(place)
             else:
@@ -123,6 +125,8 @@ def test_every_prefix_of_the_writes_is_a_whole_file(tmp_path, monkeypatch, compr
             done = max([number for written, number in reported if written <= k + 1], default=0)
             # One that follows a change of the index is worth more than a hundred that append.
             if done == 0 or (done % (10 * batch) and done < frames - 11 * batch):
+                continue
+            if behind > 1 and behind % 4:
                 continue
             cases += 1
             assert done <= require_frames(image, done) <= done + batch
