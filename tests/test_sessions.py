@@ -473,11 +473,11 @@ def test_lines_on_the_way_to_a_far_frame(capsys, monkeypatch):
 
 @pytest.mark.physics
 def test_the_example_is_stopped_twice_and_conserves(tmp_path):
-    told = long_run.main(particles=50, impacts=600.0, folder=tmp_path)
+    told = long_run.main(particles=50, impacts=200.0, folder=tmp_path)
     assert told["sessions"] == ["stopped", "stopped", "complete"]
     assert told["frames at the stops"] == [51, 301, 501]
     assert told["frames"] == long_run.FRAMES + 1
-    assert told["impacts"] == pytest.approx(50 * 600.0, rel=0.1)
+    assert told["impacts"] == pytest.approx(50 * 200.0, rel=0.1)
     assert told["energy error, worst particle"] <= 1e-14
     assert told["Joachimsthal's integral, worst relative change"] <= 1e-9
     assert told["largest penetration [m]"] <= 4.0 * np.spacing(0.6)

@@ -57,7 +57,13 @@ def test_a_page_has_the_table_the_graphs_and_the_sweep_file(folder, page):
     assert page.title.startswith("Sweep gas<script>: 4 runs, over surface.0.restitution and particles.seed")
 
 
-def test_names_of_folders_are_escaped_and_links_lead_to_files(folder, page):
+@pytest.fixture
+def words(monkeypatch):
+    """Pages without graphs, which take a second: for tests of what they say."""
+    monkeypatch.setattr(curves, "svg", lambda figure, told: "")
+
+
+def test_names_of_folders_are_escaped_and_links_lead_to_files(folder, page, words):
     assert "<script>:" not in page.html
     links = Read(page.html).links
     assert len(links) == 5
@@ -73,7 +79,7 @@ def test_what_comes_first_is_what_differs(folder):
     assert "energy_error" not in names  # round-off
 
 
-def test_a_sweep_that_is_not_complete_and_a_run_that_failed_say_so(folder, tmp_path):
+def test_a_sweep_that_is_not_complete_and_a_run_that_failed_say_so(folder, tmp_path, words):
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
     status = sorted(file for file in copy.glob("*.json"))[0]
@@ -90,7 +96,7 @@ def test_a_sweep_that_is_not_complete_and_a_run_that_failed_say_so(folder, tmp_p
     assert "not complete: 1 of 4 runs have not ended" in Read(swarm.report(copy).html).texts[""]
 
 
-def test_a_sweep_without_its_table_or_its_file_has_a_page(folder, tmp_path):
+def test_a_sweep_without_its_table_or_its_file_has_a_page(folder, tmp_path, words):
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
     (copy / "results.csv").unlink()
