@@ -38,7 +38,7 @@ def test_springs_keep_energy_and_links(kind, method, name, gravity):
     # 24 cases of three kinds: seconds each in plain Python. Those of linear springs are those of the loop below.
     surfaces = BESIDE[name] if method == "hertz" else SPHERE if name == "sphere" else BOX
     scene, start = some(kind, surfaces, gravity=gravity)
-    seen = swarm.simulate(scene, start, SPRINGS[method], until=10.0, every=0.5, compile="always").observables
+    seen = swarm.simulate(scene, start, SPRINGS[method], until=10.0, every=0.1, compile="always").observables
     assert seen["impacts"][-1] > SOME * 5
     # V feels the last bit of a place: alpha g of it, in each of so many steps.
     assert seen["energy_error"].max() < (1e-9 if method == "stiff" else 2e-11)

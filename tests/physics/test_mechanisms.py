@@ -172,7 +172,7 @@ def test_the_impulse_in_a_carried_cavity_is_that_of_two_masses(restitution):
 
 @pytest.mark.parametrize("restitution", [1.0, 0.9])
 def test_a_slider_crank_with_a_clearance_keeps_its_energy(restitution):
-    long, motion = slider_crank.run(12, restitution)
+    long, motion = slider_crank.run(20, restitution)
     seen = long.observables
     assert seen["impacts"][-1] > 500
     assert seen["energy_error"].max() < 1e-11

@@ -24,7 +24,9 @@ def test_threads_blocks_and_tiers_change_no_bit(name, monkeypatch):
     """
     particles = swarm.fill(SCENE, 1001, speed=0.5, seed=8)
     runs = [
-        swarm.simulate(SCENE, particles, CASES[name], until=3.0, every=1.0, threads=threads, block_size=size)
+        swarm.simulate(
+            SCENE, particles, CASES[name], until=3.0, every=1.0, threads=threads, block_size=size, compile="always"
+        )
         for threads, size in ((1, None), (2, None), (3, 700), (2, 10_000))
     ]
     first = runs[0]
