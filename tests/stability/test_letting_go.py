@@ -10,6 +10,7 @@ import math
 import numpy as np
 import pytest
 from bounded import bounded
+from conftest import every_pair
 
 import swarm
 from swarm.kernel.vector import Vec
@@ -43,10 +44,13 @@ def arc(x):
     return 0.5 * abs(x) * float(weights @ np.sqrt(1.0 + (3.0 * K * places**2) ** 2))
 
 
-@pytest.mark.parametrize(("restitution", "pull"), [(0.9, 0.0), (1.0, 1.0), (0.5, -3.0)])
-@pytest.mark.parametrize("center", [(0.0, 0.0, 0.0), (0.37, -0.21, 0.43)], ids=["at the origin", "off it"])
-@pytest.mark.parametrize("surface", [sampled, formula])
-def test_it_flies_on_along_the_tangent(surface, center, restitution, pull, monkeypatch):
+@every_pair(
+    surface={"sampled": sampled, "formula": formula},
+    center={"at the origin": (0.0, 0.0, 0.0), "off it": (0.37, -0.21, 0.43)},
+    given={"0.9-0.0": (0.9, 0.0), "1.0-1.0": (1.0, 1.0), "0.5--3.0": (0.5, -3.0)},
+)
+def test_it_flies_on_along_the_tangent(surface, center, given, monkeypatch):
+    restitution, pull = given
     bounded(monkeypatch, MOST)
     box = swarm.Box((0.45, 0.45, 0.45), center=center)
     scene = swarm.Scene([surface(center, restitution), box], gravity=(0.0, pull, 0.0) if pull else None)

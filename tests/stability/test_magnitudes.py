@@ -3,11 +3,14 @@
 Powers of two, which floating-point numbers carry in the exponent alone, change no bit; other factors change round-off.
 """
 
+import functools
+
 import numpy as np
 import pytest
 
 import swarm
 
+NUMBER = 12
 # Powers of 2 of length, time and mass: 2^40 is 1e12.
 UNITS = [(40, 0, 0), (-40, 0, 0), (0, 40, 0), (0, -40, 0), (0, 0, 40), (0, 0, -40), (13, -27, 39)]
 
@@ -34,12 +37,13 @@ METHODS = {
 }
 
 
+@functools.cache
 def ends(name, scene_of, length=1.0, time=1.0, mass=1.0, until=8.0):
     """Positions over lengths, velocities over speeds, and what is seen of the run, all without unit.
 
     `scene_of(length, time)` is the scene in these units.
     """
-    start = swarm.fill(scene_of(1.0, 1.0), 40, speed=0.5, seed=1)
+    start = swarm.fill(scene_of(1.0, 1.0), NUMBER, speed=0.5, seed=1)
     particles = swarm.Particles(start.position * length, start.velocity * length / time, start.mass * mass)
     method = METHODS[name](length, time, mass)
     result = swarm.simulate(scene_of(length, time), particles, method, until=until * time, every=0.25 * until * time)
@@ -57,7 +61,7 @@ def ends(name, scene_of, length=1.0, time=1.0, mass=1.0, until=8.0):
 @pytest.mark.physics
 @pytest.mark.parametrize("name", ["impact", "penalty", "verlet", "midpoint", "trapezoidal"])
 def test_units_change_no_bit(name):
-    require_the_same_bits(name, sphere, 40 * 6)
+    require_the_same_bits(name, sphere, NUMBER * 6)
 
 
 FALLING = (0.2, 0.0, -1.0)
@@ -84,7 +88,7 @@ def three_walls(rigid, pull):
     [(name, pull) for name in METHODS for pull in (None, FALLING) if pull is None or "Lagrangian" not in name],
 )
 def test_units_change_no_bit_of_three_walls(name, pull):
-    require_the_same_bits(name, three_walls(name.startswith("impact"), pull), 40 * 8)
+    require_the_same_bits(name, three_walls(name.startswith("impact"), pull), NUMBER * 8)
 
 
 def require_the_same_bits(name, scene_of, impacts):
