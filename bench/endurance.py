@@ -20,7 +20,7 @@ from .report import Row, repeated, show, tier, write
 def checkpoints(n: int, repeats: int, folder: Path) -> list[Row]:
     """Milliseconds that a checkpoint holds the run up, file and folder synced; beside the bare write of its bytes."""
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
-    job = checkpoint.Job("", "", "", "", n, "")
+    job = checkpoint.SavedRun("", "", "", "", n, "")
     path = folder / "run.h5.checkpoint"
     with Run(SPHERE, particles.copy(), swarm.Impact(), 1, None, tier()) as run:
         run.observe()

@@ -14,7 +14,7 @@ import swarm
 from swarm import observables
 from swarm.run import cluster
 from swarm.run.cluster import joined, shards, worker
-from swarm.run.machine import End
+from swarm.run.machine import RunEnd
 from swarm.run.measures import Measures
 from swarm.run.options import Task
 
@@ -26,7 +26,7 @@ _ARRAYS = ("impacts_per_particle", "escape_time", "absorbed_time", "birth_time",
 _OF_PARTICLES = ("position", "velocity", "mass", "radius", "spin", "image")
 
 
-def carry_out(task: Task, session: cluster.Sharded) -> End:
+def carry_out(task: Task, session: cluster.Sharded) -> RunEnd:
     """Carry out a run that is checked, as `swarm.run.cluster.carry_out`.
 
     Raises:

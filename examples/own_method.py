@@ -40,7 +40,7 @@ class MirrorNumbers(contract.MethodNumbers):
     def land(self, walls, gravity, lane, hit):
         t = select(hit.time < lane.remaining, hit.time, lane.remaining)
         r, v = lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t)
-        return contract.Flight(r, v, lane.remaining - t, select(hit.time <= lane.remaining, hit.wall, -1.0))
+        return contract.FlightEnd(r, v, lane.remaining - t, select(hit.time <= lane.remaining, hit.wall, -1.0))
 
     def contact(self, walls, gravity, lane, wall, solution):
         n = walls.unit_normal(wall, lane.r)

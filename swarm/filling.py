@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from . import checks
 from .errors import SceneError
 from .particles import Particles
-from .placing.sequential import Room, place_balls, require_packing, require_size
+from .placing.sequential import VolumeBox, place_balls, require_packing, require_size
 from .placing.shapes import require_shapes
 from .scene import Scene
 from .state import Floats
@@ -124,10 +124,10 @@ def _balls(scene: Scene, particles: Particles, random: np.random.Generator) -> t
     return particles, room.volume
 
 
-def room_of(scene: Scene, random: np.random.Generator, user: str) -> Room:
+def room_of(scene: Scene, random: np.random.Generator, user: str) -> VolumeBox:
     """The volume of a scene, from random points, for the `user` that a sentence names."""
     _points_of_it, volume = _points(scene, _POINTS, random, user)
-    return Room(*bounding_box(scene, user, _INSTEAD), volume)
+    return VolumeBox(*bounding_box(scene, user, _INSTEAD), volume)
 
 
 def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]:

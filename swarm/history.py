@@ -107,7 +107,7 @@ def contact_history(
     check_surfaces(method, scene)
     method.check(scene, particle)
     # The functions of kernels, in plain Python; with NumPy's numbers 1/0 is an infinity as in compiled kernels.
-    start = Start(vec(particle.position[:, 0]), vec(particle.velocity[:, 0]))
+    start = CutStep(vec(particle.position[:, 0]), vec(particle.velocity[:, 0]))
     with np.errstate(all="ignore"):
         if isinstance(method, AugmentedLagrangian):
             if method.adaptive:
@@ -121,7 +121,7 @@ def contact_history(
     raise SceneError(f"method must be AugmentedLagrangian, Penalty or Impact, got {type(method).__name__}")
 
 
-class Start(NamedTuple):
+class CutStep(NamedTuple):
     """Position and velocity before the step, and where it is cut at an impact its length [s] and the wall."""
 
     r: Vec
@@ -130,10 +130,10 @@ class Start(NamedTuple):
     wall: float = -1.0
 
 
-class _Rows:
+class _HistoryRows:
     """The entries of a history, collected sweep by sweep."""
 
-    def __init__(self, scene: Scene, start: Start, mass: float, h: float) -> None:
+    def __init__(self, scene: Scene, start: CutStep, mass: float, h: float) -> None:
         self._scene, self._start, self._mass, self._h = scene, start, mass, h
         self.step = Step(start.r, displacement(scene.pull(), start.v, h), np.float64(h * h / (2.0 * mass)))
         self._rows: list[tuple[Any, ...]] = []
@@ -158,7 +158,7 @@ class _Rows:
         return ContactHistory(*columns, *[converged])
 
 
-def _at_the_wall(scene: Scene, start: Start, h: float, begins: str) -> Start:
+def _at_the_wall(scene: Scene, start: CutStep, h: float, begins: str) -> CutStep:
     """The start of the contact step at the next impact, of length h if the flight to it is long enough."""
     walls = scene.walls()
     hit = flights.first_hit(walls, None, start.r, start.v)
@@ -166,23 +166,23 @@ def _at_the_wall(scene: Scene, start: Start, h: float, begins: str) -> Start:
         raise SceneError(f"velocity must lead to a surface, got {tuple(start.v)}, which never does")
     r = walls.project(hit.wall, start.r + hit.time * start.v)
     if begins == "impact":
-        return Start(r, start.v, h, hit.wall)
+        return CutStep(r, start.v, h, hit.wall)
     half = min(0.5 * h, hit.time)
     if not half > 0.0:
         raise SceneError(
             f"position must be off the wall that is met, for a step that begins before the impact, got {tuple(start.r)}"
         )
-    return Start(r - half * start.v, start.v, 2.0 * half, hit.wall)
+    return CutStep(r - half * start.v, start.v, 2.0 * half, hit.wall)
 
 
-def _uzawa(scene: Scene, start: Start, mass: float, method: AugmentedLagrangian) -> ContactHistory:
+def _uzawa(scene: Scene, start: CutStep, mass: float, method: AugmentedLagrangian) -> ContactHistory:
     numbers, walls, count = method.numbers(scene), scene.walls(), len(scene.owners())
     law = numbers.law
-    rows = _Rows(scene, start, mass, start.h if method.adaptive else method.dt)
+    rows = _HistoryRows(scene, start, mass, start.h if method.adaptive else method.dt)
     if method.contact_start == "centred":
         walls, law = lowered(walls, start.wall, start.r), law.stiffened((method.dt / start.h) ** 2)
     multipliers, reactions = np.zeros(count), np.zeros((count, 4))
-    before = uzawa.Before(np.zeros(count), np.zeros(count))
+    before = uzawa.LastSweep(np.zeros(count), np.zeros(count))
     uzawa.start(numbers, law, walls, rows.step, multipliers)
     for sweep in range(method.max_sweeps):
         end = uzawa.sweep_all(numbers, law, walls, rows.step, multipliers, before, sweep, reactions)
@@ -193,9 +193,9 @@ def _uzawa(scene: Scene, start: Start, mass: float, method: AugmentedLagrangian)
     return rows.history(False)
 
 
-def _penalty(scene: Scene, start: Start, mass: float, method: Penalty) -> ContactHistory:
+def _penalty(scene: Scene, start: CutStep, mass: float, method: Penalty) -> ContactHistory:
     numbers, walls, count = method.numbers(scene), scene.walls(), len(scene.owners())
-    rows, reactions = _Rows(scene, start, mass, method.dt), np.zeros((count, 4))
+    rows, reactions = _HistoryRows(scene, start, mass, method.dt), np.zeros((count, 4))
     _require(corner.hold(numbers.form, numbers.law, None, walls, rows.step, reactions).solved, 0)
     first, last = np.zeros(count), reactions[:, 3]
     corner.constraints(walls, numbers.law, start.r, first)
@@ -204,11 +204,11 @@ def _penalty(scene: Scene, start: Start, mass: float, method: Penalty) -> Contac
     return rows.history(True)
 
 
-def _impact(scene: Scene, start: Start, mass: float, method: Impact) -> ContactHistory:
+def _impact(scene: Scene, start: CutStep, mass: float, method: Impact) -> ContactHistory:
     if method.contact_step == 0.0:
         raise SceneError("contact_step must be above 0 for a history, got 0: an exact reflection takes no step")
     walls, count = scene.walls(), len(scene.owners())
-    rows, r0, wall = _Rows(scene, start, mass, start.h), start.r, start.wall
+    rows, r0, wall = _HistoryRows(scene, start, mass, start.h), start.r, start.wall
     if method.contact_start == "centred":
         walls = lowered(walls, wall, r0)
     kappa = reflection.chord(walls, wall, r0, rows.step.p)

@@ -12,7 +12,7 @@ from .errors import SceneError
 from .filling import check_velocities, fill_velocities, room_of
 from .motion import pose
 from .particles import Particles
-from .placing.sequential import Room, place_balls, require_size, told
+from .placing.sequential import VolumeBox, place_balls, require_size, told
 from .placing.shapes import require_shapes
 from .run.growing import grow
 from .scene import Scene
@@ -95,7 +95,7 @@ def pack(
     return made
 
 
-def _radii(scene: Scene, n: int | None, radius: ArrayLike | None, fraction: float | None, room: Room) -> Floats:
+def _radii(scene: Scene, n: int | None, radius: ArrayLike | None, fraction: float | None, room: VolumeBox) -> Floats:
     """The radii, from two of the three, or all."""
     given = {"n": n, "radius": radius, "fraction": fraction}
     if sum(value is not None for value in given.values()) < 2:
@@ -119,7 +119,7 @@ def _radii(scene: Scene, n: int | None, radius: ArrayLike | None, fraction: floa
     return np.asarray(sizes * part ** (-1.0 / len(scene.axes())))
 
 
-def _as_many_as_fit(scene: Scene, radius: float, fraction: float, room: Room) -> Floats:
+def _as_many_as_fit(scene: Scene, radius: float, fraction: float, room: VolumeBox) -> Floats:
     """As many balls of a radius as fill a fraction."""
     one = balls_volume(scene, np.array([radius])) / room.volume
     count = int(min(fraction / one, 1e15) + _CLOSE)
@@ -139,7 +139,7 @@ def _require_below(name: str, packing: float, axes: int, told_more: str) -> None
         raise SceneError(f"{name} must be at most {_MOST[axes]:g}, got {packing:.4g}{told_more}{why}")
 
 
-def _places(scene: Scene, radius: Floats, room: Room, random: np.random.Generator) -> Floats:
+def _places(scene: Scene, radius: Floats, room: VolumeBox, random: np.random.Generator) -> Floats:
     """Places of balls that have grown to these radii."""
     axes = len(scene.axes())
     packing = balls_volume(scene, radius) / room.volume

@@ -33,3 +33,13 @@ def arguments(node):
 def test_a_name_has_one_meaning_in_a_package(package):
     other = {name: found for name, found in definitions(package).items() if len({what for _, what in found}) > 1}
     assert not other
+
+
+def test_a_class_name_stands_once():
+    """In the whole package, so that a search for it finds the class."""
+    found = defaultdict(list)
+    for path in sorted(ROOT.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                found[node.name].append(str(path.relative_to(ROOT)))
+    assert {name: places for name, places in found.items() if len(places) > 1} == {}

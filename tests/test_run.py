@@ -12,7 +12,7 @@ from swarm.contact import events
 from swarm.kernel.arrays import next_of
 from swarm.kernel.jit import kernel
 from swarm.lanes import arrays as lanes
-from swarm.lanes.share import Draws, Place, Share
+from swarm.lanes.share import Draws, Share, ThreadPlace
 from swarm.lanes.table import LANES
 from swarm.run.engine import Run
 from swarm.status import Status
@@ -50,7 +50,7 @@ def test_every_particle_that_is_not_done_follows_once(n, size):
     number, pending = -(-n // size), np.zeros(events.PHASES, np.int64)
     draws = Draws(np.zeros(1, np.int64), np.arange(number), size, np.empty(number, np.int64))
     share = Share(None, phase, pending, lanes.none_halted(1), draws, np.zeros(1, np.int64), 1.0, 0, 0, 1.0)
-    place, found = share.following(events.FLYING, Place(0, 0, 0)), []
+    place, found = share.following(events.FLYING, ThreadPlace(0, 0, 0)), []
     while not place.is_end():
         found.append(place.i)
         place = share.following(events.FLYING, place.after())

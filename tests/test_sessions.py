@@ -67,7 +67,7 @@ def require_resumed_is_whole(tmp_path, scene, method, n=700, every=4.0, threads=
     with kind(scene, start.copy(), method, 1, None) as whole:
         expected, expected_seen = frames_of(whole, method, every)
     halts, next_threads = [], itertools.cycle(threads)
-    job = checkpoint.Job("", "", "", "", n, "")
+    job = checkpoint.SavedRun("", "", "", "", n, "")
 
     def begin_again(run, cut_short):
         halts.append(cut_short)

@@ -72,7 +72,7 @@ def session(clock, monkeypatch, saving=0.0, **options):
     """One with a limit of 10 s and a trajectory, whose checkpoints take so long."""
     given = {"until": 1.0, "trajectory": "run.h5", "checkpoint": 4.0, "walltime": 10.0, **options}
     made, saved = Session(RunOptions(**given)), []
-    made._job = checkpoint.Job("", "", "", "", 1, "")
+    made._job = checkpoint.SavedRun("", "", "", "", 1, "")
     made._owners = None
 
     def save(*_about):

@@ -25,7 +25,7 @@ _FEW, _MOST = 4, 128
 _ANY = 6
 
 
-class Known(NamedTuple):
+class NextCollision(NamedTuple):
     """A collision of a ball: when [s since the epoch], and with whom."""
 
     time: Any
@@ -157,7 +157,7 @@ def _soonest(box, flock, i, now, near, count, known):
         sooner = (time < first) | ((time == first) & (j < mate))
         if sooner and time <= flock.event[index(FLOATS * j + MEETS)]:
             first, mate = time, j
-    return Known(first, mate)
+    return NextCollision(first, mate)
 
 
 @outlined
@@ -172,7 +172,7 @@ def _soonest_of_images(box, flock, i, now, near, count, known):
         sooner = (time < first) | ((time == first) & (j < mate))
         if sooner and time < math.inf and time <= flock.event[index(FLOATS * j + MEETS)]:
             first, mate = time, j
-    return Known(first, mate)
+    return NextCollision(first, mate)
 
 
 def _looked_at(box, flock, i, now, near, count, known):
@@ -182,7 +182,7 @@ def _looked_at(box, flock, i, now, near, count, known):
 
 @outlined
 def _look_through(box, flock, i, now, near, row, known):
-    """The `Known` collision with those of a cell, at this row, beyond the first few, too."""
+    """The `NextCollision` with those of a cell too, at this row, beyond the first few."""
     count, done = flock.room[index(row)], _FEW
     while done < count:
         some = min(count - done, _MOST)
@@ -194,7 +194,7 @@ def _look_through(box, flock, i, now, near, row, known):
 
 
 def _around(box, flock, i, now, face, known):
-    """The `Known` collision of ball i with all balls in the cells around its own, or only in those beyond a face.
+    """The `NextCollision` of ball i with all balls in the cells around its own, or only in those beyond a face.
 
     The first few of each cell are copied at once, also where there are less, so that no branch of the processor is
     foretold from how many balls are in a cell.
@@ -231,7 +231,7 @@ def _keep(flock, i, known):
 @outlined
 def find_partner(box, flock, i, now):
     """Find the next collision of a ball."""
-    _keep(flock, i, _around(box, flock, i, now, _ANY, Known(math.inf, NOBODY)))
+    _keep(flock, i, _around(box, flock, i, now, _ANY, NextCollision(math.inf, NOBODY)))
 
 
 @outlined
@@ -240,7 +240,7 @@ def look_ahead(box, flock, i, now):
     row = FLOATS * i + MEETS
     if box.grid.few is None:
         face = flock.tag[index(WHOLES * i + FACE)]
-        before = Known(flock.event[index(row)], flock.tag[index(WHOLES * i + PARTNER)])
+        before = NextCollision(flock.event[index(row)], flock.tag[index(WHOLES * i + PARTNER)])
         known = _around(box, flock, i, now, face, before)
         sooner = (known.time < before.time) | (known.mate != before.mate)
         if sooner:

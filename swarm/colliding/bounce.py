@@ -40,14 +40,14 @@ class Gates(Record):
     absorbed_wall: Any = None  # (N,) int32, or None
 
 
-class Source(Record):
+class RandomSource(Record):
     """The random numbers of walls that send balls off."""
 
     seed: Any
     first: Any  # the number of the first ball of this run
 
 
-class Turned(Record):
+class BouncedBall(Record):
     """A ball after its impact; energies are twice those per mass, and `wait` is that of `Sent`."""
 
     v: Vec
@@ -98,7 +98,7 @@ def _end(box, clock, wall, i, now, after):
 
 
 def _turned(box, flock, books, walls, wall, ball):
-    """`Turned`, by the laws of a wall, of a ball: its number, the time, its position and its velocity."""
+    """`BouncedBall`, by the laws of a wall, of a ball: its number, the time, its position and its velocity."""
     i, now, r, v = ball
     fall = 2.0 * potential(box.pull, r)
     twice = flock.kept.at(i, flock.stamp(i), square(v) + fall)
@@ -107,7 +107,7 @@ def _turned(box, flock, books, walls, wall, ball):
     if box.loss is not None and box.loss.spares(flock, i, now):
         hit = exact(box.laws._replace(restitution=None), walls, box.pull, wall, r, v, energy)
     v1 = squared(hit.v, hit.twice_energy - fall)
-    turned = Turned(v1, hit.impulse, twice - (hit.twice_energy - hit.work), 0.0, hit.work, 0.0, hit.twice_energy)
+    turned = BouncedBall(v1, hit.impulse, twice - (hit.twice_energy - hit.work), 0.0, hit.work, 0.0, hit.twice_energy)
     if box.laws.send_off:
         random = Stream(box.source.seed, box.source.first + i, books.impacts[index(i)], 0, box.laws.across)
         sent = send(box.laws, walls, wall, Arriving(r, v, twice - fall, 0.0, box.kinds.mass_of(i)), random)
@@ -116,7 +116,7 @@ def _turned(box, flock, books, walls, wall, ball):
             left = select(sent.keeps, twice + sent.work, square(sent.v) + fall)
             heat = select(sent.keeps, 0.0, left - sent.work - twice)
             v1 = either(sent.keeps, squared(sent.v, left - fall), sent.v)
-            turned = Turned(v1, sent.impulse, *_shares(box.laws, heat, sent.lost), sent.work, sent.wait, left)
+            turned = BouncedBall(v1, sent.impulse, *_shares(box.laws, heat, sent.lost), sent.work, sent.wait, left)
     return _lifted(box, walls, wall, r, turned)
 
 

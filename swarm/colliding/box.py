@@ -6,7 +6,7 @@ from ..kernel.jit import Array
 from ..kernel.record import Record
 
 
-class Box(Record):
+class Domain(Record):
     """What the balls are in: walls and their laws, gravity, cells, kinds of balls, what is lost of their energy."""
 
     walls: Any
@@ -25,7 +25,7 @@ class Box(Record):
     repose: Any = None  # None, or `Repose` where balls may come to rest
 
 
-class Books(NamedTuple):
+class CollisionTotals(NamedTuple):
     """What is booked: of each ball, and of all."""
 
     impulse: Array  # (2 walls, 1)
@@ -37,7 +37,7 @@ class Books(NamedTuple):
     heat: Any = None  # (walls, 1) that walls gave [J], or None
 
 
-class Rule(NamedTuple):
+class CollisionRule(NamedTuple):
     """The end of the frame [s], and when to stop."""
 
     end: float

@@ -56,7 +56,7 @@ class Axis(Record):
         return select(up, cell < self.count, cell > 1)
 
 
-class Grid(Record):
+class BallGrid(Record):
     """The cells of a scene."""
 
     x: Axis

@@ -13,8 +13,8 @@ from ..reacting.described import scenery_of
 from ..scene import Scene
 from ..surfaces.drive import drive_of
 from .aim import Alike, Various
-from .box import Box
-from .cells import Axis, Grid
+from .box import Domain
+from .cells import Axis, BallGrid
 from .meet import Loss
 from .queue import FIRST, SPARE
 from .resting import repose_of
@@ -42,7 +42,7 @@ _DURATION, _FALL = 1e-4, 1e-3
 _SHORTEST = 2.0**-20
 
 
-def flock_of(particles: Particles, grid: Grid, loses: bool, walled: bool) -> Flock:
+def flock_of(particles: Particles, grid: BallGrid, loses: bool, walled: bool) -> Flock:
     """The balls at the start, in their cells."""
     n = len(particles)
     flight, event = aligned(FLOATS * n), aligned(FLOATS * n)
@@ -61,7 +61,7 @@ def flock_of(particles: Particles, grid: Grid, loses: bool, walled: bool) -> Flo
     return Flock(flight, event, tag, node, aligned_copy(key), item, np.empty(0, np.int32), last, kept)
 
 
-def with_room(flock: Flock, grid: Grid) -> tuple[Flock, Grid]:
+def with_room(flock: Flock, grid: BallGrid) -> tuple[Flock, BallGrid]:
     """The balls in cells that have room for all, and for some more; who is gone is in none."""
     n, cells = flock.number(), 0
     there = np.flatnonzero(flock.event.reshape(n, FLOATS)[:, WALL] != OUT)
@@ -96,7 +96,7 @@ def aligned(size: int) -> Floats:
     return made[first : first + size]
 
 
-def described(scene: Scene, particles: Particles) -> tuple[Box, Flock]:
+def described(scene: Scene, particles: Particles) -> tuple[Domain, Flock]:
     """What the balls are in, and these at the start."""
     assert particles.radius is not None
     scenery = scenery_of(scene, 0.0) if scene.reacts() else None
@@ -110,7 +110,7 @@ def described(scene: Scene, particles: Particles) -> tuple[Box, Flock]:
     flock, grid = with_room(flock_of(particles, grid, loss is not None, bool(scene.surfaces)), grid)
     shortest = max(_SHORTEST * epoch_of(scene, particles, grid), 0.0 if loss is None else loss.duration)
     walls = scene.walls(0.0) if scenery is None else scenery.given
-    made = Box(walls, laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest)
+    made = Domain(walls, laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest)
     if scene.gravity is not None:
         # Also where nothing is lost: balls may start at rest on a floor.
         made = made._replace(repose=repose_of(math.hypot(*scene.gravity), particles.radius))
@@ -148,12 +148,12 @@ def duration_of(scene: Scene, pairs: Pairs, particles: Particles) -> float:
     return _DURATION * diameter / speed if speed > 0.0 else 0.0
 
 
-def reach_of(grid: Grid) -> float:
+def reach_of(grid: BallGrid) -> float:
     """How far balls are to fly in an epoch [m], about."""
     return float(_EPOCH * max(axis.width * axis.count for axis in grid.axes()))
 
 
-def epoch_of(scene: Scene, particles: Particles, grid: Grid) -> float:
+def epoch_of(scene: Scene, particles: Particles, grid: BallGrid) -> float:
     """The length of an epoch [s], a power of two."""
     speed = speed_of(scene, particles)
     size = reach_of(grid)
@@ -162,7 +162,7 @@ def epoch_of(scene: Scene, particles: Particles, grid: Grid) -> float:
     return float(2.0 ** math.floor(math.log2(size / speed))) if speed > 0.0 else 1.0
 
 
-def grid_of(scene: Scene, particles: Particles) -> Grid:
+def grid_of(scene: Scene, particles: Particles) -> BallGrid:
     """The cells of a scene, which are not shorter than the largest diameter."""
     low, high = _region(scene, particles)
     radius = particles.radius
@@ -190,7 +190,7 @@ def grid_of(scene: Scene, particles: Particles) -> Grid:
         axes.append(Axis(float(low[k]), cell, int(counts[k]), offset, length, last))
         stride *= int(counts[k]) + 2
     few = any(axis.period is not None and axis.count < _IMAGES for axis in axes)
-    return Grid(*reversed(axes), np.ones(stride, np.bool_), 0, 1.0 if few else None)
+    return BallGrid(*reversed(axes), np.ones(stride, np.bool_), 0, 1.0 if few else None)
 
 
 def _region(scene: Scene, particles: Particles) -> tuple[Floats, Floats]:

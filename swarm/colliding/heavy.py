@@ -11,7 +11,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import Array, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
-from ..reacting.freedoms import Flight
+from ..reacting.freedoms import ParticleFlight
 from ..reacting.walls import first_hit, reach_of_all
 from .clock import LENGTH, moment_of
 from .rows import DUE, FLOATS, LEAVES, WALL
@@ -57,7 +57,7 @@ def meet_heavy(box, flock, i, now, hit):
     # At the end of its cell it looks again anyway.
     if target < due:
         due, known = select(leaves <= target, math.inf, target), UNKNOWN
-    flight = Flight(r, v, ZERO if box.pull is None else box.pull, now, target - now)
+    flight = ParticleFlight(r, v, ZERO if box.pull is None else box.pull, now, target - now)
     walls = heavy.grown(box.kinds.radius_of(i))
     free, is_near = reach_of_all(walls, heavy.freedoms, flight), False
     if free < flight.longest:

@@ -4,7 +4,7 @@ from ..kernel.arrays import index
 from ..kernel.gravity import potential
 from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, square
-from ..reacting.freedoms import Flight
+from ..reacting.freedoms import ParticleFlight
 from ..reacting.walls import all_stay, strike
 from .again import aim_again, queue_both
 from .aim import find_wall
@@ -32,7 +32,7 @@ def strike_heavy(box, flock, books, clock, i, now):
         spares = box.loss.spares(flock, i, now)
         walls = tuple(one._replace(restitution=select(spares, 1.0, one.restitution)) for one in walls)
     twice = flock.kept.at(i, flock.stamp(i), square(v) + 2.0 * potential(box.pull, r))
-    blow = strike(walls, wall, heavy.freedoms, Flight(r, v, ZERO, now, 0.0), m)
+    blow = strike(walls, wall, heavy.freedoms, ParticleFlight(r, v, ZERO, now, 0.0), m)
     # The energy decides the speed: round-off of the impulse has a bias.
     left, fall = twice - 2.0 * (blow.given + blow.lost) / m, 2.0 * potential(box.pull, blow.r)
     v1 = squared(blow.v, left - fall)

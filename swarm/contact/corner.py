@@ -18,7 +18,7 @@ _EPSILON = 2.220446049250313e-16
 _SWEEPS = 500
 
 
-class End(Record):
+class CornerEnd(Record):
     """The end r1 of a step that the walls hold back, and whether every wall was solved."""
 
     r: Vec
@@ -39,11 +39,11 @@ def hold(form, law, multipliers, walls, step, reactions):
         r = step.r + (step.p - total(reactions))
         size, moved = max(largest(r), largest(step.p)), largest(r - before)
         if solved and (reactions.shape[0] == 1 or (i > 0 and moved <= 4.0 * _EPSILON * size)):
-            return End(r, True)
+            return CornerEnd(r, True)
         if i > 0 and moved == 0.0:
             # A wall that is not solved: sweeps from where they began say the same.
-            return End(r, False)
-    return End(r, False)
+            return CornerEnd(r, False)
+    return CornerEnd(r, False)
 
 
 def _reaction_of(reactions, k):

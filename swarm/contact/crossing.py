@@ -14,7 +14,7 @@ from ..surfaces.moving import Carried
 from ..surfaces.patched import Patched
 from ..surfaces.posed import Posed
 from ..surfaces.walls import Field
-from .path import Path, at_part, bisected, members_of
+from .path import StepPath, at_part, bisected, members_of
 from .rooms import leaving
 
 _EPSILON = 2.220446049250313e-16
@@ -102,7 +102,7 @@ def own_path(field, ends, path):
     if not isinstance(field, Posed):
         return path
     r0, v0 = field.own_place(path.r0), field.own_velocity(path.r0, path.v0)
-    return Path(r0, v0, ends.own_place(path.r1), ends.own_velocity(path.r1, path.v1), path.h)
+    return StepPath(r0, v0, ends.own_place(path.r1), ends.own_velocity(path.r1, path.v1), path.h)
 
 
 def block_of_path(grid, path, near):

@@ -246,9 +246,9 @@ def _at_rest_there(active, rules, walls, gravity, wall, p):
 def careful(rules, walls, gravity, wall, p, impulse):
     """A short step of a particle that several walls hold, as a `Landing`. Adds to impulse[:, 0]."""
     shortest = 2.0 * GRAZING * rules.size / math.sqrt(own_speed2(p))
-    contacts = touching.Contacts(None, rules.laws, shortest, TOUCH * rules.size)
+    contacts = touching.ImpactSettings(None, rules.laws, shortest, TOUCH * rules.size)
     return touching.impact(
-        contacts, walls, gravity, wall, touching.Moving(p.r, p.v, p.remaining), _energy(p.twice), impulse, 0
+        contacts, walls, gravity, wall, touching.MovingParticle(p.r, p.v, p.remaining), _energy(p.twice), impulse, 0
     )
 
 

@@ -11,7 +11,7 @@ from .reflection import relative
 _TINY = 2.2250738585072014e-308
 
 
-class Held(Record):
+class HeldVector(Record):
     """A vector as a part that the walls allow and multiples of their normals: P + b n + c m."""
 
     along: Vec
@@ -45,11 +45,11 @@ class Holding(Record):
         return r
 
     def split(self: Any, walls, drift, r0, r1, w):
-        """`Held` of a velocity, with the normals of a step from r0 to r1."""
+        """`HeldVector` of a velocity, with the normals of a step from r0 to r1."""
         return self.parts(drift, w, *(walls.step_normal(one, r0, r1) for one in self))
 
     def split_at(self: Any, walls, drift, r, w):
-        """`Held` of a velocity at a point."""
+        """`HeldVector` of a velocity at a point."""
         return self.parts(drift, w, *(walls.unit_normal(one, r) for one in self))
 
     def along(self, walls, drift, r0, r1, w):
@@ -70,9 +70,9 @@ class One(Holding):
         return One(first)
 
     def parts(self, drift, w, n):
-        """`Held` of a velocity, by the normal of the wall."""
+        """`HeldVector` of a velocity, by the normal of the wall."""
         b = _towards(drift, w, n)
-        return Held(w - b * n, n, b, ZERO, 0.0)
+        return HeldVector(w - b * n, n, b, ZERO, 0.0)
 
     def along(self, walls, drift, r0, r1, w):
         """The part P of `split` alone, which needs no length of a normal."""
@@ -103,7 +103,7 @@ class Two(Holding):
         return Two(first, second)
 
     def parts(self, drift, w, n, m):
-        """`Held` of a velocity, by the normals of both walls."""
+        """`HeldVector` of a velocity, by the normals of both walls."""
         # b + cos c = w.n and cos b + c = w.m, where sin^2 = |n x m|^2
         e, cosine, wn = edge(n, m), dot(n, m), _towards(drift, w, n)
         wm = dot(relative(None if drift is None else drift.second, w), m)
@@ -111,7 +111,7 @@ class Two(Holding):
         b, c = (wn - cosine * wm) * inverse, (wm - cosine * wn) * inverse
         # Along the edge, where the walls are at rest
         along = (dot(w, e) * inverse) * e if drift is None else w - b * n - c * m
-        return Held(along, n, b, m, c)
+        return HeldVector(along, n, b, m, c)
 
     def inward(self, n, m):
         """The unit vector between those away from the walls."""

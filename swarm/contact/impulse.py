@@ -44,7 +44,7 @@ class Step(Record):
     c: float
 
 
-class Start(Record):
+class StepStart(Record):
     """The start of a step at one surface."""
 
     q: float
@@ -54,17 +54,17 @@ class Start(Record):
 
 
 def start_of(multiplier, surface, r):
-    """The `Start` of a step from r; only multipliers need a gap of round-off to count as 0."""
+    """The `StepStart` of a step from r; only multipliers need a gap of round-off to count as 0."""
     q0 = surface.inner(r)
     g0 = surface.gap_of(q0)
     if multiplier is None:
-        return Start(q0, g0, 0.0, _NEWTON_TOLERANCE)
+        return StepStart(q0, g0, 0.0, _NEWTON_TOLERANCE)
     # In State I (g0 = 0) the loop (8) ends; from a g0 = -1e-17 it would end only down to g1 ~ 1e-16, then creep.
     round_off = _ON_SURFACE * surface.gap_scale(r)
-    return Start(q0, select(abs(g0) <= round_off, 0.0, g0), round_off, _LOOP_TOLERANCE)
+    return StepStart(q0, select(abs(g0) <= round_off, 0.0, g0), round_off, _LOOP_TOLERANCE)
 
 
-class End(Record):
+class StepEnd(Record):
     """The end of a step at one surface."""
 
     gap: float  # g1, from g1 - g0: more digits of a small g1 than r1 has
@@ -107,16 +107,16 @@ class Equation(Record):
     multiplier: Any
     surface: Any
     step: Step
-    start: Start
+    start: StepStart
 
     def end(self, kappa):
-        """The `End` of the step that is pushed with kappa."""
+        """The `StepEnd` of the step that is pushed with kappa."""
         start, surface, step = self.start, self.surface, self.step
         rise, drise = surface.rise(step.r, step.p, kappa)
         slope, dslope = surface.gap_slope(start.q, start.q + rise)
         # g1 - g0 = g[q0, q1] (q1 - q0)
         g1 = start.gap + slope * rise
-        return End(select(abs(g1) <= start.round_off, 0.0, g1), rise, drise, slope, dslope)
+        return StepEnd(select(abs(g1) <= start.round_off, 0.0, g1), rise, drise, slope, dslope)
 
     def residual(self, kappa):
         """The `Residual` of kappa."""

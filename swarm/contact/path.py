@@ -11,7 +11,7 @@ from ..surfaces.posed import Posed
 _HALVINGS = 60
 
 
-class Path(Record):
+class StepPath(Record):
     """A step of length h."""
 
     r0: Vec

@@ -171,7 +171,7 @@ def still(r, v, taken, allowed):
     return select(turn < whole, least * whole / select(turn > 0.0, turn, 1.0), least)
 
 
-class Swept(Record):
+class SlidingSweep(Record):
     """One sweep of a step: r1, and whether it needs more than one other."""
 
     r: Vec
@@ -182,7 +182,7 @@ def sweep(moving, active, walls, h, step, still):
     """One sweep of (S): the step with the discrete gradients of the last r1; `step` is (r0, r1, w0)."""
     r0, r1, w = step
     end = r0 + h * active.along(walls, mean_drift(moving, active, walls, r0, r1, h), r0, r1, w)
-    return Swept(end, not (total(absolute(end - r1)) <= still))
+    return SlidingSweep(end, not (total(absolute(end - r1)) <= still))
 
 
 def part(k):

@@ -33,7 +33,7 @@ _CUTS = 60
 NEEDS = ("first_hit", "unit_normal", "discrete_gradient", "distance", "project")
 
 
-class Contacts(Record):
+class ImpactSettings(Record):
     """The settings of an impact."""
 
     contact_step: Any  # None or h
@@ -42,7 +42,7 @@ class Contacts(Record):
     touch: float  # distance within which walls hold a sliding particle too [m]
 
 
-class Moving(Record):
+class MovingParticle(Record):
     """A particle, and how much of its frame is left [s]."""
 
     r: Vec

@@ -74,14 +74,14 @@ def meets_later(walls, wall, law, r, p):
     return found
 
 
-class Before(Record):
+class LastSweep(Record):
     """The sweep before, for the secant: one entry a wall."""
 
     multipliers: Any
     misses: Any
 
 
-class Swept(Record):
+class UzawaSweep(Record):
     """The step of one sweep: its end, V there, and whether it was solved."""
 
     r: Vec
@@ -117,7 +117,7 @@ def sweep_all(method, law, walls, step, multipliers, before, sweep, reactions):
         else:
             multipliers[k] = next_multiplier(acceleration, old, miss, before.multipliers[k], before.misses[k])
         before.multipliers[k], before.misses[k] = old, miss
-    return Swept(end.r, stored, end.solved)
+    return UzawaSweep(end.r, stored, end.solved)
 
 
 @outlined
@@ -135,9 +135,9 @@ def loop(method, law, walls, step, reactions):
     """Sweeps until V <= tolerance."""
     count = walls.length()
     multipliers = scratch(count, np.float64)
-    before = Before(scratch(count, np.float64), scratch(count, np.float64))
+    before = LastSweep(scratch(count, np.float64), scratch(count, np.float64))
     start(method, law, walls, step, multipliers)
-    end = Swept(step.r, math.inf, True)
+    end = UzawaSweep(step.r, math.inf, True)
     for sweep in range(method.max_sweeps):
         end = sweep_all(method, law, walls, step, multipliers, before, sweep, reactions)
         converged = end.solved and end.stored <= method.tolerance

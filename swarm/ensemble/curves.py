@@ -7,7 +7,7 @@ import numpy as np
 from ..catalog import MAIN, NAMES, OBSERVABLES
 from ..output import style
 from ..output.amounts import plain
-from ..output.page.pictures import Drawn, svg
+from ..output.page.pictures import PagePicture, svg
 from .folder import SweepFolder
 
 # Graphs of each parameter, curves of another parameter in one, and values of a parameter that are numbers on an axis.
@@ -17,7 +17,7 @@ _SAME, _ROUND_OFF, _ERRORS = 1e-9, 1e-12, ("energy_error", "max_penetration")
 _REPEATS = "seed"
 
 
-def drawn(sweep: SweepFolder) -> list[tuple[str, list[Drawn]]]:
+def drawn(sweep: SweepFolder) -> list[tuple[str, list[PagePicture]]]:
     """Of each parameter that varies its graphs."""
     names = main_observables(sweep)
     rows = [row for row in sweep.rows if row["state"] == "done"]
@@ -69,7 +69,7 @@ def _stem(name: str) -> str:
     return next((known for known in MAIN if name == known or name.removeprefix(f"{known}_").isdecimal()), "")
 
 
-def _graph(sweep: SweepFolder, rows: list[dict[str, Any]], key: str, name: str) -> Drawn:
+def _graph(sweep: SweepFolder, rows: list[dict[str, Any]], key: str, name: str) -> PagePicture:
     others = [one for one in sweep.varying() if one != key and not one.endswith(_REPEATS)]
     split = next((one for one in others if 1 < len({str(row[one]) for row in rows}) <= _CURVES), None)
     places, labels = _places([row[key] for row in rows])
@@ -92,7 +92,7 @@ def _graph(sweep: SweepFolder, rows: list[dict[str, Any]], key: str, name: str) 
         axes.set_xlabel(key)
         unit = OBSERVABLES[_stem(name)].unit if _stem(name) else "1"
         axes.set_title(f"{name}{f' [{unit}]' * (unit != '1')}")
-        return Drawn(svg(figure, f"{name} against {key}"), "")
+        return PagePicture(svg(figure, f"{name} against {key}"), "")
 
 
 def _curve(axes: Any, places: Any, values: Any, colour: str, label: str) -> None:

@@ -34,7 +34,7 @@ START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED
     19,
 )
 COLUMNS, COLUMNS_OF_FRICTION = 16, 24
-# Columns of `Near.spans`: where those of a field begin in `listed` and end, and of which face they are.
+# Columns of `Neighbours.spans`: where those of a field begin in `listed` and end, and of which face they are.
 BEGIN, END, FACE = 0, 1, 2
 # Of a clock: the steps of the frame that are done, those since pairs were listed, and those since the run was halted
 # last; the skin of the lists [m].
@@ -51,7 +51,7 @@ class Grains(NamedTuple):
     spin: Any  # (N, 8) angular velocities, as `speed`; None where there is no friction
 
 
-class Near(NamedTuple):
+class Neighbours(NamedTuple):
     """What is near: of each ball those after it, of each wall the balls."""
 
     first: Array  # (N + 1,) where the pairs of each ball begin
@@ -77,7 +77,7 @@ class Touches(NamedTuple):
     wall_ends: Array  # (room of walls,) int32, the ball
     wall_spans: Array  # (2, walls) where those of each wall begin in `wall_rows`, and how many there are
     used: Array  # (1,) how many rows are of pairs
-    spans: Any = None  # (room of walls, 3) int32, of fields, as in `Near`; and the same members
+    spans: Any = None  # (room of walls, 3) int32, of fields, as in `Neighbours`; and the same members
     listed: Any = None
 
 
@@ -105,10 +105,10 @@ def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = 
 
 def near_of(
     n: int, walls: int, pairs: int, touching: int, has_friction: bool = False, members: int | None = None
-) -> Near:
+) -> Neighbours:
     """Room for so many pairs, for so many balls at walls, and so many members of fields, where there are any."""
     drags = (np.zeros((pairs, 3)), np.zeros((touching, 3))) if has_friction else (None, None)
-    made = Near(
+    made = Neighbours(
         np.zeros(n + 1, np.int64), np.zeros(pairs, np.int32), np.zeros(pairs, np.bool_),
         np.zeros(walls + 1, np.int64), np.zeros(touching, np.int32), np.zeros(touching, np.bool_), *drags,
     )  # fmt: skip
@@ -119,7 +119,7 @@ def near_of(
 
 
 def touches_of(walls: int, pairs: int, touching: int, has_friction: bool = False, listed: Any = None) -> Touches:
-    """Room for the contacts of so many pairs, and of so many balls at walls; with the members of fields in `Near`."""
+    """Room for the contacts of so many pairs and of so many balls at walls; `Neighbours` has the members of fields."""
     columns = COLUMNS_OF_FRICTION if has_friction else COLUMNS
     return Touches(
         np.zeros((pairs, columns)), np.zeros((pairs, 2), np.int32), np.zeros((touching, columns)),

@@ -12,7 +12,7 @@ from .contacts import closing
 from .vessel import met
 
 
-class Books(NamedTuple):
+class ContactTotals(NamedTuple):
     """The sums since the start, by the numbers of particles, and those of all."""
 
     collisions: Array  # (N,) int64

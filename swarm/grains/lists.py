@@ -21,7 +21,7 @@ from .vessel import list_in_field
 _MOST_CELLS = 1 << 20
 
 
-class Cells(NamedTuple):
+class CellOrder(NamedTuple):
     """The cells of one time: of each ball its cell as a number, in order; how many numbers a row and a layer have."""
 
     key: Array  # (N,) int64
@@ -30,8 +30,8 @@ class Cells(NamedTuple):
     wraps: Array  # (3,) bool, where the first cell is beside the last
 
 
-def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[Cells, NDArray[np.int64]]:
-    """The `Cells` of balls at centres (N, 3), no narrower than a reach, and the order of balls by them."""
+def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[CellOrder, NDArray[np.int64]]:
+    """The `CellOrder` of balls at centres (N, 3), no narrower than a reach, and the order of balls by them."""
     low, high = centres.min(axis=0), centres.max(axis=0)
     wraps = np.zeros(3, np.bool_)
     for k, length in enumerate(period or ()):
@@ -44,7 +44,7 @@ def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[C
     strides = np.array([1, counts[0] + 2, (counts[0] + 2) * (counts[1] + 2)], np.int64)
     key = cell @ strides
     order = np.argsort(key, kind="stable")
-    return Cells(key[order], counts, strides, wraps), order
+    return CellOrder(key[order], counts, strides, wraps), order
 
 
 def _first_from(key, wanted):

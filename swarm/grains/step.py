@@ -32,7 +32,7 @@ _MOST_RUBS, _LAGGING = 200, 2e-6
 _STALLED, _BETTER, _LEAST_SHARE = 20, 0.7, 1.0 / 64.0
 
 
-class Rule(NamedTuple):
+class MarchRule(NamedTuple):
     """The length of the frame in steps, and after how many to stop."""
 
     span: float

@@ -23,7 +23,7 @@ from ..surfaces.walls import Field
 from .arrays import BEGIN, END, FACE, RADIUS, X, vector_at
 
 
-class Nearest(Smooth):
+class NearestMembers(Smooth):
     """Some of the members of a field as one wall; phi, the gap, is the distance outside of the nearest one."""
 
     members: Any  # grown
@@ -73,7 +73,7 @@ def met(wall, listed, spans, k, radius):
     if not isinstance(wall, Field):
         return grown
     if is_of_faces(wall.members.like):
-        return Nearest(grown.members, listed, spans[k, BEGIN], spans[k, END])
+        return NearestMembers(grown.members, listed, spans[k, BEGIN], spans[k, END])
     return member(grown.members, index(listed[index(spans[k, BEGIN])]))
 
 

@@ -74,16 +74,16 @@ class File(IndexDataCacheFile):  # type: ignore[misc]
         if not key.repeats:
             return
         written = io.BytesIO()
-        _Writer(written, key.classes).dump(data)
+        _EntryWriter(written, key.classes).dump(data)
         super().save(key.text, written.getvalue())
 
     def load(self, key: Key) -> Any:
         """A kernel, or None."""
         written = super().load(key.text)
-        return None if written is None else _Reader(io.BytesIO(written), key.classes).load()
+        return None if written is None else _EntryReader(io.BytesIO(written), key.classes).load()
 
 
-class _Writer(NumbaPickler):  # type: ignore[misc]
+class _EntryWriter(NumbaPickler):  # type: ignore[misc]
     def __init__(self, file: io.BytesIO, classes: tuple[type, ...]) -> None:
         super().__init__(file, protocol=4)
         self._numbers = {made: number for number, made in enumerate(classes)}
@@ -93,7 +93,7 @@ class _Writer(NumbaPickler):  # type: ignore[misc]
         return self._numbers.get(thing) if isinstance(thing, type) else None
 
 
-class _Reader(pickle.Unpickler):
+class _EntryReader(pickle.Unpickler):
     def __init__(self, file: io.BytesIO, classes: tuple[type, ...]) -> None:
         super().__init__(file)
         self._classes = classes

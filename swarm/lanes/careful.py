@@ -14,7 +14,7 @@ from ..surfaces.moving import Carried
 from .accounts import book_step, lose
 from .arrays import booked, speed2_scale
 from .carried import NOT_CARRIED, carry
-from .crossings import Moment
+from .crossings import ParticleMoment
 from .escape import come_through, leave
 from .one_by_one import one_by_one
 from .periodic import return_particle
@@ -48,13 +48,15 @@ def _count_step(method, walls, gravity, share, i):
     """A short step of particle i, and what it crosses."""
     state, counters, remaining = share.state, share.counters, share.state.contacts.remaining
     left = remaining[i]
-    before = Moment(column(state.position, 0, i), column(state.velocity, 0, i), left if left > 0.0 else share.span)
+    before = ParticleMoment(
+        column(state.position, 0, i), column(state.velocity, 0, i), left if left > 0.0 else share.span
+    )
     _step(method, walls, gravity, share, i)
-    end = Moment(column(state.position, 0, i), column(state.velocity, 0, i), remaining[i])
+    end = ParticleMoment(column(state.position, 0, i), column(state.velocity, 0, i), remaining[i])
     counters.count_step(share, i, before, end)
     if state.period is not None:
         return_particle(state.period, walls, state, i)
-        back = Moment(column(state.position, 0, i), end.v, end.remaining)
+        back = ParticleMoment(column(state.position, 0, i), end.v, end.remaining)
         if square(back.r - end.r) > 0.0:
             counters.come_back(share, i, before, end.r, back)
 

@@ -10,7 +10,7 @@ from ..contact import crossing, events
 from ..contact import laws as wall_laws
 from ..contact.events import ARRIVED, CAREFUL, EVENT
 from ..contact.hold import Three
-from ..contact.path import Path
+from ..contact.path import StepPath
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
@@ -158,7 +158,7 @@ def carry(method, walls, gravity, state, i, p):
             if h < shortest:
                 break
             continue
-        path = Path(r, start.u, r1, end.u, h)
+        path = StepPath(r, start.u, r1, end.u, h)
         none = crossing.near(method, r)
         if crossing.meets(now, walls.at(remaining - h), active, path, none):
             found = crossing.arrival(walls, active, path, none, remaining)

@@ -9,7 +9,7 @@ from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, either, square
 from ..state import CROSSED
 from ..surfaces.counted import slowness
-from .table import Lane, Rows, marked_lanes
+from .table import LaneView, Rows, marked_lanes
 
 # Lanes are counted one by one where fewer than one of so many cross a counter.
 _FEW = 8
@@ -17,7 +17,7 @@ _FEW = 8
 _named = Rows()
 
 
-class Began(Lane):
+class Began(LaneView):
     """A lane before its flight, and its mass."""
 
     r, v, remaining, mass = _named.vector(), _named.vector(), _named.number(), _named.number()

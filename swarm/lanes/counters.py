@@ -17,7 +17,7 @@ from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, norm
 from ..state import CROSSED
 from ..surfaces.axes import pulls
-from ..surfaces.counted import Turned
+from ..surfaces.counted import ReversedCounter
 from ..surfaces.period import has_left, into
 from .counted_lanes import (
     BEGAN,
@@ -31,7 +31,7 @@ from .counted_lanes import (
 from .crossings import (
     AHEAD,
     Flown,
-    Moment,
+    ParticleMoment,
     beyond_face,
     book_crossing,
     come_into_cell,
@@ -58,7 +58,7 @@ class Counters(Record):
 
     def is_in_lanes(self, one):
         """Whether crossings of a counter are counted in lanes, without branches: a constant for the compiler."""
-        return self.quiet is not None and isinstance(one, Turned) and one.most(self.gravity) is not None
+        return self.quiet is not None and isinstance(one, ReversedCounter) and one.most(self.gravity) is not None
 
     # --- Flights in lanes ---
 
@@ -166,7 +166,7 @@ class Counters(Record):
                 step = back.images - images
             else:
                 return
-            self._settle_all(gravity, share, p, Moment(end, after, remaining - time), images)
+            self._settle_all(gravity, share, p, ParticleMoment(end, after, remaining - time), images)
             images = images + step
             r = Vec(
                 beyond_face(period.x, end.x, step.x),
@@ -183,14 +183,14 @@ class Counters(Record):
 
     @outlined
     def count_step(self, share, p, before, after):
-        """Count what a step of particle p has crossed, from one `Moment` to another, by its ends."""
+        """Count what a step of particle p has crossed, from one `ParticleMoment` to another, by its ends."""
         state = share.state
         for c, one in enumerate(self.each):
             d0, d1, sign = one.distance(before.r), one.distance(after.r), sign_of_side(state, c, p)
             if sign * d1 > one.near:
                 part = d0 / (d0 - d1) if (d0 - d1) * d0 > 0.0 else 0.0
                 part = min(part, 1.0)
-                there = Moment(
+                there = ParticleMoment(
                     before.r + part * (after.r - before.r),
                     before.v + part * (after.v - before.v),
                     before.remaining + part * (after.remaining - before.remaining),
@@ -212,7 +212,7 @@ class Counters(Record):
 
     @outlined
     def settle(self, share, p, there):
-        """Count particle p, a `Moment`, that has come to a counter and goes on where nothing more is known of it."""
+        """Count particle p, a `ParticleMoment`, at a counter, if it goes on from there without another look."""
         self._settle_all(None, share, p, there, ZERO)
 
     def _settle_all(self, gravity, share, p, there, images):

@@ -11,7 +11,7 @@ import numpy as np
 from ..kernel.arrays import index
 from ..kernel.jit import Array
 from ..kernel.record import Record
-from .log import Before
+from .log import BeforeContact
 
 # Units of `Sums.rest` in one of `Sums.whole`.
 PARTS = 2.0**40
@@ -48,7 +48,7 @@ class Counts(Record):
     def keep_before(self, lanes, live):
         """Keep of every lane what says whether its contact is an impact."""
         for i in range(index(live)):
-            before = Before(lanes.before, i)
+            before = BeforeContact(lanes.before, i)
             before.hits, before.wall = lanes.lane(i).hits, lanes.wall[i]
 
     def note(self, lanes, i, impulse):
@@ -57,7 +57,7 @@ class Counts(Record):
     def add_rows(self, method, walls, state, lanes, live):
         """Count the impacts of a pass."""
         for i in range(index(live)):
-            before = Before(lanes.before, i)
+            before = BeforeContact(lanes.before, i)
             # A lane without an impact may be at no wall.
             self.impacts[index(int(max(before.wall, 0.0)))] += np.int64(lanes.lane(i).hits - before.hits)
 

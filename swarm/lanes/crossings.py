@@ -29,7 +29,7 @@ class Flown(Record):
     images: Vec  # of the cell, from that where the particle is booked
 
 
-class Moment(Record):
+class ParticleMoment(Record):
     """A particle at a moment, with so much of the frame left."""
 
     r: Vec
@@ -53,14 +53,16 @@ def look_at_one(one, c, gravity, share, p, flown):
             continue
         if ends_near and one.is_near(r + displacement(gravity, v, 0.5 * left)):
             return
-        book_crossing(one, c, share, p, Moment(r, v, remaining), one.speed(sign, found.wall, r, v), flown.images)
+        book_crossing(
+            one, c, share, p, ParticleMoment(r, v, remaining), one.speed(sign, found.wall, r, v), flown.images
+        )
         if not one.may_cross_again(-sign, gravity, r, v, left):
             return
 
 
 @outlined
 def book_crossing(one, c, share, p, there, across, images):
-    """Particle p, a `Moment`, crosses counter c with a speed across it."""
+    """Particle p, a `ParticleMoment`, crosses counter c with a speed across it."""
     crossed, m = share.state.crossed, share.state.mass[p]
     sense = int(crossed.side[c, p])
     crossed.side[c, p] = 1 - sense

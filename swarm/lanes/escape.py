@@ -11,7 +11,7 @@ from ..kernel.jit import outlined
 from ..kernel.vector import norm, put
 from ..surfaces.openings import is_open
 from . import log as impact_log
-from .crossings import Moment
+from .crossings import ParticleMoment
 from .table import marked_lanes
 
 
@@ -19,7 +19,7 @@ def escape(share, p, wall, r, v, remaining):
     """Particle p has escaped, with so much of its frame left: it stays where and as fast as it is."""
     share.state.escape_time[p] = share.moment - remaining
     if share.counters is not None:
-        share.counters.settle(share, p, Moment(r, v, remaining))
+        share.counters.settle(share, p, ParticleMoment(r, v, remaining))
     if share.log is not None:
         share.log.add_escape(share.state, p, impact_log.Struck(r, v, v, wall, remaining, 0.0))
 

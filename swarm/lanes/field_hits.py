@@ -30,7 +30,7 @@ _MANY = 8
 _TIME, _WALL = 0, 1
 
 
-class Seen(Record):
+class LaneFlights(Record):
     """The flights of lanes as far as they are known, and the bodies near them."""
 
     owner: Array  # int64, whose they are
@@ -47,10 +47,10 @@ class Seen(Record):
         lanes.course[_TIME, owner], lanes.course[_WALL, owner] = self.time[i], self.wall[i]
 
 
-class Look(Record):
+class MemberLook(Record):
     """A look of all lanes at the next of the bodies in their cells."""
 
-    seen: Seen
+    seen: LaneFlights
     like: Any  # a body
     gravity: Any
     lanes: Any
@@ -144,7 +144,7 @@ def _look_at_all(members, before, lanes, live):
 def _look_at_near(gravity, members, before, lanes, live):
     """Every lane at the bodies near it: those in its cell, or all."""
     course, grid, columns = lanes.course, members.grid, width(members.like)
-    seen = Seen(
+    seen = LaneFlights(
         unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
         unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64),
         unwritten(STRIDE, np.float64), unwritten((STRIDE, columns), np.float64),
@@ -161,7 +161,7 @@ def _look_at_near(gravity, members, before, lanes, live):
         for i in range(index(n)):
             seen.which[i] = grid.entries[index(select(k < seen.number[i], seen.first[i] + k, 0))]
             copy_row(seen.body, i, members.table, index(int(seen.which[i])), columns)
-        _look(Look(seen, members.like, gravity, lanes, before, k, row), n)
+        _look(MemberLook(seen, members.like, gravity, lanes, before, k, row), n)
     if n == live:
         for i in range(index(live)):
             course[_TIME, i], course[_WALL, i] = seen.time[i], seen.wall[i]

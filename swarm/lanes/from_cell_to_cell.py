@@ -13,7 +13,7 @@ from ..kernel.record import Record
 from ..kernel.vector import column, put
 from ..surfaces import flights
 from ..surfaces.facets.cells import here_in, passes, until_out
-from ..surfaces.facets.room import FULL, KIND, Room, all_away, room_of
+from ..surfaces.facets.room import FULL, KIND, FreeCells, all_away, room_of
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import member
 from .table import STRIDE
@@ -117,7 +117,7 @@ def _find_cells(gravity, cells, under, n):
         put(under.rows, _AHEAD, i, room.ahead)
     for i in range(index(n)):
         place, pace = under.now(gravity, i)
-        room = Room(column(under.rows, _BACK, i), column(under.rows, _AHEAD, i))
+        room = FreeCells(column(under.rows, _BACK, i), column(under.rows, _AHEAD, i))
         out = until_out(gravity, cells, column(under.rows, _PLACE, i), room, place, pace)
         under.until[i], under.wall[i] = under.time[i] + out, -1.0
     for i in range(index(n)):

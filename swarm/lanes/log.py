@@ -12,8 +12,8 @@ from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
-from .share import Place
-from .table import LANES, Lane, Rows
+from .share import ThreadPlace
+from .table import LANES, LaneView, Rows
 
 # What a kernel leaves that ends with a full log: particle, stop, draws, live lanes, passes.
 GOING = 5
@@ -21,7 +21,7 @@ GOING = 5
 _named = Rows()
 
 
-class Before(Lane):
+class BeforeContact(LaneView):
     """A lane before its contact: its flight, the wall, and the impulse that this has given it since."""
 
     r, v, remaining = _named.vector(), _named.vector(), _named.number()
@@ -66,13 +66,13 @@ class Log(NamedTuple):
     def keep_before(self, lanes, live):
         """Keep every lane as it is before its contact."""
         for i in range(index(live)):
-            lane, before = lanes.lane(i), Before(lanes.before, i)
+            lane, before = lanes.lane(i), BeforeContact(lanes.before, i)
             before.r, before.v, before.remaining, before.hits = lane.r, lane.v, lane.remaining, lane.hits
             before.wall, before.impulse = lanes.wall[i], 0.0
 
     def note(self, lanes, i, impulse):
         """Note the impulse per mass that the wall of a lane gives."""
-        Before(lanes.before, i).impulse += impulse
+        BeforeContact(lanes.before, i).impulse += impulse
 
     @outlined
     def add_rows(self, method, walls, state, lanes, live):
@@ -80,10 +80,10 @@ class Log(NamedTuple):
         order, n = self.order, index(0)
         for i in range(index(live)):
             order[n] = i
-            n += index((lanes.lane(i).hits > Before(lanes.before, i).hits) & self.has(lanes.particle[i]))
+            n += index((lanes.lane(i).hits > BeforeContact(lanes.before, i).hits) & self.has(lanes.particle[i]))
         for k in range(n):
             i = index(order[k])
-            before = Before(lanes.before, i)
+            before = BeforeContact(lanes.before, i)
             struck = Struck(before.r, before.v, lanes.lane(i).v, before.wall, before.remaining, before.impulse)
             self._add(state, lanes.particle[i], struck, self._slip_of(method, walls, struck))
 
@@ -161,10 +161,10 @@ def keep_going(log, place, live, passes):
 
 
 def gone_on(log):
-    """The place where a kernel goes on: (`Place`, live lanes, passes)."""
+    """The place where a kernel goes on: (`ThreadPlace`, live lanes, passes)."""
     if log is None:
-        return Place(0, 0, 0), 0, 0
+        return ThreadPlace(0, 0, 0), 0, 0
     i, stop, drawn, live, passes = tuple(log.going[k] for k in range(GOING))
     for k in range(GOING):
         log.going[k] = 0
-    return Place(i, stop, drawn), live, passes
+    return ThreadPlace(i, stop, drawn), live, passes

@@ -19,13 +19,13 @@ from .accounts import add_work, book_sent
 from .arrays import Flying
 from .escape import absorb
 from .hit_member import of_lane
-from .table import Lane, Rows, marked_lanes
+from .table import LaneView, Rows, marked_lanes
 
 _named = Rows()
 _named.take(Flying.ALL)
 
 
-class Sending(Lane):
+class Sending(LaneView):
     """A lane that a law sends off, in rows behind those of its flight."""
 
     v, twice, impulse, work = _named.vector(), _named.number(), _named.number(), _named.number()

@@ -27,7 +27,7 @@ class Draws(NamedTuple):
         return self._replace(ticket=np.zeros(1, np.int64), order=order)
 
 
-class Place(Record):
+class ThreadPlace(Record):
     """The position of a thread among the particles that it draws."""
 
     i: int  # the next particle
@@ -40,7 +40,7 @@ class Place(Record):
 
     def after(self):
         """The place of the particle after this one."""
-        return Place(self.i + 1, self.stop, self.drawn)
+        return ThreadPlace(self.i + 1, self.stop, self.drawn)
 
 
 class Share(NamedTuple):
@@ -87,7 +87,7 @@ class Share(NamedTuple):
         self.pending[phase] += 1
 
     def following(self, phase, place):
-        """The `Place` of the first particle from this one on that is in a phase, of another draw if need be.
+        """The `ThreadPlace` of the first particle from this one on that is in a phase, of another draw if need be.
 
         Counts those in other phases, which other kernels advance.
         """
@@ -98,10 +98,10 @@ class Share(NamedTuple):
                 pending[phases[i]] += 1
                 i += 1
             if i < stop:
-                return Place(i, stop, drawn)
+                return ThreadPlace(i, stop, drawn)
             k = next_of(draws.ticket)
             if k >= draws.order.size:
-                return Place(i, i, drawn)
+                return ThreadPlace(i, i, drawn)
             k = draws.order[k]
             i = k * draws.size
             stop = min(i + draws.size, phases.size)

@@ -18,7 +18,7 @@ from ..surfaces.rooms import inside_of
 from . import log as impact_log
 from .arrays import speed2_scale
 from .counted_lanes import Began
-from .crossings import Moment
+from .crossings import ParticleMoment
 from .periodic import return_particle, return_sliding
 from .sliding import AGAIN, Slide
 from .sliding_ends import decide, set_going
@@ -114,10 +114,10 @@ def _begin_step(slide, i):
 
 @outlined
 def _count_step(slide, share, i):
-    """Count what a lane has crossed since its step began: the `Moment` of that."""
+    """Count what a lane has crossed since its step began: the `ParticleMoment` of that."""
     lane, began = slide.lanes.lane(i), Began(slide.lanes.began, i)
-    before = Moment(began.r, began.v, began.remaining)
-    share.counters.count_step(share, slide.lanes.particle[i], before, Moment(lane.r, lane.v, lane.remaining))
+    before = ParticleMoment(began.r, began.v, began.remaining)
+    share.counters.count_step(share, slide.lanes.particle[i], before, ParticleMoment(lane.r, lane.v, lane.remaining))
     _begin_step(slide, i)
     return before
 
@@ -129,7 +129,7 @@ def _count_return(slide, share, i, before, end):
     if slide.lanes.period is not None:
         shift = lane.r - end
         if square(shift) > 0.0:
-            now = Moment(lane.r, lane.v, lane.remaining)
+            now = ParticleMoment(lane.r, lane.v, lane.remaining)
             share.counters.come_back(share, slide.lanes.particle[i], before, end, now)
             _begin_step(slide, i)
 
@@ -219,5 +219,5 @@ def _retire(slide, share, i, phase):
             lane.v = v
             end = lane.r
             lane.r = column(state.position, 0, p)
-            _count_return(slide, share, i, Moment(end, v, lane.remaining), end)
+            _count_return(slide, share, i, ParticleMoment(end, v, lane.remaining), end)
     share.hand_over(p, phase)

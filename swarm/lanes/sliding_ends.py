@@ -7,7 +7,7 @@ import numpy as np
 from ..contact import crossing, events
 from ..contact.events import ARRIVED, CAREFUL, EVENT, FLYING, HELD
 from ..contact.passing import part_until_open
-from ..contact.path import Path, cubic
+from ..contact.path import StepPath, cubic
 from ..contact.rooms import ended_wall, have_ends, part_until_end, wall_after
 from ..kernel.gravity import potential
 from ..kernel.jit import outlined
@@ -74,7 +74,7 @@ def decide(slide, i):
     active, r, v = slide.active(lane), lane.r, lane.v
     if event & ENDS and ended_wall(walls.at(lane.remaining), active, r, crossing.near(method, r)) >= 0.0:
         return set_going(slide, i)
-    path, near = Path(r, v, lane.r1, lane.v1, h), crossing.near(method, r)
+    path, near = StepPath(r, v, lane.r1, lane.v1, h), crossing.near(method, r)
     cut = 1.0
     if event & LIFTED:
         particle = events.Particle(r, v, lane.remaining, lane.twice, lane.scale2)

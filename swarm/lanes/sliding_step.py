@@ -7,7 +7,7 @@ import numpy as np
 from ..contact import crossing, hold
 from ..contact import sliding as slides
 from ..contact.passing import may_pass
-from ..contact.path import Path
+from ..contact.path import StepPath
 from ..contact.reflection import relative, wall_velocity
 from ..contact.rooms import have_ends, may_end
 from ..kernel.gravity import accelerated, potential
@@ -146,7 +146,7 @@ def _end_step(slide, i):
         v1 = slides.restored(v1, twice - rest, scale2)
     force = slide.force(lane, now, r1, v1)
     ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), lane.allowed)
-    path = Path(r0, v0, r1, v1, h)
+    path = StepPath(r0, v0, r1, v1, h)
     lifted = active.lets_go(force.n, force.m)
     met = crossing.meets(start, now, active, path, crossing.near(method, r1))
     good = (ratio <= 1.0) & (lanes.event[i] == 0)

@@ -6,7 +6,7 @@ Each sweep is one loop over all lanes without branches; lanes that are solved st
 import numpy as np
 
 from ..contact.impulse import LoopRecord
-from ..contact.reflection import Turned
+from ..contact.reflection import ReflectedVelocity
 from ..contact.uzawa import ACCELERATION, BEFORE, GAIN, MEAN, MISS, MULTIPLIER, STORED, SWEEPS, UNCONVERGED
 from ..kernel.arrays import kept
 from ..kernel.jit import outlined, select
@@ -38,7 +38,7 @@ def solution(method, lanes, i):
         return methods.Solution(0.0, False, methods.NOT_TURNED)
     turned = methods.NOT_TURNED
     if method.turns:
-        turned = Turned(column(lanes.turned, 0, i), lanes.turned[3, i])
+        turned = ReflectedVelocity(column(lanes.turned, 0, i), lanes.turned[3, i])
     return methods.Solution(lanes.kappa[i], lanes.unsolved[i], turned)
 
 

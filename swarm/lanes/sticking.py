@@ -5,7 +5,7 @@ Until then another wall may come, and strike it.
 
 from ..contact import crossing, hold
 from ..contact.events import ARRIVED, EVENT
-from ..contact.path import Path
+from ..contact.path import StepPath
 from ..contact.projection import ALLOWED
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined
@@ -130,7 +130,7 @@ def _way(walls, lane, start, end):
     r0, r1 = _carried(walls, lane, start), _carried(walls, lane, end)
     v0 = walls.at(lane.remaining - start).velocity(lane.first, r0)
     v1 = walls.at(lane.remaining - end).velocity(lane.first, r1)
-    return Path(r0, v0, r1, v1, end - start)
+    return StepPath(r0, v0, r1, v1, end - start)
 
 
 @outlined

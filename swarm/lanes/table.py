@@ -66,14 +66,14 @@ class Rows:
         return Vector(self.take(3))
 
 
-class Lane(Record):
+class LaneView(Record):
     """The view of a lane; a table names its rows in a class of its own."""
 
     rows: Array
     i: int
 
 
-class Advanced(Lane):
+class Advanced(LaneView):
     """The lane of a particle on its way, whose rows say where it was when all lanes were looked at last."""
 
     def stands(self, method, p):

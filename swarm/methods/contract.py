@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from ..contact.impulse import LoopRecord
 from ..contact.laws import NONE
-from ..contact.reflection import Turned
+from ..contact.reflection import ReflectedVelocity
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec
@@ -26,7 +26,7 @@ from ..status import Status
 
 # A wall's number this low asks for `hard_pass`: HARD - wall is the wall.
 HARD = -2.0
-NOT_TURNED = Turned(ZERO, 0.0)
+NOT_TURNED = ReflectedVelocity(ZERO, 0.0)
 
 
 class Lane(NamedTuple):
@@ -43,7 +43,7 @@ class Lane(NamedTuple):
     flown: Any = None
 
 
-class Flight(NamedTuple):
+class FlightEnd(NamedTuple):
     """The end of a flight. The wall is -1 where no contact follows; `HARD - wall` leaves the contact to `hard_pass`."""
 
     r: Vec
@@ -57,7 +57,7 @@ class Solution(NamedTuple):
 
     kappa: float
     unsolved: bool
-    turned: Turned
+    turned: ReflectedVelocity
 
 
 NO_RECORD = LoopRecord(0.0, 0.0, 0.0)
@@ -152,12 +152,12 @@ class MethodNumbers(Record):
     asks_flown = False
 
     def flight(self, walls, gravity, lane):
-        """The `Flight` to the next contact, or to the end, of a method that finds its contacts by itself."""
-        return Flight(lane.r, lane.v, lane.remaining, -1.0)
+        """The `FlightEnd` to the next contact, or to the end, of a method that finds its contacts by itself."""
+        return FlightEnd(lane.r, lane.v, lane.remaining, -1.0)
 
     def land(self, walls, gravity, lane, hit):
-        """The `Flight` to the first hit, a `flights.Hit` that is found before, or to the end of the frame."""
-        return Flight(lane.r, lane.v, lane.remaining, -1.0)
+        """The `FlightEnd` to the first hit, a `flights.Hit` that is found before, or to the end of the frame."""
+        return FlightEnd(lane.r, lane.v, lane.remaining, -1.0)
 
     @property
     def lands(self):
@@ -188,7 +188,7 @@ class MethodNumbers(Record):
         return self if self.gives("guess") else None
 
     def turn(self, walls, gravity, lane, wall, kappa):
-        """The `Turned` velocity, for `contact`, where one loop of both would be too long."""
+        """The `ReflectedVelocity`, for `contact`, where one loop of both would be too long."""
         return NOT_TURNED
 
     @property

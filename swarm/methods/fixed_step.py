@@ -159,7 +159,7 @@ def whole_time(moment: float, dt: float) -> float:
 # --- As kernels know it ----------------------------------------------------------------------------------
 
 
-class Own(NamedTuple):
+class StepEnergy(NamedTuple):
     """The numbers that a lane keeps."""
 
     twice_energy: float  # per mass, at the start, and with the work of walls since
@@ -176,7 +176,7 @@ class Steps(contract.MethodNumbers):
         return 2.0 * energy, self.factor / mass, 0.0
 
     def own(self, first, second, third):
-        return Own(first, second, third)
+        return StepEnergy(first, second, third)
 
     @property
     def dissipates(self):
@@ -231,7 +231,7 @@ class Steps(contract.MethodNumbers):
         alone = (touched.number <= 1.0) & (not isinstance(self.form, MeanValue))
         wall = select(alone, touched.wall, contract.HARD - touched.wall)
         wall = select(self.is_too_fast(displacement(gravity, start.v, dt)), contract.HARD, wall)
-        return contract.Flight(start.r, start.v, start.remaining, select(start.remaining > 0.0, wall, -1.0))
+        return contract.FlightEnd(start.r, start.v, start.remaining, select(start.remaining > 0.0, wall, -1.0))
 
 
 class SoftNumbers(Steps):

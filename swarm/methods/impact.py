@@ -162,7 +162,7 @@ def _is_straight(surface: Surface) -> bool:
 # --- As kernels know it ----------------------------------------------------------------------------------
 
 
-class Own(NamedTuple):
+class ContactEnergy(NamedTuple):
     """The energy of a lane, and twice the speed [m/s] away from a wall below which its contact may last."""
 
     energy: Energy
@@ -193,7 +193,7 @@ class Reflection(contract.MethodNumbers):
         return twice_energy, half_inverse, slow
 
     def own(self, first, second, third):
-        return Own(Energy(first, second), third)
+        return ContactEnergy(Energy(first, second), third)
 
     holds = True
 
@@ -209,7 +209,7 @@ class Reflection(contract.MethodNumbers):
 
     def land(self, walls, gravity, lane, hit):
         t = select(hit.time < lane.remaining, hit.time, lane.remaining)
-        return contract.Flight(
+        return contract.FlightEnd(
             lane.r + displacement(gravity, lane.v, t),
             accelerated(gravity, lane.v, t),
             lane.remaining - t,

@@ -86,7 +86,7 @@ class Penalty(fixed_step.SoftWalls):
 # --- As kernels know it ----------------------------------------------------------------------------------
 
 
-class Cut(NamedTuple):
+class ContactStep(NamedTuple):
     """Length of the contact step, the same in the unit of `remaining`, and the regularisation."""
 
     h: float
@@ -116,8 +116,8 @@ class GradientSteps(fixed_step.Steps):
     multiplies = False
 
     def cut(self: Any, remaining):
-        """The `Cut` of the next contact step."""
-        return Cut(self.dt, 1.0, self.law)
+        """The `ContactStep` of the next contact step."""
+        return ContactStep(self.dt, 1.0, self.law)
 
     def free(self: Any, gravity, lane, h):
         """The step without walls: r0, p and c = h^2/(2m)."""

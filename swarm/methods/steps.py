@@ -14,7 +14,7 @@ from ..contact.discrete_gradient import MeanValue
 from ..contact.impulse import Step
 from ..contact.laws import NONE
 from ..contact.reflection import Energy, chord, exact
-from ..contact.touching import Contacts, Moving, impact
+from ..contact.touching import ImpactSettings, MovingParticle, impact
 from ..kernel.arrays import kept, scratch
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import outlined, select
@@ -224,7 +224,7 @@ class CutSteps(StepNumbers):
         # alpha.
         h = select(self.dt < remaining, self.dt, remaining)
         part = self.dt / h
-        return penalty.Cut(h, h, self.law.stiffened(part * part))
+        return penalty.ContactStep(h, h, self.law.stiffened(part * part))
 
     def is_new(self, walls, r):
         return True
@@ -248,8 +248,10 @@ class CutSteps(StepNumbers):
     def as_impacts(self, walls, lane, cut, wall, lanes, i):
         energy = _first_energy(lane)
         shortest = self.shortest_length / math.sqrt(energy.twice)
-        contacts = Contacts(None, NONE, shortest, _SAME_INSTANT * self.shortest_length)
-        end = impact(contacts, walls, None, wall, Moving(lane.r, lane.v, lane.remaining), energy, lanes.impulse, i)
+        contacts = ImpactSettings(None, NONE, shortest, _SAME_INSTANT * self.shortest_length)
+        end = impact(
+            contacts, walls, None, wall, MovingParticle(lane.r, lane.v, lane.remaining), energy, lanes.impulse, i
+        )
         return _after(end.r, end.v, lane.remaining - end.used, 1.0), Status.DONE.value
 
     def land(self, walls, gravity, lane, hit):
@@ -260,7 +262,9 @@ class CutSteps(StepNumbers):
         # A hit in the last instant of a frame is met again in the next one.
         met = met & (hit.wall >= 0.0) & (remaining > 0.0)
         wall = select(isinstance(self.form, MeanValue), contract.HARD - hit.wall, hit.wall)
-        return contract.Flight(select(met, walls.project(hit.wall, r), r), lane.v, remaining, select(met, wall, -1.0))
+        return contract.FlightEnd(
+            select(met, walls.project(hit.wall, r), r), lane.v, remaining, select(met, wall, -1.0)
+        )
 
 
 class CentredSteps(CutSteps):

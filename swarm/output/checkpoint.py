@@ -41,7 +41,7 @@ _HINT = "use the inputs that it was started with, or start again with --overwrit
 
 
 @dataclass(frozen=True)
-class Job:
+class SavedRun:
     """A run and its progress.
 
     Attributes:
@@ -75,7 +75,7 @@ class Job:
     counters: str = ""
     first: int = 0
 
-    def require_same(self, other: "Job", path: Path) -> None:
+    def require_same(self, other: "SavedRun", path: Path) -> None:
         """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""
         for name, told in _NAMES.items():
             mine, its = (
@@ -111,7 +111,7 @@ def digest_of(particles: Particles, body: str = "") -> str:
     return digest.hexdigest()[:16]
 
 
-def save(path: Path, job: Job, arrays: Arrays, owners: NDArray[np.int64] | None = None) -> None:
+def save(path: Path, job: SavedRun, arrays: Arrays, owners: NDArray[np.int64] | None = None) -> None:
     """Replace the checkpoint; the old one stays until the new one is completely on the disk.
 
     `owners` are those of the rows that the arrays have for walls, as `Scene.members`.
@@ -132,7 +132,7 @@ def is_one(path: Path) -> bool:
         return file.read(_HEAD).endswith(_FIRST)
 
 
-def read(path: Path) -> tuple[Job, Arrays]:
+def read(path: Path) -> tuple[SavedRun, Arrays]:
     """A checkpoint.
 
     Raises:
@@ -146,7 +146,7 @@ def read(path: Path) -> tuple[Job, Arrays]:
         arrays = {
             name: np.lib.format.read_array(io.BytesIO(data), allow_pickle=False) for name, data in entries.items()
         }
-        job = tables.convert(json.loads(str(arrays.pop("job"))), Job, "job")
+        job = tables.convert(json.loads(str(arrays.pop("job"))), SavedRun, "job")
         if job.frame < 0 or not all(map(math.isfinite, (job.time, job.wall_time, job.following or 0.0))):
             raise ValueError(f"it cannot be at frame {job.frame}, {job.time} s")
     return job, arrays

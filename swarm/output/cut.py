@@ -35,7 +35,7 @@ class Cut(NamedTuple):
     rims: Indices
 
 
-class Smooth(NamedTuple):
+class SmoothSurface(NamedTuple):
     """A smooth surface: phi and its gradient (N, 3) at points (N, 3)."""
 
     phi: Level
@@ -63,7 +63,9 @@ class Smooth(NamedTuple):
         return points
 
 
-def found_in(surface: Smooth, low: Floats, high: Floats, frame: Floats, is_cut: bool = False) -> tuple[Floats, Indices]:
+def found_in(
+    surface: SmoothSurface, low: Floats, high: Floats, frame: Floats, is_cut: bool = False
+) -> tuple[Floats, Indices]:
     """The triangles of a surface in a box that is given in a frame, the columns of a matrix.
 
     Those of a plane are few, but where many bodies cut it: these are smaller.
@@ -76,7 +78,7 @@ def found_in(surface: Smooth, low: Floats, high: Floats, frame: Floats, is_cut: 
     return points, triangles
 
 
-def _on_grid(surface: Smooth, low: Floats, high: Floats, frame: Floats, count: int) -> tuple[Floats, Indices]:
+def _on_grid(surface: SmoothSurface, low: Floats, high: Floats, frame: Floats, count: int) -> tuple[Floats, Indices]:
     margin = _MARGIN * (high - low) / (count - 1.0)
     low, high = low - margin, high + margin
     axes = [np.linspace(a, b, count) for a, b in zip(low, high, strict=True)]
@@ -92,7 +94,7 @@ def _on_grid(surface: Smooth, low: Floats, high: Floats, frame: Floats, count: i
     return surface.onto((points + low) @ frame.T, max(spacing)), triangles.astype(np.int64)
 
 
-def cut(surface: Smooth, points: Floats, triangles: Indices, level: Level, bodies: int = 0) -> Cut:
+def cut(surface: SmoothSurface, points: Floats, triangles: Indices, level: Level, bodies: int = 0) -> Cut:
     """The part of triangles on a surface at which a level, a distance to first order, is not above 0.
 
     For each of so many `bodies` that cut it there may be more triangles, so that its hole is as round as one alone.
@@ -133,7 +135,7 @@ def _widths(points: Floats, triangles: Indices) -> Floats:
 
 
 def _finer(
-    surface: Smooth, points: Floats, triangles: Indices, values: Floats, level: Level, most: int
+    surface: SmoothSurface, points: Floats, triangles: Indices, values: Floats, level: Level, most: int
 ) -> tuple[Floats, Indices, Floats]:
     """Triangles at the cut in four, as long as it bends within them: points, triangles and the levels of points."""
     for _ in range(_ROUNDS):
@@ -160,7 +162,7 @@ def _finer(
     return points, triangles, values
 
 
-def _crossings(surface: Smooth, points: Floats, edges: Indices, values: Floats, level: Level) -> Floats:
+def _crossings(surface: SmoothSurface, points: Floats, edges: Indices, values: Floats, level: Level) -> Floats:
     """The points on edges of triangles at which a level is 0."""
     if not len(edges):
         return np.empty((0, 3))

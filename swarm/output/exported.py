@@ -14,7 +14,7 @@ from .stored import whole
 Progress = Callable[[int, int], None]
 
 
-class Moment(NamedTuple):
+class ExportedFrame(NamedTuple):
     """A frame; rows are particles, as in files."""
 
     number: int
@@ -73,7 +73,7 @@ class Exported:
         born = self.trajectory.birth_time[self._rows]
         return [int((born <= time).sum()) for time in self.times.tolist()]
 
-    def moments(self) -> Iterator[Moment]:
+    def moments(self) -> Iterator[ExportedFrame]:
         """The frames one after the other, each of which is written when the next is asked for.
 
         Those that come later in a run with sources are left out.
@@ -84,7 +84,7 @@ class Exported:
             if not there.all():
                 held = {name: column[there] for name, column in held.items()}
             position, velocity = held.pop("position"), held.pop("velocity")
-            yield Moment(number, time, position, velocity, held, self.ids[there], self.mass[there])
+            yield ExportedFrame(number, time, position, velocity, held, self.ids[there], self.mass[there])
             if self._progress is not None:
                 self._progress(done + 1, len(self.numbers))
 

@@ -12,7 +12,7 @@ from ..surfaces import Cone, Torus
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from .curves import Indices, neighbours
-from .cut import Smooth
+from .cut import SmoothSurface
 
 # Points around the tube of a torus and along it, parts of the height of an outline, and points of a line on it.
 _AROUND, _ALONG, _HIGH, _FINE = 32, 96, 8, 201
@@ -92,7 +92,7 @@ def corners(surface: Outlined, low: float, high: float) -> list[Floats]:
     return [point - (point @ along) * along + height for point in at]
 
 
-def sides(surface: Outlined) -> Smooth:
+def sides(surface: Outlined) -> SmoothSurface:
     """The walls on an outline as a surface; to triangles on it nothing is to be moved."""
 
     def phi(points: Floats) -> Floats:
@@ -101,18 +101,18 @@ def sides(surface: Outlined) -> Smooth:
     def gradient(points: Floats) -> Floats:
         return np.asarray((surface.frame[:, :2] @ surface.boundary.nearest(surface.in_plane(points.T)[:2])[1]).T)
 
-    return Smooth(phi, gradient)
+    return SmoothSurface(phi, gradient)
 
 
-def lids(surface: Outlined) -> list[Smooth]:
+def lids(surface: Outlined) -> list[SmoothSurface]:
     """The lids of an outline as planes."""
     return [_lid(surface, side) for side in (-1.0, 1.0)] if surface.height is not None else []
 
 
-def _lid(surface: Any, side: float) -> Smooth:
+def _lid(surface: Any, side: float) -> SmoothSurface:
     normal = side * surface.frame[:, 2]
     offset = float(normal @ np.array(surface.center)) + 0.5 * surface.height
-    return Smooth(lambda points: points @ normal - offset, lambda points: np.broadcast_to(normal, points.shape))
+    return SmoothSurface(lambda points: points @ normal - offset, lambda points: np.broadcast_to(normal, points.shape))
 
 
 def _halved(a: Any, b: Any, c: Any, d: Any) -> Indices:

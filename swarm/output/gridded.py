@@ -13,7 +13,7 @@ from ..state import Floats
 from ..surfaces import Spheres
 from ..surfaces.fields.many import Many
 from ..surfaces.surface import Surface
-from .cut import Smooth, cut
+from .cut import SmoothSurface, cut
 
 # The box in which a scene is drawn is so many of its parts wider than the walls, two on each side.
 _POINTS = 48
@@ -71,7 +71,7 @@ def foam(spheres: Spheres) -> tuple[Triangles, list[Floats]]:
         return np.asarray(-spheres.phi(points.T) - _ROUND_OFF * size)
 
     # Points on a ball stay on it: between two of them no others are made that matter.
-    wall = Smooth(lambda points: np.zeros(len(points)), lambda points: spheres.gradient(points.T).T)
+    wall = SmoothSurface(lambda points: np.zeros(len(points)), lambda points: spheres.gradient(points.T).T)
     points, triangles, _rims = cut(wall, vertices, triangles, level)
     # Where balls of coarse triangles meet, edges would be zigzags.
     return (points, triangles, -wall.normals(points)), []

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .exported import Exported, Moment
+from .exported import Exported, ExportedFrame
 from .origin import origin_of
 
 
@@ -34,7 +34,7 @@ def write(chosen: Exported, path: Path) -> None:
 
 
 def _frame(
-    chosen: Exported, moment: Moment, center: NDArray[np.float64], needed: NDArray[np.float64]
+    chosen: Exported, moment: ExportedFrame, center: NDArray[np.float64], needed: NDArray[np.float64]
 ) -> gsd.hoomd.Frame:
     n, bonds = len(moment.ids), chosen.bonds
     position = (moment.position - center).astype(np.float32)

@@ -15,7 +15,7 @@ from ..surfaces.openings import are_open
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.surface import Surface
 from .curves import runs
-from .cut import Level, Smooth
+from .cut import Level, SmoothSurface
 from .parts import Part
 from .sharp import filled, smooth_walls
 
@@ -95,7 +95,9 @@ class PlaneWalls:
             found += self._cut(part, wall, [other for other in walls if other is not wall], curves, at)
         return found
 
-    def _cut(self, part: Part, wall: Smooth, others: list[Smooth], curves: list[Floats], at: Pose) -> list[Floats]:
+    def _cut(
+        self, part: Part, wall: SmoothSurface, others: list[SmoothSurface], curves: list[Floats], at: Pose
+    ) -> list[Floats]:
         """The parts of curves on a smooth wall that are a wall of the scene."""
         size = float((self._box[1] - self._box[0]).max())
         side = -1.0 if part.surface.is_solid() else 1.0

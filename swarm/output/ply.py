@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..state import Floats
 from . import colours
-from .exported import Exported, Moment
+from .exported import Exported, ExportedFrame
 from .origin import origin_of
 
 _KINDS = {"f4": "float", "u1": "uchar", "i4": "int"}
@@ -54,14 +54,14 @@ def older(target: Path) -> list[Path]:
 
 def write_sequence(chosen: Exported, files: list[Path]) -> None:
     """Write a file for each frame."""
-    writer = _Writer(chosen)
+    writer = _PlyWriter(chosen)
     for moment, path in zip(chosen.moments(), files, strict=True):
         with open(path, "wb") as file:
             for part in writer.parts(moment):
                 file.write(part)
 
 
-class _Writer:
+class _PlyWriter:
     """What is the same in all files."""
 
     def __init__(self, chosen: Exported) -> None:
@@ -74,7 +74,7 @@ class _Writer:
         self._body = trajectory.body
         self._copies = chosen.ids % trajectory.copies if trajectory.copies else None
 
-    def parts(self, moment: Moment) -> Iterator[bytes]:
+    def parts(self, moment: ExportedFrame) -> Iterator[bytes]:
         """The parts of the file of a frame."""
         columns, faces = self._columns(moment)
         bonds = self._chosen.bonds if not len(faces) else self._chosen.bonds[:0]
@@ -104,7 +104,7 @@ class _Writer:
             edges["vertex1"], edges["vertex2"] = bonds.T
             yield edges.tobytes()
 
-    def _columns(self, moment: Moment) -> tuple[dict[str, Any], NDArray[np.int64]]:
+    def _columns(self, moment: ExportedFrame) -> tuple[dict[str, Any], NDArray[np.int64]]:
         """The columns of the vertices, and the triangles between them."""
         position, velocity, ids = (np.asarray(rows) for rows in (moment.position, moment.velocity, moment.ids))
         faces, held = np.zeros((0, 3), np.int64), dict[str, Any]()

@@ -19,7 +19,7 @@ from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
 from . import curves, given
-from .cut import MOST_BODIES, Indices, Smooth, cut, found_in
+from .cut import MOST_BODIES, Indices, SmoothSurface, cut, found_in
 from .parts import Cover, Part
 
 # Of the size of what is drawn, a step along edges of a mesh that others may cut.
@@ -42,7 +42,7 @@ class _Placed(NamedTuple):
     high: Floats
     size: float  # of what is drawn [m]
 
-    def level(self, wall: Smooth, covers: list[Cover], others: list[Smooth]) -> Any:
+    def level(self, wall: SmoothSurface, covers: list[Cover], others: list[SmoothSurface]) -> Any:
         """The level of where the wall is none."""
 
         def above(points: Floats) -> Floats:
@@ -100,7 +100,7 @@ def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
     edges = curves.joined(points, curves.creases(points, triangles))
     covers = _near(placed, points)
     if covers or part.doorways:
-        wall = Smooth(lambda points: np.zeros(len(points)), lambda points: surface.gradient(points.T).T)
+        wall = SmoothSurface(lambda points: np.zeros(len(points)), lambda points: surface.gradient(points.T).T)
         level = placed.level(wall, covers, [])
         fine = [curves.finer(edge, placed.size / _FINE) for edge in edges]
         edges = [run for edge in fine for run in curves.runs(edge, level(edge) <= 0.0)]
@@ -110,7 +110,7 @@ def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
     return given.shaded(points, triangles if part.solid else triangles[:, ::-1]), edges
 
 
-def _pieces(placed: _Placed) -> Iterator[tuple[Any, Smooth]]:
+def _pieces(placed: _Placed) -> Iterator[tuple[Any, SmoothSurface]]:
     """The triangles of every smooth wall, cut, and the wall."""
     surface: Any = placed.part.surface
     walls, upright = smooth_walls(surface), isinstance(surface, Outlined)
@@ -120,7 +120,7 @@ def _pieces(placed: _Placed) -> Iterator[tuple[Any, Smooth]]:
     if upright:
         points, triangles = given.upright(surface, float(placed.low[2]), float(placed.high[2]))
         # Moved onto themselves, they would stay where they are.
-        wall = Smooth(lambda points: np.zeros(len(points)), walls[0].gradient)
+        wall = SmoothSurface(lambda points: np.zeros(len(points)), walls[0].gradient)
         level = placed.level(wall, _near(placed, points), [])
         yield cut(wall, points, triangles, level), wall
     for wall in walls[upright:]:
@@ -153,7 +153,7 @@ def _near(placed: _Placed, points: Floats) -> list[Cover]:
     return [one for one in placed.part.covers if one.may_cover(here.min(axis=1) - room, here.max(axis=1) + room)]
 
 
-def smooth_walls(surface: Surface) -> list[Smooth]:
+def smooth_walls(surface: Surface) -> list[SmoothSurface]:
     """Every smooth wall of a surface; of a solid with edges those of what it fills."""
     if isinstance(surface, Outlined):
         return [given.sides(surface), *given.lids(surface)]
@@ -172,16 +172,16 @@ def filled(surface: Surface) -> Surface:
         return surface
 
 
-def _smooth(wall: Any) -> Smooth:
+def _smooth(wall: Any) -> SmoothSurface:
     if isinstance(wall, Surface):
         still = replace(wall, motion=None)
-        return Smooth(lambda points: still.phi(points.T), lambda points: still.gradient(points.T).T)
+        return SmoothSurface(lambda points: still.phi(points.T), lambda points: still.gradient(points.T).T)
 
     def gradient(points: Floats) -> Floats:
         rows = vec(points.T)
         return np.stack(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3], axis=1)
 
-    return Smooth(lambda points: np.broadcast_to(wall.phi(vec(points.T)), len(points)), gradient)
+    return SmoothSurface(lambda points: np.broadcast_to(wall.phi(vec(points.T)), len(points)), gradient)
 
 
 def _frame(surface: Surface) -> tuple[Floats, Surface]:
@@ -208,7 +208,7 @@ def _in(frame: Floats, point: Any) -> Any:
     return tuple((frame.T @ np.array(point)).tolist())
 
 
-def _triangles(placed: _Placed, wall: Smooth, low: Floats, high: Floats) -> tuple[Floats, Indices]:
+def _triangles(placed: _Placed, wall: SmoothSurface, low: Floats, high: Floats) -> tuple[Floats, Indices]:
     """Triangles on a smooth wall in a box."""
     surface, frame = placed.part.surface, placed.frame
     if isinstance(surface, Torus):

@@ -20,7 +20,7 @@ from ..state import Floats
 _FEW = 300
 
 
-class Cells(NamedTuple):
+class CellLists(NamedTuple):
     """The lists: balls enter them in the order of their sizes, from the largest on."""
 
     position: Array  # (3, N) of those that have entered
@@ -41,7 +41,7 @@ def order_of(radius: Floats) -> NDArray[np.int64]:
     return np.argsort(-radius, kind="stable")
 
 
-def empty_cells(low: Floats, high: Floats, period: tuple[float | None, ...] | None, radius: Floats) -> Cells:
+def empty_cells(low: Floats, high: Floats, period: tuple[float | None, ...] | None, radius: Floats) -> CellLists:
     """The lists of balls of these radii in a box, none of which has entered."""
     sizes = np.unique(np.floor(np.log2(radius.max() / radius)).astype(np.int64), return_inverse=True)
     level, n = np.asarray(sizes[1]), radius.size
@@ -60,7 +60,7 @@ def empty_cells(low: Floats, high: Floats, period: tuple[float | None, ...] | No
         shapes.append(shape)
         inverses.append(shape / np.where(extent > 0.0, extent, 1.0))
         cells += int(shape.prod())
-    return Cells(
+    return CellLists(
         np.zeros((3, n)), radius, level, np.full(cells, -1, np.int64), np.full(n, -1, np.int64), np.array(begin),
         np.array(shapes), np.array(inverses), np.where(lengths > 0.0, 0.0, low), lengths,
         np.where(lengths > 0.0, 1.0 / np.where(lengths > 0.0, lengths, 1.0), 0.0),
@@ -185,14 +185,14 @@ class Overlaps(NamedTuple):
     depth: float  # by how much these do [m]
 
 
-def find_free(cells: Cells, points: Floats, radius: Floats) -> NDArray[np.bool_]:
+def find_free(cells: CellLists, points: Floats, radius: Floats) -> NDArray[np.bool_]:
     """Whether balls at points (3, n) would overlap none that has entered."""
     free = np.empty(points.shape[1], np.bool_)
     _tier(_find_free, points)(cells, points, radius, free)
     return free
 
 
-def enter_free(cells: Cells, points: Floats, numbers: NDArray[np.int64], done: NDArray[np.bool_]) -> None:
+def enter_free(cells: CellLists, points: Floats, numbers: NDArray[np.int64], done: NDArray[np.bool_]) -> None:
     """Let balls of these numbers, which may come again, enter at points (3, n) where they overlap none.
 
     `done` says which have entered; they are to be no larger than these.

@@ -9,7 +9,7 @@ from ..ball_numbers import balls_volume
 from ..errors import SceneError
 from ..scene import Scene
 from ..state import Floats
-from .cells import Cells, empty_cells, enter_free, find_free, order_of
+from .cells import CellLists, empty_cells, enter_free, find_free, order_of
 from .vacant import Vacant
 
 # The largest packings, in space and in a plane. Random sequential addition ends at 0.384 and 0.547, where a place for
@@ -30,7 +30,7 @@ _RARE, _ALIKE = 0.05, 0.9
 _SEARCHED = 8
 
 
-class Room(NamedTuple):
+class VolumeBox(NamedTuple):
     """What is known of a volume: a box around it (3, 1), and how large it is."""
 
     low: Floats
@@ -58,7 +58,7 @@ def require_size(scene: Scene, radius: Floats) -> None:
             )
 
 
-def require_packing(scene: Scene, radius: Floats, room: Room, most: float | None = None) -> float:
+def require_packing(scene: Scene, radius: Floats, room: VolumeBox, most: float | None = None) -> float:
     """The packing of balls in a volume; a `SceneError` where it is more than can be filled at random, or `most`."""
     axes = len(scene.axes())
     packing = balls_volume(scene, radius) / room.volume
@@ -72,7 +72,7 @@ def require_packing(scene: Scene, radius: Floats, room: Room, most: float | None
     return packing
 
 
-def told(scene: Scene, radius: Floats, room: Room) -> str:
+def told(scene: Scene, radius: Floats, room: VolumeBox) -> str:
     """Balls in a volume, for a sentence."""
     unit, kind = ("m^3", "balls") if scene.plane is None else ("m^2", "discs")
     size = f"{radius[0]:g} m" if radius.min() == radius.max() else f"{radius.min():g} to {radius.max():g} m"
@@ -83,7 +83,7 @@ def told(scene: Scene, radius: Floats, room: Room) -> str:
 
 
 def place_balls(
-    scene: Scene, radius: Floats, room: Room, random: np.random.Generator, wide: Floats | None = None
+    scene: Scene, radius: Floats, room: VolumeBox, random: np.random.Generator, wide: Floats | None = None
 ) -> Floats:
     """Places (3, N) of balls of these radii, uniform among those where they overlap nothing, one after the other.
 
@@ -118,7 +118,9 @@ def place_balls(
     return np.ascontiguousarray(cells.position)
 
 
-def _searched(scene: Scene, cells: Cells, room: Room, sizes: tuple[float, float], vacant: Vacant | None) -> Vacant:
+def _searched(
+    scene: Scene, cells: CellLists, room: VolumeBox, sizes: tuple[float, float], vacant: Vacant | None
+) -> Vacant:
     """Where balls of this radius, for others and for walls, may still be."""
     if vacant is None:
         return Vacant(scene, cells, room.low, room.high, *sizes)
@@ -126,14 +128,14 @@ def _searched(scene: Scene, cells: Cells, room: Room, sizes: tuple[float, float]
     return vacant
 
 
-def _points(scene: Scene, room: Room, n: int, random: np.random.Generator) -> Floats:
+def _points(scene: Scene, room: VolumeBox, n: int, random: np.random.Generator) -> Floats:
     points, axes = np.zeros((3, n)), scene.axes()
     points[axes] = room.low[axes] + (room.high - room.low)[axes] * random.random((len(axes), n))
     return points
 
 
 def _enter(
-    scene: Scene, cells: Cells, points: Floats, numbers: NDArray[np.int64], done: NDArray[np.bool_], wide: Floats
+    scene: Scene, cells: CellLists, points: Floats, numbers: NDArray[np.int64], done: NDArray[np.bool_], wide: Floats
 ) -> int:
     """Let balls of these numbers enter where they overlap nothing: how many of the places are within the walls."""
     # Most places overlap a ball where many have entered, which is looked up faster than where the walls are.
@@ -153,7 +155,7 @@ def admits(scene: Scene, points: Floats, radius: Floats) -> NDArray[np.bool_]:
 
 
 def _full(
-    scene: Scene, radius: Floats, room: Room, done: NDArray[np.bool_], tried: int, fitting: int
+    scene: Scene, radius: Floats, room: VolumeBox, done: NDArray[np.bool_], tried: int, fitting: int
 ) -> SceneError:  # fmt: skip
     first = int(order_of(radius)[0])
     if not done.any() and not fitting:

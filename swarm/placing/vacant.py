@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..scene import Scene
 from ..state import Floats
-from .cells import Cells, find_free
+from .cells import CellLists, find_free
 
 # The width of the first boxes, as a part of the radius, unless there were more than so many for each ball, and some.
 _WIDTH, _MOST, _SOME = 0.7, 48, 1_000_000
@@ -26,7 +26,7 @@ class Vacant:
         radius: for other balls; `wide`: for walls.
     """
 
-    def __init__(self, scene: Scene, cells: Cells, low: Floats, high: Floats, radius: float, wide: float) -> None:
+    def __init__(self, scene: Scene, cells: CellLists, low: Floats, high: Floats, radius: float, wide: float) -> None:
         self._scene, self._cells, self.radius, self._wide = scene, cells, radius, wide
         self._low, axes = low, scene.axes()
         extent = (high - low)[:, 0]

@@ -14,19 +14,19 @@ from ..surfaces.surface import Surface
 from ..surfaces.walls import Walls
 from .freedoms import Freedoms, Shifted
 from .pendulum import TERMS, Hinged, Pendulum
-from .queue import Scenery
+from .queue import SceneWalls
 from .walls import Reacting
 
 Floats = NDArray[np.float64]
 
 
-def scenery_of(scene: Scene, moment: float) -> Scenery:
+def scenery_of(scene: Scene, moment: float) -> SceneWalls:
     """The walls of a scene in the frame that ends at a moment [s]."""
     owners = np.array(scene.owners())
     rest = [surface for surface in scene.surfaces if not surface.reacts()]
     given = scene.of_some(rest).ungrouped("walls that react") if rest else None
     reacts = np.array([surface.reacts() for surface in scene.surfaces])[owners]
-    return Scenery(
+    return SceneWalls(
         Walls(()) if given is None else given.walls(moment),
         (given.laws() if given else None) or NONE,
         np.flatnonzero(~reacts),
@@ -148,7 +148,7 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
     return found
 
 
-def walls_now(scene: Scene, scenery: Scenery, freedoms: Freedoms) -> Walls:
+def walls_now(scene: Scene, scenery: SceneWalls, freedoms: Freedoms) -> Walls:
     """All walls of a scene, in its order, at the end of the frame of `scenery`."""
     given = iter(scenery.given.at(0.0).each)
     reacting = (wall.freedom.posed(wall.body, freedoms, 0.0) for wall in scenery.reacting)

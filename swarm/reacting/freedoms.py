@@ -12,7 +12,7 @@ from ..kernel.jit import Array, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, column, dot, norm, put, square
 from ..surfaces import flights, safe
-from ..surfaces.drive import Drive, Pose, Swing
+from ..surfaces.drive import Drive, PoseDerivatives, Swing
 from ..surfaces.moving import Moving
 from ..surfaces.posed import Posed
 from ..surfaces.rising import flight_of
@@ -36,7 +36,7 @@ class Freedoms(NamedTuple):
     until: Array  # (K,) when it may leave the lease by what pulls it [s]
 
 
-class Flight(NamedTuple):
+class ParticleFlight(NamedTuple):
     """A particle at a time of the frame, and how far ahead of it matters [s]."""
 
     r: Vec
@@ -83,7 +83,7 @@ class Freedom(Record):
     """A way to move of a wall, by its `row` among the `walls` and its `lightness`, 1/M or 1/I; times are of a frame."""
 
     def pose(self, walls, t):
-        """Its `Pose` at a time."""
+        """Its `PoseDerivatives` at a time."""
         raise NotImplementedError
 
     def drive(self, walls, t):
@@ -170,10 +170,12 @@ class Shifted(Freedom):
             rate, (away, speed) = self.rate, self.swing(column(walls.shift, 0, k), column(walls.velocity, 0, k))
             c, s = math.cos(rate * t), math.sin(rate * t)
             here = c * away + s * speed
-            return Pose(self.equilibrium() + here, rate * (c * speed - s * away), (-rate * rate) * here, None)
+            return PoseDerivatives(
+                self.equilibrium() + here, rate * (c * speed - s * away), (-rate * rate) * here, None
+            )
         # s = s0 + V t + a t^2/2
         v, pull = column(walls.velocity, 0, k), self.pull
-        return Pose(column(walls.shift, 0, k) + t * (v + (0.5 * t) * pull), v + t * pull, pull, None)
+        return PoseDerivatives(column(walls.shift, 0, k) + t * (v + (0.5 * t) * pull), v + t * pull, pull, None)
 
     def equilibrium(self):
         """The displacement at which the spring holds it."""

@@ -11,7 +11,7 @@ from ..kernel.arrays import index
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, cross, dot, norm
 from ..surfaces.course import rise_time
-from ..surfaces.drive import Drive, Pose, Rows, Turn
+from ..surfaces.drive import Drive, PoseDerivatives, RotationRows, Turn
 from ..surfaces.posed import Posed
 from .freedoms import Freedom, exact_sum, march
 
@@ -62,7 +62,7 @@ class Hinged(Turning):
     def pose(self, walls, t):
         k = index(self.row)
         angle = walls.angle[k] + walls.rate[k] * (t - walls.time[k])
-        return Pose(ZERO, ZERO, ZERO, rows_about(self.axis, angle))
+        return PoseDerivatives(ZERO, ZERO, ZERO, rows_about(self.axis, angle))
 
     def drive(self, walls, t):
         rate, turn = walls.rate[index(self.row)], self.pose(walls, t).turn
@@ -84,7 +84,7 @@ def rows_about(axis, angle):
     """The rows of the rotation about an axis by an angle (Rodrigues)."""
     a, c, s = axis, math.cos(angle), math.sin(angle)
     b = 1.0 - c
-    return Rows(
+    return RotationRows(
         Vec(c + b * a.x * a.x, b * a.x * a.y - s * a.z, b * a.x * a.z + s * a.y),
         Vec(b * a.y * a.x + s * a.z, c + b * a.y * a.y, b * a.y * a.z - s * a.x),
         Vec(b * a.z * a.x - s * a.y, b * a.z * a.y + s * a.x, c + b * a.z * a.z),
@@ -156,7 +156,7 @@ class Pendulum(Turning):
         return Angle(angle, rate, 2.0 * half)
 
     def pose(self, walls, t):
-        return Pose(ZERO, ZERO, ZERO, rows_about(self.axis, self.angle(walls, t).angle))
+        return PoseDerivatives(ZERO, ZERO, ZERO, rows_about(self.axis, self.angle(walls, t).angle))
 
     def drive(self, walls, t):
         spin = self.angle(walls, t).rate * self.axis

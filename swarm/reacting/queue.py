@@ -18,7 +18,7 @@ from ..kernel.vector import ZERO, column, put, square
 from ..status import Status
 from ..surfaces import flights, safe
 from ..surfaces.moving import Marched
-from .freedoms import Flight
+from .freedoms import ParticleFlight
 from .walls import all_stay, first_hit, reach_of_all, strike
 
 # What is next for a particle besides the impact on a wall that reacts, whose number is 0 or more: nothing that was
@@ -35,7 +35,7 @@ AT_ONCE = 1000
 _NEAR = 1e-6
 
 
-class Scenery(NamedTuple):
+class SceneWalls(NamedTuple):
     """The walls of a scene: those that do not react, their laws and their numbers in the scene; those that do."""
 
     given: Any  # None, or the walls
@@ -68,7 +68,7 @@ class Queue(NamedTuple):
     counts: Any = None  # (walls,) int64, impacts on each, where they are counted
 
 
-class Rule(NamedTuple):
+class ReactionRule(NamedTuple):
     """The end of the frame [s], and when to stop."""
 
     end: float
@@ -89,11 +89,11 @@ def _aim(scenery, queue, i, end):
 
 
 def _seen(scenery, queue, i, now, end):
-    """The `Flight` of particle i at a time."""
+    """The `ParticleFlight` of particle i at a time."""
     t, r, v = now - queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
     pull, target = scenery.pull, select(queue.due[i] < end, queue.due[i], end)
     here = r + displacement(pull, v, t)
-    return Flight(here, accelerated(pull, v, t), ZERO if pull is None else pull, now, target - now)
+    return ParticleFlight(here, accelerated(pull, v, t), ZERO if pull is None else pull, now, target - now)
 
 
 def _next(scenery, walls, queue, i, now, end, soon):
@@ -143,7 +143,7 @@ def _bounce(scenery, queue, i, wall, remaining):
 def _strike(scenery, walls, queue, i, now):
     """The impact of particle i on a wall that reacts."""
     r, v, m = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i]
-    blow = strike(scenery.reacting, queue.struck[i], walls, Flight(r, v, ZERO, now, 0.0), m)
+    blow = strike(scenery.reacting, queue.struck[i], walls, ParticleFlight(r, v, ZERO, now, 0.0), m)
     # The energy decides the speed, as for walls that stay: round-off of J has a bias, 1e-16 of the energy an impact.
     energy = queue.energy[i] - (blow.given + blow.lost) / m
     speed2 = 2.0 * (energy - potential(scenery.pull, blow.r))

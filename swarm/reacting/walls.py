@@ -9,7 +9,7 @@ from ..kernel.vector import Vec, dot, square
 from ..surfaces.flights import NEVER, sooner
 
 
-class Blow(NamedTuple):
+class WallImpact(NamedTuple):
     """A particle after its impact on a wall that reacts, and the impulse [N s]."""
 
     r: Vec  # on the wall
@@ -29,7 +29,7 @@ class Reacting(Record):
     restitution: float
 
     def strike(self, walls, flight, mass):
-        """The impact of a particle on it: its `Blow`."""
+        """The impact of a particle on it: its `WallImpact`."""
         freedom = self.freedom
         surface = freedom.posed(self.body, walls, flight.time)
         # The time of the frame has fewer digits than the flight: without this a particle is found in the wall next
@@ -46,7 +46,7 @@ class Reacting(Record):
         freedom.push(walls, flight.time, impulse * n, arm)
         lost = 0.5 * (1.0 - self.restitution) * (1.0 + self.restitution) * approach * approach / both
         given = impulse * (speed + 0.5 * impulse * give)
-        return Blow(r, flight.v - (impulse / mass) * n, impulse, given, lost, self.owner)
+        return WallImpact(r, flight.v - (impulse / mass) * n, impulse, given, lost, self.owner)
 
 
 def reach_of_all(reacting, walls, flight):
@@ -68,11 +68,11 @@ def first_hit(reacting, gravity, walls, flight):
 
 
 def strike(reacting, wall, walls, flight, mass):
-    """The impact of a particle on the wall with this number: its `Blow`."""
+    """The impact of a particle on the wall with this number: its `WallImpact`."""
     for k, one in enumerate(reacting):
         if wall == k:
             return one.strike(walls, flight, mass)
-    return Blow(flight.r, flight.v, 0.0, 0.0, 0.0, -1)
+    return WallImpact(flight.r, flight.v, 0.0, 0.0, 0.0, -1)
 
 
 def all_stay(reacting, wall, walls):

@@ -12,7 +12,7 @@ from ..bodies.numbers import led_points, most_contacts_of, own_surfaces, ties_of
 from ..bodies.state import Bodies
 from ..errors import RunError
 from ..lanes.bodies.advance import advance_bodies
-from ..lanes.bodies.arrays import BodyState, Rule
+from ..lanes.bodies.arrays import BodyState, StepRule
 from ..lanes.bodies.contacts import MOST_CONTACTS
 from ..methods.base import Method
 from ..observables import CHUNK
@@ -21,7 +21,7 @@ from ..scene import Scene
 from ..state import Floats, State
 from ..status import Status
 from .base import Arrays, BaseRun
-from .energies import Energies, summed
+from .energies import BodyEnergies, summed
 from .tally import Tally
 from .tiers import Tier
 
@@ -55,7 +55,7 @@ class BodyRun(BaseRun):
         self._touching = touching_of(bodies.body, self._ties, scene)
         self._carried = [Scene([surface]) for surface, _carrier, _point in bodies.body.cavities]
         self._walls = scene.walls(own=()), scene.walls(own=own)
-        self._energies = Energies(scene, self._carried, bodies.body, self._ties, law)
+        self._energies = BodyEnergies(scene, self._carried, bodies.body, self._ties, law)
         rows, walls = len(self._ties.ends) + len(bodies.body.guides), len(scene.owners()) + len(own)
         self._bodies = _state_of(bodies, particles, rows, walls)
         none = np.zeros(0)
@@ -82,7 +82,7 @@ class BodyRun(BaseRun):
         dt, stages = method.dt, np.array(STAGES[getattr(method, "order", 2)])  # type: ignore[attr-defined]
         # More gain in a compiled kernel alone.
         lanes = 1 if tier.is_plain else lanes
-        self._rule = Rule(dt, stages, gravity, 0.0, room, noise, lanes, soft, contacts, looped, strict)
+        self._rule = StepRule(dt, stages, gravity, 0.0, room, noise, lanes, soft, contacts, looped, strict)
         # Frames of fixed steps are counted in steps.
         self._unit = 1.0 if soft is None or soft.is_cut else dt
         pull = math.hypot(*gravity) * self._ties.mass.sum()

@@ -12,8 +12,8 @@ import numpy as np
 from .. import observables
 from ..ball_numbers import BallNumbers
 from ..colliding import events
-from ..colliding.bounce import Gates, Source
-from ..colliding.box import Books, Rule
+from ..colliding.bounce import Gates, RandomSource
+from ..colliding.box import CollisionRule, CollisionTotals
 from ..colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
 from ..colliding.described import aligned_copy, described, epoch_of, reach_of, with_room
 from ..colliding.queue import FIRST
@@ -27,7 +27,7 @@ from ..status import Status
 from . import failures
 from .base import Arrays, BaseRun
 from .doors import comers
-from .impacts import Page
+from .impacts import ThreadLog
 from .observed import gone_of, poses_of
 from .resting import warn_of_rest
 from .state import Seeding
@@ -78,12 +78,12 @@ class CollidingRun(BaseRun):
         self._box = self._with_heavy(box)._replace(
             log=None if self._impacts is None else self._impacts.example,
             window=None if self._windows is None else self._windows.numbers,
-            gates=gates, source=Source(seed, seeding.first) if laws.send_off else None,
+            gates=gates, source=RandomSource(seed, seeding.first) if laws.send_off else None,
         )  # fmt: skip
         pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, self._box, n)
         super().__init__(scene, method, n, pool, tier, seeding.first)
         counts = None if self._tally is None else self._tally.counts()
-        self._books = Books(
+        self._books = CollisionTotals(
             self._impulse_of_books(), state.dissipated, state.impacts, balls.virial, state.image, counts, state.heat
         )
         self._surfaces_of_walls = scene.members()[0]
@@ -107,7 +107,10 @@ class CollidingRun(BaseRun):
         latest = self._limit(latest)
         began = time.perf_counter()
         self._ends[:] = moment, moment - span
-        page, rule = None if self._impacts is None else Page(self._impacts, moment), Rule(moment, self._watch.passes)
+        page, rule = (
+            None if self._impacts is None else ThreadLog(self._impacts, moment),
+            CollisionRule(moment, self._watch.passes),
+        )
         status = ball = int(Status.LEASE_ENDED)
         while status in (Status.LEASE_ENDED, Status.LOG_FULL):
             kept = self._box if page is None else self._box._replace(log=page.log)
@@ -223,7 +226,7 @@ class CollidingRun(BaseRun):
         yield events.mark, (box, self._radius, *part)
         yield events.begin, (box, flock, -1.0, *part)
         yield events.order, (flock,)
-        yield events.take, (box, flock, self._books, self._clock, Rule(0.0, self._watch.passes))
+        yield events.take, (box, flock, self._books, self._clock, CollisionRule(0.0, self._watch.passes))
         yield events.show, (box, flock, self.state, 0.0, *part)
         if self._windows is not None:
             yield events.next_epoch, (flock, self._clock)

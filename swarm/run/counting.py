@@ -12,7 +12,7 @@ from ..lanes.counters import Counters
 from ..particles import Particles
 from ..scene import Scene
 from ..state import CROSSED, Crossed
-from ..surfaces.counted import Counted, Turned, Walled
+from ..surfaces.counted import Counted, ReversedCounter, Walled
 from ..surfaces.counter import Counter
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many
@@ -93,7 +93,7 @@ def _counted(scene: Scene, name: str, counter: Counter) -> Counted:
     if counter.inside is not None:
         volumes = volumes_in(volumes_of_counter(counter.inside, scene.period, f"{name}.inside"))
     if (wall := _one_wall(surface)) is not None:
-        return Turned(wall, near, volumes)
+        return ReversedCounter(wall, near, volumes)
     try:
         other = other_side(surface)
     except SceneError:

@@ -14,7 +14,7 @@ from ..scene import Scene
 from ..state import Floats
 
 
-class Energies:
+class BodyEnergies:
     """Energies from positions and velocities of n copies (3, P, n), each (n,) [J].
 
     Args:

@@ -28,9 +28,9 @@ from ..status import Status
 from . import failures
 from .base import Arrays, BaseRun, result_of
 from .counting import counters_of, crossed_of
-from .impacts import Page
+from .impacts import ThreadLog
 from .observed import gone_of, poses_of
-from .present import Present
+from .present import Presence
 from .state import Seeding, begin, have_lasted, holders_of_resting, state_of
 from .tally import Watched
 from .tiers import Tier
@@ -75,7 +75,7 @@ class Run(BaseRun):
         self._surfaces_of_walls = scene.members()[0]
         # Whole chunks, so that a thread observes what it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
-        self._present = Present(particles.births, n, self._size)
+        self._present = Presence(particles.births, n, self._size)
         self._present.start(self.state)
         self._ticket = np.zeros(1, np.int64)
         self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
@@ -144,7 +144,7 @@ class Run(BaseRun):
             mine = self._lanes.pop()
         except IndexError:
             mine = self._empty_lanes()
-        page = None if self._impacts is None else Page(self._impacts, self._moment)
+        page = None if self._impacts is None else ThreadLog(self._impacts, self._moment)
         if not self._kinds:
             end = self._part(span, draws, mine, page)
         else:
@@ -157,7 +157,7 @@ class Run(BaseRun):
         self._lanes.append(mine)
         return end
 
-    def _part(self, span: float, draws: Draws, mine: lanes.Lanes, page: Page | None) -> End:
+    def _part(self, span: float, draws: Draws, mine: lanes.Lanes, page: ThreadLog | None) -> End:
         """Advance and observe a part of the particles: in flight, then at walls and along them, and again."""
         share = self._shared(span, draws)
         status, particle, drawn = self._kernel(blocks.advance_block, page)(*self._flying(share, mine))
@@ -186,7 +186,7 @@ class Run(BaseRun):
         live = particle
         return status, 0, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
 
-    def _kernel(self, kernel: Any, page: Page | None) -> Any:
+    def _kernel(self, kernel: Any, page: ThreadLog | None) -> Any:
         """The function of this tier that advances particles, with the log of this page."""
         chosen = self._tier.kernel(kernel)
         return chosen if page is None else functools.partial(page.call, chosen)

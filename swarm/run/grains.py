@@ -13,11 +13,11 @@ from ..ball_numbers import BallNumbers
 from ..errors import RunError
 from ..grains import arrays, energy, lists
 from ..grains.arrays import DONE, LOST, SINCE, SKIN, TAKEN, X
-from ..grains.booking import Books
+from ..grains.booking import ContactTotals
 from ..grains.described import matter_of
 from ..grains.drags import kept_drags, set_drags
 from ..grains.overlaps import COLUMNS
-from ..grains.step import Rule, World, march
+from ..grains.step import MarchRule, World, march
 from ..methods import Penalty
 from ..methods.base import Method
 from ..particles import Particles
@@ -68,7 +68,7 @@ class GrainsRun(BaseRun):
         pool, tier = ThreadPoolExecutor(1, "swarm"), Tier(compile, (self._matter, self._walls), n)
         super().__init__(scene, method, n, pool, tier)
         state = self.state
-        books = Books(
+        books = ContactTotals(
             balls.collisions,
             state.impacts,
             state.impulse,
@@ -112,7 +112,7 @@ class GrainsRun(BaseRun):
         set_drags(self._world, kept)
         clock[SINCE] = 0.0
 
-    def _list_walls(self, kernel: Any, near: arrays.Near, skin: float) -> None:
+    def _list_walls(self, kernel: Any, near: arrays.Neighbours, skin: float) -> None:
         """List what of the walls is near."""
         if self._fields.reaches(skin):
             self._walls = self._fields.walls(0.0, skin)
@@ -150,13 +150,13 @@ class GrainsRun(BaseRun):
                 position[axis, at_face] = 0.0
                 image[axis] = self._image[axis] + cells.astype(np.int64) + at_face
 
-    def _room(self, pairs: int, touching: int, members: int | None) -> tuple[arrays.Near, arrays.Touches]:
+    def _room(self, pairs: int, touching: int, members: int | None) -> tuple[arrays.Neighbours, arrays.Touches]:
         """Arrays for so many pairs, balls at walls, and members of fields near them, None where there are no fields."""
         n, walls, rubs = len(self.state.mass), len(self._owners), self._matter.rubs
         near = arrays.near_of(n, walls, pairs, touching, rubs, members)
         return near, arrays.touches_of(walls, pairs, touching, rubs, near.listed)
 
-    def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Near:
+    def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Neighbours:
         """Make room for so many pairs, balls at walls, and members of fields, and some more."""
         near = self._world.near
         have = 0 if near.listed is None else near.listed.size
@@ -188,7 +188,7 @@ class GrainsRun(BaseRun):
             self._world.books.overlap[0] = 0.0
         self._clock[TAKEN] = 0.0
         latest = self._limit(latest)
-        status, rule = Status.LEASE_ENDED.value, Rule(span, self._watch.passes)
+        status, rule = Status.LEASE_ENDED.value, MarchRule(span, self._watch.passes)
         began = time.perf_counter()
         while status == Status.LEASE_ENDED:
             (status,) = self._called(march, [(self._matter, self._walls, self._world, self._clock, rule)], latest)
@@ -215,7 +215,7 @@ class GrainsRun(BaseRun):
         cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
         yield lists.list_pairs, (matter.period, world.grains, world.near, cells, 0.0)
         yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0)
-        yield march, (matter, self._walls, world, self._clock, Rule(0.0, self._watch.passes))
+        yield march, (matter, self._walls, world, self._clock, MarchRule(0.0, self._watch.passes))
         yield energy.stored, (matter, self._walls, world.grains, world.near)
         yield energy.show, (world.grains, self.state)
         yield observables.observe, self._observing()

@@ -146,7 +146,7 @@ def log_of(task: Task) -> Impacts | None:
     )  # fmt: skip
 
 
-class Page:
+class ThreadLog:
     """The log that one thread fills."""
 
     def __init__(self, impacts: Impacts, end: float) -> None:

@@ -47,7 +47,7 @@ _PACKED = 1024
 _UNWATCHED = Watched()
 
 
-class End(NamedTuple):
+class RunEnd(NamedTuple):
     """The end of a run; `simulation.Result` describes each."""
 
     particles: Particles
@@ -87,7 +87,7 @@ class Columns:
         return {name: np.concatenate([part[name] for part in self._packed]) for name in names}
 
 
-def carry_out_task(task: Task, session: Session) -> End:
+def carry_out_task(task: Task, session: Session) -> RunEnd:
     """Carry out a run that is checked."""
     if task.scene.is_open() and not task.is_shard:
         warn_open()
@@ -212,10 +212,10 @@ def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
     return alone(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
 
 
-def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> End:
+def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> RunEnd:
     state = run.state
     is_whole = session.first == 0 or task.is_shard
-    return End(
+    return RunEnd(
         task.particles,
         kept.arrays() if is_whole else read_back(task.options.trajectory),
         session.wall_time(),

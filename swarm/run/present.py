@@ -11,7 +11,7 @@ from ..particles import Births
 from ..state import Floats, State
 
 
-class Present:
+class Presence:
     """Who is there at a frame: who is not is in no draw of a kernel, and in no sum.
 
     Args:
@@ -74,5 +74,5 @@ class Present:
 
 
 def total_of(sums: Floats) -> dict[str, Any]:
-    """What those that have come have brought, from the sums over all chunks of `Present.sums`."""
+    """What those that have come have brought, from the sums over all chunks of `Presence.sums`."""
     return {"source_energy": float(np.add.reduce(np.ascontiguousarray(sums[-1])))}

@@ -18,7 +18,7 @@ from ..methods.base import Method
 from ..particles import Particles
 from ..reacting import queue as events
 from ..reacting.described import freedoms_of, observed, scenery_of, walls_now
-from ..reacting.queue import CLOCK, NOW, TAKEN, Queue, Rule
+from ..reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule
 from ..scene import Scene
 from ..state import State
 from ..status import Status
@@ -74,7 +74,7 @@ class ReactingRun(BaseRun):
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         self._scenery = scenery_of(self._scene, moment)
-        rule = Rule(span, self._watch.passes)
+        rule = ReactionRule(span, self._watch.passes)
         latest = self._limit(latest)
         began = time.perf_counter()
         if not self._cut_short:
@@ -96,7 +96,7 @@ class ReactingRun(BaseRun):
             self._observe(moment)
         return not self._cut_short
 
-    def _take(self, rule: Rule, latest: float) -> tuple[int, int]:
+    def _take(self, rule: ReactionRule, latest: float) -> tuple[int, int]:
         """Predict where leases have ended, and take events, to the end of the frame or a halt: (status, particle)."""
         taking: Any = self._scenery, self._freedoms, self._queue, self._clock, rule
         leases = 0
@@ -109,7 +109,7 @@ class ReactingRun(BaseRun):
             self._clock[TAKEN] = _ALL_AHEAD
         return int(Status.INTERRUPTED), 0
 
-    def _predict(self, rule: Rule, latest: float) -> bool:
+    def _predict(self, rule: ReactionRule, latest: float) -> bool:
         """New leases where some have ended, and the next event of every particle; False where a halt came between.
 
         The clock keeps how many are done: what is left is done when the frame goes on.
@@ -152,7 +152,7 @@ class ReactingRun(BaseRun):
         )
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
-        rule, part = Rule(0.0, self._watch.passes), (0, 0)
+        rule, part = ReactionRule(0.0, self._watch.passes), (0, 0)
         moving = self._freedoms, self._queue, self._clock, rule
         yield events.lease, (self._scenery, self._freedoms, self._clock)
         yield events.predict, (self._scenery, *moving, *part)

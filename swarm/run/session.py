@@ -120,7 +120,7 @@ class Session:
             )
         texts: dict[str, Any] = {**descriptions(task.scene, task.method, task.options.storage)}
         texts["kept"], texts["member_impacts"] = "" if log is None else log.kept, task.options.member_impacts
-        self._job = checkpoint.Job(VERSION, **texts, particles=len(task.particles), **self.identity)
+        self._job = checkpoint.SavedRun(VERSION, **texts, particles=len(task.particles), **self.identity)
 
     def _check(self, path: Path, overwrite: bool, what: str) -> None:
         """Raise a SceneError if the session cannot write this file, or may not replace it."""

@@ -146,7 +146,7 @@ def carry_out(
     counted_from: float | None = None,
 ) -> Result:
     """`simulate` with its keywords as `RunOptions`; the wall time counts from a time [s of time.monotonic], or now."""
-    carried: Callable[[Task, Any], machine.End] = machine.carry_out_task
+    carried: Callable[[Task, Any], machine.RunEnd] = machine.carry_out_task
     session: Session
     if options.cluster is None:
         session = Session(options, counted_from)

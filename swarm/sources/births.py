@@ -12,7 +12,7 @@ from ..particles import Births, Particles
 from ..scene import Scene
 from ..surfaces.instant import side_of
 from .pieces import Floats, Random, distances
-from .places import Points, changes, place_of
+from .places import PointBatches, changes, place_of
 from .source import Source
 from .velocities import from_surface, from_volume, leads_in
 
@@ -102,7 +102,7 @@ def _stream(seed: int, k: int, what: int) -> Random:
 def _drawn(scene: Scene, source: Source, name: str, k: int, seed: int, until: float) -> tuple[Floats, Floats, Floats]:
     """Times (n,), positions and velocities (3, n) of the births of a source."""
     place = place_of(scene, source, name)
-    points, across = Points(scene, place, name), scene.across()
+    points, across = PointBatches(scene, place, name), scene.across()
     if across is not None and source.beam is not None and source.beam[across] != 0.0:
         raise SceneError(
             f'{name}.beam[{across}] must be 0 where plane = "{scene.plane}", got {source.beam[across]:g} m/s: it would '

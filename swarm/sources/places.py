@@ -36,7 +36,7 @@ _STEPS = 3
 _BESIDE = 1e-8
 
 
-class Place(NamedTuple):
+class SourcePlace(NamedTuple):
     """The points of a source in a scene.
 
     Attributes:
@@ -55,7 +55,7 @@ class Place(NamedTuple):
     walls: tuple[tuple[Surface, tuple[Surface, ...]], ...]
 
 
-def place_of(scene: Scene, source: Source, name: str) -> Place:
+def place_of(scene: Scene, source: Source, name: str) -> SourcePlace:
     """The points of a source, as far as they are known without drawing any.
 
     Raises:
@@ -83,7 +83,7 @@ def place_of(scene: Scene, source: Source, name: str) -> Place:
     if isinstance(where, Opening):
         raise SceneError(f"{name}.where must be one of the openings of the scene's surfaces, got {where!r:.200}")
     _require_at_rest(where, name)
-    return Place(where, None, source.volume, only, ())
+    return SourcePlace(where, None, source.volume, only, ())
 
 
 def _volume(given: Surface | Opening) -> Surface:
@@ -105,11 +105,11 @@ def _is_opening(opening: Surface | Opening, where: Any) -> bool:
     return _is_same(opening, where) or (volume is not None and _is_same(volume, where))
 
 
-def _of_wall(scene: Scene, i: int, volume: bool, only: tuple[Surface, ...], name: str) -> Place:
+def _of_wall(scene: Scene, i: int, volume: bool, only: tuple[Surface, ...], name: str) -> SourcePlace:
     surface = scene.surfaces[i]
     _require_at_rest(surface, f"{name}.where = surfaces[{i}]")
     walls = tuple((one, _holes(one)) for one in surfaces_of(surface))
-    return Place(surface, i, volume, only, () if volume or not any(holes for _one, holes in walls) else walls)
+    return SourcePlace(surface, i, volume, only, () if volume or not any(holes for _one, holes in walls) else walls)
 
 
 def _holes(surface: Surface) -> tuple[Surface, ...]:
@@ -154,7 +154,7 @@ def _common(one: Bounds, other: Bounds) -> Bounds:
     return np.maximum(one[0], other[0]), np.minimum(one[1], other[1])
 
 
-class Points:
+class PointBatches:
     """The points of a source, drawn one batch after the other.
 
     Args:
@@ -163,7 +163,7 @@ class Points:
         name: of the source, for errors.
     """
 
-    def __init__(self, scene: Scene, place: Place, name: str) -> None:
+    def __init__(self, scene: Scene, place: SourcePlace, name: str) -> None:
         self._scene, self._place, self._name = scene, place, name
         self._low, self._high = self._box()
         self._extent = max(scene.extent(), place.surface.extent())

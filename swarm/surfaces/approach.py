@@ -15,7 +15,7 @@ from ..kernel.vector import Vec
 from .course import Majorant, positive, rise_by, under_way
 
 
-class Near(Majorant):
+class LevelBound(Majorant):
     """The level from one place of a flight on, nowhere above c + 2 b t + a2 t^2 + a3 t^3 + ...
 
     The window is a time for which that says something. A step that leaves no more than `nearly` of the level is the

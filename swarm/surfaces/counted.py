@@ -57,7 +57,7 @@ class Counted(Record):
         return True if self.volumes is None else is_in_any(self.volumes, r)
 
 
-class Turned(Counted):
+class ReversedCounter(Counted):
     """A counter of one wall that is the same from its other side when its sign is changed."""
 
     wall: Any

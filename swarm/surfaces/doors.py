@@ -18,7 +18,7 @@ from ..kernel.jit import select
 from ..kernel.record import Record
 from .course import Fall, Quartic, close
 from .frames import Unturned
-from .rising import Step
+from .rising import LevelStep
 
 # The distance at which a particle is from a wall that is not there, and the level of such a wall.
 _AWAY = -1e150
@@ -177,7 +177,7 @@ class Present(Unturned):
 
     def moving_step(self, seen, longest):
         step = self.body.moving_step(seen, longest)
-        return Step(
+        return LevelStep(
             self._if_there(step.level, -1.0), self._if_there(step.half, 0.0), self._if_there(step.time, longest)
         )
 

@@ -20,7 +20,7 @@ from .surface import Surface
 _SLOW = 0.05
 
 
-class Rows(Record):
+class RotationRows(Record):
     """The rows of the matrix of a rotation A."""
 
     x: Vec
@@ -36,7 +36,7 @@ class Rows(Record):
         return self.x * a.x + self.y * a.y + self.z * a.z
 
 
-class Pose(Record):
+class PoseDerivatives(Record):
     """The pose of a wall at one instant: d, d', d'' and the rows of A, or None."""
 
     shift: Vec
@@ -133,7 +133,9 @@ class Turn(Record):
         s, versine = sine_and_versine(self.rate * t)
         k = self.axis
         # row cos a + (1 - cos a) k (k.row) - sin a k x row
-        return Rows(*(row + versine * (dot(k, row) * k - row) - s * cross(k, row) for row in (self.x, self.y, self.z)))
+        return RotationRows(
+            *(row + versine * (dot(k, row) * k - row) - s * cross(k, row) for row in (self.x, self.y, self.z))
+        )
 
     def mean_velocity(self, middle, h, arm):
         """(A1 - A0) rho/h of an arm rho in the frame of the wall: w sinc(w h/2) k x A(m) rho."""
@@ -162,14 +164,14 @@ class Drive(Record):
     jerks: Vec  # bounds of the components of d''' [m/s^3]
 
     def pose(self, remaining):
-        """The `Pose` when so much of the frame is left [s]."""
+        """The `PoseDerivatives` when so much of the frame is left [s]."""
         t = -remaining
         d, v, a = ZERO, ZERO, ZERO
         for swing in self.swings:
             d, v, a = swing.added(t, d, v, a)
         e, w, b = (ZERO, ZERO, ZERO) if self.track is None else self.track.at(t)
         turn = None if self.turn is None else self.turn.at(t)
-        return Pose(self.shift + t * self.velocity + d + e, self.velocity + v + w, a + b, turn)
+        return PoseDerivatives(self.shift + t * self.velocity + d + e, self.velocity + v + w, a + b, turn)
 
     def mean_velocity(self, middle, h):
         """The mean of d' over a time h around the middle."""

@@ -23,7 +23,7 @@ _BISECTIONS = 1100
 # --- Any flight ------------------------------------------------------------------------------------------
 
 
-class Look(Record):
+class SafeStep(Record):
     """One look at a flight: a time from which on it surely meets nothing for so long, infinite if it never does."""
 
     since: Any
@@ -38,7 +38,7 @@ class Search(Record):
     start, longest, looks = 0.0, math.inf, LOOKS
 
     def look(self, t, is_first):
-        """The `Look` at a time; at the first one the sign of the approach decides whether it meets a wall at once."""
+        """The `SafeStep` at a time; at the first, the sign of the approach decides whether it meets a wall at once."""
         raise NotImplementedError
 
     def past(self: Any, t):
@@ -110,7 +110,7 @@ def safe_time_by_steps(surface, r, v, pull):
 
 
 def look(surface, r, v, pull, t, is_first):
-    """The `Look` at a wall."""
+    """The `SafeStep` at a wall."""
     p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
     level, half, step, way, steepness = _safe_step(surface, p, w, pull, 0.0)
     # By round-off, or because the surface bends more than its file says.
@@ -119,12 +119,12 @@ def look(surface, r, v, pull, t, is_first):
     slack = room * steepness
     if not is_past and lets_go(level, half, step, slack):
         _level, _half, step, _way, _steepness = _safe_step(surface, p, w, pull, slack)
-        return Look(t, step, -1.0, -1.0)
+        return SafeStep(t, step, -1.0, -1.0)
     straight = pull.x == 0.0 and pull.y == 0.0 and pull.z == 0.0
     if not is_past and straight and surface.passed(p, w):
-        return Look(t, math.inf, -1.0, -1.0)
+        return SafeStep(t, math.inf, -1.0, -1.0)
     arrives = (not is_first or step == 0.0) and way <= room
-    return Look(t, step, select(arrives, 0.0, -1.0), select(is_past, 0.0, -1.0))
+    return SafeStep(t, step, select(arrives, 0.0, -1.0), select(is_past, 0.0, -1.0))
 
 
 def lets_go(level, half, step, slack):

@@ -14,7 +14,7 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, times, total
 from . import safe
-from .drive import Drive, Pose
+from .drive import Drive, PoseDerivatives
 from .frames import Framed
 from .rising import flight_of
 from .walls import Field, Walls
@@ -24,8 +24,8 @@ class Posed(Framed):
     """A wall at one instant, or over one step, or a field of them."""
 
     body: Any
-    pose: Pose
-    end: Pose  # at the end of the step
+    pose: PoseDerivatives
+    end: PoseDerivatives  # at the end of the step
     drive: Drive
     remaining: float  # of the frame [s]
     after: float  # of the frame, at the end of the step [s]

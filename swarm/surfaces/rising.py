@@ -42,9 +42,9 @@ class Flight(Record):
         return self.v + t * self.pull
 
     def seen(self, t, wall, pull):
-        """The particle after a time as `Seen` in the frame of a wall `Posed` then, where this pulls it."""
+        """The particle after a time as `InWallFrame` in the frame of a wall `Posed` then, where this pulls it."""
         p, v = self.place(t), self.velocity(t)
-        return Seen(
+        return InWallFrame(
             wall.drive, wall.own_place(p), wall.own_velocity(p, v), wall.own_pull(p, v, pull),
             self.speed + t * self.weight, wall.arm_length(p), self.weight,
             total(absolute(p)) + total(absolute(wall.pose.shift)),
@@ -59,7 +59,7 @@ class Bounds(Record):
     jerk: float
 
 
-class Seen(Record):
+class InWallFrame(Record):
     """A particle in the frame of a wall at one time of its flight, and what bounds its way from there."""
 
     drive: Any  # a `Drive`
@@ -167,7 +167,7 @@ def _root(discriminant):
 # --- Steps -----------------------------------------------------------------------------------------------
 
 
-class Step(Record):
+class LevelStep(Record):
     """The level, half its derivative, and a time during which the flight stays admissible."""
 
     level: float
@@ -195,10 +195,10 @@ class Ahead(Record):
         return time
 
 
-class Bent(Ahead):
+class SecondDerivativeBound(Ahead):
     """Of a level whose second derivative has a bound."""
 
-    seen: Seen
+    seen: InWallFrame
     level: float
     half: float
     steepness: float
@@ -218,11 +218,11 @@ class Bent(Ahead):
         return max(step, self.clear / some)
 
 
-class Known(Ahead):
+class ThirdDerivativeBound(Ahead):
     """Of a level whose third derivative has one."""
 
     body: Any
-    seen: Seen
+    seen: InWallFrame
     level: Any  # `Level` or `Between`
 
     def third(self, within):
@@ -235,17 +235,17 @@ class Known(Ahead):
 
 
 def level_step(body, seen, level, longest):
-    """The `Step` of a level whose third derivative has a bound, whose time is at most the longest."""
-    return Step(level.c, level.b, Known(body, seen, level).longest(min(level.own_rise(), longest)))
+    """The `LevelStep` of a level whose third derivative has a bound, whose time is at most the longest."""
+    return LevelStep(level.c, level.b, ThirdDerivativeBound(body, seen, level).longest(min(level.own_rise(), longest)))
 
 
 def bent_step(body, seen, longest):
-    """The `Step` of a wall that bounds its bend."""
+    """The `LevelStep` of a wall that bounds its bend."""
     n, level = body.inner_gradient(seen.r), body.level_of(body.inner(seen.r))
     half = 0.5 * body.side * dot(n, seen.v)
     most, magnitude, reach = body.hessian_bounds(seen.r)
-    bent = Bent(seen, level, half, norm(n), most, magnitude, reach, body.clearance(seen.r))
-    return Step(level, half, bent.longest(longest))
+    bent = SecondDerivativeBound(seen, level, half, norm(n), most, magnitude, reach, body.clearance(seen.r))
+    return LevelStep(level, half, bent.longest(longest))
 
 
 def bounds_along(n, seen, within):

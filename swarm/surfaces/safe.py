@@ -12,7 +12,7 @@ from . import flights
 from .fields.grid import cell_of, until_next
 from .fields.members import member
 from .flights import NEVER, Hit, hit, sooner, soonest
-from .march import Look, Search, first_met
+from .march import SafeStep, Search, first_met
 from .rising import Flight, flight_of
 from .rooms import leaving
 from .walls import Field, Following, Walls
@@ -24,7 +24,7 @@ _ROUND_OFF = 8.0
 _CLOSE, _TRIALS = 2.0, 8
 
 
-class Nearest(Record):
+class ShortestStep(Record):
     """The shortest safe step of all walls, its wall and how far it goes; a wall that is passed, or -1, and how far."""
 
     time: float
@@ -35,7 +35,7 @@ class Nearest(Record):
     depth: float
 
 
-_NOBODY = Nearest(math.inf, -1.0, math.inf, 0.0, -1.0, 0.0)
+_NOBODY = ShortestStep(math.inf, -1.0, math.inf, 0.0, -1.0, 0.0)
 
 
 # --- Of all walls ----------------------------------------------------------------------------------------
@@ -54,7 +54,7 @@ def seen_by_walls(walls, flight, t):
 
 
 def _nearest(walls, flight, t, longest):
-    """The `Nearest` of all walls that are met by safe steps."""
+    """The `ShortestStep` of all walls that are met by safe steps."""
     found = _NOBODY
     for wall, number, seen in seen_by_walls(walls, flight, t):
         found = _nearer(seen, wall.body, number, found, longest)
@@ -73,7 +73,7 @@ def _nearest_in_cell(field, number, found, flight, t, longest):
     grid, seen = field.body.grid, field.seen(flight, t)
     until = until_next_cell(grid, seen, min(found.time, longest))
     if until < found.time:
-        found = Nearest(until, -1.0, math.inf, 0.0, found.past, found.depth)
+        found = ShortestStep(until, -1.0, math.inf, 0.0, found.past, found.depth)
     cell = index(cell_of(grid, seen.r).number)
     for k in range(grid.first[cell], grid.first[cell + 1]):
         m = grid.entries[k]
@@ -96,13 +96,13 @@ def until_next_cell(grid, seen, longest):
 
 
 def _nearer(seen, body, number, rest, longest):
-    """The `Nearest` of one wall and the rest."""
+    """The `ShortestStep` of one wall and the rest."""
     step = body.moving_step(seen, longest)
     is_past = (step.level > 0.0) & (step.half > 0.0)
     speed, room = seen.bounds(0.0).speed, 2.0 * _EPSILON * seen.coordinates
     depth, way = speed * (0.5 * step.level / select(is_past, step.half, 1.0)), speed * step.time
     sooner_one = step.time < rest.time
-    return Nearest(
+    return ShortestStep(
         *select(sooner_one, (step.time, number, way, room), rest[:4]),
         *select(is_past, (number, depth), rest[4:]),
     )
@@ -122,10 +122,10 @@ class ToWalls(Search):
         # By round-off: a wall that bends as is said is not passed by more.
         is_at = is_past and near.depth <= _ROUND_OFF * near.room
         if is_at:
-            return Look(t, 0.0, near.past, -1.0)
+            return SafeStep(t, 0.0, near.past, -1.0)
         # A step that only ends with the longest time is no hit, however short.
         arrives = near.time < longest and (not is_first or near.time == 0.0) and near.way <= near.room
-        return Look(t, near.time, select(arrives, near.wall, -1.0), select(is_past, near.past, -1.0))
+        return SafeStep(t, near.time, select(arrives, near.wall, -1.0), select(is_past, near.past, -1.0))
 
     def past(self, t):
         return _nearest(self.walls, self.flight, t, 0.0).past

@@ -12,7 +12,7 @@ from ..kernel.jit import select
 from ..kernel.vector import ZERO
 from .flights import Hit
 from .moving import Moving
-from .rising import Known, flight_of
+from .rising import ThirdDerivativeBound, flight_of
 from .safe import closed_hit, seen_by_walls
 
 _EPSILON = 2.220446049250313e-16
@@ -36,7 +36,7 @@ def stride(walls, gravity, course, lane, r, v, remaining, is_first):
     longest = select(closed < remaining, closed, remaining) - t
     flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining)
     known = tuple(
-        (number, Known(wall.body, seen, wall.body.level_along(seen)))
+        (number, ThirdDerivativeBound(wall.body, seen, wall.body.level_along(seen)))
         for wall, number, seen in seen_by_walls(walls, flight, t)
     )
     within, ahead = _first_rise(known), _AHEAD * _pace(walls)

@@ -52,7 +52,7 @@ class Loop:
 
     def constraints(self):
         """Phi1 of each sweep of one wall."""
-        multipliers, before, reactions = np.zeros(1), uzawa.Before(np.zeros(1), np.zeros(1)), np.zeros((1, 4))
+        multipliers, before, reactions = np.zeros(1), uzawa.LastSweep(np.zeros(1), np.zeros(1)), np.zeros((1, 4))
         found = []
         with np.errstate(all="ignore"):
             for sweep in range(self.method.max_sweeps):

@@ -53,7 +53,7 @@ def test_a_run_that_is_restored_goes_on_with_the_same_bits(tmp_path):
         advanced(first, 2)
         first.halt(7)
         assert not first.advance(50.0, 150.0 * METHOD.dt)
-        checkpoint.save(tmp_path / "a", checkpoint.Job("", "", "", "", 30, ""), first.arrays())
+        checkpoint.save(tmp_path / "a", checkpoint.SavedRun("", "", "", "", 30, ""), first.arrays())
         second.restore(checkpoint.read(tmp_path / "a")[1], True)
         for run in (first, second):
             while not run.advance(50.0, 150.0 * METHOD.dt):

@@ -369,7 +369,7 @@ def saved(tmp_path_factory):
     """A job and arrays as they are saved, and the file."""
     path = tmp_path_factory.mktemp("saved") / "run.h5.checkpoint"
     arrays = {"position": np.ones((3, 4)), "impacts": np.arange(4), "done": np.zeros(4, bool)}
-    job = checkpoint.Job("1", "scene", "method", "storage", 4, "start", 2, 0.2, None, 1.5)
+    job = checkpoint.SavedRun("1", "scene", "method", "storage", 4, "start", 2, 0.2, None, 1.5)
     checkpoint.save(path, job, arrays)
     return job, arrays, path.read_bytes()
 

@@ -8,7 +8,7 @@ import pytest
 import swarm
 from swarm.sources import places
 from swarm.sources.births import with_births
-from swarm.sources.places import Points
+from swarm.sources.places import PointBatches
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 OPEN = swarm.Scene([swarm.Plane((0, 0, -1), 0.0)], gravity=(0, 0, -9.81))
@@ -154,7 +154,7 @@ def test_a_source_whose_bounds_miss_the_vessel_is_refused_before_points_are_draw
 ):
     drawn = []
     for name in ("_volume", "_surface"):
-        monkeypatch.setattr(Points, name, lambda *about: drawn.append(1) or np.zeros((6, 0)))
+        monkeypatch.setattr(PointBatches, name, lambda *about: drawn.append(1) or np.zeros((6, 0)))
     monkeypatch.setattr(places, "_MOST_BATCHES", 3)
     with pytest.raises(swarm.SceneError, match=rf"sources\[0\].where must be in the vessel.*{said}"):
         run(scene, swarm.Source(where, **GIVEN, **more))

@@ -93,7 +93,7 @@ def test_when_a_flight_leaves_a_block(gravity):
     for _case in range(200):
         r, v = random.uniform(-0.5, 0.5, 3), random.normal(size=3)
         place = np.floor((r - np.array(grid.low)) * np.array(grid.inverse))
-        free = room.Room(*(Vec(*random.integers(0, 3, 3).astype(float)) for _end in range(2)))
+        free = room.FreeCells(*(Vec(*random.integers(0, 3, 3).astype(float)) for _end in range(2)))
         time = cells.until_out(gravity, grid, Vec(*place), free, Vec(*r), Vec(*v))
         pull = np.zeros(3) if gravity is None else np.array(gravity)
         low = np.array(grid.low) + (place - np.array(free.back)) * np.array(grid.width) - np.array(grid.margin)

@@ -239,10 +239,10 @@ def test_a_function_of_a_doctest():
 
 def test_the_lines_of_a_twin_are_those_of_the_function():
     """An error in a trace names the line of the user's file."""
-    from swarm.kernel.trace.frame import Frame
+    from swarm.kernel.trace.frame import CallFrame
     from swarm.kernel.trace.twins import twin_of
 
-    twin = twin_of(of_a_line, Frame(lambda function, *given: function(*given)))
+    twin = twin_of(of_a_line, CallFrame(lambda function, *given: function(*given)))
     with pytest.raises(ZeroDivisionError) as raised:
         twin(0)
     lines = {entry.lineno for entry in raised.traceback if str(entry.path) == __file__}

@@ -14,7 +14,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.extending import lower_builtin, type_callable
 
 from ..entries import is_own
-from .frame import Frame, Range
+from .frame import CallFrame, Range
 from .notes import taken
 from .twins import twin_of
 from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted
@@ -157,6 +157,6 @@ def _operation(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> 
 
 def traced(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
     """The result of a Python function, whose operations are noted."""
-    frame = Frame(called)
+    frame = CallFrame(called)
     twin_of(function, frame)(*given, **named)
     return frame.result()

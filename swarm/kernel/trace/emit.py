@@ -20,7 +20,7 @@ from .values import TraceError, Value, is_defined, kind_of, leaves, made_of, ope
 _part_numbers = itertools.count()
 
 
-class Part:
+class FunctionPart:
     """A function of a kernel: the notes of a helper, its arguments and its result, a number each."""
 
     def __init__(self, name: str, inlined: bool) -> None:
@@ -73,14 +73,14 @@ def key_of(given: Any) -> Any:
 # --- Instructions ----------------------------------------------------------------------------------------
 
 
-def emit(context: Any, builder: Any, part: Part, given: Any) -> Any:
+def emit(context: Any, builder: Any, part: FunctionPart, given: Any) -> Any:
     """The result of a part that is written out where the builder is."""
-    writer = _Writer(context, builder, dict(zip(part.arguments, given, strict=True)))
+    writer = _Emission(context, builder, dict(zip(part.arguments, given, strict=True)))
     writer.emit(part.notes)
     return writer.value(part.result)
 
 
-class _Writer:
+class _Emission:
     """The state of an emission: the values and the places that are known here."""
 
     def __init__(self, context: Any, builder: Any, values: dict[Any, Any]) -> None:
@@ -247,7 +247,7 @@ class _Writer:
     }
 
 
-def _function_of(context: Any, module: Any, part: Part) -> tuple[Any, Any]:
+def _function_of(context: Any, module: Any, part: FunctionPart) -> tuple[Any, Any]:
     """The function of a part in a module, and the type of what it gives.
 
     It takes the places of its result and of an error first, as Numba's functions do: what Numba compiled may be called
@@ -265,7 +265,7 @@ def _function_of(context: Any, module: Any, part: Part) -> tuple[Any, Any]:
     function.linkage = "internal"
     function.attributes.add("alwaysinline" if part.inlined else "noinline")
     builder = ir.IRBuilder(function.append_basic_block("entry"))
-    writer = _Writer(context, builder, dict(zip(part.arguments, function.args[2:], strict=True)))
+    writer = _Emission(context, builder, dict(zip(part.arguments, function.args[2:], strict=True)))
     writer.emit(part.notes)
     for k, one in enumerate(part.numbers):
         builder.store(writer.value(one), cgutils.gep_inbounds(builder, function.args[0], 0, k))

@@ -26,7 +26,7 @@ class _Loop:
         self.nexts: list[tuple[Assign, Any]] = []
 
 
-class Frame(Decisions):
+class CallFrame(Decisions):
     """One call of a function while it is traced: what `twins.py` makes of its statements calls this."""
 
     def __init__(self, call: Callable[..., Any]) -> None:

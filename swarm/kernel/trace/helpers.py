@@ -17,7 +17,7 @@ from numba.extending import lower_builtin
 from ..cache import is_disabled
 from . import calls, values
 from .calls import traced
-from .emit import Part, emit, key_of
+from .emit import FunctionPart, emit, key_of
 from .notes import Argument, context, noting, taken
 
 _LOG = logging.getLogger("swarm.trace")
@@ -43,8 +43,8 @@ class Helper:
         self.name: str = function.__name__
         kinds = self.signature.parameters.values()
         self._keywords = [one.name for one in kinds if one.kind is inspect.Parameter.KEYWORD_ONLY]
-        self._parts: dict[Any, Part | None] = {}
-        self._whole: dict[Any, Part | None] = {}
+        self._parts: dict[Any, FunctionPart | None] = {}
+        self._whole: dict[Any, FunctionPart | None] = {}
         self.errors: dict[Any, Exception] = {}
 
     def called(self, *given: Any, **named: Any) -> Any:
@@ -58,11 +58,11 @@ class Helper:
         part = self._part(given)
         return values.noted(self._function, *given) if part is None else part.called(given)
 
-    def whole(self, context: Any, kinds: tuple[Any, ...]) -> Part | None:
+    def whole(self, context: Any, kinds: tuple[Any, ...]) -> FunctionPart | None:
         """It as Numba calls it, for arguments of these types, or None where it cannot be traced."""
         if kinds not in self._whole:
             self._whole[kinds] = None
-            part = Part(self.name, inlined=True)
+            part = FunctionPart(self.name, inlined=True)
             part.arguments = [Argument(kind, k) for k, kind in enumerate(kinds)]
             with noting(part.notes, context):
                 given = tuple(values.opened(one.kind, one) for one in part.arguments)
@@ -81,16 +81,16 @@ class Helper:
                     _tell(self._function, error)
         return self._whole[kinds]
 
-    def known(self, kinds: tuple[Any, ...]) -> Part | None:
+    def known(self, kinds: tuple[Any, ...]) -> FunctionPart | None:
         """The result of `whole`."""
         return self._whole.get(kinds)
 
-    def _part(self, given: Any) -> Part | None:
+    def _part(self, given: Any) -> FunctionPart | None:
         """It as a part for such arguments, or None where it cannot be traced."""
         key = key_of(given)
         if key not in self._parts:
             self._parts[key] = None
-            part = Part(self.name, inlined=False)
+            part = FunctionPart(self.name, inlined=False)
             with noting(part.notes):
                 try:
                     part.give(self._run(part.take(given)))

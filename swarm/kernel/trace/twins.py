@@ -1,4 +1,4 @@
-"""Twins of functions for traces: the same statements, whose control flow and calls go through a `Frame`.
+"""Twins of functions for traces: the same statements, whose control flow and calls go through a `CallFrame`.
 
     if x > 0.0:          def then():
         y = x                nonlocal y
@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 
 from .expressions import Expressions, load, of_frame, without_arguments
-from .frame import Frame
+from .frame import CallFrame
 from .source import FRAME, arguments, compiled, definition, node_of
 from .values import UNDEFINED, TraceError
 
 
-def twin_of(function: Any, frame: Frame) -> Callable[..., Any]:
+def twin_of(function: Any, frame: CallFrame) -> Callable[..., Any]:
     """The twin of a function for one call of it.
 
     Raises:
@@ -70,7 +70,7 @@ def _factory(code: types.CodeType) -> types.CodeType | None:
     if code not in _factories:
         node = node_of(code)
         try:
-            _factories[code] = None if node is None else compiled(_Writer(node, code).written(), code)
+            _factories[code] = None if node is None else compiled(_TwinWriter(node, code).written(), code)
         except TraceError as refused:
             _factories[code] = str(refused)
     found = _factories[code]
@@ -114,7 +114,7 @@ _REFUSED = (
 )  # fmt: skip
 
 
-class _Writer(Expressions, ast.NodeTransformer):
+class _TwinWriter(Expressions, ast.NodeTransformer):
     """Writes the twin of one function."""
 
     def __init__(self, node: Any, code: types.CodeType) -> None:

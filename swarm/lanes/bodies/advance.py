@@ -9,7 +9,7 @@ from ...kernel.jit import long_kernel, select
 from ...kernel.vector import column
 from ...status import Status
 from . import impact, impact_time, prescribed
-from .arrays import PACES, Held, Lanes, Pace, arrays_of_held, shapes_of_lanes
+from .arrays import PACES, BodyLanes, HeldContacts, LaneNumbers, arrays_of_held, shapes_of_lanes
 from .newton import BRIEF, solve
 from .penalty_contact import SoftContacts
 from .persistent_contact import HardContacts
@@ -33,9 +33,9 @@ def advance_bodies(body, walls, rule, state, ticket, size, halt):
     """
     points, rows, count = state.position.shape[1], state.guess.shape[1], rule.lanes
     shapes = shapes_of_lanes(points, rows, rows if rule.loop else 0, count)
-    lanes = Lanes(*(scratch(shape, np.float64) for shape in shapes))
-    pace = Pace(*(scratch(count, kind) for kind in PACES))
-    active = Held(*(scratch(shape, kind) for shape, kind in arrays_of_held(count, rule.most)))
+    lanes = BodyLanes(*(scratch(shape, np.float64) for shape in shapes))
+    pace = LaneNumbers(*(scratch(count, kind) for kind in PACES))
+    active = HeldContacts(*(scratch(shape, kind) for shape, kind in arrays_of_held(count, rule.most)))
     contacts = (HardContacts if rule.walls is None else SoftContacts)(*body, walls[1], rule, lanes, pace, active)
     c = scratch((3, count), np.float64)
     for i in range(count):

@@ -88,7 +88,7 @@ class Touching(NamedTuple):
         return 3 if rough else 1
 
 
-class Rule(NamedTuple):
+class StepRule(NamedTuple):
     """The rule of a step."""
 
     dt: float
@@ -132,7 +132,7 @@ class BodyState(NamedTuple):
             self.counts[wall] += 1
 
 
-class Lanes(NamedTuple):
+class BodyLanes(NamedTuple):
     """The bodies that a thread advances at once: three rows for each point, and for each tie and guide."""
 
     r: Any  # (3 P, B) at the start of the step
@@ -157,12 +157,12 @@ class Lanes(NamedTuple):
 
 
 def shapes_of_lanes(points, rows, offsets, count):
-    """The shape of each array of `Lanes`."""
+    """The shape of each array of `BodyLanes`."""
     tied = (3 * rows, count)
     return (*8 * ((3 * points, count),), tied, tied, tied, (rows, rows, count), *6 * ((rows, count),), (offsets, count))
 
 
-class Pace(NamedTuple):
+class LaneNumbers(NamedTuple):
     """Numbers of each lane, (B,)."""
 
     remaining: Floats  # of the frame [s]
@@ -201,11 +201,13 @@ class Pace(NamedTuple):
     brief: Flags  # no force acts in this step, see sticking.py
 
 
-# The type of each array of `Pace`.
-PACES = tuple({Floats: np.float64, Flags: np.bool_, Counts: np.int64}[kind] for kind in Pace.__annotations__.values())
+# The type of each array of `LaneNumbers`.
+PACES = tuple(
+    {Floats: np.float64, Flags: np.bool_, Counts: np.int64}[kind] for kind in LaneNumbers.__annotations__.values()
+)
 
 
-class Held(NamedTuple):
+class HeldContacts(NamedTuple):
     """The contacts of each lane that last, at most C of them; of walls that are springs all."""
 
     name: Counts  # (B, C, 2) point and wall
@@ -219,7 +221,7 @@ class Held(NamedTuple):
 
 
 def arrays_of_held(lanes, most):
-    """The shape and the type of each array of `Held`."""
+    """The shape and the type of each array of `HeldContacts`."""
     whole, real, some = np.int64, np.float64, (lanes, most)
     return (
         ((lanes, most, 2), whole), ((lanes, most, 3, 3), real), ((lanes, 3 * most), real), ((lanes, 3 * most), real),

@@ -18,7 +18,7 @@ from typing import Any
 from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import column, dot, put, square
-from .arrays import Held, Lanes, Pace, Rule, Ties, Touching
+from .arrays import BodyLanes, HeldContacts, LaneNumbers, StepRule, Ties, Touching
 
 # Where the relative error of |y|^2 would be below this after a correction, it is the last.
 _TOLERANCE = 1e-15
@@ -40,10 +40,10 @@ class Constrained(Record):
     ties: Ties
     touching: Touching
     walls: Any
-    rule: Rule
-    lanes: Lanes
-    pace: Pace
-    active: Held
+    rule: StepRule
+    lanes: BodyLanes
+    pace: LaneNumbers
+    active: HeldContacts
 
     def launch(self):
         """The end p of the stage without ties, and D for that."""

@@ -19,7 +19,7 @@ MOST_CONTACTS = 16
 ROOM = 64.0
 
 
-class Contacts(Constrained):
+class BodyContacts(Constrained):
     """The contacts of a pass, by the kind of its walls."""
 
     def begin(self, i):

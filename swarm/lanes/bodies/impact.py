@@ -96,7 +96,7 @@ def _blow(bodies, state, name, frame, found, i):
     m, wide = ties.links + touching.guides, touching.width(name, found)
     rows = wide * found
     lost, elastic = 0.0, bounces == 1.0 and not touching.dissipate(name, found)
-    blow = Blow(
+    blow = BodyImpact(
         bodies, name, frame, wide, scratch((3, m), np.float64), scratch((m, m), np.float64),
         scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
     )  # fmt: skip
@@ -136,7 +136,7 @@ def _blow(bodies, state, name, frame, found, i):
     return True
 
 
-class Blow(Record):
+class BodyImpact(Record):
     """One blow: its contacts, the links and guides that it strains, and how velocities answer impulses."""
 
     bodies: Any

@@ -17,7 +17,7 @@ from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.vector import ZERO, column, square
 from . import impact_time
-from .contacts import MOST_CONTACTS, NEAR, ROOM, Contacts, direction, put_direction, solve_dense
+from .contacts import MOST_CONTACTS, NEAR, ROOM, BodyContacts, direction, put_direction, solve_dense
 
 
 class Soft(NamedTuple):
@@ -57,7 +57,7 @@ _ROUND_OFF = 8.0
 _SETTLED = 8.0
 
 
-class SoftContacts(Contacts):
+class SoftContacts(BodyContacts):
     """Contacts with walls that are springs."""
 
     def _start(self: Any, wall, y):

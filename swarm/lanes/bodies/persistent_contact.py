@@ -14,7 +14,7 @@ from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.vector import dot, norm
 from . import impact, impact_time, sticking
-from .contacts import MOST_CONTACTS, NEAR, ROOM, Contacts, direction, put_direction, put_frame, sweep
+from .contacts import MOST_CONTACTS, NEAR, ROOM, BodyContacts, direction, put_direction, put_frame, sweep
 
 # From this correction of a stage on the equations may be worse by the factor, in units of round-off: where more
 # contacts than three hold a rigid body, their forces converge slowly.
@@ -27,7 +27,7 @@ _CREEP = 1e-7
 _LASTS = 20
 
 
-class HardContacts(Contacts):
+class HardContacts(BodyContacts):
     """Contacts with rigid walls, which strike, and last as long as they push."""
 
     @outlined

@@ -16,7 +16,7 @@ from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.vector import column, dot, norm, square
 from .contacts import MOST_CONTACTS, direction, missing, put_direction, put_frame, sweep
-from .impact import ROUND_OFF, SHORT, SWEEPS, Blow, kinetic_of
+from .impact import ROUND_OFF, SHORT, SWEEPS, BodyImpact, kinetic_of
 
 
 def is_short(bodies, i):
@@ -61,7 +61,7 @@ def stop(bodies, state, i):
     m, wide = ties.links + touching.guides, touching.width(active.name[i], found)
     rows = wide * found
     name, frame = scratch((MOST_CONTACTS, 2), np.int64), scratch((MOST_CONTACTS, 3, 3), np.float64)
-    blow = Blow(
+    blow = BodyImpact(
         bodies, name, frame, wide, scratch((3, m), np.float64), scratch((m, m), np.float64),
         scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
     )  # fmt: skip

@@ -26,7 +26,7 @@ _LARGEST = 120_000
 _COLOURS = {"#222222": "var(--ink)", "#8a8a8a": "var(--faint)", "#e6e6e6": "var(--grid)", "#ffffff": "var(--card)"}
 
 
-class Drawn(NamedTuple):
+class PagePicture(NamedTuple):
     """A picture, what it shows in words, and whether it is wide."""
 
     picture: Markup
@@ -34,14 +34,14 @@ class Drawn(NamedTuple):
     wide: bool = False
 
 
-def of_places(content: Content) -> list[Drawn]:
+def of_places(content: Content) -> list[PagePicture]:
     """The particles, or bodies, among their walls, at the start and at the end, as far as they are kept."""
     times, found = content.seen["time"], []
     for name, k in (("start", 0), ("end", -1)):
         if name in content.frames:
             moment = amount(float(times[k]), "s")
             picture = _png(lambda dark, name=name, k=k: _placed(content, name, k, dark), f"particles at {moment}")
-            found.append(Drawn(picture, f"At the {name}, {moment}{_how_many(content, name)}"))
+            found.append(PagePicture(picture, f"At the {name}, {moment}{_how_many(content, name)}"))
     return found
 
 
@@ -70,14 +70,14 @@ def _shapes(content: Content, k: int) -> list[Shape]:
     return shapes_of(still, np.zeros((3, 1)) if frame is None else frame.position, float(seen["time"][k]))
 
 
-def of_series(content: Content) -> list[Drawn]:
+def of_series(content: Content) -> list[PagePicture]:
     """The time series that say something, a graph each, and the speeds."""
     found = []
     for title, draw in plots.graphs_of(content, _shapes(content, -1)):
         with style.applied():
             figure = style.picture(*_GRAPH)
             draw(figure.subplots())
-            found.append(Drawn(svg(figure, title), ""))
+            found.append(PagePicture(svg(figure, title), ""))
     return found
 
 

@@ -25,7 +25,7 @@ from ... import interrupt
 from ...errors import RunError, WallTimeError
 from ...frames import Frame
 from .. import hints
-from ..machine import End, start_of, warn_open
+from ..machine import RunEnd, start_of, warn_open
 from ..measures import Measures
 from ..options import Task
 from ..progress import Display, display
@@ -40,7 +40,7 @@ _SAVED, _GLANCE, _TOLD, _FOLLOWS = 60.0, 0.2, 1.0, 1.0
 _READING = 0.1
 
 
-def carry_out(task: Task, session: Sharded) -> End:
+def carry_out(task: Task, session: Sharded) -> RunEnd:
     """Carry out a run that is checked, on the cluster of its options.
 
     Raises:

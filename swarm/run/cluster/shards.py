@@ -27,7 +27,7 @@ from ...output import marks, paths
 from ...particles import Births, Particles
 from ...scene import Scene
 from ...state import Absorbed, Multipliers
-from ..machine import End, birth_times
+from ..machine import RunEnd, birth_times
 from ..options import RunOptions, Task
 from ..tally import scales_of
 
@@ -180,7 +180,7 @@ def task_of(folder: Path, k: int) -> tuple[Task, int]:
     return Task(whole.scene, particles, whole.method, options, bodies, first, *of_all), len(whole.bounds) - 1
 
 
-def write_end(path: Path, end: End) -> None:
+def write_end(path: Path, end: RunEnd) -> None:
     """Write how a shard ended."""
     arrays: dict[str, Any] = {"position": end.particles.position, "velocity": end.particles.velocity}
     arrays["impacts"] = end.impacts
@@ -198,7 +198,7 @@ def write_end(path: Path, end: End) -> None:
 # --- What the client reads ------------------------------------------------------------------------------
 
 
-def joined_end(folder: Path, task: Task, bounds: list[int]) -> End:
+def joined_end(folder: Path, task: Task, bounds: list[int]) -> RunEnd:
     """The end of all shards; without observables and wall time."""
     n = bounds[-1]
     whole: dict[str, NDArray[Any]] = {"escape_time": np.full((len(task.particles) // n, n), np.nan)}
@@ -216,7 +216,7 @@ def joined_end(folder: Path, task: Task, bounds: list[int]) -> End:
     particles.position, particles.velocity, particles.image = flat["position"], flat["velocity"], flat.get("image")
     loops = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("multipliers.")}
     gone = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("absorbed.")}
-    return End(
+    return RunEnd(
         particles, {}, 0.0, Multipliers(**loops) if loops else None, flat["impacts"], flat["escape_time"],
         Absorbed(**gone) if gone else None, birth_times(particles),
     )  # fmt: skip

@@ -34,7 +34,7 @@ _MATRIX = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 _PARTS = 4.0
 
 
-class Cells(Record):
+class SampleCells(Record):
     """Each cell in few bytes: a flight comes through many."""
 
     clear: Array  # uint8 (cells along x, y, z): 0 if the surface may be in it, else 1 + the clearance/unit
@@ -43,8 +43,8 @@ class Cells(Record):
     bends: Array  # float32 (rows, 8): the bend H = grad grad phi/2 in the cell and all around it
 
 
-def cells_of(coefficients: Floats, width: Floats) -> Cells:
-    """The `Cells` of a spline with these coefficients and this width (3,) of a cell [m]."""
+def cells_of(coefficients: Floats, width: Floats) -> SampleCells:
+    """The `SampleCells` of a spline with these coefficients and this width (3,) of a cell [m]."""
     near = _near(coefficients)
     around = _grown(near)
     low, high = _bends(coefficients, width, around)
@@ -55,7 +55,7 @@ def cells_of(coefficients: Floats, width: Floats) -> Cells:
     clear[near] = 0
     row = np.zeros(near.shape, np.int32)
     row[near] = np.arange(len(rows))
-    return Cells(clear, unit, row, _rows(low, high, rows))
+    return SampleCells(clear, unit, row, _rows(low, high, rows))
 
 
 def _near(c: Floats) -> Mask:
@@ -121,7 +121,7 @@ def _bends(c: Floats, width: Floats, of: Mask) -> tuple[Floats, Floats]:
 
 
 def _rows(low: Floats, high: Floats, places: Places) -> NDArray[np.float32]:
-    """`Cells.bends` of the cells at these places: bounds of each with its neighbours."""
+    """`SampleCells.bends` of the cells at these places: bounds of each with its neighbours."""
     all_low, all_high = low, high
     for axis in (1, 2, 3):
         all_low, all_high = _neighbours(all_low, axis, np.minimum), _neighbours(all_high, axis, np.maximum)
@@ -138,7 +138,7 @@ def _rows(low: Floats, high: Floats, places: Places) -> NDArray[np.float32]:
     return table
 
 
-def eigenvalues(cells: Cells) -> tuple[float, float]:
+def eigenvalues(cells: SampleCells) -> tuple[float, float]:
     """The least and the largest eigenvalue of H where the surface is, at least and at most."""
     bends = cells.bends.astype(np.float64)
     values, spread = np.linalg.eigvalsh(bends[:, _MATRIX].reshape(-1, 3, 3)), bends[:, SPREAD] * (1.0 + _NOISE)

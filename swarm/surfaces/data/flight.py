@@ -13,7 +13,7 @@ import numpy as np
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, dot, norm, total
 from ..course import rise_time
-from ..march import LOOKS, Look, lets_go
+from ..march import LOOKS, SafeStep, lets_go
 from .numbers import CellNumbers, known, least_of
 
 _EPSILON = float(np.finfo(np.float64).eps)
@@ -21,14 +21,14 @@ _EPSILON = float(np.finfo(np.float64).eps)
 _ROUND_OFF = 8.0
 
 
-class Bent(NamedTuple):
+class SlopeRange(NamedTuple):
     """Bounds of half the second derivative of the level along a flight."""
 
     least: float
     most: float
 
 
-class Here(NamedTuple):
+class LevelAndSlope(NamedTuple):
     """The level, half of its slope along a flight, and the gradient of phi."""
 
     level: float
@@ -55,31 +55,31 @@ class SampledNumbers(CellNumbers):
         g = norm(pull)
         if g == 0.0:
             if norm(v) == 0.0:
-                return Look(t, math.inf, -1.0, -1.0)
+                return SafeStep(t, math.inf, -1.0, -1.0)
             t = self._through_empty(r, v, t)
         p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
         cell = self._cell_of(p)
         if not cell.inside or cell.clear >= 0.0:
             # Round-off must not leave it where it is for ever.
-            return Look(t, max(self._free_time(cell, p, w, pull), _EPSILON * t), -1.0, -1.0)
+            return SafeStep(t, max(self._free_time(cell, p, w, pull), _EPSILON * t), -1.0, -1.0)
         value, n = self.spline.value_and_slope(p)
         level, half = self.side * value, 0.5 * self.side * dot(n, w)
         speed, room = norm(w), 2.0 * _EPSILON * total(self.spline.coordinates(p))
         # Within round-off of the wall and not on its way off it: nothing nearer is to be found.
         noise = _ROUND_OFF * room * norm(n)
         if not is_first and half >= 0.0 and level >= -noise:
-            return Look(t, 0.0, 0.0, select(level <= noise, -1.0, 0.0))
-        step, out, bent = self._safe_step(cell, Here(level, half, n), p, w, pull)
+            return SafeStep(t, 0.0, 0.0, select(level <= noise, -1.0, 0.0))
+        step, out, bent = self._safe_step(cell, LevelAndSlope(level, half, n), p, w, pull)
         slack = room * norm(n)
         if lets_go(level, half, step, slack):
-            step, _out, _bent_there = self._safe_step(cell, Here(-slack, half, n), p, w, pull)
-            return Look(t, step, -1.0, -1.0)
+            step, _out, _bent_there = self._safe_step(cell, LevelAndSlope(-slack, half, n), p, w, pull)
+            return SafeStep(t, step, -1.0, -1.0)
         # What is left of the level after the step is at most (most - least) step^2, and half of its slope there at
         # least this.
         rising, remaining = half + bent.least * step, (bent.most - bent.least) * step * step
         arrives = speed * step + 0.5 * g * step * step <= room or remaining * (speed + g * step) <= 2.0 * room * rising
         arrives = step < out and arrives and (not is_first or rising > 0.0 or step == 0.0)
-        return Look(t, step, select(arrives, 0.0, -1.0), -1.0)
+        return SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
 
     @outlined
     def safe_time(self, r, v, pull):
@@ -93,11 +93,11 @@ class SampledNumbers(CellNumbers):
         level, half = self.side * value, 0.5 * self.side * dot(n, v)
         if level > 0.0:
             return 0.0
-        step, _out, _bent_there = self._safe_step(cell, Here(level, half, n), r, v, pull)
+        step, _out, _bent_there = self._safe_step(cell, LevelAndSlope(level, half, n), r, v, pull)
         return step
 
     def _safe_step(self, cell, here, r, v, pull):
-        """(a time during which a flight surely stays admissible, within which its bounds hold, these as `Bent`)."""
+        """(a time for which a flight surely stays admissible, within which its bounds hold, these as `SlopeRange`)."""
         # A short straight step stays in the cells around, which is cheaper to know than when it leaves them.
         speed, falls = norm(v), norm(pull) > 0.0
         out = least_of(self.spline.width) / speed if speed > 0.0 else 0.0
@@ -115,7 +115,7 @@ class SampledNumbers(CellNumbers):
         return step, out, bent
 
     def _bent(self, row, n, v, pull, time):
-        """`Bent` around a cell for so long, with the gradient and the velocity now."""
+        """`SlopeRange` around a cell for so long, with the gradient and the velocity now."""
         # w.H w + grad phi.G/2 with w = v + G t, grad phi = n + 2 H (v t + G t^2/2) and |H - A| at most the spread
         a, spread = known(self.cells.bends, row)
         now, falls = _form(a, v, v) + 0.5 * dot(n, pull), norm(pull) * time
@@ -124,4 +124,4 @@ class SampledNumbers(CellNumbers):
         off = spread * speed * (speed + falls)
         least, most = now + min(once, 0.0) + min(twice, 0.0) - off, now + max(once, 0.0) + max(twice, 0.0) + off
         inside = self.side > 0.0
-        return Bent(select(inside, least, -most), select(inside, most, -least))
+        return SlopeRange(select(inside, least, -most), select(inside, most, -least))

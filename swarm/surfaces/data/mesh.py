@@ -86,7 +86,7 @@ def from_mesh(
     return Sampled(values, spacing, made.origin, side, mesh_error=off, mesh_weld=welded, _made=made._made, **common)
 
 
-def _distance(axes: list[Floats], mesh: triangles.Mesh) -> Floats:
+def _distance(axes: list[Floats], mesh: triangles.TriangleMesh) -> Floats:
     """The signed distance from the mesh on a grid."""
     with needed_by("from_mesh", "mesh"):
         import igl
@@ -97,7 +97,7 @@ def _distance(axes: list[Floats], mesh: triangles.Mesh) -> Floats:
     return np.asarray(found).reshape([len(axis) for axis in axes])
 
 
-def _error(made: Sampled, mesh: triangles.Mesh) -> float:
+def _error(made: Sampled, mesh: triangles.TriangleMesh) -> float:
     """The distance of the surface from the vertices, the middles of the edges and of the triangles of the mesh."""
     from scipy.spatial import KDTree
 

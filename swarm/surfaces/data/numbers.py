@@ -10,7 +10,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.vector import Symmetric, Vec, absolute, dot, lowest, norm, square, times, total
 from .. import contract
 from ..course import rise_time
-from .cells import SPREAD, Cells
+from .cells import SPREAD, SampleCells
 from .spline import MARGIN, Spline
 
 _EPSILON = float(np.finfo(np.float64).eps)
@@ -18,7 +18,7 @@ _EPSILON = float(np.finfo(np.float64).eps)
 _MANY = 200
 
 
-class Cell(NamedTuple):
+class SampleCell(NamedTuple):
     """The cell of a point, from where on, and what is known of it; `inside` is whether it is one of the grid."""
 
     low: Vec  # in cells from the corner of the grid
@@ -80,7 +80,7 @@ class CellNumbers(contract.Smooth):
     """The numbers of a sampled surface, but for its flights."""
 
     spline: Spline
-    cells: Cells
+    cells: SampleCells
     side: float
     closed: float  # 1 if there is no surface outside of the grid
     least: float  # the least eigenvalue of side H anywhere on the surface, at least
@@ -122,7 +122,7 @@ class CellNumbers(contract.Smooth):
         low = Vec(_layer(u.x, n.x), _layer(u.y, n.y), _layer(u.z, n.z))
         i, j, k = index(int(low.x)), index(int(low.y)), index(int(low.z))
         cells = self.cells
-        return Cell(low, int(cells.row[i, j, k]), (float(cells.clear[i, j, k]) - 1.0) * cells.unit, inside)
+        return SampleCell(low, int(cells.row[i, j, k]), (float(cells.clear[i, j, k]) - 1.0) * cells.unit, inside)
 
     def _until_out(self, low, around, r, v, pull):
         """When a flight is beyond a cell and so many cells around it, as far as they are in the grid."""

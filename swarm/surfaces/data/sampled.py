@@ -17,7 +17,7 @@ from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
 from . import spline
 from .arrays import read_samples
-from .cells import Cells, cells_of, eigenvalues, least_at_border
+from .cells import SampleCells, cells_of, eigenvalues, least_at_border
 from .flight import SampledNumbers
 from .spline import Spline
 
@@ -156,7 +156,7 @@ class Samples:
         self.steepness = float(max(np.abs(np.diff(values, axis=k)).max() / width[k] for k in range(3)))
 
     @cached_property
-    def cells(self) -> Cells:
+    def cells(self) -> SampleCells:
         """Which cells the surface is in, and how far it is from the others."""
         return cells_of(self.coefficients, np.array(self.spacing))
 

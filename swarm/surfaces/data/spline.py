@@ -60,7 +60,7 @@ def along(values: Floats, axis: int) -> Floats:
     return np.moveaxis(c, 0, axis)
 
 
-class Place(NamedTuple):
+class SplinePlace(NamedTuple):
     """The cell of a point, where in it the point is, from 0 to 1, and how far outside of the grid."""
 
     x: Any
@@ -130,12 +130,12 @@ class Spline(Record):
     coefficients: Array
 
     def place(self, r):
-        """The `Place` of a point, or of the nearest point of the grid."""
+        """The `SplinePlace` of a point, or of the nearest point of the grid."""
         u, n = times(r - self.low, self.inverse), self.shape
         c = Vec(_within(u.x, n.x), _within(u.y, n.y), _within(u.z, n.z))
         cell = Vec(_whole(c.x, n.x), _whole(c.y, n.y), _whole(c.z, n.z))
         # In plain Python a point may be an array of points.
-        return Place(np.int64(cell.x), np.int64(cell.y), np.int64(cell.z), c - cell, times(u - c, self.width))
+        return SplinePlace(np.int64(cell.x), np.int64(cell.y), np.int64(cell.z), c - cell, times(u - c, self.width))
 
     def value_and_slope(self, r):
         """phi and its gradient."""

@@ -24,7 +24,7 @@ from ...extras import needed_by
 from ..surface import shown
 from .mending import components, neighbours
 from .mesh_files import Floats, Indices
-from .triangles import Mesh
+from .triangles import TriangleMesh
 
 # The thickness that is resolved, in spacings.
 RESOLVED = 1.25
@@ -61,7 +61,7 @@ class _Thin(NamedTuple):
     gap: NDArray[np.bool_]  # of a gap, not of a wall
 
 
-def require_resolved(path: Path, mesh: Mesh, spacing: float) -> None:
+def require_resolved(path: Path, mesh: TriangleMesh, spacing: float) -> None:
     """Raise a `SceneError` where a wall or a gap is too thin for samples this far apart [m]."""
     normals, areas = _normals(mesh)
     thin = _thin_places(mesh, normals, areas, spacing)
@@ -102,7 +102,7 @@ def _thinnest(thin: _Thin, surface: "_Surface", spacing: float) -> int | None:
 # --- Where it is thin ------------------------------------------------------------------------------------
 
 
-def _normals(mesh: Mesh) -> tuple[Floats, Floats]:
+def _normals(mesh: TriangleMesh) -> tuple[Floats, Floats]:
     """The unit normals (T, 3) and the areas (T,) of the triangles."""
     a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
     normals = np.cross(b - a, c - a)
@@ -110,7 +110,7 @@ def _normals(mesh: Mesh) -> tuple[Floats, Floats]:
     return normals / np.maximum(twice, np.finfo(np.float64).tiny)[:, None], 0.5 * twice
 
 
-def _thin_places(mesh: Mesh, normals: Floats, areas: Floats, spacing: float) -> _Thin:
+def _thin_places(mesh: TriangleMesh, normals: Floats, areas: Floats, spacing: float) -> _Thin:
     """The place where a ball that touches the mesh, as wide as a wall that is resolved, meets another side of it."""
     counts = np.maximum(np.ceil(_DENSITY * areas / spacing**2), 1.0).astype(np.int64)
     at = np.repeat(np.arange(len(areas)), counts)
@@ -135,7 +135,7 @@ def _thin_places(mesh: Mesh, normals: Floats, areas: Floats, spacing: float) -> 
 
 
 def _touching(
-    mesh: Mesh, normals: Floats, at: Indices, points: Floats, toward: Floats, radius: Floats
+    mesh: TriangleMesh, normals: Floats, at: Indices, points: Floats, toward: Floats, radius: Floats
 ) -> tuple[NDArray[np.bool_], Floats, Floats, Indices]:
     """Whether balls that touch the mesh in points of these triangles meet a side that faces them.
 
@@ -160,7 +160,7 @@ def _touching(
 class _Surface:
     """The mesh with its edges."""
 
-    def __init__(self, mesh: Mesh, normals: Floats, spacing: float) -> None:
+    def __init__(self, mesh: TriangleMesh, normals: Floats, spacing: float) -> None:
         from scipy.spatial import KDTree
 
         self.mesh, self.normals = mesh, normals

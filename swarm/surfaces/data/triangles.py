@@ -17,7 +17,7 @@ _LOOKED_UP = 16
 _LISTED = 5
 
 
-class Mesh(NamedTuple):
+class TriangleMesh(NamedTuple):
     """Triangles that enclose a volume.
 
     Attributes:
@@ -35,7 +35,7 @@ class Mesh(NamedTuple):
     names: tuple[str, ...]
 
 
-def read_mesh(path: Path, scale: float, weld: float | None) -> Mesh:
+def read_mesh(path: Path, scale: float, weld: float | None) -> TriangleMesh:
     """The mesh in a file.
 
     Args:
@@ -50,7 +50,7 @@ def read_mesh(path: Path, scale: float, weld: float | None) -> Mesh:
     return closed(path, read_soup(path, scale), weld)
 
 
-def closed(path: Path, soup: Soup, weld: float | None) -> Mesh:
+def closed(path: Path, soup: Soup, weld: float | None) -> TriangleMesh:
     """The mesh that triangles make; see `read_mesh`."""
     soup, moved, within = seams_closed(joined(soup), weld)
     edges, counts = edges_of(soup.triangles)
@@ -69,7 +69,7 @@ def closed(path: Path, soup: Soup, weld: float | None) -> Mesh:
         )
     soup = _outward(path, soup)
     used, turned = np.unique(soup.triangles, return_inverse=True)
-    return Mesh(soup.vertices[used], turned.reshape(-1, 3), moved, soup.group, soup.names)
+    return TriangleMesh(soup.vertices[used], turned.reshape(-1, 3), moved, soup.group, soup.names)
 
 
 # --- Whether it is closed --------------------------------------------------------------------------------

@@ -35,7 +35,7 @@ _SOME = 60
 Floats = NDArray[np.float64]
 
 
-class Cells(Record):
+class FacetCells(Record):
     """A `Grid` of facets."""
 
     low: Vec
@@ -49,7 +49,7 @@ class Cells(Record):
     room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
 
 
-def cells_around(like, table: Floats, corners: Floats) -> Cells:
+def cells_around(like, table: Floats, corners: Floats) -> FacetCells:
     """The cells of the facets of a table.
 
     Args:
@@ -63,7 +63,7 @@ def cells_around(like, table: Floats, corners: Floats) -> Cells:
     numbers = (first, width, 1.0 / width, MARGIN * width, shape)
     starts, nothing = np.zeros(count + 2, np.int32), np.empty(0, np.int32)
     flat = np.empty((0, 8), np.int16)
-    grid = Cells(*(vec(row.tolist()) for row in numbers), starts, nothing, flat, np.empty((0, 8), np.int8))
+    grid = FacetCells(*(vec(row.tolist()) for row in numbers), starts, nothing, flat, np.empty((0, 8), np.int8))
     enter = cache.in_python(enter_bodies) if len(table) <= _SOME else enter_bodies
     bounds = np.ascontiguousarray(low), np.ascontiguousarray(high)
     enter(like, table, bounds, grid, starts[1:], nothing)
@@ -91,7 +91,7 @@ def _shape(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, 
     return shape, middle - 0.5 * shape * width, width
 
 
-def _planes(grid: Cells, table: Floats, corners: Floats, cells: NDArray[np.int64]) -> NDArray[np.int16]:
+def _planes(grid: FacetCells, table: Floats, corners: Floats, cells: NDArray[np.int64]) -> NDArray[np.int16]:
     """The planes and the balls of all entries, each in the cell with this number."""
     width = np.array(grid.width)
     diagonal = float(np.linalg.norm(width))
@@ -115,7 +115,7 @@ def _planes(grid: Cells, table: Floats, corners: Floats, cells: NDArray[np.int64
 # --- Which planes a flight passes ------------------------------------------------------------------------
 
 
-class Here(Record):
+class FlightInCell(Record):
     """A flight in a cell: from the middle of it, its speed, half of gravity or None, and how long it is there."""
 
     from_middle: Vec
@@ -138,7 +138,7 @@ def here_in(gravity, cells, place, r, v, span):
     pull = None if gravity is None else 0.5 * as_vector(gravity)
     weak = 0.0 if pull is None else _OFF_SPEED * total(absolute(pull))
     slow = _OFF_SPEED * total(absolute(v)) + 2.0 * span * weak
-    return Here(r - middle, v, pull, span, _OFF * math.sqrt(square(w)), slow, weak)
+    return FlightInCell(r - middle, v, pull, span, _OFF * math.sqrt(square(w)), slow, weak)
 
 
 def passes(cells, k, here):

@@ -10,7 +10,7 @@ from ...errors import SceneError
 from ...kernel.vector import Vec
 from ..balls.facet import RoundTriangle
 from ..data.mesh_files import Floats, Soup
-from ..data.triangles import Mesh as Closed
+from ..data.triangles import TriangleMesh as Closed
 from ..fields.grid import aligned
 from ..fields.many import field_of
 from ..fields.members import Members

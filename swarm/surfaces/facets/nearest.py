@@ -18,7 +18,7 @@ _TIE, _SAME = 1e-9, 1e-18
 _LEAF, _DEEPEST = 8, 96
 
 
-class Near(Record):
+class NearestTriangle(Record):
     """The nearest triangle so far: the squared distance, the foot, which one it is, and its pseudonormal.
 
     That is the sum of the normals of all triangles that meet at the foot, each times its angle there, and says on which
@@ -67,7 +67,7 @@ def _nearest(facets, mesh, r):
     """The nearest triangle: through the tree, of two boxes the nearer one first."""
     boxes, count = mesh[2], facets.table.shape[0]
     leaves, waiting, last = boxes.shape[0] // 2, scratch(_DEEPEST, np.int64), 1
-    near = Near(math.inf, r, 0.0, r)
+    near = NearestTriangle(math.inf, r, 0.0, r)
     waiting[0] = 1
     while last > 0:
         last -= 1
@@ -108,8 +108,8 @@ def _nearer(facets, mesh, r, m, near):
     foot = _foot(r, a, b, c)
     away, normal = square(r - foot), _normal(facets.table, m) * _angle_at(foot, a, b, c)
     if near.square < math.inf and square(foot - near.foot) <= _SAME * near.square:
-        return Near(near.square, near.foot, near.which, near.normal + normal)
-    return Near(away, foot, float(m), normal) if away < near.square else near
+        return NearestTriangle(near.square, near.foot, near.which, near.normal + normal)
+    return NearestTriangle(away, foot, float(m), normal) if away < near.square else near
 
 
 def _angle_at(foot, a, b, c):

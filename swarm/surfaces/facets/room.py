@@ -22,7 +22,7 @@ _WIDEST, _MORE = 126.0, 3.0
 _FARTHEST, _LONGEST = 120, 64
 
 
-class Room(Record):
+class FreeCells(Record):
     """The cells around one that a flight may leap through, along x, y, z."""
 
     back: Vec
@@ -32,7 +32,7 @@ class Room(Record):
 def room_of(rows, cell):
     """The room around a cell, none around one with facets."""
     free = 1.0 if rows[cell, KIND] != FULL else 0.0
-    return Room(
+    return FreeCells(
         free * Vec(float(rows[cell, 0]), float(rows[cell, 2]), float(rows[cell, 4])),
         free * Vec(float(rows[cell, 1]), float(rows[cell, 3]), float(rows[cell, 5])),
     )

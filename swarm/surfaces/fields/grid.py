@@ -36,7 +36,7 @@ class Grid(Record):
     entries: Array  # int32, the bodies
 
 
-class Cell(Record):
+class GridCell(Record):
     """The cell of a point: its number, its place along x, y, z, and whether it is one of the grid."""
 
     number: int
@@ -48,13 +48,13 @@ class Cell(Record):
 
 
 def cell_of(grid, r):
-    """The `Cell` of a point."""
+    """The `GridCell` of a point."""
     n, d = grid.shape, r - grid.low
     x = _place(d.x, grid.inverse.x, n.x)
     y = _place(d.y, grid.inverse.y, n.y)
     z = _place(d.z, grid.inverse.z, n.z)
     inside = (x >= 0.0) & (x < n.x) & (y >= 0.0) & (y < n.y) & (z >= 0.0) & (z < n.z)
-    return Cell(int(select(inside, (x * n.y + y) * n.z + z, n.x * n.y * n.z)), Vec(x, y, z), inside)
+    return GridCell(int(select(inside, (x * n.y + y) * n.z + z, n.x * n.y * n.z)), Vec(x, y, z), inside)
 
 
 def _place(d, inverse, count):

@@ -30,7 +30,7 @@ _FEW, _FEW_BALLS, _IN_ONE_CELL = 24, 48, 16
 _SOME = 2000
 
 
-class _Rows(NamedTuple):
+class _BodyRows(NamedTuple):
     """An argument that has a row for each body."""
 
     of_one: str  # the argument of one body
@@ -39,13 +39,13 @@ class _Rows(NamedTuple):
 
 
 _ROWS = {
-    "centers": _Rows("center", ("x", "y", "z"), bodies),
-    "radii": _Rows("radius", ("radius",), lengths),
-    "lengths": _Rows("length", ("length",), lengths),
-    "axes": _Rows("axis", ("axis_x", "axis_y", "axis_z"), directions),
-    "half_widths": _Rows("half_widths", ("half_x", "half_y", "half_z"), widths),
-    "semi_axes": _Rows("semi_axes", ("a", "b", "c"), widths),
-    "rotations": _Rows("rotation", ("q_w", "q_x", "q_y", "q_z"), quaternions),
+    "centers": _BodyRows("center", ("x", "y", "z"), bodies),
+    "radii": _BodyRows("radius", ("radius",), lengths),
+    "lengths": _BodyRows("length", ("length",), lengths),
+    "axes": _BodyRows("axis", ("axis_x", "axis_y", "axis_z"), directions),
+    "half_widths": _BodyRows("half_widths", ("half_x", "half_y", "half_z"), widths),
+    "semi_axes": _BodyRows("semi_axes", ("a", "b", "c"), widths),
+    "rotations": _BodyRows("rotation", ("q_w", "q_x", "q_y", "q_z"), quaternions),
 }
 
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from ...errors import SceneError
 from ..surface import Box, side_sign
-from .expression import COORDINATES, Piece, parse
+from .expression import COORDINATES, NonSmoothTerm, parse
 from .form import Form
-from .interval import Cells, check_constants, check_smooth
+from .interval import IntervalBoxes, check_constants, check_smooth
 from .numbers import Bend
 
 # Operations of the derivatives: beyond, deriving and compiling them would take minutes.
@@ -35,7 +35,7 @@ def derived(text: str, names: tuple[str, ...]) -> "Derived":
     """The formula and its derivatives, as expressions and as functions."""
     import sympy
 
-    pieces: list[Piece] = []
+    pieces: list[NonSmoothTerm] = []
     phi = parse(text, names, pieces)
     x, y, z = axes = tuple(map(sympy.Symbol, COORDINATES))
     gradient = tuple(sympy.diff(phi, axis) for axis in axes)
@@ -61,7 +61,7 @@ class Derived(NamedTuple):
     phi: Any
     gradient: tuple[Any, ...]
     hessian: tuple[Any, ...]
-    pieces: tuple[Piece, ...]
+    pieces: tuple[NonSmoothTerm, ...]
     axes: tuple[Any, ...]
     functions: tuple[Any, ...]
 
@@ -83,7 +83,7 @@ class Derived(NamedTuple):
         across = [k for k, axis in enumerate(self.axes) if axis in self.phi.free_symbols] or [0, 1, 2]
         for power in range(_LARGEST, _SMALLEST, -1):
             half = 2.0**power
-            cells = Cells.grid(self.axes, ((-half,) * 3, (half,) * 3), _shape(across, _CUBES))
+            cells = IntervalBoxes.grid(self.axes, ((-half,) * 3, (half,) * 3), _shape(across, _CUBES))
             shell = (np.maximum(-cells.lower, cells.upper) > 0.5 * half)[across].any(axis=0)
             if not (cells.bounds(self.phi).low > 0.0)[shell].all():
                 return None if power == _LARGEST else self._tightened(half, across)
@@ -105,7 +105,7 @@ class Derived(NamedTuple):
     def _is_empty(self, layer: Any, across: list[int]) -> bool:
         thin = layer[1] - layer[0]
         along = [k for k in across if not thin[k] < 0.5 * thin[across].max()]
-        cells = Cells.grid(self.axes, layer, _shape(along, _LAYER_CELLS))
+        cells = IntervalBoxes.grid(self.axes, layer, _shape(along, _LAYER_CELLS))
         if (cells.bounds(self.phi).low > 0.0).all():
             return True
         return bool((cells.centred(self.phi, self.gradient).low > 0.0).all())
@@ -133,7 +133,7 @@ class Derived(NamedTuple):
         if not self._varies():
             entries = side * np.array([float(one) for one in self.hessian])[:, None]
             return Bend.of_entries(entries, entries)
-        cells = Cells.grid(self.axes, form.domain(), (_CELLS, _CELLS, _CELLS))
+        cells = IntervalBoxes.grid(self.axes, form.domain(), (_CELLS, _CELLS, _CELLS))
         # Flights are in the admissible part only, so its cells are enough.
         admissible = cells.may_be_admissible(self.phi, side)
         parts = [cells.bounds(one) for one in self.hessian]
@@ -167,7 +167,7 @@ def _function(name: str, rows: Sequence[Any]) -> Any:
     import sympy
 
     shared, rows = sympy.cse(rows, symbols=sympy.numbered_symbols("s"), order="none")
-    writer = _Writer()
+    writer = _DerivativeWriter()
     for symbol, expression in shared:
         writer.known[symbol] = writer.name_of(expression)
     results = ", ".join(map(writer.name_of, rows))
@@ -181,7 +181,7 @@ def _function(name: str, rows: Sequence[Any]) -> Any:
     return scope[name]
 
 
-class _Writer:
+class _DerivativeWriter:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.known: dict[Any, str] = {}

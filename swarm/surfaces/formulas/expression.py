@@ -39,7 +39,7 @@ _OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
 }  # fmt: skip
 
 
-class Piece(NamedTuple):
+class NonSmoothTerm(NamedTuple):
     """A root, power, quotient, log or tan of a formula, which is smooth only where its argument is `wanted`."""
 
     argument: Any
@@ -47,7 +47,7 @@ class Piece(NamedTuple):
     place: str
 
 
-def parse(text: Any, parameters: Iterable[str] = (), pieces: list[Piece] | None = None) -> Any:
+def parse(text: Any, parameters: Iterable[str] = (), pieces: list[NonSmoothTerm] | None = None) -> Any:
     """The SymPy expression of a formula in x, y, z and `parameters`, whose symbols are p0, p1, ... in their order.
 
     SymPy simplifies as it builds, so that sqrt(x**2)**2 becomes x**2. What is smooth only in places is appended to
@@ -71,16 +71,16 @@ def parse(text: Any, parameters: Iterable[str] = (), pieces: list[Piece] | None 
     lead = len(line) - len(line.lstrip())
     names = {name: sympy.Symbol(name) for name in COORDINATES}
     names |= {name: sympy.Symbol(f"p{i}") for i, name in enumerate(parameters)}
-    expression = _Reader(line.strip(), lead, names, sympy, [] if pieces is None else pieces).expression()
+    expression = _FormulaReader(line.strip(), lead, names, sympy, [] if pieces is None else pieces).expression()
     if not expression.free_symbols & {names[name] for name in COORDINATES}:
         raise SceneError(f"phi must depend on x, y or z, got {text.strip()!r}")
     return expression
 
 
-class _Reader:
+class _FormulaReader:
     """The tree of one text, node by node."""
 
-    def __init__(self, text: str, lead: int, names: dict[str, Any], sympy: Any, pieces: list[Piece]) -> None:
+    def __init__(self, text: str, lead: int, names: dict[str, Any], sympy: Any, pieces: list[NonSmoothTerm]) -> None:
         self._text, self._lead, self._names, self._sympy, self._pieces = text, lead, names, sympy, pieces
         self._nodes = 0
 
@@ -210,7 +210,7 @@ class _Reader:
 
     def _note(self, node: ast.expr, argument: Any, wanted: str) -> None:
         if not argument.is_number:
-            self._pieces.append(Piece(argument, wanted, self._place(node)))
+            self._pieces.append(NonSmoothTerm(argument, wanted, self._place(node)))
 
     def _refuse(self, node: ast.expr, why: str, hint: str = "") -> NoReturn:
         raise SceneError(f"{why}, got {self._place(node)}{hint}")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ..surface import Box
-from .expression import Piece
+from .expression import NonSmoothTerm
 
 Floats = NDArray[np.float64]
 # The functions of the system's library are off by less than this.
@@ -133,7 +133,7 @@ def _bounds_of(expression: Any, known: dict[Any, Interval]) -> Interval:
     return first.monotonic(getattr(np, name), bottom=1.0 if name == "cosh" else None)
 
 
-class Cells:
+class IntervalBoxes:
     """Many boxes, in which expressions of their axes are bounded: corners (3, cells)."""
 
     def __init__(self, axes: Sequence[Any], lower: Floats, upper: Floats) -> None:
@@ -142,7 +142,7 @@ class Cells:
         self._known = dict(self._cells)
 
     @classmethod
-    def grid(cls, axes: Sequence[Any], box: Any, shape: Any) -> "Cells":
+    def grid(cls, axes: Sequence[Any], box: Any, shape: Any) -> "IntervalBoxes":
         """A box cut into so many cells along each edge."""
         low, high = np.array(box)[:, :, None, None, None]
         index, counts = np.indices(tuple(shape)), np.array(shape)[:, None, None, None]
@@ -158,7 +158,7 @@ class Cells:
         """`bounds` by f(m) + grad f.(r - m), m the middle: closer for small cells where a coordinate occurs twice."""
         with np.errstate(invalid="ignore"):
             middle = 0.5 * (self.lower + self.upper)
-            found = Cells(tuple(self._cells), middle, middle).bounds(expression)
+            found = IntervalBoxes(tuple(self._cells), middle, middle).bounds(expression)
             for cell, m, slope in zip(self._cells.values(), middle, gradient, strict=True):
                 found = found + self.bounds(slope) * (cell + Interval(-m, -m))
         return found
@@ -180,7 +180,7 @@ _REASONS = {
 }
 
 
-def check_constants(pieces: Sequence[Piece]) -> None:
+def check_constants(pieces: Sequence[NonSmoothTerm]) -> None:
     """Raise if a piece of constants only has no value; inner pieces come first."""
     for piece in pieces:
         if piece.argument.is_number and not _is_smooth(piece, bounds_of(piece.argument, {})):
@@ -189,7 +189,7 @@ def check_constants(pieces: Sequence[Piece]) -> None:
 
 
 def check_smooth(
-    pieces: Sequence[Piece], phi: Any, axes: Sequence[Any], side: float, box: Box | None, scale: float
+    pieces: Sequence[NonSmoothTerm], phi: Any, axes: Sequence[Any], side: float, box: Box | None, scale: float
 ) -> None:
     """Raise unless every piece is surely smooth wherever side * phi may be 0 or below in a box.
 
@@ -212,12 +212,12 @@ def check_smooth(
         return
     slopes = [[sympy.diff(piece.argument, axis) for axis in axes] for piece in pieces]
     work = 1 + int(sympy.count_ops([phi, *(piece.argument for piece in pieces), *itertools.chain(*slopes)]))
-    unit = Cells.grid(axes, ((-1.0,) * 3, (1.0,) * 3), (_CELLS,) * 3)
+    unit = IntervalBoxes.grid(axes, ((-1.0,) * 3, (1.0,) * 3), (_CELLS,) * 3)
     lower, upper = unit.lower, unit.upper
     for halving in range(_HALVINGS):
         if halving:
             lower, upper = _halved(lower, upper)
-        cells = Cells(axes, *_placed((lower, upper), box, scale))
+        cells = IntervalBoxes(axes, *_placed((lower, upper), box, scale))
         rough = np.array([_may_be_rough(*pair, cells) for pair in zip(pieces, slopes, strict=True)])
         kept = rough.any(axis=0) & cells.may_be_admissible(phi, side)
         lower, upper, rough = lower[:, kept], upper[:, kept], rough[:, kept]
@@ -231,13 +231,13 @@ def check_smooth(
     _refuse(pieces[i], [end[:, nearest] for end in _placed((lower, upper), box, scale)])
 
 
-def _may_be_rough(piece: Piece, slopes: Sequence[Any], cells: Cells) -> Any:
+def _may_be_rough(piece: NonSmoothTerm, slopes: Sequence[Any], cells: IntervalBoxes) -> Any:
     """In which cells a piece may be other than smooth."""
     whole, centred = cells.bounds(piece.argument), cells.centred(piece.argument, slopes)
     return ~_is_smooth(piece, Interval(np.maximum(whole.low, centred.low), np.minimum(whole.high, centred.high)))
 
 
-def _is_smooth(piece: Piece, argument: Interval) -> Any:
+def _is_smooth(piece: NonSmoothTerm, argument: Interval) -> Any:
     if piece.wanted == "above 0":
         return argument.low > 0.0
     if piece.wanted == "not 0":
@@ -264,7 +264,7 @@ def _halved(lower: Floats, upper: Floats) -> tuple[Floats, ...]:
     return tuple(edges[parts + end, rows, cells].reshape(3, -1) for end in (0, 1))
 
 
-def _refuse(piece: Piece, ends: Any) -> NoReturn:
+def _refuse(piece: NonSmoothTerm, ends: Any) -> NoReturn:
     where = ", ".join(
         "0" if low <= 0.0 <= high else f"{0.5 * (low + high):.3g}" for low, high in zip(*ends, strict=True)
     )

@@ -9,7 +9,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, dot, largest, square, total
 from .. import contract
 from ..course import rise_time
-from ..march import Look, Search, first_met
+from ..march import SafeStep, Search, first_met
 
 _EPSILON = 2.220446049250313e-16
 # Points this close, relative to the size, are joined by Gauss's rule, whose error is the 7th power; its outer node.
@@ -168,14 +168,14 @@ class Straight(Search):
         half = 0.5 * surface.side * dot(surface.gradient(p), self.v)
         if level > 0.0 and half > 0.0 and not is_first:
             # By round-off, or because the surface bends more than was said.
-            return Look(t, 0.0, -1.0, 0.0)
+            return SafeStep(t, 0.0, -1.0, 0.0)
         step = rise_time(level, half, self.most)
         if not t + step <= self.end or not step < math.inf:
-            return Look(t, math.inf, -1.0, -1.0)
+            return SafeStep(t, math.inf, -1.0, -1.0)
         # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
         rising = half + self.least * step
         shortest = self.resolved * (total(absolute(p)) + speed * step)
         arrives = (not is_first or rising > 0.0 or step == 0.0) and (
             step <= shortest or (self.most - self.least) * step * step <= 2.0 * shortest * rising
         )
-        return Look(t, step, select(arrives, 0.0, -1.0), -1.0)
+        return SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)

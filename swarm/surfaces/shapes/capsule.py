@@ -9,7 +9,7 @@ from ...checks import Vector, at_least, length
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
-from ..approach import Border, Near
+from ..approach import Border, LevelBound
 from ..course import ball_rise_time
 from ..surface import Box, box_around, farthest, side_sign
 from .common import Distance
@@ -123,7 +123,7 @@ class CapsuleNumbers(Distance):
         s3, s4 = v.x * g.x + v.y * g.y + speed * pull, 0.25 * (g.x * g.x + g.y * g.y + pull * pull)
         radius2 = self.near_radius2(q)
         size2 = select(q > radius2, q, radius2)
-        return Near(
+        return LevelBound(
             side * (q - radius2), side * dot(e, v), side * s2, (side * s3, side * s4),
             2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * square(g)))), _CLOSE * self.radius2,
             radius2 == self.radius2, Border(abs(v.z), 0.5 * abs(g.z), abs(past), (side > 0.0) == in_tube),

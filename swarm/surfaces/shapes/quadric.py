@@ -26,7 +26,7 @@ _NEAR = 1e-3
 Matrix = tuple[Vector, Vector, Vector]
 
 
-class Frame(NamedTuple):
+class PrincipalFrame(NamedTuple):
     """A quadric in its principal frame: phi = sum A d^2 + sum b d - level, d = axes^T (r - center) - shift."""
 
     axes: NDArray[np.float64]  # as columns
@@ -61,7 +61,7 @@ class Frame(NamedTuple):
         return [math.sqrt(abs(self.height / a)) if a else math.inf for a in self.curvatures.tolist()]
 
 
-def principal_frame(matrix: NDArray[np.float64], linear: NDArray[np.float64], constant: float) -> Frame:
+def principal_frame(matrix: NDArray[np.float64], linear: NDArray[np.float64], constant: float) -> PrincipalFrame:
     """The principal frame of d.A d + b.d + c."""
     # The eigenvectors of a diagonal matrix are the axes themselves, exactly.
     diagonal = not np.any(matrix - np.diag(np.diag(matrix)))
@@ -76,7 +76,7 @@ def principal_frame(matrix: NDArray[np.float64], linear: NDArray[np.float64], co
     middle = np.where(curved, -0.5 * linear / np.where(curved, curvatures, 1.0), 0.0)
     squares = curvatures * middle**2
     height, round_off = squares.sum() - constant, _FLAT * (abs(squares).sum() + abs(constant))
-    return Frame(
+    return PrincipalFrame(
         axes,
         curvatures,
         np.where(near, 0.0, linear),
@@ -126,7 +126,7 @@ class Quadric(Surface):
             )
 
     @functools.cached_property
-    def _frame(self) -> Frame:
+    def _frame(self) -> PrincipalFrame:
         return principal_frame(np.array(self.matrix), np.array(self.vector), self.constant)
 
     def _axes(self) -> NDArray[np.float64]:

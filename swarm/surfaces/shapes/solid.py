@@ -16,7 +16,7 @@ from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
 from .. import contract
 from ..approach import place
 from ..course import under_way
-from ..rising import Step
+from ..rising import LevelStep
 
 _EPSILON = 2.220446049250313e-16
 # A step that is no hit has a length, even if it is of none.
@@ -78,7 +78,7 @@ class SolidNumbers(contract.Smooth):
 
     def moving_step(self, seen, longest):
         # Of the part that the particle is least deep in: outside of one part is outside of the body.
-        found = Step(math.inf, 0.0, 0.0)
+        found = LevelStep(math.inf, 0.0, 0.0)
         for part in reversed(self.parts):
             here = part.moving_step(seen, longest)
             # Of a part that the particle is inside of nothing is known; on its face the sign of the approach decides.
@@ -86,7 +86,7 @@ class SolidNumbers(contract.Smooth):
             time = select(depth > noise(part, self.extent, seen.r), 0.0, here.time)
             least = here.level < found.level
             level, half = select(least, here.level, found.level), select(least, here.half, found.half)
-            found = Step(level, half, select(time > found.time, time, found.time))
+            found = LevelStep(level, half, select(time > found.time, time, found.time))
         return found
 
 

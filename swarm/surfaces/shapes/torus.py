@@ -10,7 +10,7 @@ from ...errors import SceneError
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
-from ..approach import Near
+from ..approach import LevelBound
 from ..rotation import turned
 from ..surface import Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign
 from .common import Distance
@@ -148,7 +148,7 @@ class TorusNumbers(Distance):
         far, ball2 = self._ball(d2)
         size2 = major * self.radius + q
         window = 2.0 * math.sqrt(size2 / w)
-        return Near(
+        return LevelBound(
             select(far, ball2 - d2, side * f0), select(far, -b, side * f1), select(far, -w, side * f2),
             (select(far, 0.0, side * 4.0 * b * w), select(far, 0.0, side * w * w)),
             select(far, math.inf, window), self._nearly(), (not far) & (tube2 == self.radius2),
@@ -176,7 +176,7 @@ class TorusNumbers(Distance):
         far, ball2 = self._ball(d2)
         size2 = major * self.radius + q
         window = 2.0 * math.sqrt(size2 / (square(v) + math.sqrt(size2 * 4.0 * s4)))
-        return Near(
+        return LevelBound(
             select(far, ball2 - d2, side * f0), select(far, -b, side * f1), select(far, -s2, side * f2),
             (
                 select(far, -s3, side * f3), select(far, -s4, side * f4),
