@@ -97,7 +97,12 @@ FACTS = {
 
 
 # Those whose runs plain Python would not end before it is out of patience.
-LONG = ("Grains that rest on one another, or hard balls",)
+LONG = (
+    "Grains that rest on one another, or hard balls",
+    "The force on a wall over time, as CSV",
+    "The pressure at each place of a wall",
+    "Warm, rough and sticky walls",
+)
 
 
 def slug(title):
