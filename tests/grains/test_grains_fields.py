@@ -101,7 +101,7 @@ def test_a_ball_rests_in_a_corner_of_two_faces():
 def test_a_hopper_in_a_plane(corners):
     scene = swarm.Scene([swarm.Polygon(corners)], gravity=(0.0, -9.81, 0.0), plane="z")
     place = np.array([(-0.5, 0.02, 0.5), (0.2, 0.1, 0.3), (0.0, 0.0, 0.0)])
-    result = ran(scene, swarm.Particles(place, 0.0 * place, radius=0.1), SOFT, 0.8, every=0.2)
+    result = ran(scene, swarm.Particles(place, 0.0 * place, radius=0.1), SOFT, 0.6, every=0.2)
     assert result.observables["impacts"][-1] > 2
     assert result.observables["energy_error"].max() < 1e-13
     assert (result.particles.position[2] == 0.0).all()

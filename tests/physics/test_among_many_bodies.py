@@ -88,10 +88,10 @@ def test_bits_do_not_depend_on_threads_and_blocks(laws):
     random = np.random.default_rng(5)
     packing = swarm.Spheres(random.uniform(-0.5, 0.5, (300, 3)), random.uniform(0.02, 0.06, 300), **laws)
     scene = swarm.Scene([swarm.Box(BOX, **laws), packing], DOWN)
-    start = swarm.fill(scene, 1500, speed=1.0, seed=3)
+    start = swarm.fill(scene, 300, speed=1.0, seed=3)
     ends = [
         run(scene, start, 0.4, every=0.1, threads=threads, block_size=block, compile="always")
-        for threads, block in ((1, None), (2, None), (2, 256))
+        for threads, block in ((1, None), (2, None), (2, 64))
     ]
     few = swarm.Particles(*(np.ascontiguousarray(a[:, :6]) for a in (start.position, start.velocity)))
     plain, compiled = (run(scene, few, 0.2, every=0.1, compile=how) for how in ("never", "always"))

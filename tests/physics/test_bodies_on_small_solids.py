@@ -42,7 +42,7 @@ def test_a_cube_lands_on_a_pedestal_with_contact_points_on_its_faces(caplog):
 
 
 def test_a_cube_comes_to_rest_on_a_pedestal():
-    result = fall(0.5, 0.4, pedestal(restitution=0.0, friction=0.3))
+    result = fall(0.5, 0.32, pedestal(restitution=0.0, friction=0.3))
     seen = result.observables
     assert seen["sliding"][-1] == 1
     assert seen["energy_error"].max() < 1e-12

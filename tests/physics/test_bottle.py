@@ -9,7 +9,7 @@ pytestmark = pytest.mark.physics
 
 
 def test_a_shutter_lets_out_what_a_bottle_of_triangles_stores():
-    storage = bottle_from_stl.run(6000)
+    storage = bottle_from_stl.run(2500)
     assert (np.abs(storage.part - storage.law) <= 3.0 * storage.error + 1e-12).all()
     assert storage.part[-1] < 0.2
     assert storage.mesh.names == ("bottle", "shutter")

@@ -114,7 +114,7 @@ def cusp(gap, gravity=None):
 def test_a_cusp_costs_a_bounded_number_of_impacts(gap, gravity):
     """Shot into it, aimed at its tip, let go, and along the wall into it: 1e4 steps a crossing, and some."""
     scene = cusp(gap, gravity)
-    start = swarm.fill(scene, 20, speed=1.0, seed=5)
+    start = swarm.fill(scene, 8, speed=1.0, seed=5)
     aim = np.array([[1.0], [0.0], [0.0]]) - start.position
     angle = np.linspace(0.3, 2.0, 8)
     wall = np.array([np.cos(angle), np.sin(angle), 0.0 * angle])

@@ -74,7 +74,7 @@ def between_plates(packing, layers, side=10, seed=3):
 def test_pressure_at_the_walls(packing, tmp_path):
     """The force on a plate is the pressure of a fluid as dense as that is in the middle, far from both."""
     # Up to 0.3 the layers at a plate end two diameters from it, and plates that are closer are hit more often.
-    few = {0.1: (10, 400_000, 200), 0.3: (12, 600_000, 240)}
+    few = {0.1: (10, 600_000, 300), 0.3: (12, 800_000, 320)}
     layers, collisions, frames = few.get(packing, (24, 2_000_000, 1000))
     scene, start, (x, y, z) = between_plates(packing, layers)
     n, one = len(start), collision_time(packing)
@@ -255,7 +255,7 @@ def test_self_diffusion(packing, tmp_path):
 def test_a_gas_that_cools():
     """Haff's law with e = 0.9: T = T0/(1 + t/tau)^2, 1/tau = (1 - e^2) w/6 with w collisions a ball and second."""
     e, packing = 0.9, 0.05
-    scene, start = mixed(packing, side=12, collisions=20, pairs=swarm.Pairs(restitution=e))
+    scene, start = mixed(packing, side=20, collisions=20, pairs=swarm.Pairs(restitution=e))
     rate = 1.0 / collision_time(packing)
     # Velocities are no Maxwellian's any more: van Noije and Ernst, Granular Matter 1, 1998.
     a2 = 16.0 * (1.0 - e) * (1.0 - 2.0 * e * e) / (81.0 - 17.0 * e + 30.0 * e * e * (1.0 - e))

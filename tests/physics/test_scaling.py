@@ -24,7 +24,7 @@ def _surfaces(name, length):
 def _end(name, kind, length=1.0, time=1.0, mass=1.0):
     pull = (0.1 * length / time**2, 0.0, -1.0 * length / time**2)
     scene = swarm.Scene(_surfaces(name, length), gravity=pull if kind == "falling" else None)
-    unit = swarm.fill(swarm.Scene(_surfaces(name, 1.0)), 10, speed=0.5, seed=8)
+    unit = swarm.fill(swarm.Scene(_surfaces(name, 1.0)), 4, speed=0.5, seed=8)
     start = swarm.Particles(unit.position * length, unit.velocity * (length / time), mass)
     if kind.startswith("impact"):
         method = swarm.Impact(contact_step=1e-3 * time if kind == "impact, chord" else 0.0)

@@ -31,7 +31,7 @@ def start_of(scene, n):
 
 def bits(scene, **keywords):
     result = swarm.simulate(
-        scene, start_of(scene, 2500), swarm.Impact(), until=1.0, every=0.25, compile="always", **keywords
+        scene, start_of(scene, 600), swarm.Impact(), until=1.0, every=0.25, compile="always", **keywords
     )
     assert result.observables["sliding"][-1] > 0
     assert result.observables["sliding_time"][-1] > 100.0

@@ -138,7 +138,9 @@ def test_penalty_balances_energy_and_work(name, motion, gravity):
     scene = swarm.Scene(CAVITIES[name](MOTIONS[motion]), gravity)
     closed = scene if name != "planes" else swarm.Scene([swarm.Sphere(0.25)])
     for method in BALANCED[: 1 if name == "torus" else None]:
-        start = swarm.fill(closed, 2, speed=1.0, mass=np.array([0.5, 2.0]), seed=2)
+        # Planes are met less often than the walls of a cavity.
+        mass = np.array([0.5, 2.0, 1.0] if name == "planes" else [0.5, 2.0])
+        start = swarm.fill(closed, len(mass), speed=1.0, mass=mass, seed=2)
         result = run(scene, start, METHODS[method], 2.0, frames=8)
         assert result.observables["impacts"][-1] >= 2
         assert imbalance(result) <= 1e-12
@@ -162,7 +164,7 @@ def test_late_frames_have_the_round_off_of_the_time():
         [swarm.Plane((0, 0, -1), 0.0, motion=swarm.Oscillation((0.0, 0.0, 0.4), 0.5))], (0.0, 0.0, -9.81)
     )
     start = swarm.Particles([0.0, 0.0, 0.5], [0.0, 0.0, 0.0], 1.0)
-    result = run(scene, start, swarm.Penalty(0.05, 50.0), 150.0, frames=1500)
+    result = run(scene, start, swarm.Penalty(0.05, 50.0), 250.0, frames=2500)
     assert result.observables["impacts"][-1] > 100
     assert imbalance(result) <= 1e-12
 

@@ -260,11 +260,11 @@ def test_a_light_piston_takes_its_share():
     scene = swarm.Scene([swarm.Slab((1.0, 0.0, 0.0), 1.0), plate])
     kinetic = []
     result = run(
-        scene, start, 6_000.0, frames=1_200, compile="always",
+        scene, start, 9_000.0, frames=1_800, compile="always",
         progress=lambda frame: kinetic.append(float(frame.observables["wall_energy"][1])),
     )  # fmt: skip
     energy = result.observables["total_energy"][0]
-    blocks = np.array(kinetic[121:]).reshape(40, -1).mean(axis=1)
+    blocks = np.array(kinetic[201:]).reshape(40, -1).mean(axis=1)
     mean, error = blocks.mean(), blocks.std(ddof=1) / math.sqrt(len(blocks))
     assert abs(mean - energy / (count + 1)) <= 3.0 * error
     assert error <= 0.05 * mean
