@@ -4,7 +4,20 @@ import math
 
 import numpy as np
 import pytest
-from conftest import EPSILON, LAWS, call, directions, every_level, exponent_of, gap, numbers_of, wall_point
+from conftest import (
+    EPSILON,
+    LAWS,
+    SAMPLED_WALLS,
+    SURFACES,
+    call,
+    directions,
+    every_level,
+    every_pair,
+    exponent_of,
+    gap,
+    numbers_of,
+    wall_point,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -412,31 +425,38 @@ def _mean_value_step(name, law, part, lean, depth, length, stiffness):
     return solved, miss <= slack, (step, held, end, strength)
 
 
-@every_level
-@pytest.mark.parametrize("law", [LAWS["1.5"], LAWS["4.0"]], ids=["1.5", "4.0"])
-def test_reaction_of_the_mean_value_form_solves_its_step(name, law):
+SOLVED = {"law": {"1.5": LAWS["1.5"], "4.0": LAWS["4.0"]}, "part": {"no multiplier": None, "a multiplier": 0.3}}
+
+
+@every_pair(name=[*SURFACES], **SOLVED)
+def test_reaction_of_the_mean_value_form_solves_its_step(name, law, part):
     """And it is along grad Phi at a point between, with the beta of `mean_value`."""
-    for part in (None, 0.3):
-        for lean, depth, length in ((0.9, -0.02, 0.1), (0.8, 0.02, 0.03), (-0.9, 0.05, 0.03)):
-            solved, balanced, (step, held, end, strength) = _mean_value_step(name, law, part, lean, depth, length, 1.0)
-            assert solved
-            assert balanced
-            d, beta = mean_value(law, step.surface, step.start, end)
-            assert 0.0 <= beta <= 1.0
-            assert held == pytest.approx(strength * d, rel=1e-7, abs=1e-9 * size(held))
+    for lean, depth, length in ((0.9, -0.02, 0.1), (0.8, 0.02, 0.03), (-0.9, 0.05, 0.03)):
+        solved, balanced, (step, held, end, strength) = _mean_value_step(name, law, part, lean, depth, length, 1.0)
+        assert solved
+        assert balanced
+        d, beta = mean_value(law, step.surface, step.start, end)
+        assert 0.0 <= beta <= 1.0
+        assert held == pytest.approx(strength * d, rel=1e-7, abs=1e-9 * size(held))
 
 
-@pytest.mark.parametrize("name", CONVEX)
-@pytest.mark.parametrize("law", SMOOTH[:3], ids=map(exponent_of, SMOOTH[:3]))
-def test_reaction_of_the_mean_value_form_just_below_the_surface(name, law):
+@pytest.mark.long
+@pytest.mark.parametrize("name", SAMPLED_WALLS)
+def test_reaction_of_the_mean_value_form_solves_its_step_at_samples(name):
+    for law in SOLVED["law"].values():
+        for part in SOLVED["part"].values():
+            test_reaction_of_the_mean_value_form_solves_its_step(name, law, part)
+
+
+@every_pair(name=CONVEX, law={str(exponent_of(law)): law for law in SMOOTH[:3]}, part=SOLVED["part"])
+def test_reaction_of_the_mean_value_form_just_below_the_surface(name, law, part):
     """A step that ends (or starts) in the wall by a small part of its length is balanced, or reported as unsolved.
 
     For exponents near 1 Phi' rises there faster than beta has digits. The composite form has no such limit.
     """
-    for part in (None, 0.3):
-        for lean, depth in ((0.9, -0.0899), (0.9, -0.088), (-0.9, 1e-4), (-0.9, 2e-3)):
-            solved, balanced, _ = _mean_value_step(name, law, part, lean, depth, 0.1, 0.01)
-            assert balanced or not solved
+    for lean, depth in ((0.9, -0.0899), (0.9, -0.088), (-0.9, 1e-4), (-0.9, 2e-3)):
+        solved, balanced, _ = _mean_value_step(name, law, part, lean, depth, 0.1, 0.01)
+        assert balanced or not solved
 
 
 @pytest.mark.parametrize("name", ["ball", "egg", "ring"])
