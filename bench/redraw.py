@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from . import accuracy, figure, report, throughput
+from . import accuracy, figure, pairs, report, throughput
 from .stability import MAPS
 
 
@@ -81,6 +81,8 @@ def main() -> None:
         path = folder / f"stability-{name}.csv"
         if path.exists():
             one.draw([{key: number(text) for key, text in row.items()} for row in rows(path)])
+    if (path := folder / "pairs.csv").exists():
+        pairs.draw(pairs.read(path))
 
 
 if __name__ == "__main__":

@@ -120,6 +120,37 @@ def require_as_listed(row):
     assert [sentence for sentence in refused if not is_declared(sentence)] == []
 
 
+# --- The table of the guide ------------------------------------------------------------------------------
+
+ENGINES = dict(zip(cells.ENGINES, (
+    knows.POINTS, knows.BALLS, knows.BODIES, knows.SOFT, knows.GRAINS, knows.PAPER, knows.MASSIVE, knows.HEAVY,
+), strict=True))  # fmt: skip
+SUPPORTED = {
+    "restitution": "restitution", "friction": "friction", "temperature": "temperature", "Lambert": "law of a wall",
+    "Sticky": "wait", "counters": "counter", "source": "source", "log": "log of impacts", "opening": "opening",
+    "timed opening": "opening for a time", "present": "present", "period": "period", "plane": "plane", "spin": "spin",
+    "translation": "motion", "turning": "rotation", "mass": "mass of a wall", "member impacts": "impacts on members",
+    "pair restitution": "law of pairs", "pair friction": "friction of pairs", "contact duration": "contact duration",
+    "cluster": "cluster",
+}  # fmt: skip
+OF_WALLS = {"union": "union", "field": "field", "mesh": "mesh or outline", "prism": "mesh or outline"}
+# A wall with a mass has neither; the walls beside it do.
+NOT_OF_HEAVY_WALLS = ("friction", "turning")
+
+
+@pytest.mark.parametrize("engine", cells.ENGINES)
+def test_the_table_says_yes_where_a_cell_works(engine):
+    known = {tuple(name.split(" / ")[1:]): word for name, word in pairs.KNOWN.items() if name.startswith(f"{engine} /")}
+    asked = {one: name for one, name in SUPPORTED.items() if one in {capability for _wall, capability in known}}
+    for one, name in asked.items():
+        if "heavy" in engine and one in NOT_OF_HEAVY_WALLS:
+            continue
+        works = any(word == "works" for (_wall, capability), word in known.items() if capability == one)
+        assert works == (knows.sentence(ENGINES[engine], name) is None), one
+    for wall, name in OF_WALLS.items():
+        assert (known[wall, "plain"] == "works") == (knows.sentence(ENGINES[engine], name) is None), wall
+
+
 # --- The judge -------------------------------------------------------------------------------------------
 
 

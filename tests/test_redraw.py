@@ -1,12 +1,13 @@
 """Pictures of benchmarks are drawn again from the tables of their reports, which that does not change."""
 
+import json
 import shutil
 from pathlib import Path
 
 import pytest
 from children import python
 
-from bench import redraw
+from bench import cells, pairs, redraw
 
 pytest.importorskip("matplotlib")
 ROOT = Path(__file__).parents[1]
@@ -19,6 +20,7 @@ def test_pictures_are_made_of_tables_alone(tmp_path):
         "accuracy-soft-sphere-amd-epyc-avx2-2-cores.csv",
         "throughput-amd-epyc-avx2-2-cores.csv",
         "stability-tunnelling.csv",
+        "pairs.csv",
     ]
     for name in tables:
         shutil.copy(RESULTS / name, tmp_path)
@@ -45,3 +47,16 @@ def test_a_folder_that_is_not_there_is_a_sentence(tmp_path):
     done = python("-m", "bench.redraw", str(tmp_path / "nothing"), cwd=ROOT)
     assert done.returncode == 2
     assert "is no folder" in done.stderr
+
+
+def test_the_table_of_pairs_is_that_of_the_committed_list():
+    """So are the shares of the picture."""
+    known = json.loads((ROOT / "tests" / "reference" / "pairs.json").read_text())
+    names, words = known["capabilities"].split(", "), {"w": "works", "r": "refused", "!": "third"}
+    assert pairs.read(RESULTS / "pairs.csv") == {
+        cells.Cell(engine, wall, name): words[letter]
+        for engine, rows in known["cells"].items()
+        for wall, row in rows.items()
+        for name, letter in zip(names, row.split(), strict=True)
+        if letter != "-"
+    }

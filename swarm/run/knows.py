@@ -414,7 +414,7 @@ CAPABILITIES = (
     }),
     Capability("union", _rooms, {
         _EVERY_BODY: _of_one_room("bodies", "use particles and Impact()"),
-        (GRAINS,): _of_one_room("Penalty", f"{_TO_POINTS}, and Impact()"),
+        (BALLS, GRAINS): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
         (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
         (CHORDS,): _of_one_room("a contact_step", _NO_STEP),
         (MASSIVE, HEAVY): Refusal(BESIDE_MASS, INSTEAD_OF_MASS),
@@ -653,7 +653,7 @@ CAPABILITIES = (
             "surfaces[{i}] must not be {kind} with bodies, got {got!r:.200}",
             "use particles, or from_mesh with a spacing",
         ),
-    }),
+    }, within="field"),
     Capability("cavity with losses", _lossy_cavities, {
         (SOFT_BODIES, PAPER_BODIES): Refusal(
             "cavities[{k}] must be elastic with {method}, got {got}", "use Impact(dt=...)"
@@ -690,11 +690,9 @@ CAPABILITIES = (
             "cluster must be left out where particles have a radius, got {got!r:.100}: particles that meet one another "
             "cannot be in different shards", "run without a cluster",
         ),
-    }),
-    Capability("cluster and mass of a wall", _on_cluster(_masses), {
         (MASSIVE,): Refusal(
-            "surfaces[{i}] must have no mass and no inertia with a cluster, got {got}: through such a wall each "
-            "particle depends on all others", f"{_TO_MOTION}, or run without a cluster",
+            "cluster must be left out where a wall has a mass, got {got!r:.100}: through such a wall each particle "
+            "depends on all others", f"{_TO_MOTION}, or run without a cluster",
         ),
     }),
     Capability("cluster without a trajectory", _on_cluster(_no_trajectory), {

@@ -303,7 +303,7 @@ def test_what_cannot_be_is_refused_before_anything_is_written(name, tmp_path, mo
 
 def test_walls_that_react_are_refused(tmp_path):
     scene = swarm.Scene([swarm.Sphere(0.5, mass=10.0)])
-    with pytest.raises(swarm.SceneError, match="must have no mass and no inertia with a cluster"):
+    with pytest.raises(swarm.SceneError, match="cluster must be left out where a wall has a mass"):
         swarm.simulate(
             scene, swarm.fill(scene, 10, speed=1.0), swarm.Impact(), until=1.0, trajectory=tmp_path / "run.h5",
             cluster="local:1",
