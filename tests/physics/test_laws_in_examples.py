@@ -50,13 +50,12 @@ def test_neutrons_stay_in_a_bottle_by_their_energy():
     assert np.abs(whole[late] - stays * curve.left[late]).max() < 0.02
 
 
-@pytest.fixture(scope="module")
-def gas():
-    return vacuum_chamber.run(15_000)
+def test_a_pump_takes_what_a_source_gives():
+    """Its throughput is the speed times the pressure; what enters the tube and does not come back is pumped.
 
-
-def test_a_pump_takes_what_a_source_gives(gas):
-    """Its throughput is the speed times the pressure; what enters the tube and does not come back is pumped."""
+    Gauges show a pressure that is even in the chamber and falls in the tube.
+    """
+    gas = vacuum_chamber.run(15_000)
     for part, law in ((gas.part, vacuum_chamber.CAPTURED), (gas.at_pump, vacuum_chamber.CAPTURE)):
         assert abs(part[0] - law) < 3.0 * part[1]
     # Who is in the tube at the two moments is between both counts.
@@ -64,8 +63,5 @@ def test_a_pump_takes_what_a_source_gives(gas):
     late = gas.time >= 5.0
     assert gas.inside[late].mean() == pytest.approx(1.0, abs=0.05)
     assert gas.inside == pytest.approx(1.0 - np.exp(-gas.time), abs=0.1)
-
-
-def test_gauges_show_a_pressure_that_is_even_in_the_chamber_and_falls_in_the_tube(gas):
     assert gas.balls == pytest.approx(1.0, abs=0.08)
     assert gas.discs == pytest.approx(vacuum_chamber.expected(np.array(vacuum_chamber.DISCS)), abs=0.05)
