@@ -80,8 +80,11 @@ def cover():
     The engine changes from each wall to the next and from each capability to the next.
     """
     known, engines, chosen = set(cells.CELLS), list(cells.ENGINES), list(SOON)
+    found = pairs_of(chosen)
     for w, wall in enumerate(cells.WALLS):
         for c, capability in enumerate(cells.CAPABILITIES):
+            if ((1, wall), (2, capability)) in found:
+                continue
             turn = [Cell(engines[(w + c + k) % len(engines)], wall, capability) for k in range(len(engines))]
             chosen += [cell for cell in turn if cell in known][:1]
     found = pairs_of(chosen)
