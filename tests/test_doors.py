@@ -77,7 +77,7 @@ def test_particles_escape_while_the_opening_is_open():
 
 @pytest.mark.physics
 def test_the_storage_curve_falls_by_a_quarter_of_area_speed_over_volume_while_the_shutter_is_open():
-    n, radius, speed, begin, end = 20_000, 0.05, 1.0, 20.0, 320.0
+    n, radius, speed, begin, end = 5_000, 0.05, 1.0, 20.0, 320.0
     hole = swarm.Sphere(radius, center=(0.0, 0.0, 0.5))
     scene = swarm.Scene([swarm.Sphere(0.5, openings=[swarm.Opening(hole, [(begin, end)])], laws=[Lambert()])])
     found = run(scene, swarm.fill(scene, n, speed=speed, seed=3), until=400.0, frames=40, compile="always", threads=2)

@@ -153,7 +153,7 @@ def test_it_stands_along_its_axis(axis):
 def test_every_flight_ends_where_brute_force_says(name):
     rows = OUTLINES.get(name) or spiky(*((1, 9) if name == "star" else (2, 40)))
     scene = scene_of(rows)
-    start = swarm.fill(scene, 300, speed=1.0, seed=4)
+    start = swarm.fill(scene, 100, speed=1.0, seed=4)
     outline, walls = scene.surfaces[0].boundary, scene.walls()
     for r, v in zip(start.position.T, start.velocity.T, strict=True):
         place, time, wall = vec(r), 0.0, -1.0
