@@ -49,10 +49,11 @@ def write(chosen: Exported, path: Path) -> None:
             root[f"PointData/{name}"], steps[f"PointDataOffsets/{name}"] = constant, np.zeros(frames, np.int64)
 
 
-def begin(file: h5py.File, cells: dict[str, NDArray[np.int64]], parts: Sequence[int]) -> Any:
+def begin(file: h5py.File, cells: dict[str, Any], parts: Sequence[int]) -> Any:
     """The root of a PolyData with these cells, rows of as many points as each has, in parts of so many points each.
 
-    If there is more than one part, each has the first of the vertices, one a point.
+    If there is more than one part, each has the first of the vertices, one a point. Of other cells all parts have the
+    same ones, or those of its own where they are a list with an array for each part.
     """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array(VERSION)
@@ -61,10 +62,15 @@ def begin(file: h5py.File, cells: dict[str, NDArray[np.int64]], parts: Sequence[
     root["NumberOfPoints"] = np.array(parts)
     for name in CELLS:
         rows = cells.get(name, np.zeros((0, 1), np.int64))
-        each = np.array(parts) if name == "Vertices" and len(parts) > 1 else np.full(len(parts), len(rows))
+        if isinstance(rows, list):
+            each, most, rows = np.array([len(one) for one in rows]), max(map(len, rows)), np.concatenate(rows)
+        else:
+            is_first = name == "Vertices" and len(rows) > 0 and len(parts) > 1
+            each, most = np.array(parts) if is_first else np.full(len(parts), len(rows)), len(rows)
         root[f"{name}/NumberOfCells"], root[f"{name}/NumberOfConnectivityIds"] = each, rows.shape[1] * each
         root[f"{name}/Connectivity"] = rows.astype(np.int64).ravel()
-        root[f"{name}/Offsets"] = rows.shape[1] * np.arange(len(rows) + 1)
+        # Those of the part with the most cells, which all others share: a step begins at the first.
+        root[f"{name}/Offsets"] = rows.shape[1] * np.arange(most + 1)
     return root
 
 

@@ -10,6 +10,7 @@ radius 1 that is scaled by "radius", others by Glyph of a Box, Cylinder or Spher
 "halves" and turned by "orientation", in mode Quaternion. A million take 120 MB.
 """
 
+import bisect
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ..scene import Scene
 from . import vtkhdf
 from .exported import Exported
 from .shape import Shape
@@ -33,17 +35,17 @@ def shapes(chosen: Exported) -> list[Shape]:
 
 
 def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
-    """Write the walls."""
+    """Write the walls, of those that come or go, or open or shut, in each frame those that are there."""
+    if chosen.trajectory.scene.instants:
+        _write_changing(chosen, path)
+        return
     firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
-    triangles = np.concatenate([shape.triangles + first for shape, first in zip(drawn, firsts, strict=False)])
+    triangles = _triangles(drawn)
     with h5py.File(path, "w") as file:
         root = vtkhdf.begin(file, {"Polygons": triangles}, [int(firsts[-1])])
         counts = [len(shape.triangles) for shape in drawn]
-        root["CellData/surface"] = np.repeat([shape.surface for shape in drawn], counts)
-        root["CellData/solid"] = np.repeat([int(shape.solid) for shape in drawn], counts)
-        if parts := chosen.trajectory.scene.parts:
-            numbers = [parts.index((shape.surface, shape.place)) if shape.place else -1 for shape in drawn]
-            root["CellData/part"] = np.repeat(numbers, counts)
+        for name, numbers in _data_of(chosen.trajectory.scene, drawn).items():
+            root[f"CellData/{name}"] = np.repeat(numbers, counts)
         if not chosen.trajectory.scene.moves():
             root["Points"] = np.concatenate([shape.vertices for shape in drawn])
             return
@@ -57,6 +59,51 @@ def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
             for shape, first in zip(drawn, done * firsts[-1] + firsts[:-1], strict=True):
                 turn, way = since_start(chosen.trajectory.scene, shape, seen["time"][number], places)
                 points[first : first + len(shape.vertices)] = shape.vertices @ turn.T + way
+
+
+def _data_of(scene: Scene, drawn: list[Shape]) -> dict[str, list[int]]:
+    """The data of the cells of each shape."""
+    data = {"surface": [shape.surface for shape in drawn], "solid": [int(shape.solid) for shape in drawn]}
+    if parts := scene.parts:
+        data["part"] = [parts.index((shape.surface, shape.place)) if shape.place else -1 for shape in drawn]
+    return data
+
+
+def _write_changing(chosen: Exported, path: Path) -> None:
+    """Write each state of the walls as a part with cells of its own; a step has the part of its frame."""
+    scene, positions = chosen.trajectory.scene, chosen.trajectory.frame(chosen.numbers[0]).position
+    states: dict[tuple[int, float], int] = {}
+    found, of_steps = list[list[Shape]](), list[int]()
+    for time in chosen.times.tolist():
+        state = bisect.bisect_right(scene.instants, time), time if scene.moves() else 0.0
+        if state not in states:
+            states[state] = len(found)
+            found.append(shapes_of(scene, positions, time, most=MANY))
+        of_steps.append(states[state])
+    points = [sum(len(shape.vertices) for shape in drawn) for drawn in found]
+    counts = [sum(len(shape.triangles) for shape in drawn) for drawn in found]
+    with h5py.File(path, "w") as file:
+        root = vtkhdf.begin(file, {"Polygons": [_triangles(drawn) for drawn in found]}, points)
+        root["Points"] = np.concatenate([shape.vertices for drawn in found for shape in drawn])
+        which = np.array(of_steps)
+        cells = np.cumsum([0, *counts])[which]
+        steps = vtkhdf.timed(root, chosen, np.cumsum([0, *points])[which])
+        steps["PartOffsets"][...] = which
+        steps["ConnectivityIdOffsets"][:, vtkhdf.CELLS.index("Polygons")] = 3 * cells
+        data = [_data_of(scene, drawn) for drawn in found]
+        for name in data[0]:
+            numbers = [
+                np.repeat(one[name], [len(shape.triangles) for shape in drawn])
+                for one, drawn in zip(data, found, strict=True)
+            ]
+            root[f"CellData/{name}"] = np.concatenate(numbers).astype(np.int64)
+            steps[f"CellDataOffsets/{name}"] = cells
+
+
+def _triangles(drawn: list[Shape]) -> Any:
+    """The triangles of shapes, with the numbers of their points among those of all."""
+    firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
+    return np.concatenate([shape.triangles + first for shape, first in zip(drawn, firsts, strict=False)])
 
 
 # Of each solid, with the type of a number and how many there are.

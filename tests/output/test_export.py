@@ -140,6 +140,32 @@ def test_walls_are_triangles_where_they_are(stored, tmp_path):
                 assert abs(gaps).max() < 0.02
 
 
+@pytest.mark.parametrize("motion", [None, swarm.Translation((0.1, 0.0, 0.0))], ids=["at rest", "moving"])
+def test_walls_that_come_and_go_are_in_the_steps_in_which_they_are_there(tmp_path, motion):
+    """By VTK's reader, each step on its own and in any order."""
+    walls = [
+        swarm.Box((1.0, 1.0, 1.0)),
+        swarm.Box((0.2, 0.1, 0.1), (0.5, 0.0, 0.0), "outside", present=[(0.0, 0.4)]),
+        swarm.Box((0.1, 0.2, 0.1), (-0.5, 0.0, 0.0), "outside", present=[(0.4, 0.7)], motion=motion),
+    ]
+    start = swarm.Particles([0.0, 0.5, 0.0], [0.1, 0.0, 0.0])
+    path = run(tmp_path, swarm.Scene(walls), start, until=1.0, every=0.25, compile="never")
+    with swarm.load(path) as trajectory:
+        trajectory.export(tmp_path / "out.vtkhdf")
+    found = list(steps_of(tmp_path / "out.surfaces.vtkhdf"))
+    assert [set(cells["surface"].tolist()) for *_before, cells, _connected in found] == [
+        {0, 1}, {0, 1}, {0, 2}, {0}, {0},
+    ]  # fmt: skip
+    for time, position, _points, cells, (_vertices, _lines, triangles) in found:
+        for i in set(cells["surface"].tolist()):
+            corners = position[triangles.reshape(-1, 3)[cells["surface"] == i]].reshape(-1, 3)
+            shift = 0.0 if i < 2 or motion is None else 0.1 * time
+            middle, half = 0.5 * (corners.max(axis=0) + corners.min(axis=0)), 0.5 * np.ptp(corners, axis=0)
+            np.testing.assert_allclose(middle, np.add(walls[i].center, (shift, 0.0, 0.0)), atol=1e-12)
+            np.testing.assert_allclose(half, walls[i].half_widths, rtol=1e-12)
+            assert cells["solid"][cells["surface"] == i].tolist() == [int(i > 0)] * (len(corners) // 3)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_ase_reads_every_bit(stored, tmp_path, kind):
     with swarm.load(stored[kind]) as trajectory:
