@@ -3,6 +3,7 @@
 import sys
 import textwrap
 
+import h5py
 import numpy as np
 import pytest
 from children import python
@@ -259,6 +260,30 @@ def test_a_run_goes_on_in_the_middle_of_a_frame(tmp_path, monkeypatch):
             within += saved.following is not None and saved.rows > 0
     assert within > 5
     assert table_of(tmp_path / "i.h5").tobytes() == table_of(tmp_path / "whole.h5").tobytes()
+
+
+def test_a_run_does_not_go_on_behind_a_damaged_row_of_the_frame_under_way(tmp_path, monkeypatch):
+    """Its rows have no checksum in the file yet: the checkpoint has it."""
+    day, options = 86_400.0, {"until": 6.0, "every": 2.0, "n": 50, "seed": 1}
+    more = {"trajectory": tmp_path / "run.h5", "resume": True, "checkpoint": 7.0 * day, "walltime": day}
+    halted_after(monkeypatch, 12, day)
+    saved = checkpoint.SavedRun("", "", "", "", 0, "")
+    while saved.following is None or saved.rows == 0:
+        with pytest.raises(swarm.WallTimeError):
+            run(tmp_path / "i.h5", ROUGH, **options, **more)
+        saved = checkpoint.read(paths.checkpoint_of(tmp_path / "run.h5"))[0]
+    with h5py.File(tmp_path / "i.h5") as file:
+        number = file["impacts/impulse"][saved.rows - 1]
+        complete = int(file["frames/complete"][0])
+    data = (tmp_path / "i.h5").read_bytes()
+    place = data.rindex(number.tobytes())
+    (tmp_path / "i.h5").write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+    told = rf"impacts/impulse after frame {complete - 1}: expected the checksum that .*run.h5.*has"
+    with pytest.raises(swarm.SceneError, match=told):
+        run(tmp_path / "i.h5", ROUGH, **options, **more)
+    (tmp_path / "i.h5").write_bytes(data)
+    with pytest.raises(swarm.WallTimeError):
+        run(tmp_path / "i.h5", ROUGH, **options, **more)
 
 
 KILLED = """

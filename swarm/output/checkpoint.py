@@ -51,6 +51,7 @@ class SavedRun:
         wall_time: used so far [s].
         seed: of thermal walls.
         kept: what the log of impacts keeps, as text, or ""; rows: how many it has.
+        sums: checksums of those of the frame that is being computed, by column, as text; "" of older versions.
         member_impacts: whether the impacts on each member are counted.
         observables: the names of those of one's own, in order.
         counters: as text, or "".
@@ -70,6 +71,7 @@ class SavedRun:
     seed: int = 0
     kept: str = ""
     rows: int = 0
+    sums: str = ""
     member_impacts: bool = False
     observables: str = ""
     counters: str = ""

@@ -1,5 +1,6 @@
 """Logs of impacts, read on demand. impacts.py describes the file and writes it."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -135,8 +136,15 @@ class ImpactLog(Stored):
         identity = {"particles": self.count, "start": self.start, "seed": self.seed}
         return {**texts, **identity, "counters": self.counters_text}
 
-    def require_holds(self, frames: int, rows: int, checkpoint: Path) -> None:
-        """Raise a SceneError if there are fewer frames, or rows with those of the frame after them."""
+    def require_holds(self, frames: int, rows: int, sums: str, checkpoint: Path) -> None:
+        """Raise a SceneError if there are fewer frames, or fewer or other rows with those of the frame after them.
+
+        Args:
+            frames: how many frames are complete.
+            rows: how many rows there are with those of the frame after them.
+            sums: the checksums of the rows after these frames, by column, as text; "": they are not known.
+            checkpoint: the file that says so.
+        """
         with self._reading("its rows") as file:
             layout.require_index(file)
             there = min(column.shape[0] for column in self._columns.values())
@@ -145,6 +153,13 @@ class ImpactLog(Stored):
                 f"{self.path} must hold {frames} frames and {rows} impacts, as {checkpoint} says, got "
                 f"{len(self.times)} and {there}: it was changed since; remove them and the trajectory to start again"
             )
+        for name, known in json.loads(sums or "{}").items():
+            with self._reading(f"impacts/{name} after frame {frames - 1}"):
+                found = 0
+                for begin in range(int(self.ends[frames - 1]), rows, _AT_ONCE):
+                    found = checksum_of(self._columns[name][begin : min(begin + _AT_ONCE, rows)], found)
+                if found != known:
+                    raise ValueError(f"expected the checksum that {checkpoint} has")
 
     @property
     def dtype(self) -> np.dtype[Any]:

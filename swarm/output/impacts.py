@@ -8,6 +8,7 @@ walls/{surface,member} are what each number in impacts/wall stands for. paramete
 parameters/particles, their number, parameters/start, a digest of them at the start, and parameters/seed.
 """
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -174,6 +175,10 @@ class ImpactWriter(AppendedFile):
             self._complete(frames[-1][0] + 1)
             if self._is_new():
                 self._rename()
+
+    def sums(self) -> str:
+        """The checksums of the rows of the frame under way, by column, as text; "" where the file has none."""
+        return "" if self._sums is None else json.dumps(self._running)
 
     def sync(self) -> None:
         """Flush to the disk what was written."""

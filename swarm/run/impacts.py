@@ -46,6 +46,7 @@ class Impacts:
         total: rows so far.
         ends: frame -> rows at its end, until the writer takes them.
         write: adds rows to the file; the writer sets it.
+        sums: the checksums of the rows of the frame under way, as text; the writer sets it.
         queue: what has a thread call a function in its turn among the frames; the writer's thread sets it.
     """
 
@@ -67,6 +68,7 @@ class Impacts:
         self.example = self._made(0)
         self.begin, self.total, self.ends = 0.0, 0, dict[int, int]()
         self.write: Callable[[Rows], None] = lambda rows: None
+        self.sums: Callable[[], str] = lambda: ""
         self.queue: Callable[[Callable[[], None]], None] = lambda job: job()
         self._problem: BaseException | None = None
         self._counting = threading.Lock()

@@ -64,7 +64,7 @@ def _impacts(task: Task, session: Session, log: Impacts | None) -> "Writer | Non
     texts = about(task.scene, task.method, log.kept, {"particles": len(task.particles), **session.identity})
     start = (session.first, log.total) if session.first > 0 else None
     writer = ImpactWriter(task.options.impacts, log.columns(), log.ends, texts, start)
-    log.write = writer.add
+    log.write, log.sums = writer.add, writer.sums
     return writer
 
 

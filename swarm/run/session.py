@@ -140,7 +140,7 @@ class Session:
             there.require_same(self._job, path)
             if self.first == 0:
                 return  # a kill came before the first frame of the trajectory
-            before.require_holds(self._job.frame + 1, self._job.rows, self._path)
+            before.require_holds(self._job.frame + 1, self._job.rows, self._job.sums, self._path)
             before.require_intact()
 
     def _refuse_to_restart(self, until: float) -> None:
@@ -265,7 +265,7 @@ class Session:
         writer.drain()
         job = dataclasses.replace(
             self._job, frame=frame, time=moment, following=following, wall_time=self.wall_time(),
-            rows=0 if self._log is None else self._log.total,
+            rows=0 if self._log is None else self._log.total, sums="" if self._log is None else self._log.sums(),
         )  # fmt: skip
         checkpoint.save(self._path, job, run.arrays(), self._owners)
 
