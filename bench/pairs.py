@@ -32,7 +32,8 @@ _TITLES = {
     "balls, heavy wall": "balls with Impact, wall with a mass",
 }
 
-_PALE = "#D9DDE3"
+# Of the grey of what is refused.
+_OPACITY = 0.32
 
 Found = dict[Cell, str]  # works, refused or third
 
@@ -109,14 +110,14 @@ def read(path: Path) -> Found:
 
 def draw(found: Found) -> None:
     """One panel an engine: a column a capability, a line a wall."""
-    from matplotlib.colors import ListedColormap
+    from matplotlib.colors import ListedColormap, to_rgb
     from matplotlib.patches import Patch
 
     from swarm.output import style
 
     walls, capabilities = _names(found)
     picture, panels = figure.subplots(len(_TITLES), 10.0, 14.5, rows=len(_TITLES) // 2, sharex=True, sharey=True)
-    colours = {"works": figure.colours()[0], "refused": _PALE, "third": "red"}
+    colours = {"works": figure.colours()[0], "refused": (*to_rgb(style.GREY), _OPACITY), "third": "red"}
     for k, (axes, engine) in enumerate(zip(panels.flat, _TITLES, strict=True)):
         rows = [[found.get(Cell(engine, wall, one), "") for one in capabilities] for wall in walls]
         numbers = [[list(colours).index(what) if what else np.nan for what in row] for row in rows]
