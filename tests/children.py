@@ -45,9 +45,8 @@ def python(*arguments, cwd=None, env=None, timeout=600, file_size=None, bare=Fal
 
 
 def _environment(env):
-    """What an import looks at: settings of Python and of Numba, but for the folder of kernels."""
-    read = {name: value for name, value in env.items() if name.startswith(("PYTHON", "NUMBA_"))}
-    return {name: value for name, value in read.items() if name != "NUMBA_CACHE_DIR"}
+    """What an import looks at: settings of Python and of Numba, the folder of kernels among them."""
+    return {name: value for name, value in env.items() if name.startswith(("PYTHON", "NUMBA_"))}
 
 
 _AT_START = _environment(os.environ)

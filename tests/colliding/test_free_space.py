@@ -44,9 +44,7 @@ def test_balls_far_away_have_not_escaped():
 def test_points_are_told_what_they_lack():
     point = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
     for method in (swarm.Impact(), swarm.Penalty(dt=1e-3, penalty=1e3)):
-        with pytest.raises(
-            swarm.SceneError, match=r"at least one surface.*give the walls, or give the particles a rad"
-        ):
+        with pytest.raises(swarm.SceneError, match=r"at least one surface.*give walls, or give the particles a rad"):
             swarm.simulate(swarm.Scene([]), point, method, until=1.0)
     with pytest.raises(swarm.SceneError, match="fill needs a bounded volume"):
         swarm.fill(swarm.Scene([]), 3, speed=1.0, radius=0.1)

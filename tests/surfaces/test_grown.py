@@ -339,7 +339,10 @@ def test_balls_that_are_too_large_for_a_shape(surfaces, plane, words):
 @pytest.mark.parametrize(
     ("surfaces", "words"),
     [
-        ([swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.5, (0.6, 0.0, 0.0))])], "Union, of 2 rooms"),
+        (
+            [swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.5, (0.6, 0.0, 0.0))])],
+            r"must not be a Union of several rooms with particles that have a radius, got Union.*use particles without",
+        ),
         ([swarm.Formula("x**2 + y**2 + z**4 - 1")], "Formula"),
     ],
     ids=["union", "formula"],
