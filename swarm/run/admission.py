@@ -70,7 +70,7 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
     method.span("until", times.until)
     method.span("every", times.every)
     require_start(scene, particles)
-    # Who comes later is born inside the walls as they are then.
+    # Particles from sources are born later, inside the walls of that time.
     if start is not None:
         _require_place(scene, start, method)
     workload.require_few_impacts(scene, particles, method, times.until, times.every)

@@ -48,7 +48,7 @@ class BaseRun:
         self._scene, self._method, self._first = scene, method, first
         self._owners, self._parts = scene.owners(), scene.parts_of_rows()
         self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
-        # Where there is no wall nobody escapes: balls in free space are all there is.
+        # In a scene without walls no particle escapes: it has only balls in free space.
         self._far = _FAR * scene.extent() if scene.surfaces and scene.is_open() else math.inf
         self._pool, self._tier, self._watch = pool, tier, Watch(n)
         self._cut_short = False

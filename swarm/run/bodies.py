@@ -239,7 +239,7 @@ class BodyRun(BaseRun):
 def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
     """A pool of `count` threads, all of them begun, each with room for so many bytes of scratch arrays.
 
-    Memory that is not used is none: a system maps a stack page by page.
+    Scratch memory that is not used costs nothing: the system maps a stack page by page.
     """
     before = threading.stack_size(-(-(scratch + _REST) // _PAGE) * _PAGE)
     try:

@@ -58,7 +58,7 @@ class CollidingRun(BaseRun):
         laws, openings = box.laws, scene.openings()
         loses = laws.may_dissipate or laws.loses or box.loss is not None
         balls = Balls(particles.radius, np.zeros(n, np.int64), np.zeros(1))
-        # The energy of each alone is not kept; of zeros that nobody writes there is one page.
+        # The energy of each ball is not kept. An array of zeros that is never written takes one page of memory.
         unused = np.zeros(n)
         # Times are those of the start of each flight: so what is written at frames is no part of the motion.
         self.state = State(

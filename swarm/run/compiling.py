@@ -5,7 +5,7 @@ from typing import Any
 
 from ..kernel import cache
 
-# What a kernel computes, for who does not know its name.
+# What each kernel computes, in words for users.
 _WORDS = {
     "advance_block": "flights and impacts",
     "slide_block": "sliding",

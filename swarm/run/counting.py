@@ -65,7 +65,7 @@ def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) 
 
 
 def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) -> Counters | None:
-    """The counters as kernels take them, with their crossings logged or not; None where there are none.
+    """The counters as kernels take them, or None if none is given; `logs`: their crossings are logged.
 
     Raises:
         SceneError: a surface cannot be a counter in this scene.
@@ -181,7 +181,7 @@ def _turning(wall: Any) -> Any:
 
 
 def crossed_of(counters: Counters, given: tuple[Counter, ...], scene: Scene, position: NDArray[Any]) -> Crossed:
-    """The arrays of a run at its start; who is on a counter is on its admissible side."""
+    """The arrays of a run at its start; a particle on a counter is on its admissible side."""
     n = position.shape[1]
     side = np.zeros((len(given), n), np.int8)
     for k, (one, counter) in enumerate(zip(counters.each, given, strict=True)):

@@ -90,10 +90,10 @@ class DoorRun(Run):
         distances = self._scene.distances_outside(self.state.position, instant)
         distances[~came] = -math.inf
         distances[:, self.state.gone()] = -math.inf
-        # Who comes later is born where no wall is then.
+        # Particles from sources are born later, where no wall is at that time.
         self._present.reach(instant)
         distances[:, self._present.count :] = -math.inf
-        # Where phi is no number is no place either.
+        # A place at which phi is NaN counts as inside.
         inside = ~(distances <= self._deepest)
         if inside.any():
             particle = int(np.argmax(inside.any(axis=0)))
@@ -102,7 +102,7 @@ class DoorRun(Run):
             raise RunError(sentence_of_coming(self._scene, self.state, found, depth, instant, self._first))
 
     def _let_go(self, contacts: Contacts, gone: NDArray[np.bool_]) -> None:
-        """Let what slides or rests on walls that have gone fly: those of the pieces that are `gone`."""
+        """Let particles that slide or rest on the walls of the pieces in `gone` fly: these walls left the scene."""
         # Number -1 is no wall.
         walls = np.append(gone[self._scene.pieces_of_walls()], False)
         held = walls[contacts.walls.astype(np.int64)].any(axis=0)

@@ -148,7 +148,7 @@ class Run(BaseRun):
         if not self._kinds:
             end = self._part(span, draws, mine, page)
         else:
-            # Who flies first would have drawn everything when the others are ready to slide.
+            # In parts: a thread that flies first would draw all particles before the other threads are ready to slide.
             some, end = max(1, len(self._present.order) // (_PARTS * self._threads)), _DONE
             while end[0] == Status.DONE and (order := take(draws, some)).size:
                 end = self._part(span, draws.again(order), mine, page)
@@ -192,7 +192,7 @@ class Run(BaseRun):
         return chosen if page is None else functools.partial(page.call, chosen)
 
     def observe(self) -> None:
-        """Observe the start: nobody flies."""
+        """Observe the start, at which no particle is advanced."""
         self._reach(0.0)
         self._phase.fill(ARRIVED)
         self._ticket[0] = 0

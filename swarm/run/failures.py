@@ -87,7 +87,7 @@ def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
 
 
 def _of_law(scene: Scene, state: State, particle: int, moment: float, seeding: Seeding) -> str:
-    """Which law has gone wrong, and what it was asked: that is in the state."""
+    """The text on the law that failed and on its arguments, which the kernel left in the state."""
     contacts, laws = state.contacts, scene.laws()
     assert contacts is not None
     assert laws is not None

@@ -50,8 +50,8 @@ def grow(
 ) -> tuple[Floats, float]:
     """Places (3, N) of balls that have grown from a part of their radii to these: the places, and the part at the end.
 
-    That is 1 unless they have jammed before. The balls begin at places at which they overlap nobody, and are within
-    walls with their last radii.
+    The part is 1 unless the balls jam before. They begin at places without overlaps, and are within the walls with
+    their last radii.
     """
     axes, speed = scene.axes(), float(np.sqrt((radius**2).mean()))
     velocity = np.zeros_like(places)

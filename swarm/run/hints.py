@@ -16,7 +16,8 @@ from .overlaps import warn_of_overlap
 _LOG = logging.getLogger("swarm")
 # The parts of the time between impacts from which a step, a contact, and the round-off of a time are said.
 _STEP, _CONTACT, _ROUND_OFF = 0.25, 0.5, 1e-4
-# Before that time is looked for, what is this much shorter than the parts above of a crossing is none of them.
+# The time between impacts is computed only if a step, a contact or a round-off is longer than this fraction of its part
+# (above) of the time that a crossing of the scene takes.
 _SURELY = 1e-2
 # Explicit steps of a spring are stable up to this many over its angular frequency.
 _STABLE = 2.0

@@ -133,7 +133,7 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
 
 @contextlib.contextmanager
 def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display, Watched, Measures]]:
-    """A run at its start or its checkpoint, its `Background` writer or None, and who else observes it.
+    """A run at its start or its checkpoint, its `Background` writer or None, its display, its records and its measures.
 
     Until the context ends signals stop the run, and its files are locked.
     """
@@ -163,12 +163,12 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
 
 
 def _measured(task: Task, measures: Measures, number: int, read: Read, moment: float) -> dict[str, Any]:
-    """The observables of one's own of a frame."""
+    """The user-defined observables of a frame."""
     return measures.of(number, moment, _snapshot_of(task, read, moment)) if measures else {}
 
 
 def _measures_of(task: Task, session: Session) -> Measures:
-    """The functions of one's own of a run, tried with its start, or with the shapes that its trajectory holds."""
+    """The user-defined observables of a run, tried at its start, or with the shapes that its trajectory holds."""
     made = Measures(task.options.observables, task.options.until)
     if made and session.first == 0:
         made.begin(0, 0.0, start_of(task))

@@ -1,4 +1,4 @@
-"""Observables of one's own: functions of a frame, called when it is whole."""
+"""User-defined observables: functions of a frame, called when the frame is complete."""
 
 import re
 import traceback

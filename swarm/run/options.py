@@ -100,7 +100,7 @@ class RunOptions:
         _ = self.storage
 
     def _check_recording(self) -> None:
-        """Raise a SceneError unless what a recording and a display are given is known, also where there is none."""
+        """Raise a SceneError if an option of a recording or a display is wrong, even if the run has neither of them."""
         checks.count("record_particles", self.record_particles)
         checks.one_of("record_color", self.record_color, COLOURS)
         object.__setattr__(self, "record_megabytes", checks.positive("record_megabytes", self.record_megabytes))

@@ -36,7 +36,7 @@ def recorder_of(task: Task) -> "Writer | None":
 
 def writer_of(task: Task, session: Session, recorder: "Writer | None", log: Impacts | None) -> "Background | None":
     """A context that gives the function which writes a frame, in a background thread."""
-    # The impacts of a frame are on the disk before it is: who reads the frame finds them.
+    # The impacts of a frame are on the disk before the frame, so that readers of the frame find them.
     outputs = [
         (_impacts(task, session, log), slice(0)),
         (_trajectory(task, session), task.options.storage.kept(task.first)),

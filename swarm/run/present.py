@@ -12,16 +12,16 @@ from ..state import Floats, State
 
 
 class Presence:
-    """Who is there at a frame: who is not is in no draw of a kernel, and in no sum.
+    """The particles of the start and those born by the end of a frame. No others are in a draw of a kernel or in a sum.
 
     Args:
-        births: when particles come, None where all are there from the start.
-        n: how many there are in the end.
+        births: when particles are born, or None if all are in the scene from the start.
+        n: the number of particles in the end.
         size: particles of a draw.
 
     Attributes:
-        count: how many are there.
-        order: the draws of them.
+        count: the number of these particles.
+        order: the numbers of their draws.
     """
 
     def __init__(self, births: Births | None, n: int, size: int) -> None:
@@ -30,7 +30,7 @@ class Presence:
         self._energy = np.empty(0)
 
     def start(self, state: State) -> None:
-        """Take what each that comes brings, from the state at the start."""
+        """Keep the energy that each particle from a source brings in, from the state at the start."""
         if self._births is not None:
             self._energy = np.where(self._births.source >= 0, state.mass * state.energy, 0.0)
 
@@ -51,7 +51,7 @@ class Presence:
         return state._replace(mass=self.of(state.mass), starts=None)
 
     def sums(self, sums: Floats) -> Floats:
-        """The sums over chunks (quantities, chunks), and behind them what those of each that have come have brought."""
+        """The sums over chunks (quantities, chunks), with a last row for the energy brought in by sources so far."""
         if self._births is None:
             return sums
         brought = np.zeros((1, sums.shape[1]))
@@ -59,7 +59,7 @@ class Presence:
         return np.concatenate([sums, brought])
 
     def observed(self) -> dict[str, Any]:
-        """How many have come from each source, and the energy that they have brought."""
+        """The number of particles born so far from each source, and the energy that they brought in."""
         if self._births is None:
             return {}
         source = self._births.source[: self.count]
@@ -74,5 +74,5 @@ class Presence:
 
 
 def total_of(sums: Floats) -> dict[str, Any]:
-    """What those that have come have brought, from the sums over all chunks of `Presence.sums`."""
+    """The energy brought in by sources so far, from the sums over all chunks of `Presence.sums`."""
     return {"source_energy": float(np.add.reduce(np.ascontiguousarray(sums[-1])))}

@@ -56,8 +56,8 @@ class Result:
             the cell of a scene without surfaces; where they have a spin "rotational_energy" [J], which "total_energy"
             includes as "angular_momentum" does the spins. Of those with Penalty also "largest_overlap" [m], by how much
             two balls, or a ball and a wall, have overlapped at most, at any end of a step since the frame before.
-            With sources "born" (frames, sources), how many have come, and "source_energy" [J], what they have brought;
-            who comes later is in no observable.
+            With sources "born" (frames, sources), the number of particles born so far, and "source_energy" [J], the
+            energy that they brought in. Particles born later are in no observable of the frame.
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.

@@ -46,7 +46,7 @@ class Session:
         # One half way to the limit says how long they take.
         self._due = self._began + min(self._every, 0.5 * (self._end - self._began) if self._saves else math.inf)
         self._stops = False
-        # Of a run without a trajectory they are None, and so is its `Job`.
+        # A run without a trajectory has None in their place, and no `Job`.
         self._trajectory: Any = options.trajectory
         self._path: Any = options.checkpoint_file()
         self._job: Any = None
@@ -130,7 +130,7 @@ class Session:
             marks.check_target(path, overwrite, what)
 
     def _find_log(self, path: Path, overwrite: bool) -> None:
-        """Raise a SceneError if the log of impacts is none to go on with, or to begin anew."""
+        """Raise a SceneError if the run cannot go on with its log of impacts, or begin it anew."""
         if self.first == 0 and (overwrite or not path.exists()):
             return
         from ..output.impact_log import load_impacts

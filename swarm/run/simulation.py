@@ -78,12 +78,13 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         impact_particles: those whose impacts it has, "all", k for every k-th one, or a list of their numbers.
         member_impacts: True to count the impacts on each member of each surface, and how long particles stay there; see
             `Result`.
-        observables: functions of one's own by their names, each called with every `Frame`: what they return, a number,
-            or an array of the same shape at every frame, is an observable as the others are, in float64; NaN says that
-            there is none. They are tried with the start before anything is compiled, and are given all particles, also
-            on a cluster, where the client calls them when the shards have ended.
-        counters: surfaces that stop nobody and count what crosses them, each a surface at rest or a `Counter`, by
-            Impact with contact_step = 0. The motion has the same bits without them. See `Result.observables`.
+        observables: user-defined observables, functions by their names. Each is called with every `Frame` and returns a
+            number, or an array of the same shape at every frame. The values are kept in float64, with the other
+            observables; NaN means no value. The functions are tried at the start, before anything is compiled. They
+            get all particles, also on a cluster, where the client calls them when the shards have ended.
+        counters: surfaces that count the particles that cross them and do not stop any, each a surface at rest or a
+            `Counter`, by Impact with contact_step = 0. The motion has the same bits without them. See
+            `Result.observables`.
         record_particles: the most particles recorded, evenly chosen.
         record_color: what their colour shows, "speed" or "energy-error".
         record_megabytes: largest size of the recording, above 0; of too many frames every k-th is recorded.

@@ -60,7 +60,7 @@ def _starts(particles: Particles, wait: bool) -> Floats | None:
 def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], lasts: bool) -> None:
     """Set whether each particle begins a frame in flight, along its walls or at rest; `lasts`: a contact has lasted.
 
-    The frame is (its length, in the method's unit, its end [s]); who is not there has no phase.
+    The frame is (its length, in the method's unit, its end [s]). Particles that are not born yet have no phase.
     """
     span, end = frame
     contacts = state.contacts
@@ -81,7 +81,10 @@ def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], las
 
 
 def _begin_late(starts: Floats, contacts: Contacts | None, phase: NDArray[np.int8], span: float, end: float) -> None:
-    """Who starts at the end of a frame or later has arrived; who starts within it flies for what is left then."""
+    """Mark particles that start at or after the frame's end as ARRIVED.
+
+    Particles that start within the frame fly for the time left after their start.
+    """
     left = end - starts
     phase[left <= 0.0] = ARRIVED
     late = np.flatnonzero((left < span) & (phase == FLYING))

@@ -116,7 +116,7 @@ class Tally:
 
 
 class Watched(NamedTuple):
-    """The records of impacts: their log and their tally, None where there is none; and the counters."""
+    """The log of impacts and their tally, each None if it is not kept, and the counters."""
 
     log: Impacts | None = None
     tally: Tally | None = None

@@ -1,4 +1,4 @@
-"""When the kernels of a frame return: what they ask, who has asked for it, and what the caller's thread may compute."""
+"""When the kernels of a frame return: after how many passes, and how many the caller's thread may compute."""
 
 import math
 import time
@@ -18,8 +18,9 @@ class Watch:
     """The halt of the kernels of a frame.
 
     Python hands a signal to the main thread alone, between two of its instructions. So a thread that may be this one
-    computes for a few passes only, without anybody to halt it, and then leaves the frame to others and watches them.
-    (Rejected: a thread that halts it in time, which is told of no signal, but by a descriptor that belongs to asyncio.)
+    computes for a few passes only, in which no other thread halts it. Then it leaves the frame to others and watches
+    them.
+    (Rejected: a thread that halts it in time. It would learn of a signal only by a descriptor, which asyncio uses.)
 
     Attributes:
         passes: (1,) what kernels ask: after so many passes they return.

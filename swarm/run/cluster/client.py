@@ -1,4 +1,4 @@
-"""A run on a cluster, from the side of who started it: it hands out shards, waits for them and joins their files.
+"""A run on a cluster, from the side of the client: it hands out shards, waits for them and joins their files.
 
 What a thousand workers do, from what 200 shards on two workers take (`python -m bench cluster`). Particles do not pass
 through the scheduler: a task is a name, a number and a folder, its answer two words, a report some 100 bytes, of which
@@ -33,8 +33,8 @@ from . import connection, joined, shards, worker
 from .sharded import Sharded
 
 _COMPLETE, _FAILED = "complete", "failed"
-# Seconds from one checkpoint of a shard to the next where the options name none; from one look at the shards to the
-# next; until they are told again to stop; and from one look at their frames to the next.
+# Seconds between checkpoints of a shard if the options give no time; between looks at the shards; between requests to
+# the shards to stop; and between looks at their frames.
 _SAVED, _GLANCE, _TOLD, _FOLLOWS = 60.0, 0.2, 1.0, 1.0
 # To read frames of many shards takes at most about this part of the time.
 _READING = 0.1
@@ -111,7 +111,7 @@ class _Run:
                 now = time.monotonic()
                 if self._left and now >= told + _TOLD and (stops or self._stopped.is_set() or now >= self._session.end):
                     stops, told = True, now
-                    # Told again: to shards that begin later, or on a worker that takes the place of another.
+                    # The request is repeated for shards that begin later, or on a worker that replaces another.
                     self._client.run(worker.stop, self._token, on_error="ignore")
                 self._look()
                 self._changed.wait(_GLANCE)

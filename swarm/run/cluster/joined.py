@@ -160,7 +160,7 @@ class JoinedWriter(TrajectoryWriter):
 def _measured(
     seen: Iterator[tuple[int, dict[str, Any], Snapshot]], measures: Measures
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """The frames with what functions of one's own return for them."""
+    """The frames, with the values of the user-defined observables added."""
     for k, (frames, one, particles) in enumerate(seen):
         yield frames, one | measures.of(k, one["time"], particles)
 
@@ -168,12 +168,12 @@ def _measured(
 def join(
     folder: Path, task: Task, bounds: list[int], identity: dict[str, Any], measures: Measures = NONE
 ) -> dict[str, NDArray[Any]]:
-    """Write the frames that every shard holds in place of an earlier file: their observables, with those of one's own.
+    """Write the frames that every shard holds in place of an earlier file, and return their observables.
 
-    If there is none nothing is written.
+    These include the user-defined observables. Without such frames nothing is written.
 
     Raises:
-        RunError: a function of one's own fails.
+        RunError: a user-defined observable fails.
     """
     seen, kept = _measured(seen_of(folder, task, bounds), measures), Columns()
     head = list(itertools.islice(seen, 1))

@@ -18,7 +18,7 @@ from ...errors import RunError
 _ROOT = Path(__file__).parents[3]
 # Seconds until its processes have ended by themselves.
 _ENDS = 10.0
-# Who reaches a scheduler can run any code: it listens where only this machine does, whatever Dask's default is.
+# A scheduler runs any code that is sent to it, so it listens on this machine only, whatever Dask's default is.
 _HERE = "127.0.0.1"
 
 
