@@ -1,4 +1,4 @@
-"""With whom a ball collides next, and when it meets a wall.
+"""The next collision of a ball with another one, and the time at which it meets a wall.
 
 A ball has one collision of its own, the soonest. One that its partner would have after another does not count: then
 the partner has another flight, or looks again. So of two balls at least one knows of their collision, or has another
@@ -26,7 +26,7 @@ _ANY = 6
 
 
 class NextCollision(NamedTuple):
-    """A collision of a ball: when [s since the epoch], and with whom."""
+    """A collision of a ball: its time [s since the epoch], and the other ball."""
 
     time: Any
     mate: Any
@@ -251,7 +251,7 @@ def look_ahead(box, flock, i, now):
 
 
 def tell_partner(flock, i):
-    """Let the partner of a ball know of their collision, if it is its soonest too: that ball, or nobody."""
+    """Give the collision of a ball to its partner too, if it is its soonest too. Return the partner or `NOBODY`."""
     mate, time = flock.tag[index(WHOLES * i + PARTNER)], flock.event[index(FLOATS * i + MEETS)]
     told = NOBODY
     if mate >= 0 and time < flock.event[index(FLOATS * mate + MEETS)]:
@@ -270,7 +270,7 @@ def forget_wall(box, flock, i):
 def _given_hit(box, flock, i, now):
     """The next `Hit` on a wall without a mass, if the cell is near one."""
     time, wall = math.inf, UNKNOWN
-    # Without walls there is none to be compiled.
+    # Without walls `next_hit` is not compiled.
     if len(box.walls.each) > 0 and box.grid.near[index(box.grid.number(i, flock))]:
         time, wall = next_hit(box, flock, i, now)
     return Hit(time, wall)

@@ -146,7 +146,7 @@ def _lifted(box, walls, wall, r, turned):
     most = max(_ENOUGH * norm(w), 0.5 * norm(pull) * box.shortest)
     # At least so fast that its own velocity has digits of it
     least, away = max(min(0.5 * held * box.shortest, most), _PARTS * norm(turned.v)), -dot(n, w)
-    # Who is absorbed stays as it is.
+    # An absorbed ball stays as it is.
     if away < least and turned.wait == 0.0:
         lift = least - away
         v, gained, work, speed2 = turned.v - lift * n, lift * (least + away), given(u, -lift * n), square(turned.v)

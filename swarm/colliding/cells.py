@@ -1,4 +1,4 @@
-"""Cells, each with the balls whose centres are in it: who meets whom before one of them leaves its cell.
+"""Cells, each with the balls whose centres are in it: which balls meet before one of them leaves its cell.
 
 No cell is shorter than the largest diameter, so that balls that touch are in the same cell or in neighbours. Each axis
 has one cell more at either end, which is empty, or stands for the one at the other end where the scene repeats. The
@@ -103,7 +103,7 @@ def take_out(grid, flock, i, cell):
 def cross(grid, flock, i):
     """Bring a ball into the cell that it enters now: (the axis, by how many periods it goes back, whether it has room).
 
-    Where there is none, nothing is done.
+    If the cell has no room, nothing is done.
     """
     face, old = flock.tag[index(WHOLES * i + FACE)], grid.number(i, flock)
     which, step = face >> 1, 2 * (face & 1) - 1

@@ -62,7 +62,7 @@ def flock_of(particles: Particles, grid: BallGrid, loses: bool, walled: bool) ->
 
 
 def with_room(flock: Flock, grid: BallGrid) -> tuple[Flock, BallGrid]:
-    """The balls in cells that have room for all, and for some more; who is gone is in none."""
+    """The balls in cells that have room for all, and for some more. Balls that left the scene are in no cell."""
     n, cells = flock.number(), 0
     there = np.flatnonzero(flock.event.reshape(n, FLOATS)[:, WALL] != OUT)
     whole = flock.tag.reshape(n, WHOLES)

@@ -75,7 +75,7 @@ def _book(flock, books, clock, pair, blow, now):
 
 @outlined
 def _vanish(box, flock, i):
-    """Take a ball out that is no more among the walls: it stays where it is, and meets nobody."""
+    """Take out a ball that has left the scene: it stays where it is, and meets no other ball."""
     take_out(box.grid, flock, i, box.grid.number(i, flock))
     for k in (MEETS, LEAVES, DUE):
         flock.event[index(FLOATS * i + k)] = math.inf
@@ -93,7 +93,7 @@ def _at_wall(box, flock, books, clock, i, now):
         if len(box.walls.each) == 0:
             _look_for_wall(box, flock, i, now)
             return FLIES
-    # Without walls there is none to be compiled.
+    # Without walls `_at_given_wall` is not compiled.
     if len(box.walls.each) == 0:
         return FLIES
     return _at_given_wall(box, flock, books, clock, i, now)
@@ -163,7 +163,7 @@ def next_epoch(flock, clock):
 def begin(box, flock, now, first, last):
     """Find what is next for the balls from `first` to before `last`, at the start, which is before time 0.
 
-    Before the first one nobody knows. Later, where a window begins, only the next wall of each.
+    At the start this is the next event of each ball. Later, where a window begins, it is only the next wall of each.
     """
     for i in range(first, last):
         if box.window is not None and now >= 0.0:

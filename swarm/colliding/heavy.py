@@ -1,4 +1,4 @@
-"""Walls with a mass among balls: who is near them, and when these meet them if nothing else strikes the walls before.
+"""Walls with a mass among balls: the balls near them, and when these meet them if nothing strikes the walls before.
 
 A ball that is far is looked at again after a time in which it surely meets none, whatever others do to the walls within
 their leases. What is known of one that is near holds until a wall is struck. All look again where a lease ends.
@@ -39,7 +39,10 @@ class Heavy(Record):
         return tuple(wall._replace(body=wall.body.grown(radius)) for wall in self.walls)
 
     def soon(self, now):
-        """The mean time from one strike to the next: who is nearer waits for it."""
+        """The mean time from one strike to the next.
+
+        A ball that may meet a wall sooner is looked at again after the next strike.
+        """
         return moment_of(self.clock, now) / (1.0 + self.counts[STRIKES])
 
 

@@ -26,7 +26,7 @@ def _wins(flock, item, other, key):
 
 
 def _pair(flock, item, key):
-    """The balls of an event, the smaller number first; of one ball alone the other is nobody."""
+    """The balls of an event, the smaller number first. In an event of one ball the second is `NOBODY`."""
     mate = flock.tag[index(WHOLES * item + PARTNER)]
     meets = (flock.event[index(FLOATS * item + MEETS)] == key) & (mate >= 0)
     return select(meets & (mate < item), mate, item), select(meets, select(mate < item, item, mate), NOBODY)

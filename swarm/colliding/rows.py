@@ -17,8 +17,9 @@ FLOATS, WHOLES = 8, 16
 _X, _V, TIME, RADIUS = 0, 3, 6, 7
 # Of what is next [s since the epoch]: a collision, the end of the cell, a wall; and which wall.
 MEETS, LEAVES, DUE, WALL = 0, 1, 2, 3
-# Whole numbers of what is next: with whom it collides, and how often that one's velocity had changed then; how often
-# its own has, and how often it has collided; its cell; by which face it leaves that.
+# Whole numbers of what is next: the ball that it collides with, and how often the velocity of that ball had changed
+# when this was found; how often its own has changed, and how often it has collided; its cell; the face by which it
+# leaves the cell.
 PARTNER, SEEN, STAMP, MET, CELL, FACE = 8, 9, 10, 11, 12, 15
 # Of no ball.
 NOBODY = -1

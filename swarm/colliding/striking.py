@@ -1,4 +1,4 @@
-"""The impact of a ball on a wall with a mass, and who looks again then."""
+"""The impact of a ball on a wall with a mass, after which the balls near such walls look for their next wall."""
 
 from ..kernel.arrays import index
 from ..kernel.gravity import potential
