@@ -43,8 +43,8 @@ def advance_block(method, walls, gravity, hard, share, lanes):
 
     `drawn` is how many draws that were; `lanes` are any. After `share.halt[0]` passes, which another thread may change
     at any time, it ends before the next: (INTERRUPTED, live lanes, drawn), and `lanes.left_behind` has what these held,
-    which the next call takes as `share.halted`. Particles that are done are left alone, and those that arrive become
-    it: where `hard` is None, the first hard contact ends it with HARD_CONTACT, to go on from there with what can do it.
+    which the next call takes as `share.halted`. Particles that are done are skipped; those that arrive are then done.
+    Without `hard` the first hard contact ends the call with HARD_CONTACT; a kernel that can do it goes on from there.
     LOG_FULL asks for a call with an empty log and the same lanes, which goes on.
     """
     lanes, state, picked = with_distances(lanes), share.state, picks(walls)
@@ -119,7 +119,7 @@ def _look(method, walls, state, lanes, live):
     for i in range(live):
         lane, p, status = lanes.lane(i), float(lanes.particle[i]), Status.DONE.value
         if method.laws.own is not None and math.isnan(lane.remaining):
-            # What it was asked is in the state.
+            # The arguments of the law are in the state.
             return Status.SENT_WRONG.value, i
         if method.holds and lane.hits > most_hits:
             status = Status.STALLED.value

@@ -20,7 +20,7 @@ from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, put, square, 
 NOT_CARRIED = -1
 # The volume that three unit normals span, below which they hold no point.
 _FLATTEST = 1e-6
-# Of a speed, what is none where no wall loses energy.
+# A relative speed below this fraction of the particle's own speed is zero if no wall loses energy.
 _NO_SPEED = 1e-13
 # Sweeps until a point is on three walls: one where they are flat.
 _SWEEPS = 20

@@ -126,7 +126,7 @@ def _send_off(method, walls, gravity, share, i):
     if not sent.happens:
         return False
     if laws.own is not None and math.isnan(sent.v.x):
-        # Who asks whether it goes on finds it.
+        # The test of whether the particle goes on finds this NaN.
         contacts.keep[i] = math.nan
         return True
     after = select(sent.keeps, before + sent.work, square(sent.v) + fall)

@@ -51,7 +51,7 @@ def count_in_lanes(one, c, gravity, lanes, live):
         for i in range(index(live)):
             _count_in_lane(one, c, gravity, lanes, i, rounds)
         return
-    # Two rounds take three times as long as to see who crosses it: of few, these are counted one by one.
+    # Two rounds take three times as long as a test for a crossing. If few lanes cross, these are counted one by one.
     for i in range(index(live)):
         lane, began = lanes.lane(i), Began(lanes.began, i)
         time = one.crossing(lanes.began[row_of_counter(c), i], gravity, began.r, lane.v).time

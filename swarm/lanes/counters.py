@@ -2,8 +2,9 @@
 
 Each particle has its side of each counter. A flight is looked at from that side, crosses where it leaves it, and is
 looked at from the other side from there on: so crossings out less those back are the change of the number outside,
-exactly. What ends a flight on a counter, within round-off, crosses it in the next one, or not at all if it is turned
-round there: a counter at the place of a wall counts nobody, and one at a face of a cell that repeats everyone once.
+exactly. A particle that ends a flight on a counter, within round-off, crosses it in the next flight, or not at all if
+it is turned round there. So a counter at the place of a wall counts no particle, and a counter at a face of a periodic
+cell counts each particle once.
 """
 
 from typing import Any

@@ -1,6 +1,6 @@
 """What walls have of the impacts and contacts that one thread has computed: counts, and sums that are as exact.
 
-Where a run has none there is None in its place, and nothing of it is compiled.
+A run without counts has None in their place, and compiles none of this code.
 """
 
 import math

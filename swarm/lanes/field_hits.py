@@ -1,7 +1,7 @@
 """The first hits of all lanes where walls are bodies of a field: each lane looks at the bodies of its cell.
 
-What the loops write is on the stack: of an array that comes from elsewhere the compiler cannot tell that it is none of
-the tables, whose rows are looked up, and vectorises nothing.
+The loops write to arrays on the stack. For any other array the compiler cannot prove that it does not overlap the
+tables, whose rows are looked up, and then it vectorises nothing.
 """
 
 from typing import Any

@@ -1,7 +1,7 @@
 """The body of a field that each lane has met: its numbers in rows of lanes, so that contacts with bodies vectorise.
 
-A contact writes into the lanes. Of numbers that it looks up in a table the compiler cannot tell that they are none of
-what it writes, and it vectorises nothing: 13 of the 29 ns of a pass. These rows are on the stack.
+A contact writes into the lanes. The compiler cannot prove that a table of numbers that it reads does not overlap the
+lanes, and vectorises nothing: 13 of the 29 ns of a pass. So these rows are on the stack.
 """
 
 from typing import Any

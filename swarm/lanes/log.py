@@ -1,6 +1,6 @@
 """The log of impacts: each one that a kernel counts is a row, in arrays that another thread writes to a file.
 
-Where a run has none there is None in its place, and nothing of it is compiled.
+A run without a log has None in its place, and compiles none of this code.
 """
 
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Particles that have left a cell that repeats, back into it; what they were on is told by where they are then."""
+"""Return particles to the periodic cell that they left; a check there shows whether their walls still hold them."""
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from ..surfaces.period import has_left, into, keeps_walls
 from .sliding import AGAIN
 from .table import marked_lanes
 
-# A wall that is farther away than this part of the cell is none that holds a particle.
+# A wall does not hold a particle that comes back into the cell if its distance changes by more than this fraction of
+# the cell.
 _ON_THE_WALL = 1e-12
 
 
@@ -33,7 +34,8 @@ def return_lanes(period, state, lanes, live):
 def _come_through(period, state, p, images, twice):
     """Count the images that a particle has come through, and change its energy to that in the cell.
 
-    Of a lane, part of whose changes the state is not told yet: `twice` its energy per mass, after this too.
+    `twice` is twice the energy per mass of a lane, some of whose changes are not in the state yet. Return its value
+    after this change.
     """
     state.image[0, p] += np.int64(images.x)
     state.image[1, p] += np.int64(images.y)

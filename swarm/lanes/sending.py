@@ -1,8 +1,8 @@
-"""The impacts on walls that send particles off by a law: a temperature's, or one's own.
+"""The impacts on walls that send particles off by a law: a temperature's, or a user-defined one.
 
 A loop without branches, which LLVM vectorises if the law has none, computes what becomes of each lane; another books
-it for those that are sent off. What the first reads of a particle, by its number, is put beside its lane before: of
-what it looks up in a table the compiler cannot tell that it is none of what it writes.
+it for those that are sent off. What the first reads of a particle, by its number, is put beside its lane before: the
+compiler cannot prove that a table in which the loop looks up numbers does not overlap what it writes.
 """
 
 import math
@@ -69,7 +69,7 @@ def _compute(method, walls, gravity, share, lanes, picked, i):
 
 
 def _book(method, walls, share, lanes, i):
-    """Send a lane off; whether a law has gone wrong."""
+    """Send a lane off; return whether a law failed."""
     state, laws = share.state, method.laws
     lane, sent, wall, p = lanes.lane(i), Sending(lanes.rows, i), lanes.wall[i], index(lanes.particle[i])
     if laws.own is not None and math.isnan(sent.v.x):
@@ -105,11 +105,11 @@ def _detain(share, lanes, i, p, wall):
 
 
 def _leave_wrong(state, lanes, i):
-    """Leave in the state what a law was asked that has gone wrong."""
+    """Leave the arguments of a law that failed in the state."""
     lane, p = lanes.lane(i), index(lanes.particle[i])
     put(state.position, 0, p, lane.r)
     put(state.velocity, 0, p, lane.v)
     state.impacts[p] += np.int64(lane.hits)
     state.contacts.remaining[p], state.contacts.met[p] = lane.remaining, lanes.wall[i]
-    # Who looks at all lanes finds it.
+    # The look at all lanes finds this NaN.
     lane.remaining, lanes.wall[i] = math.nan, -1.0

@@ -47,7 +47,7 @@ class Share(NamedTuple):
     """The part of a frame that one thread advances."""
 
     state: Any  # `state.State`
-    phase: Array  # (N,) int8, who flies, slides on one wall or on two, or has arrived
+    phase: Array  # (N,) int8, whether each flies, slides on one wall or on two, or has arrived
     pending: Array  # (PHASES,) int64, how many particles are left to other kernels, by their phase
     halted: Any  # `arrays.Halted`
     draws: Draws

@@ -19,7 +19,7 @@ _HALVINGS = 60
 # So many paces it stays at a time, and is asked again: a frame may have millions of them, and between them halts count.
 # (Rejected: a halt in any of them. What is carried in two parts is rounded twice.)
 _MOST_PACES = 128.0
-# Steps in the search for another wall that comes: where none is met after so many, it is too near to be told.
+# Steps in the search for another wall that comes. A wall that is not found after so many is too near to be resolved.
 _MOST_STEPS = 10_000
 
 

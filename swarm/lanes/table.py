@@ -16,8 +16,8 @@ LANES = 256
 STRIDE = 264
 # Bytes of a line of the cache, and of a number of eight flags.
 _LINE, EIGHT = 64, 8
-# After so many passes lanes are looked at: who has moved on since by less than this part of the time left would need
-# 1e9 passes, and is given up if it got nowhere.
+# After so many passes lanes are looked at. A particle that has moved on since by less than this part of the time left
+# would need 1e9 passes, and is given up if it got nowhere.
 LOOK, MOVED = 1024, 1e-6
 
 with_distances = spaced(STRIDE)

@@ -251,7 +251,7 @@ def _look(contacts, scene, c):
                             c[x, i] += b * r1[3 * q + x, i]
         for i in range(count):
             pace.out[i] = pace.out[i] | scene.outside(-1.0, column(c, 0, i))
-    # What a point carries is looked at one body after the other: a wall of thousands of bodies is none of theirs.
+    # Cavities that points carry are checked one by one. Each has one surface, never a wall of thousands of bodies.
     for k in range(touching.points + touching.guides, touching.plain.size):
         wall = float(touching.walls + k - touching.points)
         for i in range(count):

@@ -110,7 +110,7 @@ class BodyState(NamedTuple):
     position: Any  # (3, P, n)
     velocity: Any  # (3, P, n)
     remaining: Any  # (n,) of the frame [s]
-    guess: Any  # (3, L + G, n) multipliers of the last three steps, NaN where there is none since the last blow
+    guess: Any  # (3, L + G, n) multipliers of the last three steps, NaN until the first step after a blow
     path: Any  # (A, 13, n) of led points: start, velocity, cosine, sine, rate
     short: Any  # (n,) short steps between impacts, one after the other
     lasting: Any  # (n,) int8, whether a contact lasts
@@ -213,7 +213,7 @@ class HeldContacts(NamedTuple):
     name: Counts  # (B, C, 2) point and wall
     frame: Floats  # (B, C, 3, 3) normal and two tangents
     press: Floats  # (B, 3 C) force along each [N]
-    before: Floats  # (B, 3 C) and in the step before, NaN where there is none
+    before: Floats  # (B, 3 C) and in the step before, NaN if that step had other contacts
     impulse: Floats  # (B, C) of the step [N s]
     stages: Counts  # (B, C) in how many stages of the step it pushes
     lost: Floats  # (B,) to friction in the step [J]

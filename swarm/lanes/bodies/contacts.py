@@ -144,7 +144,7 @@ class BodyContacts(Constrained):
                 w = wall_at(walls, met, j, c)
                 if found < MOST_CONTACTS and walls.distance(float(w), c) >= -NEAR * self.rule.room:
                     n = walls.unit_normal(float(w), c)
-                    # What is left of an approach by round-off is none.
+                    # A velocity towards the wall at the level of round-off does not count as an approach.
                     if not approaching or dot(n, u) > 4.0 * np.finfo(np.float64).eps * norm(u):
                         name[found, 0], name[found, 1] = k, w
                         flat = Vec(1.0, 0.0, 0.0) if abs(n.x) < 0.6 else Vec(0.0, 1.0, 0.0)

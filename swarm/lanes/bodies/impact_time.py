@@ -8,8 +8,8 @@ from .contacts import NEAR, count_at, wall_at
 
 # The action of a lane after a trial.
 AGAIN, COMMIT, STRIKE, STRIKE_NOW, FAILED = 0, 1, 2, 3, 4
-# A bracket of the time of impact this narrow, as a part of a whole step, is a point; a step this short from a wall to
-# itself is none.
+# As fractions of a whole step: a bracket of the time of impact this narrow is a point, and a body that comes back to a
+# wall within a step this short does not leave the wall.
 _NARROW, _SHORTEST = 1e-13, 1e-4
 # A guess by the velocity that leaves less than this part of the gap is a good one.
 _CLOSER = 0.25
@@ -66,8 +66,8 @@ def look(bodies, i, larger):
     if pace.high[i] < math.inf and again:
         pace.inside[i] *= _weight(worst, pace.outside[i])
     pace.high[i], pace.outside[i] = tau, worst
-    # The first guess is by the velocity at the end. It is none where that has a part along the ties. Where it is a good
-    # one, twice as far is just inside.
+    # The first guess follows from the velocity at the end. It is useless if that has a component along the ties. If the
+    # last guess was good, a step back twice as long ends just inside.
     beyond = 2.0 * first - tau
     if low < first < tau and not again:
         pace.trial[i] = first

@@ -21,7 +21,7 @@ from .contacts import MOST_CONTACTS, NEAR, ROOM, BodyContacts, direction, put_di
 
 
 class Soft(NamedTuple):
-    """Walls that are springs, and what Uzawa's loop (8) of their multipliers is told."""
+    """The law of walls that are springs, and the parameters of Uzawa's loop (8) for their multipliers."""
 
     law: Any  # of contact/regularisation.py
     tolerance: float  # of the stored energy V [J], which ends the loop
