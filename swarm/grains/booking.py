@@ -1,4 +1,4 @@
-"""What the contacts of a step did: impulses on walls and their works, the virial, what was dissipated, who has met."""
+"""Sums over the contacts of a step: impulses on walls and their works, the virial, dissipated energy, and meetings."""
 
 from typing import NamedTuple
 

@@ -83,7 +83,7 @@ def pressed(matter, damping, gap, change):
 
 
 def damper(own, rows, c):
-    """The damping in a row, None where there is none."""
+    """The damping in a row, or None for a law without damping."""
     return None if own is None else rows[c, DAMPING]
 
 

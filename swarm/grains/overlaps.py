@@ -33,7 +33,7 @@ class Limits(Record):
 
     overlap: float  # [m]
     move: float  # [m]
-    longest: Any  # the longest move that jumps over no solid [m], None where there is none
+    longest: Any  # the longest move that jumps over no solid [m], or None in a scene without solids
 
 
 def _move(matter, grains, i):

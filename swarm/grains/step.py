@@ -1,7 +1,7 @@
 """Steps of soft balls, from frame to frame.
 
-A step gathers who may be in contact, solves for the impulses, and looks whether anybody else has come into contact by
-them. Its end follows from its impulses, each of which is there twice with opposite signs: momentum does not depend on
+A step gathers the contacts that may exist, solves for the impulses, and checks whether these have led to new contacts.
+Its end follows from its impulses, each of which is there twice with opposite signs: momentum does not depend on
 how well they are solved.
 """
 
@@ -75,7 +75,7 @@ def _fly(matter, grains):
 
 
 def _gather(matter, walls, world):
-    """Add who is in contact; how many are new."""
+    """Add the contacts; return how many are new."""
     grains, near, touches, _books = world
     new = gather_pairs(matter, grains, near, touches)
     for k, wall in enumerate(walls.each):
