@@ -201,7 +201,7 @@ def enter_free(cells: CellLists, points: Floats, numbers: NDArray[np.int64], don
 
 
 def overlaps_of(position: Floats, radius: Floats, period: tuple[float | None, ...] | None = None) -> Overlaps | None:
-    """The overlaps of balls at positions (3, N), with their images where these repeat; None where there are none."""
+    """The overlaps of balls at positions (3, N), with their images where these repeat, or None without overlaps."""
     low, high = position.min(axis=1), position.max(axis=1)
     cells, found = empty_cells(low, high, period, radius), np.zeros(4)
     _tier(_enter_all, position)(cells, position, order_of(radius), found)
