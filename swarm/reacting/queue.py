@@ -164,7 +164,10 @@ def _strike(scenery, walls, queue, i, now):
 
 
 def _soon(clock):
-    """The mean time from one strike of a wall that reacts to the next: who is nearer waits for it."""
+    """The mean time from one strike of a wall that reacts to the next.
+
+    A particle that may meet such a wall sooner is looked at again after the next strike.
+    """
     return (clock[BEFORE] + clock[NOW]) / (1.0 + clock[STRIKES])
 
 
