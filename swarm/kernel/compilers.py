@@ -144,6 +144,6 @@ def deep() -> Iterator[None]:
     finally:
         with _limits:
             _inside.pop()
-            # Who has set another limit meanwhile keeps it.
+            # A limit that other code has set meanwhile is kept.
             if not _inside and sys.getrecursionlimit() == raised:
                 sys.setrecursionlimit(before)

@@ -23,7 +23,7 @@ def held(path: Path) -> Iterator[None]:
         yield
     finally:
         if lock.is_locked:
-            # While it is locked: who has it open notices that its name is gone, and makes a new one.
+            # Removed while locked: a process that has the file open notices that its name is gone, and makes a new one.
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
             lock.release()

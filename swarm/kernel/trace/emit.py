@@ -41,7 +41,7 @@ class FunctionPart:
         return opened(self.arguments[-1].kind, self.arguments[-1])
 
     def give(self, result: Any) -> None:
-        """Its result: a constant of it stays one for who calls it."""
+        """Set the result of the function. A constant in it stays a constant for the caller."""
         self.result, self.numbers = result, [one for one in leaves(result) if isinstance(one, Value)]
         if not is_defined(result):
             raise TraceError("its result has values of several kinds")

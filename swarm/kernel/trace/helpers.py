@@ -175,7 +175,7 @@ def prepare(function: Any, options: Any, outlined: bool, body: Any = None, is_ke
     infer(Template)
     infer_global(function, types.Function(Template))
 
-    # By the helper and not by its function: who prepares a function again has another.
+    # The key is the helper, not its function: a function that is prepared again has another helper.
     @lower_builtin(helper, types.VarArg(types.Any))
     def _emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         part: Any = helper.known(sig.args)
