@@ -29,7 +29,8 @@ class CornerEnd(Record):
 def hold(form, law, multipliers, walls, step, reactions):
     """The end of one step against all walls.
 
-    `multipliers` has one entry a wall, or is None; `reactions` (walls, 4) becomes c D (alpha Phi_mean + lambda), Phi1.
+    `multipliers` has one entry for each wall; None: no multipliers. `reactions` (walls, 4) is set to
+    c D (alpha Phi_mean + lambda), Phi1.
     """
     reactions[:] = 0.0
     r = step.r
@@ -90,7 +91,7 @@ def add_reaction_impulses(reactions, h, impulse, lane):
 def add_reaction_works(moving, walls, factor, reactions, impulse, lane):
     """Add the work per mass of each wall, `factor` reaction.displacement, to its row of `impulse`; the sum.
 
-    The rows of work are behind those of impulses; where no wall moves there are none.
+    The rows of work follow the rows of impulses; without moving walls `impulse` has no rows of work.
     """
     found = 0.0
     if moving is None:

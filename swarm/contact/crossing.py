@@ -20,7 +20,7 @@ from .rooms import leaving
 _EPSILON = 2.220446049250313e-16
 # Of a speed, the part across a wall of what goes along it.
 _ALONG = 1e-9
-# Of a length, the part that is none.
+# Fraction of the size of a scene that counts as 0.
 _NEAR = 1e-13
 # Places of a step that are looked at for another wall.
 _PLACES = 16
@@ -53,7 +53,7 @@ def _leaves_all(rooms, ends, active, path, near):
         for (number, wall, _gentle), (_number, end, _) in zip(room, then, strict=True):
             met = (_may_meet(wall, end, path, near) & (not active.has(number))) | met
             enters, holds = _is_entrance(wall, path, near) | enters, active.has(number) | holds
-        # Who comes to the face of a room that does not hold it has not come in.
+        # A particle that comes to the face of a room that does not hold it has not entered the room.
         leaves = (met | (enters & (not holds))) & leaves
     return leaves
 

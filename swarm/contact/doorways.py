@@ -13,7 +13,7 @@ _PRESSED = 1e-9
 
 
 def closeness(walls):
-    """A distance from an opening that is none for a flight: round-off of where rooms meet, 0 where there are none."""
+    """A distance from an opening that counts as 0 for a flight: round-off of where rooms meet, 0 without unions."""
     return 2.0 * _depth(walls) if len(walls.unions) > 0 else 0.0
 
 

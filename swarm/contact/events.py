@@ -22,9 +22,10 @@ FLYING, HELD, EDGE, ARRIVED, EVENT, CAREFUL = range(PHASES)
 GRAZING = 5e-5
 # Of a speed, the impulse that is no impact: round-off of a particle at its wall.
 NO_IMPACT = 1e-12
-# Of a velocity, the part across the walls that is none: its square is round-off of the energy.
+# A speed across the walls up to this fraction of a particle's own speed counts as 0: its square is round-off of the
+# energy.
 _NO_HOP = 1e-7
-# Parts of an acceleration and of a time that are none.
+# Fractions of an acceleration and of a time that count as 0.
 _PRESSED, _INSTANT = 1e-12, 1e-9
 # Walls nearer to each other's tangent plane than this (as a sine) have no edge to slide along.
 _SHARPEST = 1e-7
@@ -65,7 +66,7 @@ def own_speed2(p):
 
 
 def weightless(rules, gravity, p):
-    """An acceleration that is none for this particle: round-off of gravity, and of the pull of walls that bend.
+    """An acceleration that counts as 0 for this particle: round-off of gravity, and of the pull of walls that bend.
 
     Not by the size: of a floor, or of a slot between two planes, that is where they are, and says nothing of the pull.
     """

@@ -62,7 +62,7 @@ class One(Holding):
 
     first: float
 
-    # There is none.
+    # No second wall holds it.
     second = -1.0
 
     def of_lane(self, first, second):

@@ -1,4 +1,7 @@
-"""The laws of walls: restitution, Coulomb's friction, thermal walls, one's own. What no wall has is None."""
+"""The laws of walls: restitution, Coulomb's friction, thermal walls, `laws` of surfaces.
+
+None stands for a law that no wall has.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -11,7 +14,7 @@ from ..kernel.vector import dot, square
 from ..surfaces.shapes.slab import AXES
 from ..surfaces.wall_law import leave_of, may_end, mirrored
 
-# The square of the part of speeds before and after that is none into the wall.
+# A squared speed into the wall counts as 0 up to this fraction of the squared speeds before and after the law.
 _ROUND_OFF = 1e-30
 # Of |v|^2, the change by a law that is round-off of it or of the normal.
 KEPT = 1e-12
@@ -24,7 +27,7 @@ class Laws(Record):
     friction: Any  # None, or mu of each wall
     thermal: Any  # None, or `Thermal` of each wall
     moving: Any  # None, or `Moves` where a wall moves
-    own: Any = None  # None, or `Owned` of each surface that has laws of one's own
+    own: Any = None  # None, or `Owned` of the surfaces that have `laws`
     across: Any = None  # None, or the axis across the plane in which all particles stay
 
     @property
@@ -59,7 +62,7 @@ class Laws(Record):
 
     @property
     def may_end(self):
-        """Whether a law of its own may absorb a particle, or let it wait."""
+        """Whether one of the `laws` of surfaces may absorb a particle, or let it wait."""
         return any(may_end(law) for one in self.own or () for some in one.each for law in some.laws)
 
     def in_plane(self, across):
@@ -198,7 +201,7 @@ def of_wall(given, wall, neutral=0.0):
 def owned_in(
     spans: Iterable[tuple[int, int]], pieces: Sequence[Any], owners: Sequence[int]
 ) -> tuple[Owned, ...] | None:
-    """`Owned` of every piece of a scene that has laws of one's own, None where there is none.
+    """`Owned` of all pieces of a scene that have `laws`, or None.
 
     `spans` are (number of a piece, how many walls in a row are of it), `owners` the surfaces that pieces are of.
     """

@@ -33,7 +33,7 @@ def _lets_out(openings, rules, walls, wall, r, near):
 
 @outlined
 def _is_covered(openings, rules, walls, wall, r, near):
-    """Whether a closed wall that faces the same way is at the same place: who slides on one slides on both."""
+    """Whether a closed wall that faces the same way is at the same place: a particle on one wall slides on both."""
     number = walls.numbers_near(r)
     touch, n = TOUCH * rules.size + near, walls.unit_normal(wall, r)
     for i in range(number.size):
@@ -60,7 +60,8 @@ def hit_wall(openings, rules, walls, motion, wall, near):
     for i in range(number.size):
         w = relative(wall_velocity(moving, walls, number[i], r), v)
         towards, distance = dot(walls.unit_normal(number[i], r), w), walls.distance(number[i], r)
-        # Reached within the distance `touch` along the way, not across it: at a corner who leaves, leaves.
+        # A wall is reached within the distance `touch` along the way, not across it: a particle that leaves at a corner
+        # does not hit the other wall.
         here = towards > 0.0 and distance <= touch and -distance * norm(w) <= touch * towards
         here = here and not has_ended(walls, number[i], r, near)
         if here and -distance < soonest * towards and not lets_through(openings, walls, number[i], r, near):
@@ -147,7 +148,7 @@ def part_until_open(openings, rules, walls, active, path, near):
 
 @outlined
 def _part_uncovered(openings, rules, walls, wall, path, near):
-    """`part_until_open` of one wall. Where its opening lets nobody out, the step is looked at until that ends."""
+    """`part_until_open` of one wall. If its opening does not let the particle out, the rest of the step is examined."""
     low = _part(openings, wall, path, near)
     if not low < math.inf or _lets_out_at(openings, rules, walls, wall, path, near, low):
         return low

@@ -1,4 +1,4 @@
-"""Walls that send particles off by a law: thermal ones, with a velocity of their temperature, and one's own."""
+"""Walls that send particles off by a law: thermal walls, with a velocity of their temperature, and `laws`."""
 
 import math
 
@@ -71,7 +71,7 @@ def send(laws, walls, wall, arriving, random):
     work = given(moving, after - before)
     sent, away = from_relative(moving, after), -dot(after, n)
     if laws.own is not None:
-        # Who is absorbed gives its normal momentum, and is as it was.
+        # A particle that is absorbed gives its normal momentum to the wall and keeps its velocity.
         stays = wait < math.inf
         sent = either(keeps & stays, _restored(sent, arriving.speed2 + work), sent)
         away = select(stays, away, 0.0)
@@ -90,7 +90,7 @@ class _Own(Record):
 def _by_law(laws, one, wall, at, arriving, random, acts):
     """`_Own` by the laws `one` of a wall, with the normal and the velocity `at` it; any where they do not act."""
     n, moving = at
-    # Numbers that are none would be ones with which a law of the user's does not end.
+    # Where the laws do not act they get valid numbers: with NaN, a law of the user might not end.
     n = either(acts, -1.0 * n, _NORMAL)
     u = ZERO if moving is None else moving
     v = either(acts, arriving.v, u - n)
@@ -99,7 +99,7 @@ def _by_law(laws, one, wall, at, arriving, random, acts):
     after = ended.v - u
     is_right = ended.is_right if laws.across is None else ended.is_right & (laws.across.part(after) == 0.0)
     if moving is not None:
-        # Who waits would have to be carried along.
+        # A particle that waits would have to be carried along by the wall.
         is_right = is_right & ((ended.wait == 0.0) | (not ended.stays))
     stays, wait = ended.stays, select(is_right & (not ended.wait < 0.0), ended.wait, 0.0)
     speed2 = square(before)

@@ -103,7 +103,7 @@ def _force_of_speed(friction, active, walls, gravity, r, slip):
     none = _grip(friction, active, active.presses(walls, r, u, pull))
     ahead = _grip(friction, active, active.presses(walls, r, u + step * direction, pull))
     back = _grip(friction, active, active.presses(walls, r, u - step * direction, pull))
-    # A force that is negative is none: the wall lets go.
+    # Where this force is negative, the wall lets go.
     k, slope = 0.5 * (ahead + back) - none, 0.5 * (ahead - back)
     return k / (step * step), slope / step, none
 
