@@ -138,7 +138,7 @@ def fastest(pull, v, t):
 
 
 def pulls(gravity):
-    """Gravity along each axis, None where there is none at all."""
+    """Gravity along each axis; three times None without gravity."""
     return (None, None, None) if gravity is None else (gravity.x, gravity.y, gravity.z)
 
 

@@ -218,7 +218,7 @@ class Smooth(AtRest):
     def near(self, gravity, r, v):
         """A polynomial of time that is nowhere below the level of a flight from here on, and touches it here.
 
-        A `Near` of approach.py; `gravity` is None where the flight is straight.
+        Returns a `Near` of approach.py. A straight flight has the `gravity` None.
         """
         raise NotImplementedError
 

@@ -1,4 +1,4 @@
-"""Counters: surfaces that stop nobody and count what crosses them, as users describe them."""
+"""Counters: surfaces that stop no particle and count crossings, as users describe them."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -10,7 +10,7 @@ from .surface import Surface
 
 @dataclass(frozen=True)
 class Counter:
-    """A surface that stops nobody and counts what crosses it; `counters` of `simulate` has them.
+    """A surface that stops no particle and counts crossings; an entry of the argument `counters` of `simulate`.
 
     Crossings have two senses: 0 is out of the admissible side of the surface (along the normal of a plane, out of a
     sphere), 1 is back. A surface by itself is a counter as well: this says where on it crossings count.

@@ -1,7 +1,8 @@
 """Doors: openings that are open, and walls that are there, between some times only.
 
-Kernels know no times. A run cuts its frames at the instants at which something opens, shuts, comes or goes, and from
-one instant to the next a number says of each such wall whether it is there, and of each such volume whether it is open.
+Kernels do not depend on these times. A run cuts its frames at the instants at which something opens, shuts, comes or
+goes. From one instant to the next a number says of each such wall whether it is there, and of each such volume whether
+it is open.
 """
 
 import bisect

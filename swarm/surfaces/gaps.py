@@ -32,7 +32,7 @@ class Beside(Record):
 
 
 class Gaps(Record):
-    """The gap along each axis, None where there is none; and whether there are walls without images, None for no."""
+    """The gap along each axis, or None; and whether there are walls without images, None for no."""
 
     x: Any
     y: Any
@@ -44,7 +44,7 @@ class Gaps(Record):
 
 
 def _time_in(gap, length, x, v, pull):
-    """The time that a coordinate stays in a gap; 0 where it is not in it, or there is none."""
+    """The time that a coordinate stays in a gap; 0 if it is outside the gap, or if the axis has no gap."""
     if gap is None:
         return 0.0
     if isinstance(gap, Gap):
@@ -136,5 +136,5 @@ def _across(length, v):
 
 
 def _passed(length):
-    """The distance from a face to the other; there is none where nothing repeats."""
+    """The distance from one face to the other; infinite along an axis that does not repeat."""
     return math.inf if length is None else length_of(length)

@@ -20,7 +20,8 @@ from .surface import Box, Surface
 Lengths = tuple[float | None, float | None, float | None]
 # What is closer to a face than this part of the period counts as reaching over it: a step may end a little beyond.
 _NEAR = 1e-3
-# Points at which it is looked whether a surface is the same all along an axis, and the part of a slope that is none.
+# The number of points at which the slope of a surface along an axis is evaluated, and the fraction of a slope that
+# counts as 0.
 _POINTS, _NO_SLOPE = 256, 1e-14
 # Of the period, the part by which a cavity may be outside of the cell: round-off.
 _ROUND_OFF = 1e-12
@@ -146,7 +147,7 @@ def _shifted(surface: Surface, shift: Sequence[float]) -> Surface:
 
 
 def is_same_along(surface: Surface, k: int, period: Lengths, least: float = _NO_SLOPE) -> bool:
-    """Whether a surface has no slope along an axis, at points all around; `least` is the part of it that is none."""
+    """Whether a surface has no slope along an axis, at points all around; the fraction `least` counts as 0."""
     reach = 2.0 * surface.extent() or 1.0
     cells = np.array([[-reach, reach] if length is None else [0.0, length] for length in period])
     points = cells[:, :1] + (cells[:, 1:] - cells[:, :1]) * np.random.default_rng(0).random((3, _POINTS))

@@ -16,7 +16,8 @@ from .walls import Walls
 _SLACK = 1e-13
 # Of it, how far inside what meets a wall is put where rooms touch.
 _INSET = 3.0
-# A distance that is none, of the extent, and how many of all places on a wall are on another one where both touch.
+# A place is on a wall up to this distance from it, relative to the extent. Two walls touch if so many of the places on
+# one are on the other.
 _TOUCHES, _SOME = 1e-12, 3
 # Places at which it is asked how steep a level is, and moves of each onto its wall.
 _PLACES, _MOVES = 64, 4

@@ -133,7 +133,7 @@ def lets_go(level, half, step, slack):
     A particle that slides lets go where the wall bends neither to it nor away, and flies on along it. A bound of the
     bend is above 0 there: the step ends where the particle may be back, after 1e-16 of what the bend takes, and the
     next one too, without end; the time does not change, or the places that these steps are rounded to drift through the
-    wall. By its last digits a place is not told from one on the wall: the step may end as deep outside as that.
+    wall. Round-off does not distinguish such a place from one on the wall: the step may end that deep outside.
     """
     return (half < 0.0) & (level >= -slack) & (-half * step <= slack)
 

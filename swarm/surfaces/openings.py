@@ -1,4 +1,4 @@
-"""Openings: volumes inside which a wall is not there. Who reaches the wall there has passed.
+"""Openings: volumes inside which a wall is not there. A particle that reaches the wall there has passed.
 
 A volume is where a particle would be admissible among the walls of the surface that gives it; of many bodies (`Spheres`
 and the like) it is the inside of each.

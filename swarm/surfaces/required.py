@@ -48,7 +48,7 @@ _ROUND_OFF = 1e-9
 def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[str], name: str | None = None) -> None:
     """Raise a `SceneError` where a surface does not give what the functions `asked` of its walls are made of.
 
-    `name` is that of the only surface, where it is none of a scene's.
+    `name` is the name of a single surface that is not in the list of a scene.
     """
     asked = tuple(asked)
     for i, surface in enumerate(surfaces):

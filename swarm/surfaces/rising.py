@@ -67,7 +67,7 @@ class InWallFrame(Record):
     v: Vec
     a: Vec
     speed: float  # a bound of |v| in the scene
-    arm: float  # its distance from the centre of the rotation; 0 where there is none
+    arm: float  # its distance from the centre of the rotation; 0 without a rotation
     weight: float  # |G|
     coordinates: float  # what the round-off of its place is relative to [m]
 

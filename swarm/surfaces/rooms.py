@@ -54,7 +54,7 @@ def held_by(walls, gaps):
     for gap in gaps:
         is_nearest = (gap == least) & (not nearest)
         nearest = is_nearest | nearest
-        # Where rooms touch, who is at the wall between two is in one.
+        # Where rooms touch, a particle at the wall between two rooms is in one of them only.
         most = walls.slack if walls.inset is None else -walls.slack
         held = (*held, (gap <= most) | is_nearest)
     return held

@@ -27,7 +27,7 @@ def quaternion(name: str, value: Any) -> Quaternion | None:
         value: None, four numbers (w, x, y, z) not all 0, or {"axis": three numbers not all 0, "angle": radians}.
 
     Raises:
-        SceneError: it is none of these, or of length 0.
+        SceneError: `value` has another form, or is of length 0.
 
     >>> quaternion("rotation", {"axis": (0, 0, 2), "angle": math.pi})
     (6.123233995736766e-17, 0.0, 0.0, 1.0)

@@ -223,7 +223,7 @@ def _may_be_one(face: Face, mate: Face, size: float) -> bool:
 
 
 def _is_at(apart: Any, size: float) -> Any:
-    """Whether so much between faces is none, or so little overlap that a flight would not go on."""
+    """Whether the distance between faces is round-off, or an overlap too small for a flight to go on."""
     return (apart <= _ROUNDINGS * size) & (apart >= -_OUTSIDE * size)
 
 
@@ -305,7 +305,7 @@ def _gaps(room: Room, points: Floats) -> Floats:
 
 
 def _gap(surface: Surface, points: Floats) -> Floats:
-    """`_distance` where it is a number, and far away where it is none."""
+    """`_distance`, with infinity in place of NaN."""
     found = _distance(surface, points)
     return np.asarray(np.where(np.isnan(found), np.inf, found))
 

@@ -37,8 +37,8 @@ class Surface:
         temperature: k_B T of a thermal wall [J], as in `fill`, 0 or more; None: the wall exchanges no heat.
         accommodation: in [0, 1], with which probability a particle leaves a thermal wall with a velocity of the wall's
             temperature (diffusely), instead of specularly.
-        laws: `WallLaw`s, such as `Lambert`, `Absorb`, `CercignaniLampis`, `Sticky` or one's own, which say with which
-            velocity a particle leaves, in their order.
+        laws: `WallLaw`s in their order, such as `Lambert`, `Absorb`, `CercignaniLampis`, `Sticky` or user-defined laws.
+            They give the velocity with which a particle leaves.
         motion: None, `Translation`, `Oscillation`, `Rotation`, `Path` or a sum of them, with what is given being where
             the wall is before it moves. Its laws act on the velocity relative to the wall.
         mass: of a wall that impacts move [kg], above 0; None: nothing does. It moves without turning: along its

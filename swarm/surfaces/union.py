@@ -77,7 +77,7 @@ class Joined(Surface):
 
     @cached_property
     def rooms(self) -> tuple[Room, ...]:
-        """The admissible side as a union of intersections of surfaces that are none of these, with their laws."""
+        """The admissible side as a union of rooms: intersections of surfaces without parts, with their laws."""
         return tuple(map(tuple, self._places_in_rooms))
 
     def places(self) -> tuple[Place, ...]:
@@ -186,7 +186,7 @@ class Joined(Surface):
     def bounds(self) -> Box:
         if self.is_solid():
             return UNBOUNDED
-        # The motion of the whole is none of its bounds.
+        # The bounds do not include the motion of the whole.
         still = [[replace(one, motion=None) if self.motion is not None else one for one in room] for room in self.rooms]
         boxes = [room_bounds(lasting(room)) for room in still]
         low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
@@ -229,7 +229,7 @@ class Joined(Surface):
 
 @dataclass(frozen=True, repr=False)
 class Union(Joined):
-    """A vessel of several parts, which may overlap: who is in one of them is in the vessel.
+    """A vessel of several parts, which may overlap: a particle in one of them is in the vessel.
 
     A wall is there where it is in no other part. Parts that have a flat or a round face in common, to 4 roundings of
     the size, are one room, and parts that do not touch separate ones. An `Opening` in a common face is a door: the rest

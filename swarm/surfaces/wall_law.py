@@ -12,7 +12,8 @@ from ..kernel.random import Stream
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot
 
-# Impacts with which a law is tried before a run, and the speed into the wall that is none, as a part of that of these.
+# The number of impacts with which a law is tried before a run, and the speed into the wall that counts as 0, relative
+# to the speeds of an impact.
 _TRIED, _ROUND_OFF = 64, 1e-15
 # Where it is booked what a law takes or gives.
 BOOKS = ("heat", "dissipated")
@@ -50,10 +51,11 @@ class WallLaw(Record):
 
     Derive a record from it, whose fields are numbers, and give it as `laws=[...]` of a surface. Kernels call `leave`:
     numbers in, numbers out, no lists and no arrays; without branches (`swarm.kernel.jit.select` in their place) it
-    costs least. Laws take the place of the elastic reflection at every impact, on a thermal wall of the particles that
-    this does not accommodate. Of several each is told of what a mirror would make come from what the one before sends
-    off. A particle that it leaves so slowly that it is back at once (`shortest_flight` of `Impact`) slides or rests, by
-    the restitution and the friction of the surface, and meets no law of this wall meanwhile.
+    costs least. Laws take the place of the elastic reflection at every impact; on a thermal wall, at impacts of the
+    particles that the wall does not accommodate. Several laws act in their order: each law gets the velocity that a
+    mirror would turn into the velocity after the law before. A particle that leaves so slowly that it is back at once
+    (`shortest_flight` of `Impact`) slides or rests, by the restitution and the friction of the surface, and meets no
+    law of this wall meanwhile.
 
     What a law changes of the energy is heat that the wall gives, in the observable "wall_heat"; with `book =
     "dissipated"` in the class it is lost, in "dissipated_energy". A square of a speed,

@@ -18,7 +18,8 @@ from .. import contract
 from ..approach import place
 from ..course import rise_time, under_way
 
-# The last step is shorter than this part of the radius, whose square is none, or than round-off of a place.
+# The last step is shorter than this fraction of the radius plus round-off of a place. The square of the fraction is
+# below round-off.
 _CLOSE, _ROUND_OFF = 1e-8, 4.0 * 2.220446049250313e-16
 # Part of a distance over which the normal is differenced: the cube root of the round-off.
 _SPACING = 6e-6

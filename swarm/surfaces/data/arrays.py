@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 # The highest compression of any HDF5 filter: deflate, 1032 to 1.
 _DENSEST = 1032
 _MAGIC = b"\x93NUMPY"
-# What NumPy and h5py raise where a file is damaged, or is none of theirs.
+# Errors that NumPy and h5py raise for a file that is damaged or of another format.
 _DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, ArithmeticError, MemoryError, EOFError)
 
 
@@ -40,7 +40,7 @@ def _of_npy(path: Path) -> Floats:
         begin = file.read(12)
     if not begin.startswith(_MAGIC):
         raise SceneError(f"{path} must hold one array, as np.save writes it, got another kind of file")
-    # NumPy allocates the header that it is told of.
+    # NumPy allocates a header of the length that the file states.
     if int.from_bytes(begin[8 : 10 if begin[6:7] == b"\x01" else 12], "little") > size:
         raise SceneError(f"{path} must be whole, got a header that is longer than the file")
     try:

@@ -1,4 +1,4 @@
-"""What files of triangles do wrong, mended: corners that are not joined, triangles that are none, or turned over.
+"""Repairs of files of triangles: unjoined corners, degenerate triangles, and triangles that are turned over.
 
 Readers that join corners within a fixed distance make a small body a point, and those that join none leave seams open:
 here equal corners are one, and then only corners of edges that are still open are joined, within a distance that grows
@@ -96,7 +96,7 @@ def without_flat(soup: Soup) -> Soup:
 
 
 def _split(soup: Soup, beside: float) -> Soup | None:
-    """Triangles split at corners that are on their open edges, one edge of each; None: there are none."""
+    """Triangles split at corners on their open edges, along one edge of each; None if no triangle is split."""
     from scipy.spatial import KDTree
 
     edges, counts = edges_of(soup.triangles)

@@ -137,7 +137,7 @@ def _obj(text: str) -> tuple[Floats, Indices, Indices, list[str]]:
 
 
 def _number_of(name: str, names: list[str]) -> int:
-    """The number of a group by its name, which is a new one where there is none yet."""
+    """The number of a group by its name; a name that is not yet in `names` is appended."""
     if name not in names:
         names.append(name)
     return names.index(name)
@@ -183,7 +183,7 @@ def _by_library(path: Path) -> tuple[Floats, Indices, Indices, list[str]]:
 
 
 def _values_of(mesh: Any, count: int) -> Any:
-    """The property `group` of the faces of a PLY file, None where there is none."""
+    """The property `group` of the faces of a PLY file, or None."""
     data = mesh.metadata.get("_ply_raw", {}).get("face", {}).get("data")
     names = () if data is None or getattr(data, "dtype", None) is None else data.dtype.names or ()
     if isinstance(data, dict):

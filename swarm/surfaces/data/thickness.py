@@ -7,10 +7,10 @@ axis), a flat wall is whole from t = 0.683 h on. Walls and gaps that alternate, 
 2 t, which samples resolve for t > h. RESOLVED leaves a quarter of that for walls that are bent.
 
 Not every thin place is a wall that leaks. Towards the edge of a wedge the thickness is 0, and an engraved letter is
-thinner than samples need to be: what is lost there becomes round, as all edges do. So of the surface around a thin
-place that part counts that joins its two sides. Where it is a disc, folded about an edge that is near, the surface
-without the fold is still one piece. Where there is none the wall goes on, and where it is no disc (a wire, a narrow
-bore, a grain), samples would cut something or close it.
+thinner than samples need to be: what is lost there becomes round, as all edges do. So what counts is the part of the
+surface around a thin place that joins its two sides. If this part is a disc, folded about a near edge, the surface
+without the fold is still one piece. If no part joins the two sides, the wall goes on. If the part is no disc (a wire, a
+narrow bore, a grain), samples would cut something or close it.
 """
 
 from pathlib import Path
@@ -33,14 +33,14 @@ _DENSITY = 4.0
 # The two sides of a wall are turned from each other by less: of a wedge that is as blunt as this, less than two
 # spacings are thinner than RESOLVED.
 _FACING = np.cos(np.radians(45.0))
-# Sides that are turned by less than this do not meet in an edge, as far as anybody can tell.
+# Sides that are turned by less than this do not meet in an edge, as far as a mesh shows.
 _WEDGE = np.sin(np.radians(5.0))
 # A fold that ends within this many spacings becomes round.
 _ROUND = 2.0
 # Of the way to the edge of a wedge, how far around its middle the surface is looked at.
 _AROUND = 0.6
-# Balls to look at, of the radius that should do: where a ball comes through the three edges of a corner but leaves out
-# the corner, there is a hole, and in another one there is none.
+# Radii of the balls that are examined, relative to the radius that should do. If a ball crosses the three edges of a
+# corner but leaves out the corner, the part of the surface in it has a hole, which is absent for another radius.
 _BALLS = (1.0, 1.5)
 # Of a distance, more than round-off.
 _CLOSE = 1e-6

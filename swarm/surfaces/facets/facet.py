@@ -85,7 +85,7 @@ class FacetNumbers(Flat):
 
     def _taken(self, may_hit, time, pull, r, v):
         """The time at which its plane is met from inside, if that is at the facet."""
-        # Where it never is, at the start, so that no place is none.
+        # If the plane is never met, the place is that of the start: every place is then a finite number.
         t = select(time < math.inf, time, 0.0)
         place = r + displacement(pull, v, t)
         here = may_hit & (self.within(place) >= 0.0)

@@ -16,7 +16,8 @@ from .room import FULL, KIND, room_of
 
 # So many cells and blocks of cells are crossed before a flight is said to be free so far.
 _MOST = 4000
-# The sine of an angle between facets that are on one plane, and a distance from a plane that is none, by the round-off.
+# Facets are on one plane up to this sine of the angle between them. A place is on a plane up to this distance from it,
+# in units of round-off.
 _PARALLEL, _ON = 1e-9, 1.0
 
 

@@ -111,7 +111,7 @@ class Derived(NamedTuple):
         return bool((cells.centred(self.phi, self.gradient).low > 0.0).all())
 
     def check(self, form: Form, needs_box: bool) -> None:
-        """Raise if phi may have a corner or a pole where particles go, or the box is needed and there is none."""
+        """Raise if phi may have a corner or a pole where particles go, or if a box is needed and `form` has no box."""
         if needs_box and form.box is None and self._varies():
             raise SceneError(
                 "bounds must be given: none were found that hold all of phi <= 0; or give curvature, a number that the "

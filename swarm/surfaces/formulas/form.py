@@ -26,7 +26,8 @@ _NOISE = 1e-6
 _MARGIN = 0.25
 # Points of a check that are moved onto the surface, and the moves.
 _ONTO, _MOVES = 256, 60
-# A gradient this small, relative to |phi|/size in the bounds, is none; one this far from differences of phi is wrong.
+# A gradient up to this length, relative to |phi|/size in the bounds, counts as 0. A gradient that differs from
+# differences of phi by more than this is wrong.
 _FLAT, _WRONG = 1e-8, 1e-4
 
 _STRAIGHT = Bend.of_magnitude(0.0)
@@ -183,7 +184,7 @@ class Form:
             return np.array(np.broadcast_arrays(*parts, points[0])[:3])
 
     def points(self, n: int) -> Floats:
-        """Random points of the box, or about the center where there is none."""
+        """Random points of the box, or around the center if the form has no box."""
         box = np.array(((-self.reach(),) * 3, (self.reach(),) * 3)) if self.box is None else self.corners
         low, high = box[:, :, None]
         return np.asarray(low + (high - low) * np.random.default_rng(0).random((3, n)))

@@ -64,7 +64,7 @@ class Interval:
         return _wider(low, np.maximum(a, b), _ULPS)
 
     def above_zero(self, function: Callable[[Floats], Any]) -> "Interval":
-        """A monotonic function of numbers from 0 on; nothing is known where there are none."""
+        """A monotonic function that is defined from 0 on; the bounds are infinite where all numbers are below 0."""
         found = Interval(np.maximum(self.low, 0.0), np.maximum(self.high, 0.0)).monotonic(function)
         known = self.high >= 0.0
         return Interval(np.where(known, found.low, -np.inf), np.where(known, found.high, np.inf))
@@ -193,9 +193,9 @@ def check_smooth(
 ) -> None:
     """Raise unless every piece is surely smooth wherever side * phi may be 0 or below in a box.
 
-    Cells that may hold a corner or a pole are halved until there are none or too many. What counts is each root, power,
-    quotient, log and tan as it was read. The argument of a piece has been simplified, which changes no value of it
-    where the pieces within it, checked in the same cells, are smooth.
+    Cells that may hold a corner or a pole are halved until no such cell is left, or too many are. What counts is each
+    root, power, quotient, log and tan as it was read. The argument of a piece has been simplified, which changes no
+    value of it where the pieces within it, checked in the same cells, are smooth.
 
     Args:
         pieces: inner ones first.

@@ -1,4 +1,4 @@
-"""A surface by functions as kernels take it: its flights by safe steps. Its subclasses know phi and gradient."""
+"""A surface by functions as kernels take it: its flights by safe steps. Its subclasses give phi and gradient."""
 
 import math
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Laws of walls: each is a `WallLaw` as one's own is."""
+"""Laws of walls: each is a `WallLaw`, as a user-defined law is."""
 
 from typing import Any
 

@@ -13,13 +13,13 @@ class Absorb(WallLaw):
 
     Args:
         probability: in [0, 1]: so many particles that reach the wall are absorbed.
-        barrier: energy E [J], 0 or more, in place of a probability: who comes with more than it in the motion along
-            the normal, m (n.(v - u))^2/2 > E, is absorbed, as a neutron is above the optical potential of a wall.
+        barrier: energy E [J], 0 or more, in place of a probability. A particle is absorbed if the energy of its motion
+            along the normal is larger, m (n.(v - u))^2/2 > E, as a neutron is above the optical potential of a wall.
         loss: in [0, 1], with a barrier: so many of the others are absorbed too.
 
-    Who is not absorbed leaves as from a mirror, or by the next law: `laws=[Absorb(0.01), Lambert()]`. One who is ends
-    where it is: `Result.absorbed_time`, the observable "absorbed" (frames, surfaces) and a row in the log of impacts;
-    the wall gets its normal momentum, and its energy stays in the sums of all particles.
+    A particle that is not absorbed leaves as from a mirror, or by the next law: `laws=[Absorb(0.01), Lambert()]`. A
+    particle that is absorbed ends where it is: `Result.absorbed_time`, the observable "absorbed" (frames, surfaces) and
+    a row in the log of impacts. The wall gets its normal momentum; its energy stays in the sums of all particles.
 
     Raises:
         SceneError: by the surface: a number out of its range, or neither or both of a probability and a barrier.

@@ -49,7 +49,7 @@ def require_apart(name: str, sides: Edges, nothing: float) -> None:
 
 
 def _common(a: Edges, b: Edges) -> list[Floats]:
-    """The two points that each pair of lines or circles has in common, NaN where there is none."""
+    """The two points that each pair of lines or circles has in common, NaN for a pair that has no such points."""
     with np.errstate(all="ignore"):
         ka, kb = a.curvature, b.curvature
         # A line through both points: kb La - ka Lb has no square; of two lines it is one of them.

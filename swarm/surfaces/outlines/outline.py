@@ -34,7 +34,7 @@ class Outline:
     """A closed outline, from the rows of its vertices.
 
     Raises:
-        SceneError: fewer than two sides, a vertex that is none, two that are one, sides that cross, or no area.
+        SceneError: fewer than two sides, an invalid vertex, two vertices at one point, sides that cross, or no area.
     """
 
     def __init__(self, name: str, rows: Any) -> None:
@@ -110,7 +110,7 @@ class Outline:
 
     @cached_property
     def thickness(self) -> Floats:
-        """Of every side a distance within which there is none but those next to it [m]."""
+        """For every side, a distance within which the only other sides are those next to it [m]."""
         s, n = self.sides, len(self)
         found, bent = np.full(n, self.extent), np.flatnonzero(s.curvature)
         points, owner = [s.start, s.end], [np.arange(n)] * 2

@@ -24,7 +24,7 @@ from .sides import FewSides, Side, Sides
 
 # At so few sides each lane looks on a straight flight; under gravity so few are in one cell of a grid.
 _FEW, _IN_ONE_CELL = 24, 8
-# Of a coordinate, round-off of a place on a wall; of a matrix, what is none of an axis.
+# Round-off of a place on a wall, relative to a coordinate; and entries of a matrix up to this size count as 0.
 _SLACK, _ALIGNED = 256.0 * 2.220446049250313e-16, 1e-15
 # The axes x, y, z of the scene along which the plane's axes to the right, upwards and the axis across it are.
 _ALONG = {(1.0, 0.0, 0.0): (1, 2, 0), (0.0, 1.0, 0.0): (2, 0, 1), (0.0, 0.0, 1.0): (0, 1, 2)}
@@ -87,7 +87,7 @@ class Outlined(Many):
 
     @property
     def across(self) -> int | None:
-        """The axis of the scene across its plane, None where that is none of them."""
+        """The axis of the scene across its plane, or None if the plane is across no axis of the scene."""
         column = self.frame[:, 2]
         return int(np.argmax(np.abs(column))) if np.count_nonzero(column) == 1 else None
 

@@ -98,7 +98,7 @@ class Side(Unturned):
         return 2.0 * level / (1.0 + steep), gradient * (1.0 / select(steep > 0.0, steep, 1.0))
 
     def beside(self, r):
-        """(Signed distance outside, distance, whether the nearest point is none of its ends) of a point from the side.
+        """(Signed distance outside, distance, whether the nearest point is not an end) of a point from the side.
 
         At its ends corners say on which side of the outline the point is.
         """

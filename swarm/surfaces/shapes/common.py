@@ -8,7 +8,7 @@ from ...kernel.jit import select
 from .. import contract
 
 _TINY = float(np.finfo(np.float64).tiny)
-# The least root of an inner function that is told from 0: the cube of its inverse is a number.
+# Smaller roots of an inner function are replaced by this number: the cube of its inverse is finite.
 _MIDDLE = 1e-100
 # From farther than the root of this many times the radius a flight first goes so much nearer.
 _AFAR = 1024.0

@@ -63,7 +63,7 @@ class Plane(Surface):
 
 
 class Flat(ExactChord):
-    """What is on a plane, with the fields of `PlaneNumbers`: the methods that know no bounds."""
+    """A plane or a part of it, with the fields of `PlaneNumbers`: the methods that do not depend on where it ends."""
 
     if TYPE_CHECKING:
         normal: Any
