@@ -102,7 +102,7 @@ def prefixed(size: float, unit: str) -> tuple[float, str]:
 def _of_prefixes(size: float, unit: str, factor: float) -> tuple[float, str]:
     size = float(f"{size:.4g}")
     power = 0 if _LEAST_WHOLE <= size < 1e3 else 3 * math.floor(math.log10(size) / 3.0 + 1e-12)
-    # Nobody reads minutes in kiloseconds, nor zeptojoules.
+    # Seconds take no prefix above 1, masses from 1 kg on are in kg, and prefixes outside of `_PREFIXES` are not used.
     if power not in _PREFIXES or (power > 0 and unit == "s") or (unit == "g" and power > 0):
         return (1e-3 * factor, "kg") if unit == "g" else (1.0, unit)
     return factor * 10.0**-power, f"{_PREFIXES[power]}{unit}"

@@ -53,7 +53,7 @@ class SavedRun:
         kept: what the log of impacts keeps, as text, or ""; rows: how many it has.
         sums: checksums of those of the frame that is being computed, by column, as text; "" of older versions.
         member_impacts: whether the impacts on each member are counted.
-        observables: the names of those of one's own, in order.
+        observables: the names of the user-defined observables, in order.
         counters: as text, or "".
         first: of a shard the number of its first particle, or body, in the whole run.
     """

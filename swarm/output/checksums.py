@@ -3,11 +3,11 @@
 HDF5 has checksums of its metadata (objects, attributes of a fixed length, indexes of chunks), not of values. Its filter
 Fletcher-32 would cover a chunk as a whole: one of ten frames is written again as each of them comes, and a kill in the
 middle of that would lose the frames before it, which other processes could not read meanwhile either. So each row of a
-dataset, in blocks of 250 particles, has a CRC-32 in the file: parameters/checksums/rows, (frames, columns) uint32, 0 of
-what is not known. parameters/checksums/columns says of which dataset the columns are, a line of its name, how many
+dataset, in blocks of 250 particles, has a CRC-32 in the file: parameters/checksums/rows, (frames, columns) uint32, 0 if
+it is not known. parameters/checksums/columns says of which dataset the columns are, a line of its name, how many
 there are, and the entries of each (0: the row). parameters/checksums/constants has a line of the name and the checksum
 of each dataset that is written once, and of each attribute that is a text, GROUP@NAME. Both are texts of a fixed
-length. Files of older versions have none of them.
+length. Files of older versions have no checksums.
 """
 
 import zlib
@@ -66,16 +66,16 @@ def row_sums(entries: Any, block: int = 0) -> Sums:
 
 
 class RowSums:
-    """The checksums of a file that is written, or None of a file that has none."""
+    """The checksums of the rows of a file that is written."""
 
     def __init__(self, file: Any, blocks: dict[str, tuple[int, int]]) -> None:
         self._data, self._new, self._blocks = file[_ROWS], dict[str, Sums](), blocks
 
     @classmethod
     def create(cls, file: Any, growing: dict[str, tuple[int, int]], other: Sequence[str] = ()) -> "RowSums":
-        """Make room for those of these datasets, entries a row and of a block, and add those of what is constant.
+        """Make room for the checksums of growing datasets, and add those of constant ones.
 
-        `other` datasets have none.
+        `growing` has the entries of a row and of a block of each. The `other` datasets get no checksums.
         """
         blocks = {
             name: (max(1, -(-entries // block)) if block else 1, block) for name, (entries, block) in growing.items()
@@ -88,12 +88,12 @@ class RowSums:
         )
         sums = {name: checksum_of(_value(file[name])) for name in constants(file) if name not in other}
         file[_CONSTANTS] = np.bytes_(_told(sums | _attributes(file)))
-        # Of a disk that is full nothing is read back.
+        # From a full disk nothing can be read back.
         return cls(file, blocks)
 
     @classmethod
     def of(cls, file: Any) -> "RowSums | None":
-        """Those of a file that is there."""
+        """The checksums of the rows of an existing file; None if the file has no checksums."""
         if _ROWS not in file:
             return None
         return cls(file, {name: (count, block) for name, count, block in _columns(file)})
@@ -106,18 +106,18 @@ class RowSums:
         return there > 0
 
     def add(self, name: str, entries: Any) -> None:
-        """Those of the next rows of a dataset."""
+        """Add the checksums of the next rows of a dataset."""
         if name in self._blocks:
             self._new[name] = row_sums(entries, self._blocks[name][1])
 
     def take(self, sums: dict[str, list[int]]) -> None:
-        """Add those of rows by the names of their datasets."""
+        """Add the checksums of rows by the names of their datasets."""
         self._new |= {name: np.array(each, np.uint32)[:, None] for name, each in sums.items()}
 
     def write(self, first: int) -> None:
         """Write what was added, from row `first` on."""
         rows = len(next(iter(self._new.values())))
-        # Who has taken a dataset out of the file has no rows of it.
+        # A dataset that was removed from the file has no new rows; its checksums are 0, which means unknown.
         nothing = {name: np.zeros((rows, count), np.uint32) for name, (count, _block) in self._blocks.items()}
         put(self._data, first, np.hstack(list((nothing | self._new).values())))
         self._new.clear()

@@ -29,7 +29,7 @@ _TABLE = np.array(
     ],
     dtype=np.float64,
 )  # fmt: skip
-# Okabe and Ito's, told apart by every kind of eye; also in look.mplstyle.
+# The palette of Okabe and Ito, distinct with every kind of colour vision; also in look.mplstyle.
 BLUE, RED, GREEN, PINK, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 CURVES = (BLUE, RED, GREEN, PINK, ORANGE, SKY)
 # The sum of all where the background is not known: it is seen on a light one and on a dark one.
@@ -58,7 +58,7 @@ class Scale:
     high: float
 
     def colours(self, values: Floats) -> Colours:
-        """0xRRGGBBAA of each value; of NaN, of who is not there, nothing is to be seen."""
+        """The colours of values as 0xRRGGBBAA; transparent for NaN, which marks absent particles."""
         steps = (values - self.low) * (_STEPS / (self.high - self.low))
         nobody = np.isnan(steps)
         if nobody.any():

@@ -22,7 +22,7 @@ class Content:
         count: number of particles, or of points of bodies, that were run.
         seen: the observables, one entry a frame.
         frames: the particles at the "start" and at the "end", as far as they are known.
-        gone: who of them has escaped or was absorbed by then.
+        gone: of each frame a mask of the particles that had escaped or been absorbed by then.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Content:
     gone: dict[str, Gone] = field(default_factory=dict)
 
     def inside(self, name: str) -> Particles:
-        """The particles of a frame, with those that have gone at NaN."""
+        """The particles of a frame; those that left the scene have positions of NaN."""
         return without(self.frames[name], self.gone.get(name))
 
 

@@ -42,7 +42,7 @@ class SmoothSurface(NamedTuple):
     gradient: Callable[[Floats], Floats]
 
     def normals(self, points: Floats) -> Floats:
-        """The unit gradient, 0 where there is none."""
+        """The unit gradient; 0 where the gradient is 0 or NaN."""
         with np.errstate(all="ignore"):
             slope = np.nan_to_num(self.gradient(points))
             return np.asarray(slope / np.maximum(np.sqrt((slope**2).sum(axis=1, keepdims=True)), 1e-300))

@@ -36,7 +36,7 @@ class Exported:
         numbers, times: of the frames, times in [s].
         ids: (n,) numbers of the particles; mass: (n,) [kg]; radius: (n,) of balls [m], else None.
         bonds: (B, 2) rows that are tied, of bodies.
-        periods: the lengths of the cell that repeats, 0 where none does.
+        periods: the lengths of the cell, 0 along directions in which it does not repeat.
     """
 
     def __init__(self, trajectory: Any, frames: slice | int | None, particles: int, progress: Progress | None) -> None:
@@ -76,7 +76,7 @@ class Exported:
     def moments(self) -> Iterator[ExportedFrame]:
         """The frames one after the other, each of which is written when the next is asked for.
 
-        Those that come later in a run with sources are left out.
+        Particles that are not yet born in a run with sources are left out.
         """
         for done, (number, time) in enumerate(zip(self.numbers, self.times.tolist(), strict=True)):
             held = {name: column[self._rows] for name, column in self.trajectory.columns(number).items()}

@@ -67,7 +67,7 @@ def of_checksums(stored: Any) -> dict[str, str]:
 
 
 def of_counters(counters: Any, crossings: Any = None) -> dict[str, str]:
-    """The counters of a run, and how many rows of a log each has; nothing where there are none."""
+    """The counters of a run, with the numbers of their crossings in a log; empty for a run without counters."""
     told = [call(one.surface if one.inside is None else one) for one in counters]
     if crossings is not None:
         told = [f"{one}: {out} out, {back} back" for one, (out, back) in zip(told, crossings.tolist(), strict=True)]

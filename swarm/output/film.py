@@ -150,10 +150,10 @@ class _Film:
             self._noun = "body" if drawn.noun == "bodies" else self._noun.removesuffix("s")
         self._changes = self._scene.moves() or self._scene.has_doors()
         self._shapes = shapes_of(self._scene, self._around)
-        # Of those that come during the run nobody may be there at the start.
+        # The first frame of a run with sources may hold no particle: the scale is then made from the last one.
         shown = last if np.isnan(start.position[0]).any() else start
         self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, shown)
-        # With half a pixel round-off takes none away.
+        # Half a pixel is added so that round-off does not take a whole one away.
         dpi = _DPI * min(1.0, min(pixels) / _ROOM)
         self.picture = style.picture((pixels[0] + 0.5) / dpi, (pixels[1] + 0.5) / dpi)
         self.picture.set_dpi(dpi)

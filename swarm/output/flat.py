@@ -113,7 +113,7 @@ def _apart(one: Floats, other: Floats) -> float:
 
 
 def _chained(others: list[Floats], same: float) -> list[Floats]:
-    """Lines with those whose ends are theirs as one."""
+    """Lines joined into chains where their ends are at most `same` apart [m]."""
     found = []
     while others:
         chain = others.pop()

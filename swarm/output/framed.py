@@ -7,7 +7,7 @@ from ..state import Floats
 from .eye import Eye, eye_for
 from .shape import Shape
 
-# Who is farther than this many times the distance that 95 % of all are within does not widen an open picture.
+# An open picture leaves out points beyond `_FAR` times the distance within which the part `_MOSTLY` of them lies.
 _FAR, _MOSTLY = 3.0, 0.95
 # Of more points than this some are looked at.
 _ENOUGH = 100_000
@@ -50,7 +50,7 @@ def most_of(positions: Floats) -> Floats:
 
 
 def _are_near(points: Floats) -> NDArray[np.bool_]:
-    """Who is not far away from most."""
+    """A mask (N,) of the points that are near to most of the others."""
     if not len(points):
         return np.empty(0, bool)
     far = np.sqrt(((points - np.median(points, axis=0)) ** 2).sum(axis=1))

@@ -35,7 +35,10 @@ def torus(surface: Torus) -> Triangles:
 
 
 def cone(surface: Cone, low: Floats, high: Floats, frame: Floats) -> Triangles:
-    """A cone as far as a box goes that is given in a frame whose z is the axis: a grid would lose the apex."""
+    """The part of a cone in a box.
+
+    The box is given in a frame with the axis as z. A grid of the level would lose the apex.
+    """
     apex = np.array(surface.center) @ frame
     slope = math.tan(surface.half_angle)
     widest = math.hypot(*np.maximum(np.abs(high - apex), np.abs(low - apex))[:2])
@@ -58,7 +61,10 @@ def cone(surface: Cone, low: Floats, high: Floats, frame: Floats) -> Triangles:
 
 
 def without_gaps(normals: Floats, triangles: Indices) -> Floats:
-    """Unit normals (V, 3), and where there is none, as at the apex of a cone, the mean of those beside the point."""
+    """Unit normals (V, 3) without gaps.
+
+    A point without a normal, such as the apex of a cone, gets the mean normal of its triangles, normalised.
+    """
     missing = np.asarray((normals == 0.0).all(axis=1))
     if not missing.any():
         return normals

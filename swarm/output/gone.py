@@ -1,4 +1,4 @@
-"""Who has gone, through an opening or into a wall: pictures do not show them, and say how many they are."""
+"""Particles that left the scene, through an opening or into a wall: pictures show only their number."""
 
 from typing import Any
 
@@ -11,18 +11,21 @@ Gone = NDArray[np.bool_]
 
 
 def gone_of(ends: Any) -> Gone:
-    """Who has gone, (N,), from the times at which some escaped and some were absorbed [s], NaN of who is inside."""
+    """A mask (N,) of the particles that left the scene.
+
+    `ends` are two arrays (N,): the times of escape and of absorption [s], NaN for particles inside.
+    """
     escaped, absorbed = ends
     return np.asarray(~np.isnan(escaped) | ~np.isnan(absorbed))
 
 
 def gone_at(trajectory: Any, k: int) -> Gone | None:
-    """Who has gone at a frame of a trajectory; None of bodies, which do not go."""
+    """A mask of the particles that left by a frame of a trajectory; None for a run of bodies."""
     return None if trajectory.body else gone_of((trajectory.escape_times(k), trajectory.absorbed_times(k)))
 
 
 def without(frame: Particles, gone: Gone | None) -> Particles:
-    """The particles of a frame, with those that have gone at NaN."""
+    """The particles of a frame; those that left the scene have positions of NaN."""
     if gone is None or not gone.any():
         return frame
     made = object.__new__(Particles)
@@ -32,7 +35,7 @@ def without(frame: Particles, gone: Gone | None) -> Particles:
 
 
 def how_many_left(seen: dict[str, NDArray[Any]], gone: Gone | None) -> dict[str, int]:
-    """How many of all that were run have "escaped" and were "absorbed" by the end; {} where no one has."""
+    """The numbers of particles that "escaped" and were "absorbed" by the end; {} if no particle left."""
     if gone is None or not gone.any():
         return {}
     counts = {"escaped": int(seen["escaped"][-1]), "absorbed": int(np.sum(seen.get("absorbed", [[0]])[-1]))}

@@ -198,7 +198,7 @@ class ImpactLog(Stored):
             surface has friction also `slip` (3,) [m/s], the tangential velocity relative to the wall, before. Where the
             scene repeats, the position is in the cell and `image` (3,) says how many cells away that is.
 
-            Who passes an opening of a surface has a last row there, with an impulse of 0.
+            A particle that passes an opening of a surface has its last row there, with an impulse of 0.
 
             Of particles with a radius a collision of two is a row too, of the one with the smaller number: `partner` is
             the other one, -1 at a wall, `impulse` what each gives the other, and both `surface` and `member` are -1.
@@ -315,7 +315,7 @@ def load_impacts(path: str | Path) -> ImpactLog:
     """Open a log of impacts for reading; see `ImpactLog`.
 
     Raises:
-        SceneError: there is no such file, or it is none.
+        SceneError: the file does not exist, or it is not a log of impacts.
 
     >>> import swarm, tempfile
     >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])

@@ -177,7 +177,7 @@ class ImpactWriter(AppendedFile):
                 self._rename()
 
     def sums(self) -> str:
-        """The checksums of the rows of the frame under way, by column, as text; "" where the file has none."""
+        """The checksums of the rows of the frame under way, by column, as text; "" if the file has no checksums."""
         return "" if self._sums is None else json.dumps(self._running)
 
     def sync(self) -> None:

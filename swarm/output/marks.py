@@ -59,7 +59,7 @@ def require_own(path: Path, what: str) -> None:
 def why_not(path: Path, what: str) -> str | None:
     """What a file had to be to be replaced by `what`, such as "a trajectory of swarm"; None if it is that, or empty.
 
-    A file that cannot be read is none.
+    A file that cannot be read counts as one of another kind.
     """
     suffix = path.suffix.lower()
     kind, is_one = _KINDS.get(what) or _FORMATS.get(suffix, ("a file of swarm", _never))

@@ -100,7 +100,7 @@ def labels(scene: Scene) -> dict[tuple[int, Place], str]:
 
 
 def moves_how(surface: Surface) -> str:
-    """What moves a surface, as the end of "a drum that ..."; nothing of one at rest."""
+    """What moves a surface, as the end of "a drum that ..."; "" for a surface at rest."""
     if surface.reacts():
         return "impacts swing" if surface.mass is None or surface.inertia is not None else "impacts push"
     kinds = {type(part).__name__ for part in getattr(surface.motion, "parts", (surface.motion,))}
@@ -111,7 +111,7 @@ def moves_how(surface: Surface) -> str:
 
 
 def size_of(surface: Surface) -> str:
-    """How large a surface is, "of radius 0.5 m"; nothing where it has no length."""
+    """The size of a surface, such as "of radius 0.5 m"; "" if it has no length."""
     told = []
     for name, noun in _SIZES.items():
         value = getattr(surface, name, None)
@@ -155,7 +155,7 @@ def in_full(surface: Surface, scene: Scene | None = None) -> str:
 
 
 def laws_of(surface: Surface) -> list[str]:
-    """The laws of the wall of a surface; none of one that keeps the energy."""
+    """The laws of the wall of a surface; empty for a wall that keeps the energy."""
     told = []
     if surface.restitution < 1.0:
         told.append(f"restitution {plain(surface.restitution)}")

@@ -15,7 +15,8 @@ from ..surfaces.part import handed_down
 from ..surfaces.surface import Surface
 from ..surfaces.union import Joined, Place, Union
 
-# Of the size of what is drawn, what is no distance, and how far beside a wall it is asked which of two is there.
+# Parts of the size of the drawing: a distance that counts as 0, and the distance from a wall at which a level is
+# evaluated to choose between two walls in one place.
 _NOTHING, _BESIDE = 1e-8, 2e-8
 # No distance is more than this many times that size.
 _FAR = 1e3
@@ -44,12 +45,15 @@ class Cover:
     turn: float = 1.0
 
     def level(self, points: Floats, outwards: Floats, size: float) -> Floats:
-        """At points (N, 3) of a wall with unit normals (N, 3): above 0 where it is none; a distance to first order."""
+        """The level at points (N, 3) of a wall with unit normals (N, 3).
+
+        It is above 0 where this surface takes the wall away, and a distance to first order.
+        """
         if not self.surface.is_there(self.time):
-            # Its admissible side is all over.
+            # All points are on its admissible side.
             return np.full(len(points), -self.sign * size)
         way = self.turn * _BESIDE * size * outwards
-        # Of walls in one place one is drawn; none that two rooms without a volume in common would be between.
+        # Of several walls in one place one is drawn. A wall between two rooms without a common volume is not drawn.
         if self.sign < 0.0:
             here = self._level(points - way if self.first else points, size)
             return np.maximum(here, self._level(points + way, size)) if self.opens else here
@@ -82,11 +86,11 @@ class Part:
 
     Attributes:
         owner: the number of the surface in the scene.
-        place: its place in that: the number of the part, and of the part of this; none where it is the whole.
+        place: its place in that surface: the number of the part, and of the part of the part; empty for the whole.
         surface: with what is given to the whole.
         solid: whether particles are kept out of it.
         covers: what leaves of it a wall.
-        doorways: volumes in which it is none where another part is behind it.
+        doorways: volumes that take the wall away where another part is behind it.
     """
 
     owner: int

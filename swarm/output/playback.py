@@ -171,7 +171,7 @@ class Playback:
         return self._points(PARTICLES, _POSITIONS, number), self._colours(PARTICLES, _COLOURS, number)
 
     def lines(self, number: int) -> tuple[Floats, Colours]:
-        """Lines of bodies (S, 2, 3) and their colours (S,) at a frame; none where bodies have faces."""
+        """Lines of bodies (S, 2, 3) and their colours (S,) at a frame; empty if bodies have faces."""
         colours = self._colours(LINES, _TINTS, number)
         return self._points(LINES, _STRIPS, number)[: 2 * len(colours)].reshape(-1, 2, 3), colours
 
@@ -181,7 +181,7 @@ class Playback:
         return corners[self._triangles], colours[self._triangles]
 
     def _row(self, entity: str, name: str, number: int) -> Any:
-        """The entry of a frame in a column, as nested lists; empty if there is none."""
+        """The entry of a frame in a column, as nested lists; an empty list if the column has no entry."""
         column, row = self._rows.get((entity, name), {}).get(number, (None, 0))
         return [] if column is None else column[row].as_py()
 

@@ -143,7 +143,7 @@ def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most:
     end = content.inside(name)
     drawn = Drawn(len(end), content.body, most, end.radius)
     start = content.frames.get("start", content.frames[name])
-    # Of those that come during the run nobody may be there at the start.
+    # The first frame of a run with sources may hold no particle: the scale is then made from the last one.
     start = end if np.isnan(start.position[0]).any() else start
     scale, values = colours.colouring("speed", content.scene, content.method, start)
     position, packed, tints = drawn.coloured(end, scale, values)

@@ -68,7 +68,7 @@ class _PlyWriter:
         trajectory, self._chosen = chosen.trajectory, chosen
         scene, first = trajectory.scene, trajectory.frame(chosen.numbers[0])
         self._center = origin_of(scene, first)
-        # Of those that come during the run nobody may be there at the start.
+        # The first frame of a run with sources may hold no particle: the scale is then made from the last one.
         shown = trajectory.frame(chosen.numbers[-1]) if np.isnan(first.position[0]).any() else first
         self._scale, self._values = colours.colouring("speed", scene, trajectory.method, shown)
         self._body = trajectory.body

@@ -111,7 +111,8 @@ def _remove(folder: Path) -> None:
 def _exchange(parts: Sequence[Path], files: Sequence[Path], old: Sequence[Path], folder: Path) -> None:
     """Give files their names, after the old ones are set aside; all of them, or on an error none.
 
-    Who is killed in this instant leaves no file without those that follow: a sequence has no beginning then.
+    The last file gets its name first. If the process is killed meanwhile, a sequence lacks its beginning, and no file
+    in between.
     """
     aside = folder / "old"
     aside.mkdir()

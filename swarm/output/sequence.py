@@ -61,7 +61,7 @@ class Frames(Sequence[Frame]):
 
 
 def values_of(trajectory: Trajectory, k: int, name: str) -> Any:
-    """An array of the particles of frame k, or None where there is none of that name."""
+    """An array of the particles of frame k by its name, or None if they do not have it."""
     if name == "collisions" and trajectory.radius is None:
         return None
     read = {"impacts": trajectory.impacts, "escape_time": trajectory.escape_times,

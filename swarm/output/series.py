@@ -162,7 +162,10 @@ def lines_of(
 
 
 def _lines_of_numbers(seen: Mapping[str, Any]) -> list[Line]:
-    """How many are inside, have come or have gone, and what crosses counters, of a run whose observables are known."""
+    """The lines of numbers, from the observables of a run.
+
+    They show how many particles are inside, came, escaped or were absorbed, and the crossings of counters.
+    """
     lines = []
     if "inside" in seen:
         told = {"inside": "inside", "born": "came", "escaped": "escaped", "absorbed": "absorbed"}
@@ -255,7 +258,7 @@ def plots_of(curves: Mapping[str, tuple[str, Floats, Floats]]) -> dict[str, dict
 
 
 def says_nothing(group: str, curves: Mapping[str, tuple[Floats, Floats]]) -> bool:
-    """Whether a sentence says all that a plot shows: rates of one frame, and errors that are none."""
+    """Whether a sentence can replace a plot: of rates at a single frame, or of errors that are all 0."""
     values = [values for _times, values in curves.values()]
     if not any(len(column) for column in values):
         return True

@@ -24,7 +24,7 @@ from .solids import is_of_solids
 
 
 def those_there(positions: Floats) -> Floats:
-    """The positions (3, N) of particles that are there, not NaN; the origin if nobody is."""
+    """The positions (3, N) that are not NaN; the origin if there are no such positions."""
     there = ~np.isnan(positions[0])
     if len(there) and there.all():
         return positions

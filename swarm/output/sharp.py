@@ -43,7 +43,7 @@ class _Placed(NamedTuple):
     size: float  # of what is drawn [m]
 
     def level(self, wall: SmoothSurface, covers: list[Cover], others: list[SmoothSurface]) -> Any:
-        """The level of where the wall is none."""
+        """A function of points that is above 0 where the wall is taken away."""
 
         def above(points: Floats) -> Floats:
             outwards = self.side() * self.pose.turned(wall.normals(points).T).T

@@ -20,7 +20,7 @@ Spread = dict[str, Floats]
 
 
 def of_frames(content: Any) -> Spread:
-    """The speeds at the start and at the end, as far as they are known; none where all are one number in each."""
+    """The known speeds at the start and at the end; {} if all particles have one speed in each of these frames."""
     found = {}
     for name, frame in content.frames.items():
         values = np.sqrt((frame.velocity**2).sum(axis=0))
@@ -42,7 +42,7 @@ def _top(spread: Spread) -> float:
 
 
 def of_all(content: Any) -> float | None:
-    """The speed that all have at the end, if that is one [m/s]; None of one particle, and where they differ."""
+    """The common speed of all particles at the end [m/s]; None for a single particle, or if speeds differ."""
     frame = content.frames.get("end", content.frames.get("start"))
     if frame is None or content.body is not None:
         return None

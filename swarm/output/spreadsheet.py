@@ -2,8 +2,9 @@
 
 The first line has the names, plain ones, of the columns, so that every program reads the file unaided: frame, time [s],
 id, x, y, z [m], vx, vy, vz [m/s], mass [kg], of balls radius [m], where they turn wx, wy, wz [rad/s], then impacts and
-what else there is; of points of bodies also body, its number. A cell is empty where there is no number: the time of an
-escape of who is inside. Of one frame the file is a start: `from = "start.csv"`, `Particles.from_csv`.
+what else there is; of points of bodies also body, its number. A cell is empty where there is no number, such as
+the escape time of a particle that is inside. A file of one frame is a start: `from = "start.csv"`,
+`Particles.from_csv`.
 """
 
 from pathlib import Path

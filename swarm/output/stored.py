@@ -53,7 +53,7 @@ class Stored:
             return Checked(file, self.path, open_stored)
 
     def has_checksums(self) -> bool:
-        """Whether its values have checksums; those of older versions have none."""
+        """Whether the values have checksums, which files of older versions lack."""
         with self._reading("its checksums"):
             return self._checked.has_any()
 
@@ -79,18 +79,18 @@ class Stored:
 
     @property
     def start(self) -> str:
-        """A digest of the particles at the start; "" if the file has none."""
+        """A digest of the particles at the start; "" if the file has no digest."""
         return self._text("start") if self._has("parameters/start") else ""
 
     @property
     def seed(self) -> int:
-        """The seed of thermal walls; 0 if the file has none, as those of runs before there were such walls."""
+        """The seed of thermal walls; 0 if the file has no seed, as in versions without thermal walls."""
         with self._reading("its seed") as file:
             return int(self._checked.constant("parameters/seed")) if "parameters/seed" in file else 0
 
     @property
     def counters_text(self) -> str:
-        """The counters of the run as text; "" if it had none."""
+        """The counters of the run as text; "" for a run without counters."""
         return self._text("counters") if self._has("parameters/counters") else ""
 
     @property
@@ -194,7 +194,7 @@ def is_log(path: Path) -> bool:
     require_file(path, "a trajectory or a log of impacts (.h5)")
     with open_stored(path) as file, contextlib.suppress(*DAMAGE):
         return "impacts" in file and "h5md" not in file
-    return False  # what is damaged is said by who reads more of it
+    return False  # damage is reported when more of the file is read
 
 
 def _joins(file: h5py.File) -> bool:

@@ -5,10 +5,10 @@ start; where the scene repeats also particles/all/image, (frames, N, 3), and par
 walls have openings particles/all/escape_time, (frames, N) [s], NaN of those inside, and where they may absorb also
 absorbed_time; of balls particles/all/radius (N,), particles/all/collisions (frames, N), and where they turn
 particles/all/spin (frames, N, 3) [rad/s]; particles/all/{mass,id} (N,), and
-of a run with sources particles/all/{birth_time,birth_source} (N,), where who comes later is at NaN;
+of a run with sources particles/all/{birth_time,birth_source} (N,); positions are NaN before the birth;
 observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
 number that were run, parameters/start, a digest of them at the start, parameters/seed, of thermal walls, and
-parameters/observables, the names of those of one's own, if there are any; parameters/{until,threads}, and
+parameters/observables, the names of user-defined observables, if there are any; parameters/{until,threads}, and
 parameters/wall_time (frames,) [s], the seconds that the run had taken, but of runs on clusters. Of bodies:
 parameters/body, the table of one as TOML text, parameters/copies, their number n, and connectivity/bonds (B n, 2);
 point p of copy i is particle p n + i. All elements share one step and one time dataset by hard links. writer.py
@@ -142,7 +142,7 @@ class Trajectory(Stored):
 
     @property
     def own_observables(self) -> list[str]:
-        """The names of the observables of one's own; these may be NaN."""
+        """The names of the user-defined observables; their values may be NaN."""
         return self._text("observables").split(", ") if self._has("parameters/observables") else []
 
     def members(self, k: int = -1) -> dict[str, list[NDArray[Any]]]:
@@ -181,7 +181,10 @@ class Trajectory(Stored):
             self._checked.require_intact(self._frames if frames is None else frames)
 
     def frame(self, k: int) -> Particles:
-        """The particles at frame k; negative k count from the end. Who comes later is at NaN: see `born`."""
+        """The particles at frame k; negative k count from the end.
+
+        Particles that are born later have positions and velocities of NaN: see `born`.
+        """
         k = self._number(k)
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
@@ -304,7 +307,7 @@ class Trajectory(Stored):
         return position.T, velocity.T
 
     def _there(self, file: Any, k: int) -> NDArray[np.bool_] | None:
-        """Who is there at frame k; None where no one comes."""
+        """A mask of the particles that are born by frame k; None for a run without sources."""
         if not self._comes(file):
             return None
         return np.asarray(self._births() <= float(self._checked.row("parameters/time", k)))
@@ -459,8 +462,8 @@ class Trajectory(Stored):
 
         Returns:
             A figure of matplotlib, which a notebook shows where it is the last line of a cell, and which can be
-            changed and saved: `figure.axes`, `figure.savefig("run.pdf")`. It is none of pyplot's, so nothing keeps it
-            and no backend is chosen.
+            changed and saved: `figure.axes`, `figure.savefig("run.pdf")`. It is not registered with pyplot:
+            nothing keeps it alive, and no backend is chosen.
 
         Raises:
             SceneError: an argument is out of its range, the trajectory is damaged or holds no frame, or matplotlib or

@@ -32,14 +32,17 @@ def judged(content: Any) -> list[Verdict]:
     """The verdicts on a run, of what plots show of it (`Content`)."""
     found = _numbers(content)
     if any(verdict.holds is False for verdict in found):
-        return found  # whatever else is said of numbers that are none
+        return found  # with values that are not finite other verdicts mean nothing
     for judge in (_energy, _balance, _penetration, _overlap, _momentum, _multipliers, _links, _books):
         found[-1:-1] = judge(content)
     return found
 
 
 def marked(content: Any) -> list[str]:
-    """The verdicts as lines of a picture, "✓ energy: kept to round-off: ..."; of numbers only that they are none."""
+    """The verdicts as lines of a picture, such as "✓ energy: kept to round-off: ...".
+
+    The verdict on numbers has a line only if some values are not finite.
+    """
     marks = {True: "✓", False: "✗", None: "·"}
     found = [one for one in judged(content) if one.about != "numbers" or not one.holds]
     return [f"{marks[one.holds]} {one.about}: {one.text}" for one in found]
@@ -58,7 +61,8 @@ def _tolerated(content: Any, each: float) -> float:
     """The relative energy that `each` contacts of a particle may change within the tolerance of the loop.
 
     A contact ends with a gap of at most g, V = penalty g^2/2 = tolerance; its force, the impulse over the step, has
-    done no more than force times g of work that nobody books. A particle may have four times the mean impulse.
+    done at most force times g of work, which is missing in the balance of energy. A particle may have four times the
+    mean impulse.
     """
     seen, method = content.seen, content.method
     most = float((seen["kinetic_energy"] + np.abs(seen["contact_energy"])).max()) / max(1, int(content.count))
@@ -234,7 +238,10 @@ def _links(content: Any) -> list[Verdict]:
 
 
 def _books(content: Any) -> list[Verdict]:
-    """Whether all who were there or came are inside, absorbed or gone; nothing where nobody comes or goes."""
+    """Whether the numbers of particles balance: all are inside, or were absorbed, or escaped.
+
+    Empty for a run without sources that no particle left.
+    """
     seen, body = content.seen, content.body
     ends = {"escaped": int(seen["escaped"][-1]), "absorbed": int(np.sum(seen.get("absorbed", [0])[-1]))}
     if not any(ends.values()) and "born" not in seen:
@@ -264,7 +271,7 @@ def at_start(content: Any) -> int:
         return int(content.count)
     if frame is not None and len(frame.mass) == content.count:
         return int((~np.isnan(frame.position[0])).sum() - np.sum(born[0]))
-    # Of a run to its end: all who were to come have come.
+    # The run has reached its end: all particles of its sources are born.
     return int(content.count - np.sum(born[-1]))
 
 

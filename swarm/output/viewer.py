@@ -25,7 +25,7 @@ def live_url(live: bool | str) -> str:
     """The URL of the viewer that shows a run: the one given, one that listens on this machine, or a new one.
 
     Raises:
-        SceneError: there is none, and no screen for one.
+        SceneError: no viewer listens, and a new one has no screen.
     """
     if isinstance(live, str):
         return live

@@ -20,7 +20,8 @@ from .exported import Exported
 VERSION = (2, 0)
 # In the order of the columns of CellOffsets and ConnectivityIdOffsets.
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")
-# Digits that somebody types, and how far a multiple of such a number is from the nearest float.
+# Digits of a number that a user types, and how far a multiple of it may be from the nearest float, in units in the
+# last place.
 _DIGITS, _ROUND_OFF = 12, 4.0
 
 
@@ -93,7 +94,7 @@ def timed(root: Any, chosen: Exported, firsts: NDArray[np.int64]) -> Any:
 def as_typed(time: float) -> float:
     """The decimal of few digits that a time is but for round-off, if there is one: of frame 3 at every 0.1 s it is 0.3.
 
-    Programs look for the last step at or before a time that somebody types, and 0.30000000000000004 is after it.
+    Programs look for the last step at or before a time that a user types, and 0.30000000000000004 is after it.
 
     >>> as_typed(3 * 0.1), as_typed(1.0 / 3.0)
     (0.3, 0.3333333333333333)

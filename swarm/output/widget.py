@@ -14,7 +14,8 @@ _PATIENCE = 3.0  # [s]
 # Pixels; the width is that of the cell.
 _HEIGHT = 600
 
-# What is shown, as long as the kernel lives: a viewer that nobody refers to is closed before its browser has begun.
+# References to what is shown, for the life of the kernel: a viewer without a reference is closed before its browser
+# has begun.
 _shown: list[Any] = []
 
 

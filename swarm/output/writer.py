@@ -86,7 +86,7 @@ class TrajectoryWriter(AppendedFile):
         self._kept = storage.kept(identity.get("first", 0))
         self._count, self._mass, self._text = len(particles), particles.mass[self._kept], scene_text
         self._identity, self._births = identity, particles.births
-        # How the run goes, from who knows it, before the context begins.
+        # The end, the threads and the clock of the run, set before the context begins.
         self.course: Course | None = None
         self._wall_time: Any = None
         self._radius, self._turns, self._volume = particles.radius, particles.spin is not None, particles.volume

@@ -82,7 +82,7 @@ def of_series(content: Content) -> list[PagePicture]:
 
 
 def svg(figure: Any, told: str) -> Markup:
-    """A figure in the light style as SVG in the colours of the page; `told` is for those who do not see it."""
+    """A figure in the light style as SVG in the colours of the page; `told` is its text for screen readers."""
     buffer = io.StringIO()
     with style.applied(), rc_context({"svg.hashsalt": "swarm"}):
         figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=False)

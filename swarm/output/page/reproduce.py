@@ -11,7 +11,7 @@ import tomli_w
 from ...errors import SceneError
 from ..storage import Storage
 
-# Code of one's own in a scene file, and the keys of files.
+# User code in a scene file, and the keys of files.
 _CODE, _FILES = re.compile(r"([A-Za-z_][\w.]*):[A-Za-z_]\w*"), ("from", "file")
 # What stands for a long array, which a scene file does not have.
 _ARRAY = "sha256:"
@@ -27,7 +27,8 @@ class Again(NamedTuple):
     Attributes:
         notes: sentences about them, in order.
         command: of a shell, or "".
-        scene_file: the text of the file that the command is of, or "", and `told`, what that is.
+        scene_file: the text of the scene file that the command runs, or "".
+        told: the name of that file, or a description of it.
         python: the same in Python, or "".
     """
 
@@ -143,7 +144,7 @@ def _span(trajectory: Any) -> dict[str, float]:
 
 
 def _scene_file(trajectory: Any) -> str | None:
-    """A scene file of the run from its first frame; None where there is none, for long arrays."""
+    """The text of a scene file that repeats the run from its first frame; None if the scene has long arrays."""
     document = tomllib.loads(trajectory.descriptions["scene"])
     if _ARRAY in trajectory.descriptions["scene"]:
         return None
