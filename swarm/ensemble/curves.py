@@ -27,7 +27,7 @@ def drawn(sweep: SweepFolder) -> list[tuple[str, list[PagePicture]]]:
 
 
 def main_observables(sweep: SweepFolder) -> list[str]:
-    """The observables that differ between runs and say the most; those of one's own come first."""
+    """The observables that differ between runs and say the most; user-defined ones come first."""
     columns = {name: _numbers([row.get(name) for row in sweep.rows]) for name in sweep.observables}
     columns = {name: values[np.isfinite(values)] for name, values in columns.items()}
     found = [name for name, values in columns.items() if len(values) and _differ(values)]

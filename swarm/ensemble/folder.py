@@ -84,7 +84,7 @@ def _parameters(status: dict[str, Any]) -> dict[str, Any]:
 
 
 def _status(file: Path) -> dict[str, Any] | None:
-    """What a status file says; None if it is none."""
+    """The content of a status file; None if the file is not a whole status file."""
     if not STEM.fullmatch(file.stem):
         return None
     try:

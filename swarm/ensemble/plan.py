@@ -79,8 +79,8 @@ def read(path: Path, plugins: Iterable[str] = ()) -> Plan:
     """The plan of a sweep file.
 
     Raises:
-        SceneError: the file cannot be read, its [sweep] table is none, or the scene of one of its runs is none; the
-            sentence names the key of the sweep and the value.
+        SceneError: the file cannot be read, its [sweep] table is invalid, or the scene of one of its runs is invalid;
+            the message names the key of the sweep and the value.
     """
     document = scene_file.document_of(scene_file.text_of(path), path)
     try:
@@ -253,7 +253,7 @@ def _put(place: Any, steps: list[str], value: Any, key: str) -> Any:
 
 
 def _attributed(sentence: str, parameters: Mapping[str, Any], k: int, n: int) -> str:
-    """A sentence of a scene that is none, with the key of the sweep that it comes from."""
+    """The message of an invalid scene, with the key of the sweep that caused the error."""
     match = re.match(r"[\w.\[\]-]+", sentence)
     named = match.group().rstrip(".") if match else ""
     owners = {}

@@ -150,7 +150,7 @@ def _command(sweep: Any) -> str:
 
 
 def _link(file: Path, place: Path) -> str:
-    """The address of a file as seen from a folder, or "" where there is none."""
+    """The address of a file as seen from a folder, or "" if the file does not exist."""
     if not file.is_file():
         return ""
     try:

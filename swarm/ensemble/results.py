@@ -73,11 +73,11 @@ class Results:
                 status = json.loads(self.status_file(variant).read_text(encoding="utf-8"))
                 known = {key: status[key] for key in ("state", "error", "wall_time", "observables")}
             except (OSError, ValueError, KeyError, TypeError):
-                continue  # none, or none that is whole: the trajectory says what there is
+                continue  # no whole status file: the state of the run is read from its trajectory
             self._statuses[variant.stem] = known
 
     def require_own(self) -> None:
-        """Raise a SceneError if a file that the sweep is to replace is none of a sweep."""
+        """Raise a SceneError if the sweep would replace a file that was not made by a sweep."""
         for path, what in ((self.path, "table"), (self.folder / KEPT, "sweep file")):
             if path.exists() and not (what == "sweep file" and self._is_kept(path)):
                 marks.require_own(path, what)
@@ -115,7 +115,7 @@ class Results:
                     path.unlink(missing_ok=True)
 
     def keep_file(self) -> None:
-        """Keep the sweep file in the folder, for whoever asks later what the runs are."""
+        """Copy the sweep file into the folder, as a description of the runs."""
         with replaced(self.folder / KEPT, "sweep file") as file:
             file.write(self.plan.path.read_bytes())
 

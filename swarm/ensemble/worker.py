@@ -49,12 +49,12 @@ class _Line:
                 self.interrupt()
             else:
                 self.orders.put(order)
-        # The parent has closed the pipe or was killed, and nobody waits for the outcome. The files of a run survive an
+        # The parent has closed the pipe or was killed: no process waits for the outcome. The files of a run survive an
         # end at any moment, and their locks are free for the sweep that goes on with them.
         os._exit(_ORPHANED)
 
     def interrupt(self) -> None:
-        """End a run that is under way as SIGTERM would; where none is, this does nothing."""
+        """End a run that is under way as SIGTERM would; without such a run, do nothing."""
         if self.stops.is_set():
             _thread.interrupt_main(signal.SIGTERM)
 
@@ -68,7 +68,7 @@ class _Line:
 
 def main() -> None:
     """Carry out orders until standard input ends."""
-    # Ctrl-C reaches all processes of a terminal; the parent tells what is to be done.
+    # Ctrl-C reaches all processes of a terminal; only the parent reacts to it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     line = _Line()
     from ..run import simulation  # noqa: F401  a second; then the parent knows that the package can be imported
