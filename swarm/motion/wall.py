@@ -139,7 +139,7 @@ class Guide(Given):
         checks.assign(self, axis=axis, speed=speed, stiffness=checks.magnitude("stiffness", self.stiffness))
 
     def harmonic(self, start: ArrayLike) -> Led:
-        """The path of a point of the wall before anything moves it: none."""
+        """The path of a point of the wall before an impact moves it: the point is at rest."""
         return Led(point_of(start), np.zeros(3), np.zeros(3), np.zeros(3), 0.0)
 
 
@@ -172,7 +172,7 @@ def parts_of_wall(value: Any, where: str = "motion", within: tuple[Any, ...] = (
     `within` are the lists that it is in.
 
     Raises:
-        SceneError: it is none of these.
+        SceneError: `value` is not one of these.
     """
     if value is None or isinstance(value, WallMotion):
         return value
@@ -227,7 +227,7 @@ def _times(value: ArrayLike) -> tuple[float, ...]:
 
 
 def require_freedom(motion: "WallMotion | None", mass: float | None, inertia: float | None) -> None:
-    """Raise a `SceneError` where a wall with this mass or inertia has a motion that is none for it."""
+    """Raise a `SceneError` if a wall with this mass or inertia cannot have this motion."""
     if isinstance(motion, Guide) and mass is None:
         raise SceneError("mass must go with a Guide, along which impacts move the wall, got None; give mass= [kg]")
     if mass is not None and inertia is None and not (motion is None or isinstance(motion, Translation | Guide)):
