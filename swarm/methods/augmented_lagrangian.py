@@ -64,7 +64,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
             time, and contact steps are dt long. A step on whose way another wall stands is replaced by the exact
             reflection. Without gravity only.
         acceleration: "none" is the paper's loop; "secant" replaces (8) by a secant; "reflection" starts the secant from
-            the multiplier of the converged step. The fixed point is the same; where there is none, so is the loop.
+            the multiplier of the converged step. All have the same fixed point; where it does not exist, all use (8).
         on_unconverged: what a contact does whose loop ends above the tolerance. "raise" ends the run and names step,
             particle, sweeps and V; "count" accepts the step and counts it in the observable "unconverged"; "impact"
             counts it too, and replaces the contact by the exact one (without gravity only).

@@ -239,11 +239,11 @@ class SoftNumbers(Steps):
 
     dt: float
     law: Any
-    longest: Any  # step that jumps over no solid [m], None where there is none
+    longest: Any  # step that jumps over no solid [m]; None without solids
     factor: float  # of 1/mass in what a lane keeps
     form: Any  # of the discrete gradient, or None
     moving: Any  # None, or `Moves` where a wall moves
-    half_widths: Any  # of the solid of each wall [m], infinite where it is none; None where no wall has another side
+    half_widths: Any  # of the solid of each wall [m], infinite for a cavity; None if no wall has another side
 
     def passes(self, walls, lane, wall, r, v):
         """Whether a step that ends so leads a lane through the middle of this wall."""

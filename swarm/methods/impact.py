@@ -66,11 +66,11 @@ class Impact(base.Method):
 
     Particles with a radius meet at instants too, and neither slide nor rest: where a contact would last they bounce, so
     high that a flight from a wall back to it takes t_c (`contact_duration` of `Pairs`; without losses 1e-7 crossings
-    or so), and who has met another ball in the last t_c loses nothing. What such a bounce gives is a negative part of
-    the dissipated energy, m (a t_c)^2/8 where a pulls back to the wall, and the next impact takes it. So each lasting
-    contact costs an impact or some in t_c: for grains that rest on each other for long use `Penalty`. Walls may move,
-    have a mass, come and go, be open, hot, or have laws of their own, but for those on which particles wait; a ball is
-    gone where the point of it that touches is in an opening.
+    or so). A ball that has met another one in the last t_c loses no energy. What such a bounce gives is a negative part
+    of the dissipated energy, m (a t_c)^2/8 where a pulls back to the wall, and the next impact takes it. So each
+    lasting contact costs an impact or some in t_c: for grains that rest on each other for long use `Penalty`. Walls may
+    move, have a mass, come and go, be open, hot, or have laws of their own, but for those on which particles wait. A
+    ball leaves where its point of contact is in an opening.
 
     Raises:
         SceneError: an argument is out of its range.

@@ -47,7 +47,7 @@ class StepNumbers(penalty.GradientSteps):
     max_sweeps: int
     acceleration: float
     policy: int
-    longest: Any  # step that jumps over no solid [m], None where there is none
+    longest: Any  # step that jumps over no solid [m]; None without solids
     moving: Any  # None, or `Moves` where a wall moves, in fixed steps
 
     def is_new(self, walls, r):
