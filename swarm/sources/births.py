@@ -22,7 +22,7 @@ _TIMES, _PLACES, _VELOCITIES = range(3)
 _PARTICLE = 500
 # So many standard deviations more births than are expected are reckoned with.
 _SIGMAS = 6.0
-# A birth this part of the scene's extent outside of a wall that moves is none.
+# A birth outside of a moving wall by up to this part of the scene's extent counts as inside.
 _OUTSIDE = 1e-9
 # A birth at so many roundings before the stop is at it.
 _ROUND_OFF = 4.0
@@ -36,7 +36,7 @@ def with_births(
     """The particles of a run with sources: those of the start, and behind them those that come, in order of time.
 
     Raises:
-        SceneError: a source does not go with the scene, too many come, or nobody is there and none comes.
+        SceneError: a source does not fit the scene, too many particles come, or the run has no particles at all.
     """
     if particles is not None and not sources:
         return particles

@@ -59,7 +59,7 @@ def pieces_of(surface: Surface, bounds: Bounds, across: int | None) -> list[Piec
     """The pieces of a surface, as far as they are within the bounds; in a plane the axis `across` it is given.
 
     Raises:
-        SceneError: of this kind none are known, or it is not bounded.
+        SceneError: the pieces of this kind of surface are not known, or the surface is not bounded.
     """
     if isinstance(surface, Joined):
         # One that several rooms have is drawn once.

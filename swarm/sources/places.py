@@ -26,7 +26,7 @@ _LOG = logging.getLogger("swarm")
 # nearest triangle of each point is looked for. And so many of these in all, as long as fewer than one in a million is a
 # place of a birth.
 _BATCH, _FEW, _MOST_BATCHES = 1 << 14, 1 << 11, 250
-# After so many batches, and whenever there are twice as many, it is said how far the search is.
+# The progress of the search is logged after so many batches, and after every doubling of their number.
 _TOLD = 32
 # Round-off of a point of a surface, as a part of the scene's extent.
 _ROUND_OFF = 16.0 * np.finfo(np.float64).eps
@@ -41,7 +41,7 @@ class SourcePlace(NamedTuple):
 
     Attributes:
         surface: on which particles are born, or in whose volume.
-        number: of the surface of the scene that it is, None where it is none of them.
+        number: of that surface in the scene; None if it is not a surface of the scene.
         volume: whether they are born in its volume.
         only: the surfaces on whose admissible sides births are.
         walls: the surfaces of which it is made that births are on, each with the volumes in which they are not; none:
@@ -132,7 +132,7 @@ def _require_at_rest(surface: Surface, name: str) -> None:
 
 
 def _box_of(surface: Surface) -> Bounds:
-    """The corners of a box that a surface is in, a solid as well as a cavity; infinite where none is known."""
+    """The corners of a box that a surface is in, a solid as well as a cavity; infinite if no box is known."""
     if isinstance(surface, Mesh):
         vertices = np.asarray(surface.vertices)
         return vertices.min(axis=0), vertices.max(axis=0)
@@ -182,7 +182,7 @@ class PointBatches:
         """So many points (3, n), and there the unit normals (3, n) out of the admissible side; in a volume they are 0.
 
         Raises:
-            SceneError: there is none, or far fewer than places that are tried.
+            SceneError: no point is found, or far fewer than the points tried.
         """
         found: list[Floats] = []
         count, tried, told = 0, 0, _TOLD * self._batch
