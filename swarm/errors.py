@@ -9,7 +9,7 @@ class SceneError(SwarmError, ValueError):
     """Bad input: an argument, a TOML key, a row of a file. Found before anything runs or is written.
 
     Attributes:
-        particle: the number of the particle that it is about, the first one; None where it is about none.
+        particle: the number of the first particle with the error; None if the error is not about particles.
     """
 
     particle: int | None = None

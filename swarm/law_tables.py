@@ -52,7 +52,7 @@ def _no_law(where: str, given: Any) -> Any:
 
 
 def table_of_law(law: Any) -> Any:
-    """The table of a law of a kind; of one's own its name, which is all that a file without code can have."""
+    """The table of a built-in law. Of a user-defined law it is the name, as a file cannot hold its code."""
     kinds = {cls: kind for kind, cls in ALL_LAWS.items()}
     if type(law) not in kinds:
         return law if isinstance(law, str) else repr(law)

@@ -1,4 +1,4 @@
-"""Links of an HDF5 file to other files, which who reads it would open unasked: all are refused but those to shards."""
+"""Links of an HDF5 file to other files, which reading it would open unasked: only links to shards are allowed."""
 
 import re
 from collections.abc import Sequence

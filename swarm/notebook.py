@@ -39,5 +39,5 @@ def is_running() -> bool:
     """Whether this is the kernel of a notebook."""
     shell = sys.modules.get("IPython")
     running = shell.get_ipython() if shell is not None else None
-    # That of a terminal has none.
+    # The IPython of a terminal has no kernel.
     return getattr(running, "kernel", None) is not None

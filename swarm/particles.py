@@ -44,7 +44,7 @@ class Particles:
     """
 
     volume: float | None = None
-    # Of a run with sources: who comes when.
+    # The births of the particles in a run with sources.
     births: "Births | None" = None
 
     def __init__(
@@ -106,7 +106,7 @@ class Particles:
     def of_frame(
         cls, position: Floats, velocity: Floats, mass: Floats, image: NDArray[Any] | None, there: NDArray[np.bool_]
     ) -> "Particles":
-        """Those of a frame, checked; who is not there yet is at NaN."""
+        """The particles of a frame, checked; those that are not yet born have positions and velocities of NaN."""
         made = cls(np.where(there, position, 0.0), np.where(there, velocity, 0.0), mass, image)
         made.position[:, ~there] = made.velocity[:, ~there] = np.nan
         return made

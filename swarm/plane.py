@@ -31,12 +31,12 @@ PLANES = {"x": 0, "y": 1, "z": 2}
 # Points from which places of a wall in the plane are looked for, the steps to them, and what is near to a wall, as a
 # part of the extent of the scene.
 _STARTS, _STEPS, _NEAR = 2048, 40, 1e-9
-# The part of a normal out of the plane that is none, of what kernels take as upright.
+# A component of a unit normal across the plane up to this size counts as 0, as in the kernels.
 _ROUND_OFF = 1e-13
 
 
 def across_of(plane: str | None) -> int | None:
-    """The number of the axis across a plane, None where there is none."""
+    """The number of the axis across a plane; None without a plane."""
     return None if plane is None else PLANES[plane]
 
 
@@ -218,7 +218,7 @@ def _require_motion(plane: str, where: str, surface: Surface) -> None:
 
 
 def _require_laws(plane: str, where: str, surface: Surface) -> None:
-    """Raise a `SceneError` where a law of one's own sends a particle out of the plane in a trial."""
+    """Raise a `SceneError` if a user-defined law sends a particle out of the plane in a trial."""
     across = PLANES[plane]
     for k, law in enumerate(surface.laws):
         if isinstance(law, str):

@@ -17,7 +17,7 @@ from .tables import convert, opening_of, surface_of, table_of, table_of_opening
 
 
 def counters_text(counters: Iterable[Counter]) -> str:
-    """Counters as TOML text; "" where there are none."""
+    """Counters as TOML text; "" without counters."""
     made = [counter_table(one) for one in counters]
     return tomli_w.dumps({"counter": made}) if made else ""
 

@@ -53,8 +53,8 @@ from .surfaces.walls import Walls
 MOST_WALLS = 24
 # Points whose gaps are found at once.
 _BATCH = 4096
-# A slot thinner than this part of the scene's extent is none of its lengths: steps that are a part of it end in the
-# round-off of a time.
+# A slot thinner than this part of the scene's extent does not set the length of steps, which would be lost in the
+# round-off of times.
 _THIN = 1e-6
 # Planes nearer to the origin than an atom's nucleus is wide [m] are at it: a scene of them has no extent.
 _AT_ORIGIN = 1e-15
@@ -176,7 +176,7 @@ class Scene:
         return notebook.table("Scene", rows)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Whoever has a copy makes walls of its own: `apart` of other walls, a worker of what is compiled there.
+        # Copies do not keep the walls: `ungrouped` and `of_balls` have other ones, and a worker process makes its own.
         return {name: value for name, value in self.__dict__.items() if name != "_walls"}
 
     def _require_few_walls(self, why: str) -> None:
@@ -338,7 +338,7 @@ class Scene:
         return np.concatenate(found) if found else np.empty(0, np.intp)
 
     def is_open(self) -> bool:
-        """Whether a particle may fly to infinity, at the start or as soon as a wall has gone."""
+        """Whether a particle may fly to infinity, at the start or after a wall disappears."""
         at_start = np.isfinite(self.bounds()).all()
         return not (at_start and (not self.has_doors() or np.isfinite(self._bounds_of_lasting(self.surfaces)).all()))
 
@@ -355,7 +355,7 @@ class Scene:
             if surface.is_there(time)
         ]
         rows = np.array(faces, dtype=np.float64).reshape(-1, 4)
-        # Through a face across the period nobody leaves.
+        # Particles do not leave through a face across a direction in which the cell repeats.
         repeats = np.array([length is not None for length in self.period or (None,) * 3])
         rows = rows[(rows[:, :3][:, repeats] == 0.0).all(axis=1)]
         return np.asarray(rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0])

@@ -99,7 +99,7 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
 
 
 def _with_nested(table: dict[str, Any], described: Surface | Method, arrays: dict[str, Any] | None) -> dict[str, Any]:
-    """The table of a surface, with those of its motion, openings and parts, and the names of laws of one's own."""
+    """The table of a surface, with the tables of its motion, openings and parts, and the names of user-defined laws."""
     if isinstance(described, Surface):
         del table["openings"], table["laws"]
         if described.motion is not None:
