@@ -82,7 +82,7 @@ def colour_bar(
 
 
 def _values_in_words(quantity: str, values: Floats) -> str:
-    """What values that have one colour are; NaN is of a particle that is not there."""
+    """The values of particles that have one colour, in words; NaN marks absent particles."""
     values = values[~np.isnan(values)]
     least, most = float(values.min()), float(values.max())
     name, unit = _named(quantity)

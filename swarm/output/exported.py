@@ -10,7 +10,7 @@ from .. import checks
 from ..errors import SceneError
 from .stored import whole
 
-# Is called with how many frames are written, and how many there are to write.
+# A function of the number of frames that are written and of the number of all frames to write.
 Progress = Callable[[int, int], None]
 
 

@@ -86,7 +86,7 @@ def of_scene(scene: Any) -> dict[str, str]:
 
 
 def of_meshes(scene: Any) -> dict[str, str]:
-    """The meshes of a `Scene`, and distances of surfaces from those that they were made from; nothing without any."""
+    """The meshes of a `Scene`, and the distances of surfaces from the meshes that they are made from; {} without."""
     surfaces = () if scene is None else scene.surfaces
     made = {i: one for i, one in enumerate(surfaces) if getattr(one, "mesh_error", None) is not None}
     said = [
@@ -183,7 +183,7 @@ def _what(trajectory: Any) -> dict[str, str]:
 
 
 def of_balls(trajectory: Any) -> dict[str, str]:
-    """The radii of balls, and which part of their volume they fill; nothing of points."""
+    """The radii of balls, and the part of the volume that they fill; {} for points."""
     if not trajectory.has_particles() or trajectory.radius is None:
         return {}
     balls = trajectory.frame(0)

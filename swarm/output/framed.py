@@ -7,7 +7,7 @@ from ..state import Floats
 from .eye import Eye, eye_for
 from .shape import Shape
 
-# An open picture leaves out points beyond `_FAR` times the distance within which the part `_MOSTLY` of them lies.
+# Points beyond `_FAR` times the distance within which the part `_MOSTLY` of them lies do not widen an open picture.
 _FAR, _MOSTLY = 3.0, 0.95
 # Of more points than this some are looked at.
 _ENOUGH = 100_000
@@ -16,7 +16,7 @@ _DIRECTIONS = np.random.default_rng(1).normal(size=(64, 3))
 
 
 def around(points: Floats, shapes: list[Shape], radius: Floats | None = None) -> list[Floats]:
-    """The points of walls, and where these enclose nothing particles (N, 3), or balls of a `radius`."""
+    """The points of walls. Where walls do not enclose a volume, also the particles (N, 3), or balls of a `radius`."""
     found = [part for shape in shapes for part in (shape.vertices, *shape.edges) if len(part)]
     there = points[~np.isnan(points[:, 0])]
     if is_open(shapes):
@@ -40,12 +40,12 @@ def ends(found: list[Floats]) -> list[Floats]:
 
 
 def near_most(points: Floats) -> Floats:
-    """Those of points (N, 3) that are not far away from most."""
+    """The points, of these (N, 3), that are near to most of the others."""
     return np.asarray(points[_are_near(points)])
 
 
 def most_of(positions: Floats) -> Floats:
-    """Those of positions (3, N) that are there, and not far away from most."""
+    """The positions, of these (3, N), that are not NaN and near to most of the others."""
     return near_most(positions[:, ~np.isnan(positions[0])].T).T
 
 

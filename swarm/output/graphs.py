@@ -128,7 +128,7 @@ def _curves(axes: Any, drawn: Curves, steps: bool) -> list[End]:
     """Draw the curves, and return their names with their ends and colours: of many their mean, and all in grey."""
     named = [name for name in drawn if name.startswith(_ENERGIES)]
     if len(drawn) - len(named) <= _MOST:
-        # The curves of more walls than this are grey, with their mean: single ones could not be distinguished.
+        # The curves of more than `_MOST` walls are grey, with their mean: a single one says little.
         named = list(drawn)
     ends: list[End] = []
     for name, (times, values) in drawn.items():

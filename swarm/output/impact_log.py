@@ -163,7 +163,7 @@ class ImpactLog(Stored):
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of the rows of `table`."""
+        """The dtype of the rows of `table`."""
         real = self._columns["position"].dtype
         fields: list[Any] = [("time", "f8"), ("particle", "i4"), ("surface", "i4"), ("member", "i4")]
         fields += [*((name, real, 3) for name in _VECTORS), ("impulse", real)]

@@ -13,7 +13,7 @@ import rerun as rr
 from ..state import Floats
 from .solids import Solids, curves, matrices
 
-# Of a ball, and of another solid.
+# Bytes of a ball, and of another solid.
 _BALL_BYTES, _SOLID_BYTES = 16, 40
 
 

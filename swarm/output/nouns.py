@@ -74,7 +74,7 @@ def is_outlined(surface: Surface) -> bool:
 
 
 def number_of(surface: Surface) -> int:
-    """Of how many things of its noun a surface is."""
+    """The number of bodies in a surface, as its noun counts them."""
     return len(surface) if isinstance(surface, Many) and not is_outlined(surface) else 1
 
 
@@ -183,7 +183,7 @@ def law_of(law: Any) -> str:
 
 
 def changes_of(surface: Surface) -> list[str]:
-    """What of a surface changes with time: openings, doors, motion, what impacts do to it."""
+    """The changes of a surface with time: openings, doors, motion, and the effects of impacts."""
     told = []
     doors = [one for one in surface.openings if isinstance(one, Opening) and one.times is not None]
     if doors:

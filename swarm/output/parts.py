@@ -101,7 +101,7 @@ class Part:
     doorways: tuple[Cover, ...] = ()
 
     def level(self, points: Floats, outwards: Floats, size: float, near: list[Cover]) -> Floats:
-        """As that of all covers, of which those that are not `near` take nothing away."""
+        """The level with respect to all covers. Covers that are not `near` take nothing away."""
         found = np.full(len(points), -size)
         for cover in near:
             found = np.maximum(found, cover.level(points, outwards, size))
@@ -143,7 +143,7 @@ class _Found(NamedTuple):
         )  # fmt: skip
 
     def open(self, volumes: Iterable[Surface]) -> tuple[Cover, ...]:
-        """Those by volumes in which a wall is open."""
+        """The covers by volumes in which a wall is open."""
         return tuple(Cover(one, -1.0, sign_of(one), self.time) for one in volumes if one.is_there(self.time))
 
     def add(self, part: Part) -> None:

@@ -53,7 +53,7 @@ class Shape:
         return self.edges + self.levels
 
     def area(self) -> float:
-        """Of the triangles [m^2]; in a scene of two dimensions the length of the curves [m]."""
+        """The area of the triangles [m^2]; in a scene of two dimensions the length of the curves [m]."""
         return self._area
 
     @cached_property

@@ -48,7 +48,7 @@ class Stored:
 
     @functools.cached_property
     def _checked(self) -> Checked:
-        """What reads values and holds them against their checksums."""
+        """The reader of values, which compares them with their checksums."""
         with self._reading("its checksums") as file:
             return Checked(file, self.path, open_stored)
 
@@ -203,7 +203,7 @@ def _joins(file: h5py.File) -> bool:
 
 
 def _nested(table: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The table of a surface, and those of its openings, its parts and theirs."""
+    """The table of a surface, and all tables nested in it: those of its openings and its parts."""
     yield table
     for key in tables.NESTED:
         for one in table.get(key, ()):

@@ -5,7 +5,7 @@ start; where the scene repeats also particles/all/image, (frames, N, 3), and par
 walls have openings particles/all/escape_time, (frames, N) [s], NaN of those inside, and where they may absorb also
 absorbed_time; of balls particles/all/radius (N,), particles/all/collisions (frames, N), and where they turn
 particles/all/spin (frames, N, 3) [rad/s]; particles/all/{mass,id} (N,), and
-of a run with sources particles/all/{birth_time,birth_source} (N,); positions are NaN before the birth;
+of a run with sources particles/all/{birth_time,birth_source} (N,); positions and velocities are NaN until the birth;
 observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
 number that were run, parameters/start, a digest of them at the start, parameters/seed, of thermal walls, and
 parameters/observables, the names of user-defined observables, if there are any; parameters/{until,threads}, and
@@ -146,7 +146,7 @@ class Trajectory(Stored):
         return self._text("observables").split(", ") if self._has("parameters/observables") else []
 
     def members(self, k: int = -1) -> dict[str, list[NDArray[Any]]]:
-        """Of a run with member_impacts=True what each member of each surface has had until frame k; else nothing.
+        """The sums of each member of each surface until frame k; {} for a run without member_impacts=True.
 
         "impacts", and "residence" [s], "heat" [J] and "absorbed" where walls hold, heat or absorb particles: a list
         with an array for each surface, as `Result.member_impacts`.
@@ -313,7 +313,7 @@ class Trajectory(Stored):
         return np.asarray(self._births() <= float(self._checked.row("parameters/time", k)))
 
     def _of_frame(self, name: str, k: int) -> NDArray[Any]:
-        """What is kept of the particles at frame k by a name, checked."""
+        """The values of the particles at frame k with a name, checked."""
         return np.asarray(self._checked.row(f"particles/all/{name}/value", k))
 
     # --- What is the same in all frames ------------------------------------------------------------------

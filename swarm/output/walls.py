@@ -35,7 +35,7 @@ def shapes(chosen: Exported) -> list[Shape]:
 
 
 def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
-    """Write the walls, of those that come or go, or open or shut, in each frame those that are there."""
+    """Write the walls. Where walls or openings change with time, each frame has the walls of its time."""
     if chosen.trajectory.scene.instants:
         _write_changing(chosen, path)
         return
@@ -120,7 +120,7 @@ _MOVED = ("orientation", "Points")
 
 
 def write_solids(chosen: Exported, path: Path) -> None:
-    """Write the solids of large fields as points: in each frame those that are there."""
+    """Write the solids of large fields as points: in each frame the solids that are present."""
     scene, times = chosen.trajectory.scene, chosen.times.tolist()
     come = any(surface.present is not None for surface in scene.surfaces if is_many(surface))
     frames = len(times) if come or scene.moves() else 1
