@@ -18,7 +18,7 @@ _REPEATS = "seed"
 
 
 def drawn(sweep: SweepFolder) -> list[tuple[str, list[PagePicture]]]:
-    """Of each parameter that varies its graphs."""
+    """The graphs of each parameter that varies."""
     names = main_observables(sweep)
     rows = [row for row in sweep.rows if row["state"] == "done"]
     if not rows:

@@ -105,7 +105,7 @@ def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
 
 
 def longest_step(scene: Scene, dt: float) -> float | None:
-    """The longest flight in a step that jumps over no solid [m]; None where there is no solid."""
+    """The longest flight in a step that jumps over no solid [m]; None without solids."""
     if not any(surface.is_solid() for surface in scene.surfaces):
         return None
     thickness, i = _thinnest(scene, dt)
@@ -113,7 +113,7 @@ def longest_step(scene: Scene, dt: float) -> float | None:
 
 
 def _half_widths(scene: Scene) -> tuple[float, ...] | None:
-    """Of each wall that of its solid [m], infinite of a cavity; None where no wall has another side."""
+    """The half width of the solid of each wall [m], infinite for a cavity; None if no wall has another side."""
     if not any(surface.may_be_passed() for surface in scene.surfaces):
         return None
     owned = [scene.surfaces[i] for i in scene.owners()]
@@ -256,7 +256,7 @@ class SoftNumbers(Steps):
         return medial.passes((before, lane.r), (after, r), wall, way, self.dt * (lane.v - v), self.half_widths)
 
     def _passes_any(self, walls, lane, r, v):
-        """The same of all walls that the step is in contact with."""
+        """As `passes`, for any of the walls that the step is in contact with."""
         if self.half_widths is None:
             return False
         before, _over, after = self.times(walls, lane.remaining)

@@ -197,7 +197,7 @@ class Sum(Given):
 
 
 def parts_of(motion: Any) -> tuple[Any, ...]:
-    """The parts of a sum, or the motion itself; nothing of None."""
+    """The parts of a sum, or the motion itself; () for None."""
     if motion is None:
         return ()
     return motion.parts if isinstance(motion, Sum) else (motion,)

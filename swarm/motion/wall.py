@@ -139,7 +139,7 @@ class Guide(Given):
         checks.assign(self, axis=axis, speed=speed, stiffness=checks.magnitude("stiffness", self.stiffness))
 
     def harmonic(self, start: ArrayLike) -> Led:
-        """The path of a point of the wall before an impact moves it: the point is at rest."""
+        """The path of a point of the wall without its motion along the guide: a point at rest."""
         return Led(point_of(start), np.zeros(3), np.zeros(3), np.zeros(3), 0.0)
 
 
