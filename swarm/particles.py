@@ -89,9 +89,9 @@ class Particles:
         return float(np.sqrt(np.nanmax((self.velocity**2).sum(axis=0), initial=0.0)))
 
     def born(self) -> "Particles":
-        """Those that are there: without those of a frame of a run with sources that come later, whose rows are NaN.
+        """The particles without rows of NaN, which in a frame of a run with sources are particles not yet born.
 
-        There may be none.
+        The result may be empty.
         """
         there = ~np.isnan(self.position[0])
         held = {name: getattr(self, name) for name in ("position", "velocity", "mass", "image", "radius", "spin")}
@@ -144,9 +144,9 @@ class Births(NamedTuple):
     """The particles of a run that come while it lasts: behind those of the start, in the order in which they come.
 
     Attributes:
-        time: (N,) when each comes [s], 0 of those of the start.
-        source: (N,) the number of its source, -1 of those of the start.
-        sources: how many there are.
+        time: (N,) of the birth of each particle [s], 0 for particles of the start.
+        source: (N,) the number of its source, -1 for particles of the start.
+        sources: the number of sources.
     """
 
     time: Floats
@@ -154,7 +154,7 @@ class Births(NamedTuple):
     sources: int
 
     def there(self, moment: float) -> int:
-        """The number of those, the first ones, that are there at a time [s]."""
+        """The number of particles, the first ones, that are born by a time [s]."""
         return int(np.searchsorted(self.time, moment, side="right"))
 
 

@@ -101,10 +101,10 @@ def is_named(text: Any) -> bool:
 
 
 def named(where: str, text: Any, what: str) -> Any:
-    """What a value of a file names; `where` is its key, `what` says what it should be.
+    """The object that a value of a file names; `where` is its key, `what` says what it should be.
 
     Raises:
-        SceneError: it is no name of code, its module is not allowed, or has nothing of that name.
+        SceneError: the value does not name code, the module is not allowed, or the module has no object of that name.
     """
     match = _NAMED.fullmatch(text) if isinstance(text, str) else None
     if match is None:

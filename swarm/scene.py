@@ -517,7 +517,7 @@ class Scene:
 
     @cached_property
     def _parts_of_pieces(self) -> list[tuple[int, Place]]:
-        """Of every piece the surface, and the place of its part in that."""
+        """The surface of each piece, and the place of its part in that surface."""
         every = ((i, image) for i, images in enumerate(self._images) for image in images)
         return [(i, place) for i, image in every for place in places_of(image)]
 
@@ -546,7 +546,7 @@ class Scene:
         return [self.owners_of_pieces[i] for i in self.order.owners(self.pieces)]
 
     def members(self) -> NDArray[np.int64]:
-        """Of each wall of the scene its surface, and its number in the field or of the part, or -1: (2, walls)."""
+        """The surface of each wall, and its number in the field, or that of its part, or -1: (2, walls)."""
         number = {part: k for k, part in enumerate(self.parts)}
         of_pieces = [number.get(part, -1) for part in self._parts_of_pieces]
         rows = [(i, of_pieces[i] if member < 0 else member) for i, member in self.order.members(self.pieces)]
@@ -557,7 +557,7 @@ class Scene:
         return any(isinstance(law, str) for piece in self.pieces for law in piece.laws)
 
     def split_by_members(self, values: NDArray[Any]) -> list[NDArray[Any]]:
-        """Of each surface what its members have, from (..., members) of those of all surfaces, one after the other."""
+        """The values of the members of each surface, from (..., members) of all surfaces one after the other."""
         surface, member = self.members()
         counts = np.zeros(int(surface.max()) + 1, np.int64)
         np.maximum.at(counts, surface, member + 1)

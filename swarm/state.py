@@ -67,7 +67,7 @@ class Absorbed(NamedTuple):
     wall: NDArray[np.int32]
 
 
-# What is summed up of the crossings of a counter: three components of the momentum, the energy, the slowness.
+# The sums over the crossings of a counter: three components of the momentum, the energy, the slowness.
 CROSSED = 5
 
 
@@ -86,7 +86,7 @@ class Crossed(NamedTuple):
 
 
 class Balls(NamedTuple):
-    """What particles with a radius have besides.
+    """The further state of particles with a radius.
 
     Attributes:
         radius: (N,) [m].
@@ -142,17 +142,17 @@ class State(NamedTuple):
 
     @property
     def radius(self) -> Floats | None:
-        """Of balls [m], (N,)."""
+        """The radii of balls (N,) [m]; None for points."""
         return None if self.balls is None else self.balls.radius
 
     @property
     def spin(self) -> Floats | None:
-        """Of balls that turn [rad/s], (3, N)."""
+        """The angular velocities (3, N) of balls that turn [rad/s], else None."""
         return None if self.balls is None else self.balls.spin
 
     @property
     def collisions(self) -> NDArray[np.int64] | None:
-        """Of balls, (N,) how many each has had with others since the start."""
+        """The number of collisions (N,) of each ball with others since the start; None for points."""
         return None if self.balls is None else self.balls.collisions
 
     def having(self, **arrays: NDArray[Any]) -> "State":
