@@ -1,6 +1,8 @@
 """A word means one thing: what two modules of a package define by one name is one interface."""
 
 import ast
+import re
+import tokenize
 from collections import defaultdict
 from pathlib import Path
 
@@ -11,6 +13,10 @@ import swarm
 ROOT = Path(swarm.__file__).parent
 PACKAGES = sorted({path.parent.relative_to(ROOT) for path in ROOT.rglob("*.py")}, key=str)
 DEFINITIONS = ast.FunctionDef | ast.ClassDef
+# Turns of phrase that a reader has to decode: "who" is for people, and a function returns -1, not what is none.
+TURNS = re.compile(
+    r"\b([Ww]ho|[Ww]hom|[Ww]hoever|[Nn]obody|[Kk]nows? no|of one's own|(is|are) none|ha(s|ve) gone)\b",
+)
 
 
 def definitions(package):
@@ -43,3 +49,14 @@ def test_a_class_name_stands_once():
             if isinstance(node, ast.ClassDef):
                 found[node.name].append(str(path.relative_to(ROOT)))
     assert {name: places for name, places in found.items() if len(places) > 1} == {}
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=str)
+def test_docstrings_and_comments_are_in_plain_words(package):
+    found = []
+    for path in sorted((ROOT / package).glob("*.py")):
+        with path.open("rb") as file:
+            tokens = list(tokenize.tokenize(file.readline))
+        texts = [one for one in tokens if one.type == tokenize.COMMENT or one.string.startswith(('"""', 'r"""'))]
+        found += [f"{path.name}:{one.start[0]}: {turn[0]}" for one in texts for turn in TURNS.finditer(one.string)]
+    assert found == []
