@@ -133,7 +133,7 @@ def _mend(scene: Scene, wall: int, position: Places, outside: int) -> str:
 
 
 def _center_around(surface: Surface, position: Places) -> tuple[float, ...] | None:
-    """The centre that a cavity needs to hold all particles, or None if moving its own centre does not suffice."""
+    """The centre with which a cavity holds all particles; None if no shift of it does, or it cannot be shifted."""
     if _is_kept_out(surface) or not hasattr(surface, "center") or surface.motion is not None:
         return None
     box = np.array(box_of(surface, 0.0))

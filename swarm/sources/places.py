@@ -182,7 +182,7 @@ class PointBatches:
         """So many points (3, n), and there the unit normals (3, n) out of the admissible side; in a volume they are 0.
 
         Raises:
-            SceneError: no point is found, or far fewer than the points tried.
+            SceneError: fewer than one in a million of the points tried are admissible.
         """
         found: list[Floats] = []
         count, tried, told = 0, 0, _TOLD * self._batch
