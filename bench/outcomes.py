@@ -9,7 +9,6 @@ a particle outside, other bits.
 
 import contextlib
 import functools
-import hashlib
 import logging
 import math
 import os
@@ -48,11 +47,6 @@ class Ran(NamedTuple):
     given: cells.Build
     result: swarm.Result
     rows: int
-
-
-def digest_of(sentence: str) -> str:
-    """The first digits of its SHA-256."""
-    return hashlib.sha256(sentence.encode()).hexdigest()[:12]
 
 
 @contextlib.contextmanager
