@@ -1,5 +1,6 @@
 """Shards against the single run, bit for bit. They run here, one after the other, as they would on workers."""
 
+import shutil
 import signal
 
 import numpy as np
@@ -206,6 +207,24 @@ def test_workers_are_sent_the_modules_that_are_not_installed(on_a_cluster, tmp_p
     assert int(shown.impacts.sum()) > 20
     # NumPy is not sent: scenes of this kind hold its numbers, which would be pickled with their classes.
     assert on_a_cluster(*periodic(), 2, until=0.4, every=0.2, compile="never", trajectory=tmp_path / "cell.h5")
+
+
+def test_workers_are_sent_the_modules_of_a_package(on_a_cluster, tmp_path, monkeypatch):
+    """A package beside the scene file that takes its surface from a module of its own."""
+    package = tmp_path / "vessels"
+    package.mkdir()
+    (package / "__init__.py").write_text("from .bowls import Superellipsoid\n")
+    shutil.copy("examples/own_surface.py", package / "bowls.py")
+    monkeypatch.setattr(plugins, "imported", set())
+    monkeypatch.syspath_prepend(tmp_path)
+    path = tmp_path / "scene.toml"
+    path.write_text(PLUGINS.replace("examples.own_surface", "vessels"))
+    job = scene_file.read(path, ["vessels", "numpy"])
+    keywords = {"until": 0.4, "every": 0.2, "compile": "never"}
+    shown = on_a_cluster(job.scene, job.start(), job.method, 2, **keywords, trajectory=tmp_path / "run.h5")
+    alone = swarm.simulate(job.scene, job.start(), job.method, **keywords)
+    assert the_same(shown.particles.position, alone.particles.position)
+    assert int(shown.impacts.sum()) > 20
 
 
 def require_same_file(one, other):

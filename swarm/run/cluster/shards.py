@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import IO, Any, NamedTuple
 
 import numpy as np
@@ -80,14 +81,12 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     """Write what is run, and its start."""
     import cloudpickle
 
-    # Workers have what is installed, and are sent the code of other modules.
+    # Workers have what is installed, and are sent the code of other modules, those of a package included.
     for name in plugins.not_installed():
-        module = sys.modules[name]
-        cloudpickle.register_pickle_by_value(module)
-        for kind in vars(module).values():
-            # msgspec keeps there what it knows of a class that it made objects of, which cannot be pickled.
-            if isinstance(kind, type) and kind.__module__ == name and "__msgspec_cache__" in vars(kind):
-                del kind.__msgspec_cache__  # type: ignore[attr-defined]
+        cloudpickle.register_pickle_by_value(sys.modules[name])
+        for of_it, module in list(sys.modules.items()):
+            if of_it == name or of_it.startswith(f"{name}."):
+                _without_caches(of_it, module)
     body = None if task.bodies is None else task.bodies.body
     options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None, observables=None)
     whole = Whole(task.scene, task.method, options, body, bounds, start, scales_of(task))
@@ -99,6 +98,13 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     if task.particles.births is not None:
         for name, array in zip(_BIRTHS, task.particles.births, strict=False):
             _replace(folder / f"{name}.npy", functools.partial(_save, array))
+
+
+def _without_caches(name: str, module: ModuleType) -> None:
+    """Delete what msgspec keeps in the classes of a module that it made objects of: it cannot be pickled."""
+    for kind in vars(module).values():
+        if isinstance(kind, type) and kind.__module__ == name and "__msgspec_cache__" in vars(kind):
+            del kind.__msgspec_cache__  # type: ignore[attr-defined]
 
 
 def _save(*arrays_and_file: Any) -> None:
