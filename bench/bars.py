@@ -211,7 +211,7 @@ def recording(n: int, frames: int, repeats: int) -> list[Row]:
 
     All particles are recorded, then half of them: of 10 000 that is `record_particles = 5000`, the default.
     """
-    from swarm.output.recording import RecordingWriter, Settings
+    from swarm.recording.writer import RecordingWriter, Settings
 
     crossing = 4.0 / 3.0 * 0.5 / SPEED
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import swarm
-from swarm.run.colliding import CollidingRun
+from swarm.events.balls_run import CollidingRun
 from swarm.run.state import Seeding
 from swarm.run.tally import Watched
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 import swarm
-from swarm.output import checkpoint, checksums
-from swarm.output.storage import Storage
-from swarm.output.writer import TrajectoryWriter
+from swarm.files import checkpoint, checksums
+from swarm.files.storage import Storage
+from swarm.files.writer import TrajectoryWriter
 from swarm.run.engine import Run
 from swarm.state import State
 

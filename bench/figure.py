@@ -18,7 +18,7 @@ Limits = dict[str, list[float]]  # yardstick -> nanoseconds
 
 def colours() -> tuple[str, ...]:
     """One for each curve of a picture."""
-    from swarm.output import style
+    from swarm.pictures import style
 
     return (*style.CURVES, style.ink(), style.GREY)
 
@@ -27,9 +27,9 @@ def subplots(count: int, width: float, height: float, rows: int = 1, **options: 
     """A picture of so many panels side by side [inches], or in so many rows, drawn without a screen."""
     from matplotlib import style as styles
 
-    from swarm.output import style
+    from swarm.pictures import style
 
-    styles.use("swarm.output.look")
+    styles.use("swarm.pictures.look")
     picture = style.picture(width, height)
     return picture, picture.subplots(rows, count // rows, **options)
 
@@ -79,7 +79,7 @@ def _speeds(axes: Any, found: Found, lines: list[tuple[str, str, str]]) -> None:
 
 def _bounds(axes: Any, limits: Limits, *names: str) -> None:
     """What is not ours, as grey lines."""
-    from swarm.output.style import GREY, ink
+    from swarm.pictures.style import GREY, ink
 
     for colour, name in zip((GREY, ink()), names, strict=False):
         if name in limits:
@@ -88,7 +88,7 @@ def _bounds(axes: Any, limits: Limits, *names: str) -> None:
 
 def _scaling(axes: Any, found: Found, limits: Limits, scenes: list[str]) -> None:
     """Speed of two threads over one."""
-    from swarm.output.style import GREY
+    from swarm.pictures.style import GREY
 
     for colour, scene in zip(colours(), scenes, strict=False):
         best = {
@@ -116,7 +116,7 @@ _LEAST = 1e-17
 
 def accuracy(name: str, found: list[Any], front: list[Any], advice: str, where: str, file: str) -> None:
     """Errors over wall time, one curve a method, as PNG; `where` is the machine, `file` the name of the file."""
-    from swarm.output.style import GREY
+    from swarm.pictures.style import GREY
 
     picture, panels = subplots(3, 11.0, 5.4, sharex=True)
     for method in dict.fromkeys(p.method for p in found):

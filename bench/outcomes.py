@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import swarm
-from swarm.surfaces.doors import is_there
 from swarm.surfaces.instant import side_of
+from swarm.surfaces.presence.doors import is_there
 
 from . import cells, shards
 from .cells import Cell

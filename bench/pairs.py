@@ -113,7 +113,7 @@ def draw(found: Found) -> None:
     from matplotlib.colors import ListedColormap, to_rgb
     from matplotlib.patches import Patch
 
-    from swarm.output import style
+    from swarm.pictures import style
 
     walls, capabilities = _names(found)
     picture, panels = figure.subplots(len(_TITLES), 10.0, 14.5, rows=len(_TITLES) // 2, sharex=True, sharey=True)

@@ -100,7 +100,7 @@ def run(count: int, opens: float = 20.0, until: float = 100.0, frames: int = 40)
 
 def draw(storage: Storage, file: Path) -> None:
     """The bottle with what it stores, and the storage curve."""
-    from swarm.output.style import CAVITY_LINE, GREEN, ORANGE
+    from swarm.pictures.style import CAVITY_LINE, GREEN, ORANGE
 
     mesh, title = storage.mesh, "A storage bottle from an STL file keeps its gas until a shutter in its floor opens"
     with page(file, title, 1, 2, (9.0, 4.4)) as (place, axes):

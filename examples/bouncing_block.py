@@ -31,7 +31,7 @@ def run(until: float) -> swarm.Result:
 
 def draw(seen: dict[str, np.ndarray], file: Path) -> None:
     """The energies over time, and how constant their sum is."""
-    from swarm.output.style import ENERGIES, ink
+    from swarm.pictures.style import ENERGIES, ink
 
     title = "An elastic block falls on a plane: most of its fall becomes vibration, and the sum stays"
     with page(file, title, 1, 2, (9.0, 3.9)) as (energies, error):

@@ -79,7 +79,7 @@ def draw(game: Game, file: Path) -> None:
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Circle, Rectangle
 
-    from swarm.output.style import BLUE, CAVITY, CAVITY_LINE, GREY, RED, ink
+    from swarm.pictures.style import BLUE, CAVITY, CAVITY_LINE, GREY, RED, ink
 
     title = "A break shot: the red ball comes from the left with 9 m/s, and fifteen blue ones scatter"
     with page(file, title, 2, 2, (8.4, 4.9)) as axes:

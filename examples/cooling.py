@@ -48,7 +48,7 @@ def curves(folder: Path) -> dict[float, tuple[np.ndarray, np.ndarray]]:
 
 def draw(found: dict[float, tuple[np.ndarray, np.ndarray]], file: Path) -> None:
     """Every gas as dots, the law as a line."""
-    from swarm.output.style import CURVES
+    from swarm.pictures.style import CURVES
 
     with page(file, "A gas loses its energy to the walls of its box", 1, 1, (6.4, 4.6)) as (axes,):
         for colour, (restitution, (times, energies)) in zip(CURVES, found.items(), strict=False):

@@ -57,7 +57,7 @@ def run(restitution: float, side: int = SIDE, taus: float = TAUS, packing: float
 
 def draw(found: dict[float, Cooled], file: Path) -> None:
     """The energy over time, and how far it is from the law."""
-    from swarm.output.style import CURVES
+    from swarm.pictures.style import CURVES
 
     fine = np.geomspace(0.05, TAUS, 200)
     title = "A gas of balls that lose energy when they meet cools by Haff's law, and no longer when they cluster"

@@ -80,7 +80,7 @@ def _flow(time: np.ndarray, part: np.ndarray, law: np.ndarray, run: Any) -> Flow
 
 def draw(flow: Flow, file: Path, names: tuple[str, ...], walls: Any, opened: tuple[float, float, str]) -> None:
     """The particles at two times, seen along z, between what `walls` draws; and the part over time."""
-    from swarm.output.style import BLUE, ORANGE
+    from swarm.pictures.style import BLUE, ORANGE
 
     title, label, *captions = names
     since, until, what = opened
@@ -104,7 +104,7 @@ def draw(flow: Flow, file: Path, names: tuple[str, ...], walls: Any, opened: tup
 
 def draw_vessel(axes: Any, shut: bool) -> None:
     """The section of the vessel at z = 0, with its shutter if that is there."""
-    from swarm.output.style import CAVITY_LINE, ORANGE
+    from swarm.pictures.style import CAVITY_LINE, ORANGE
 
     axes.plot(
         HALF * np.array([-1, 1, 1, -1, -1]), HALF * np.array([-1, -1, 1, 1, -1]), color=CAVITY_LINE, linewidth=2.0
@@ -123,7 +123,7 @@ def draw_vessel(axes: Any, shut: bool) -> None:
 
 def draw_rooms(axes: Any, shut: bool) -> None:
     """The section of the rooms at z = 0, with the door."""
-    from swarm.output.style import CAVITY_LINE, ORANGE
+    from swarm.pictures.style import CAVITY_LINE, ORANGE
 
     low, high = -2.0 * HALF, HALF
     axes.plot([low, high, high, low, low], [-HALF, -HALF, HALF, HALF, -HALF], color=CAVITY_LINE, linewidth=2.0)

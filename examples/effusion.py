@@ -88,7 +88,7 @@ def run(count: int, hot: bool, until: float = 2.0, frames: int = 20) -> Gas:
 
 def draw(cold: Gas, hot: Gas, file: Path) -> None:
     """What is left, how far that is from the law, and the energy of a particle inside."""
-    from swarm.output.style import BLUE, RED
+    from swarm.pictures.style import BLUE, RED
 
     kinds = (("elastic walls", cold, BLUE), ("walls of one temperature", hot, RED))
     title = "A gas leaves its box through a small hole: between elastic walls fast particles go first, and it cools"

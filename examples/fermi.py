@@ -62,7 +62,7 @@ def in_fifty_digits(speed: float, amplitude: float, impacts: int) -> tuple[float
 
 def draw(places: np.ndarray, velocities: np.ndarray, file: Path) -> None:
     """The phase space once a period, and the largest and smallest speed of each particle."""
-    from swarm.output.style import BLUE, RED
+    from swarm.pictures.style import BLUE, RED
 
     speeds = np.abs(velocities)
     title = "A ball between a wall at rest and one that swings: slow ones wander in chaos, fast ones keep their speed"

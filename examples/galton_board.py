@@ -97,7 +97,7 @@ def draw(found: Filled, smooth: Filled, file: Path) -> None:
     """The board with some paths, and the bins beside the binomial law."""
     from matplotlib.patches import Rectangle
 
-    from swarm.output.style import BLUE, GREEN, ORANGE, RED, SOLID_LINE, ink
+    from swarm.pictures.style import BLUE, GREEN, ORANGE, RED, SOLID_LINE, ink
 
     title = "Galton's board: twelve rows of rough pegs fill the bins by the binomial law, smooth pegs do not"
     with page(file, title, 1, 2, (10.0, 4.6)) as axes:

@@ -86,7 +86,7 @@ def measure(packing: float, collisions: int, side: int = SIDE) -> Measured:
 
 def draw(found: dict[float, Measured], file: Path) -> None:
     """Z over the packing, and how far it is from the law."""
-    from swarm.output.style import BLUE, GREEN
+    from swarm.pictures.style import BLUE, GREEN
 
     packing, fine = np.array(list(found)), np.linspace(0.0, 0.5, 200)
     z, error = (np.array([one[k] for one in found.values()]) for k in range(2))

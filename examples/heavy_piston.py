@@ -84,7 +84,7 @@ def late_difference(found: Shared) -> tuple[float, float]:
 
 def draw(found: Shared, file: Path) -> None:
     """The place of the piston and the temperatures over time."""
-    from swarm.output.style import BLUE, GREEN, RED
+    from swarm.pictures.style import BLUE, GREEN, RED
 
     title = "A piston between a cold gas and a hot one: its own thermal motion makes their temperatures equal"
     with page(file, title, 1, 2, (9.0, 3.8)) as axes:

@@ -109,7 +109,7 @@ def mean_of(values: np.ndarray) -> tuple[float, float]:
 
 def draw(found: dict[float, Measured], memory: dict[float, float], file: Path) -> None:
     """D over the gap, its ratio to the law of narrow gaps, and the path of a particle."""
-    from swarm.output.style import BLUE, GREEN
+    from swarm.pictures.style import BLUE, GREEN
 
     gaps, fine = np.array(list(found)), np.linspace(1e-3, 0.305, 200)
     value, error = np.transpose([one.diffusion for one in found.values()])

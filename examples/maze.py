@@ -29,7 +29,7 @@ def run(count: int | None = None, until: float | None = None) -> tuple[swarm.Sce
 
 def draw(scene: swarm.Scene, result: swarm.Result, file: Path) -> None:
     """The maze with those who are left in it, and how many are left over time."""
-    from swarm.output.style import BLUE, RED
+    from swarm.pictures.style import BLUE, RED
 
     title = "A maze: most particles find the exit, some need very long"
     with page(file, title, 1, 2, (10.0, 3.9), width_ratios=(1.35, 1.0)) as axes:

@@ -58,7 +58,7 @@ def run(count: int, until: float = 1000.0) -> Run:
 
 def draw(found: Run, file: Path) -> None:
     """Where each path starts and whether it stays, a path of each kind, and how many are left over time."""
-    from swarm.output.style import BLUE, RED
+    from swarm.pictures.style import BLUE, RED
 
     title = "Bunimovich's mushroom: who circles in the cap stays for ever, all others find the stem and leave"
     with page(file, title, 1, 3, (11.0, 3.9)) as axes:

@@ -107,7 +107,7 @@ def bottle(count: int, until: float = 400.0) -> tuple[Curve, np.ndarray, float]:
 
 def draw(one: Curve, thermal: Curve, neutrons: Curve, whole: np.ndarray, file: Path) -> None:
     """The curves beside their laws, and how far they are from them."""
-    from swarm.output.style import BLUE, GREEN, GREY, PINK, RED
+    from swarm.pictures.style import BLUE, GREEN, GREY, PINK, RED
 
     title = "Gases that are lost at walls: one speed is lost exponentially, a thermal gas by a tail, as the laws say"
     with page(file, title, 1, 3, (11.0, 4.0)) as axes:

@@ -66,7 +66,7 @@ CRADLES = {
 
 def draw(found: dict[str, Swung], file: Path) -> None:
     """Where the centres of the balls are over time: lines of one width, which at rest are a diameter apart."""
-    from swarm.output.style import CURVES
+    from swarm.pictures.style import CURVES
 
     title = "Newton's cradle on a rail: as many balls leave the row as came, unless one is heavier or energy is lost"
     with page(file, title, 1, len(found), (11.0, 4.8), sharey=True) as axes:

@@ -14,7 +14,7 @@ from swarm.kernel.jit import select
 from swarm.kernel.vector import dot
 from swarm.methods import contract
 from swarm.methods.base import Method
-from swarm.surfaces import flights
+from swarm.surfaces.time_of_impact import flights
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ def run(porosity: float, rough: bool, balls: int = 4_000, count: int = 1_000, fl
 
 def draw(found: dict[bool, dict[float, Bed]], file: Path) -> None:
     """A section of a bed, mean free path and diffusion over the porosity."""
-    from swarm.output.style import BLUE, ORANGE, RED
+    from swarm.pictures.style import BLUE, ORANGE, RED
 
     title = "A gas in a bed of balls that overlap: its free path is known exactly, its diffusion falls as pores close"
     with page(file, title, 1, 3, (11.0, 3.9)) as axes:

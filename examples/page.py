@@ -30,7 +30,7 @@ def page(
     `panels` are further arguments of `Figure.subplots`.
     """
     # Imported here: only drawing needs matplotlib.
-    from swarm.output import style
+    from swarm.pictures import style
 
     with style.applied():
         picture = style.picture(*size)
@@ -54,7 +54,7 @@ def save(picture: Any, file: Path) -> None:
 
 def law(axes: Any, x: Any, y: Any, label: str | None = None, line: str = "-") -> None:
     """A thin grey line: what a theory says, beside what is measured; level where `y` is a number and `x` is None."""
-    from swarm.output.style import GREY
+    from swarm.pictures.style import GREY
 
     thin: Any = {"color": GREY, "linewidth": 1.2, "zorder": 1, "label": label, "linestyle": line}
     if x is None:
@@ -65,7 +65,7 @@ def law(axes: Any, x: Any, y: Any, label: str | None = None, line: str = "-") ->
 
 def outline(axes: Any, scene: swarm.Scene) -> None:
     """The walls of a table of two dimensions, x and y in metres."""
-    from swarm.output.style import CAVITY_LINE
+    from swarm.pictures.style import CAVITY_LINE
 
     for curve in scene.surfaces[0].curves():
         axes.plot(*curve[:, :2].T, color=CAVITY_LINE, zorder=1)
@@ -77,7 +77,7 @@ def solid(axes: Any, center: tuple[float, float], radius: float) -> None:
     """The section of a ball, a cylinder or a peg."""
     from matplotlib.patches import Circle
 
-    from swarm.output.style import SOLID, SOLID_LINE
+    from swarm.pictures.style import SOLID, SOLID_LINE
 
     axes.add_patch(Circle(center, radius, facecolor=SOLID, edgecolor=SOLID_LINE, linewidth=0.6, zorder=2.5))
 
@@ -91,7 +91,7 @@ def vessel(axes: Any, parts: list[tuple[Any, str]], places: Any) -> None:
     from matplotlib.colors import to_rgba
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    from swarm.output.style import BLUE
+    from swarm.pictures.style import BLUE
 
     axes.set_axis_off()
     axes.computed_zorder = False

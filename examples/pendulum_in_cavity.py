@@ -40,7 +40,7 @@ def run(until: float, order: int = 2, file: Path | None = None) -> swarm.Result:
 
 def draw(seen: dict[str, np.ndarray], paths: list[np.ndarray], file: Path) -> None:
     """The paths of both bobs from the side, and the energies over time."""
-    from swarm.output.style import BLUE, CAVITY, CAVITY_LINE, RED, ink
+    from swarm.pictures.style import BLUE, CAVITY, CAVITY_LINE, RED, ink
 
     title = "A double pendulum in a ball strikes its wall: after every blow the energy is what it was"
     with page(file, title, 1, 2, (9.0, 4.0)) as (side, error):

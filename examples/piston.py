@@ -73,7 +73,7 @@ def growth(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
 
 def draw(found: Compressed, file: Path) -> None:
     """Temperature over volume, beside the adiabatic law."""
-    from swarm.output.style import BLUE
+    from swarm.pictures.style import BLUE
 
     title = "A slow piston compresses a gas: it warms by the adiabatic law"
     with page(file, title, 1, 2, (9.0, 3.8)) as axes:

@@ -45,7 +45,7 @@ def section(degrees: float, orbits: int, until: float) -> tuple[NDArray[np.int32
 
 def draw(path: Path) -> None:
     """The section at three angles."""
-    from swarm.output.style import CURVES
+    from swarm.pictures.style import CURVES
 
     angles = {45.0: "45°: regular, each on its line", 32.0: "32°: islands in a sea", 55.0: "55°: chaos"}
     title = "A ball bounces in a wedge: each impact on one wall is a dot, sixty balls in six colours"

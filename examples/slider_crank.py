@@ -83,7 +83,7 @@ def run(revolutions: int, restitution: float = 1.0) -> tuple[swarm.Result, Motio
 
 def draw(motion: Motion, file: Path) -> None:
     """The pin's path in its cavity, the force, and the slider beside the ideal one."""
-    from swarm.output.style import BLUE, CAVITY, CAVITY_LINE, GREEN, RED
+    from swarm.pictures.style import BLUE, CAVITY, CAVITY_LINE, GREEN, RED
 
     turns = motion.time * RATE / (2.0 * np.pi)
     title = "A pin that is loose by 0.5 mm in its joint rattles and slides: two turns of 5000 a minute"

@@ -95,7 +95,7 @@ def paths(ratio: float, apart: float, until: float, frames: int) -> np.ndarray:
 
 def draw(found: list[tuple[float, float]], file: Path) -> None:
     """Two paths that part, their distance over time, and the exponent over the shape of the stadium."""
-    from swarm.output.style import BLUE, GREEN, RED
+    from swarm.pictures.style import BLUE, GREEN, RED
 
     pair = paths(2.0, 1e-9, 60.0, 6000)
     title = "Bunimovich's stadium: two particles that begin a nanometre apart part exponentially"

@@ -72,7 +72,7 @@ def run(count: int, until: float, frames: int) -> Gas:
 
 def draw(gas: Gas, file: Path) -> None:
     """Both pressures and their ratio by time."""
-    from swarm.output.style import BLUE, GREEN, RED
+    from swarm.pictures.style import BLUE, GREEN, RED
 
     title = "Two chambers of two temperatures, joined by a tube: their pressures settle, and not at one value"
     with page(file, title, 1, 2, (9.0, 3.8)) as axes:

@@ -80,7 +80,7 @@ def run(count: int, length: float, stays: float = 12.0, seed: int = 1) -> Flow:
 
 def draw(flows: dict[float, Flow], file: Path) -> None:
     """The number in each tube, the density along it, and the factors."""
-    from swarm.output.style import CURVES
+    from swarm.pictures.style import CURVES
 
     title = "A gas flows through tubes without collisions: the longer the tube, the more turn back, as Clausing says"
     with page(file, title, 1, 3, (11.0, 3.9)) as axes:

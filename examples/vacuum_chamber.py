@@ -131,7 +131,7 @@ def draw_vessel(axes: Any, gas: Vacuum) -> None:
     """The section at y = 0, with the gauges in the colour of what they show."""
     from matplotlib.patches import Circle
 
-    from swarm.output.style import CAVITY, CAVITY_LINE, GREEN, MAP, PINK
+    from swarm.pictures.style import CAVITY, CAVITY_LINE, GREEN, MAP, PINK
 
     end = HALF + LENGTH
     upper = np.array([[-HALF, 0.0], [-HALF, WIDE], [HALF, WIDE], [HALF, NARROW], [end, NARROW]])
@@ -160,7 +160,7 @@ def draw_vessel(axes: Any, gas: Vacuum) -> None:
 
 def draw(gas: Vacuum, file: Path) -> None:
     """The vessel with its gauges, the pressure along the axis, and the numbers over time."""
-    from swarm.output.style import BLUE, CAVITY, GREEN, PINK
+    from swarm.pictures.style import BLUE, CAVITY, GREEN, PINK
 
     title = "Gas comes into a vacuum chamber and leaves by a tube to a pump: gauges show the pressure everywhere"
     with page(file, title, 1, 3, (11.0, 4.0), width_ratios=(1.15, 1.0, 1.0)) as axes:

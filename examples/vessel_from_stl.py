@@ -83,7 +83,7 @@ def law(z: np.ndarray) -> np.ndarray:
 
 def draw(gas: Gas, file: Path) -> None:
     """The vase with the gas in it, and the density over the height."""
-    from swarm.output.style import BLUE, CAVITY_LINE
+    from swarm.pictures.style import BLUE, CAVITY_LINE
 
     title = "A gas between the warm walls of a vase from an STL file: it is denser below, by the barometric law"
     with page(file, title, 1, 2, (9.0, 4.6)) as (place, axes):

@@ -6,6 +6,7 @@ The public names are loaded when they are first used, so that `swarm --help` nee
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from . import moved
 from .version import VERSION
 
 if TYPE_CHECKING:
@@ -14,19 +15,19 @@ if TYPE_CHECKING:
     from .bodies.placing import place
     from .bodies.shapes import chain, dumbbell, rigid, tetrahedron
     from .bodies.state import Bodies
+    from .common.frames import Frame
     from .ensemble.report import report
     from .ensemble.sweeping import sweep
     from .errors import CompleteError, FileError, RunError, SceneError, SwarmError, WallTimeError
-    from .filling import fill
-    from .frames import Frame
+    from .events.packing import pack
+    from .files.impact_log import ImpactLog, load_impacts
+    from .files.trajectory import Trajectory, load
     from .history import ContactHistory, contact_history
     from .methods import AugmentedLagrangian, Impact, Midpoint, Penalty, Trapezoidal, Verlet
     from .motion import Guide, Oscillation, Path, Rotation, Translation
-    from .output.impact_log import ImpactLog, load_impacts
-    from .output.trajectory import Trajectory, load
-    from .packing import pack
     from .pairs import Pairs
     from .particles import Particles
+    from .placing.filling import fill
     from .run.result import Result
     from .run.simulation import simulate
     from .scene import Scene
@@ -60,11 +61,12 @@ if TYPE_CHECKING:
     )  # fmt: skip
     from .surfaces.counter import Counter
     from .surfaces.data.mesh import from_mesh
-    from .surfaces.doors import Opening
     from .surfaces.laws import Absorb, CercignaniLampis, Lambert, Sticky
+    from .surfaces.presence.doors import Opening
     from .surfaces.wall_law import Leave, WallLaw
 
 __version__ = VERSION
+moved.find()
 
 # A module of the package and the public names that it defines.
 _HOMES = {
@@ -76,14 +78,14 @@ _HOMES = {
     "ensemble.report": ("report",),
     "ensemble.sweeping": ("sweep",),
     "errors": ("FileError", "CompleteError", "RunError", "SceneError", "SwarmError", "WallTimeError"),
-    "filling": ("fill",),
-    "frames": ("Frame",),
+    "placing.filling": ("fill",),
+    "common.frames": ("Frame",),
     "history": ("ContactHistory", "contact_history"),
     "methods": ("AugmentedLagrangian", "Impact", "Midpoint", "Penalty", "Trapezoidal", "Verlet"),
     "motion": ("Guide", "Oscillation", "Path", "Rotation", "Translation"),
-    "output.impact_log": ("ImpactLog", "load_impacts"),
-    "output.trajectory": ("Trajectory", "load"),
-    "packing": ("pack",),
+    "files.impact_log": ("ImpactLog", "load_impacts"),
+    "files.trajectory": ("Trajectory", "load"),
+    "events.packing": ("pack",),
     "pairs": ("Pairs",),
     "particles": ("Particles",),
     "scene": ("Scene",),
@@ -92,7 +94,7 @@ _HOMES = {
     "run.simulation": ("simulate",),
     "surfaces.counter": ("Counter",),
     "surfaces.data.mesh": ("from_mesh",),
-    "surfaces.doors": ("Opening",),
+    "surfaces.presence.doors": ("Opening",),
     "surfaces": (
         "Box", "Boxes", "Capsule", "Capsules", "Cone", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids", "Formula",
         "Intersection", "Mesh", "OwnSurface", "Paraboloid", "Plane", "Polygon", "Prism", "Quadric", "Sampled", "Slab",
@@ -121,7 +123,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'swarm' has no attribute {name!r}")
     # No public name is the name of a module: importing that module would hide it.
     value = getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
-    importlib.import_module(".signature", __name__).show_in_lines(value)
+    importlib.import_module(".common.signature", __name__).show_in_lines(value)
     globals()[name] = value
     return value
 

@@ -1,12 +1,12 @@
 """`python -m swarm` is the command `swarm`."""
 
-from . import interrupt
+from .common import interrupt
 
 
 def main() -> None:
     """Run the command line."""
     with interrupt.at_once():
-        from .cli import main as command
+        from .commands.cli import main as command
     command()
 
 

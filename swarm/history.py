@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .common.status import Status
 from .contact import corner, reflection, uzawa
 from .contact.impulse import Step
 from .contact.regularisation import regularisation
@@ -16,12 +17,11 @@ from .kernel.vector import Vec, vec
 from .methods import AugmentedLagrangian, Impact, Method, Penalty
 from .methods.base import check_surfaces
 from .particles import Particles
-from .run.knows import Asked, require_known
 from .run.options import RunOptions
+from .run.preflight.knows import Asked, require_known
 from .scene import Scene
-from .status import Status
-from .surfaces import flights
 from .surfaces.lowered import lowered
+from .surfaces.time_of_impact import flights
 
 Floats = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from .kernel.vector import Vec, column, cross, dot, square, vec
 from .pieces import PartsOfRows
 from .scene import Scene
 from .state import CROSSED, Floats, State, is_gone
-from .surfaces import flights
 from .surfaces.depth import penetration
+from .surfaces.time_of_impact import flights
 
 # Particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256

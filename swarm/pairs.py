@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from . import checks
+from .common import checks
 from .errors import SceneError
 
 # Of soft contacts: the largest overlap that a start may have, as a part of the radius of the smaller ball.

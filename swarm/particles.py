@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import checks, notebook
-from .columns import read_columns
+from .common import checks, notebook
+from .common.columns import read_columns
 from .errors import SceneError
 from .state import Floats
 

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from .contact.laws import Span, Thermal
 from .errors import SceneError
-from .surfaces.images import Lengths
-from .surfaces.openings import reaches, volumes_of
+from .surfaces.periodic.images import Lengths
+from .surfaces.presence.openings import reaches, volumes_of
 from .surfaces.surface import Surface, volume_of
 from .surfaces.union import Joined, Place, nodes_of
 

@@ -11,9 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import checks, notebook
 from . import motion as motions
-from . import plane as planes
+from .common import checks, notebook
 from .contact.laws import NONE, Laws, Moves, owned_in
 from .errors import SceneError
 from .kernel.gravity import Gravity
@@ -30,20 +29,21 @@ from .pieces import (
     volumes_of_pieces,
     with_reach,
 )
+from .surfaces import plane as planes
 from .surfaces import required
 from .surfaces import rotation as rotations
-from .surfaces.doors import instants_of, was_there
 from .surfaces.facets.mesh import Mesh
 from .surfaces.fields.grouped import Order, order_of, walls_in
 from .surfaces.fields.many import Many, in_straight_flights, members_of
 from .surfaces.fields.members import Members
-from .surfaces.images import Lengths, cell_of, corners_of, images_of, into_cell, lengths_of
+from .surfaces.in_motion.moving import carried
 from .surfaces.instant import box_of, gaps_of, gradient_of, has_room, planes_of
-from .surfaces.joined import with_rooms
-from .surfaces.moving import carried
-from .surfaces.openings import Opened, openings_in, require_few
-from .surfaces.period import Period, cell_in
+from .surfaces.periodic.images import Lengths, cell_of, corners_of, images_of, into_cell, lengths_of
+from .surfaces.periodic.period import Period, cell_in
 from .surfaces.polyhedron import polyhedron_bounds
+from .surfaces.presence.doors import instants_of, was_there
+from .surfaces.presence.joined import with_rooms
+from .surfaces.presence.openings import Opened, openings_in, require_few
 from .surfaces.surface import UNBOUNDED, Box, Surface
 from .surfaces.union import Joined, Place, surfaces_of
 from .surfaces.upright import upright

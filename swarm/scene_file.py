@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import plugins, run_tables, tables
-from .checks import closest, count, listed, particles_fit
-from .columns import read_columns, row_of
+from .common.checks import closest, count, listed, particles_fit
+from .common.columns import read_columns, row_of
 from .errors import SceneError
-from .filling import fill
+from .files import paths
 from .methods import Method
-from .output import paths
 from .particles import Particles
-from .plugins import allowed
+from .placing.filling import fill
 from .run.options import RunOptions
 from .scene import Scene
+from .serialization import plugins, run_tables, tables
+from .serialization.plugins import allowed
 from .surfaces import ALL_FIELDS
 from .surfaces.data.files import samples_of
 
@@ -68,7 +68,7 @@ class ParticlesTable:
         )
 
     def _packed(self, scene: Scene) -> Particles:
-        from .packing import pack  # which imports the engine
+        from .events.packing import pack  # which imports the engine
 
         if self.exact:
             raise SceneError("exact must be left out with a fraction, got true: use temperature alone")
@@ -155,7 +155,7 @@ def _read(file: Path, table: ParticlesTable | BodiesFile) -> "Particles | Bodies
     """The particles or bodies that a file holds."""
     if file.suffix.lower() == ".csv":
         return Particles.from_csv(file)
-    from .output.trajectory import load  # h5py only where it is used
+    from .files.trajectory import load  # h5py only where it is used
 
     frame = -1 if table.frame is None else table.frame
     with load(file) as trajectory:

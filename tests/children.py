@@ -71,14 +71,14 @@ def _import_swarm():
     import filelock  # noqa: F401
     import psutil  # noqa: F401
 
-    import swarm.output.exported
-    import swarm.output.trajectory
-    import swarm.output.writer
+    import swarm.commands.summary
+    import swarm.exports.exported
+    import swarm.files.trajectory
+    import swarm.files.writer
     import swarm.run.machine
     import swarm.run.session
     import swarm.scene_file
-    import swarm.summary
-    from swarm import cli  # noqa: F401
+    from swarm.commands import cli  # noqa: F401
 
     for name in swarm.__all__:
         getattr(swarm, name)

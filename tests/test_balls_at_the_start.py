@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.run.admission import task_of
 from swarm.run.options import RunOptions
+from swarm.run.preflight.admission import task_of
 
 BOX = swarm.Box((0.5, 0.5, 0.5))
 VESSEL = swarm.Scene([BOX])

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import swarm
-from swarm import catalog
+from swarm.common import catalog
 
 GUIDE = Path(__file__).parents[1] / "examples" / "README.md"
 

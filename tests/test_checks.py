@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from swarm import SceneError, SwarmError, checks
+from swarm import SceneError, SwarmError
+from swarm.common import checks
 
 MASKED = "points must be an array without a mask, got a masked one; remove or fill the masked entries"
 

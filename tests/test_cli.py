@@ -18,7 +18,7 @@ from children import python
 from test_scene_file import GOOD
 
 import swarm
-from swarm import cli
+from swarm.commands import cli
 from swarm.run import machine
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set")
@@ -352,8 +352,8 @@ def test_version_and_help(folder):
 def test_help_does_not_import_the_engine(folder):
     """--help answers fast because neither Numba nor NumPy nor HDF5 is imported for it."""
     code = (
-        "import sys, swarm.cli\n"
-        "try: swarm.cli.app(['--help'])\n"
+        "import sys, swarm.commands.cli\n"
+        "try: swarm.commands.cli.app(['--help'])\n"
         "except SystemExit: pass\n"
         "print([name for name in ('numba', 'numpy', 'h5py', 'rich', 'msgspec') if name in sys.modules])"
     )

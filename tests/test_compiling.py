@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from swarm.kernel import cache
-from swarm.run.compiling import Compilations
+from swarm.kernel.compiling import Compilations
 
 
 def named(name):
@@ -36,10 +36,10 @@ def test_it_says_what_and_how_far(monkeypatch):
 @pytest.mark.parametrize("run", ["particles", "bodies", "reacting"])
 def test_every_kernel_of_a_run_has_words(run):
     import swarm
-    from swarm.run import compiling
-    from swarm.run.admission import task_of
+    from swarm.kernel import compiling
     from swarm.run.machine import run_of
     from swarm.run.options import RunOptions
+    from swarm.run.preflight.admission import task_of
 
     walls = [swarm.Plane((0.0, 0.0, -1.0), 0.0), swarm.Sphere(0.5)]
     walls[0] = walls[0] if run != "reacting" else swarm.Plane((0.0, 0.0, -1.0), 0.0, mass=1.0)

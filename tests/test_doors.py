@@ -13,11 +13,11 @@ import swarm
 from swarm import scene_file
 from swarm.contact.events import ARRIVED
 from swarm.kernel.vector import Vec, norm
-from swarm.output.film import _Film
-from swarm.output.shapes import shapes_of
+from swarm.pictures.film import _Film
 from swarm.run.doors import DoorRun
-from swarm.surfaces.doors import instants_of, is_there, was_there
-from swarm.tables import scene_of, scene_table
+from swarm.serialization.tables import scene_of, scene_table
+from swarm.surfaces.presence.doors import instants_of, is_there, was_there
+from swarm.triangles.shapes import shapes_of
 
 HOLE = swarm.Sphere(0.2, center=(0.0, 0.0, 0.5))
 DOWN = (0.0, 0.0, -1.0)

@@ -13,8 +13,9 @@ import pytest
 from conftest import row
 
 import swarm
-from swarm.extras import PACKAGES, needed_by
-from swarm.output import export, views
+from swarm import views
+from swarm.common.extras import PACKAGES, needed_by
+from swarm.exports import export
 
 ROOT = Path(swarm.__file__).parent
 PROJECT = tomllib.loads((ROOT.parent / "pyproject.toml").read_text())["project"]
@@ -80,7 +81,7 @@ def of_module(module):
     """What a module imports when it is imported; of pages and films also the packages of their functions."""
     at_once = set(imported(tree_of(module).body, module, deep=False))
     later = {name for name in imported(tree_of(module).body, module, deep=True) if not name.startswith("swarm")}
-    return at_once | later if module.startswith(("swarm.output.page", "swarm.output.film")) else at_once
+    return at_once | later if module.startswith(("swarm.report", "swarm.pictures.film")) else at_once
 
 
 def packages(names):
@@ -110,7 +111,7 @@ def guarded():
             for node in (one for one in ast.walk(function) if isinstance(one, ast.With)):
                 for extra in extras_of(node):
                     names = set(imported(node.body, module, deep=True))
-                    if module == "swarm.output.export" and "import_module" in ast.unparse(node):
+                    if module == "swarm.exports.export" and "import_module" in ast.unparse(node):
                         forms = [form for kind, form in export._FORMS.items() if (kind == ".gsd") == (extra == "gsd")]
                         names |= {f"swarm.output.{form}" for form in forms}
                     yield f"{module}:{node.lineno}", (*before, extra), names
@@ -147,7 +148,7 @@ def test_what_is_imported_is_in_the_extra():
 
 
 def test_what_is_imported_without_an_extra_is_a_dependency():
-    assert packages(["swarm", "swarm.cli", *(f"swarm.{home}" for home in swarm._HOME.values())]) <= CORE
+    assert packages(["swarm", "swarm.commands.cli", *(f"swarm.{home}" for home in swarm._HOME.values())]) <= CORE
 
 
 def test_the_sentence():

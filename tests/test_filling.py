@@ -137,7 +137,7 @@ def test_an_open_volume_is_refused(surface):
 
 
 def test_a_volume_too_thin_to_find_is_refused(monkeypatch):
-    monkeypatch.setattr(importlib.import_module("swarm.filling"), "_TRIES", 1_000_000)
+    monkeypatch.setattr(importlib.import_module("swarm.placing.filling"), "_TRIES", 1_000_000)
     scene = swarm.Scene([swarm.Sphere(1.0), swarm.Sphere(1.0 - 1e-8, side="outside")])
     with pytest.raises(swarm.SceneError, match=r"admissible points in .* tries.*below 1e-6"):
         swarm.fill(scene, 1000, speed=1.0)

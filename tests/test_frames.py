@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.frames import FrameTimes
+from swarm.common.frames import FrameTimes
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 START = swarm.fill(SPHERE, 3, speed=1.0, seed=1)

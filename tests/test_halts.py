@@ -12,14 +12,15 @@ from children import python
 
 import swarm
 from swarm.contact.events import CAREFUL, EVENT
+from swarm.events import walls_run as reacting
+from swarm.events.reacting import queue
 from swarm.lanes import block, careful, contact_events, slide
 from swarm.lanes.table import LANES
-from swarm.reacting import queue
-from swarm.run import reacting, turns
-from swarm.run.admission import task_of
+from swarm.run import turns
 from swarm.run.engine import Run
 from swarm.run.machine import run_of
 from swarm.run.options import RunOptions
+from swarm.run.preflight.admission import task_of
 from swarm.run.watch import Watch
 
 FLOOR = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0)], (0.0, 0.0, -9.81))
@@ -242,7 +243,7 @@ report(scene, start, swarm.Impact(), until=0.2, every=0.04, compile="never")
 """
 # An inelastic collapse of a wall on a particle.
 COLLAPSE = """
-from swarm.reacting import queue
+from swarm.events.reacting import queue
 queue.MOST_HITS, real = 10**15, queue._carry_out
 def noted(*about):
     note()
@@ -254,7 +255,7 @@ report(scene, swarm.Particles((0.0, 0.0, 0.2), (0.0, 0.0, 1.0), 0.01), swarm.Imp
 """
 # Leases that end at once.
 LEASES = """
-from swarm.reacting import queue
+from swarm.events.reacting import queue
 real = queue.take.py_func
 def take(*about):
     note()
@@ -265,7 +266,7 @@ scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0), plate])
 report(scene, swarm.Particles((0.0, 0.0, 0.2), (0.0, 0.0, 1.0), 0.01), swarm.Impact(), until=1e9, compile="never")
 """
 CHAIN = """
-from swarm.lanes.bodies import advance
+from swarm.bodies.lanes import advance
 real = advance._judge
 def noted(*about):
     note()

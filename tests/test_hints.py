@@ -9,9 +9,9 @@ from conftest import METHODS, SURFACES
 
 import swarm
 from swarm import scene_file
-from swarm.run import hints
-from swarm.run.admission import task_of
 from swarm.run.options import RunOptions
+from swarm.run.preflight import hints
+from swarm.run.preflight.admission import task_of
 
 BOX = swarm.Box((0.5, 0.5, 0.5))
 BALL = swarm.Sphere(0.5)

@@ -12,8 +12,8 @@ from test_sessions import halted_after, stopped_at
 from typer.testing import CliRunner
 
 import swarm
-from swarm.cli import app
-from swarm.output import checkpoint, paths
+from swarm.commands.cli import app
+from swarm.files import checkpoint, paths
 from swarm.run import impacts
 
 DOWN = (0.0, 0.0, -1.0)
@@ -196,7 +196,7 @@ def test_some_particles(tmp_path):
 
 
 def test_a_part_is_read(tmp_path, monkeypatch):
-    from swarm.output import impact_log
+    from swarm.files import impact_log
 
     run(tmp_path / "i.h5", ROUGH)
     table = table_of(tmp_path / "i.h5")

@@ -29,7 +29,7 @@ from swarm.kernel.jit import select
 from swarm.kernel.record import Record
 from swarm.kernel.vector import Vec, absolute, cross, dot, largest, moves, norm, square, times, total
 from swarm.scene import MOST_WALLS
-from swarm.surfaces import flights
+from swarm.surfaces.time_of_impact import flights
 
 PACKAGE = Path(swarm.__file__).parent
 compiled_only = pytest.mark.skipif(

@@ -20,13 +20,13 @@ from swarm.kernel.trace import calls
 from swarm.kernel.trace.helpers import Helper
 from swarm.lanes import block
 from swarm.lanes.arrays import Lanes
-from swarm.run.admission import task_of
 from swarm.run.machine import run_of
 from swarm.run.options import RunOptions
-from swarm.surfaces import flights
+from swarm.run.preflight.admission import task_of
 from swarm.surfaces.contract import Smooth
 from swarm.surfaces.shapes.sphere import SphereNumbers
 from swarm.surfaces.shapes.torus import TorusNumbers
+from swarm.surfaces.time_of_impact import flights
 
 PACKAGE = Path(swarm.__file__).parent
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: nothing compiles")

@@ -12,10 +12,10 @@ import pytest
 import swarm
 from swarm.kernel import cache
 from swarm.run import engine
-from swarm.run.admission import task_of
 from swarm.run.engine import Run
 from swarm.run.machine import run_of
 from swarm.run.options import RunOptions
+from swarm.run.preflight.admission import task_of
 
 UP, DOWN = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
 TURN = {"axis": (1.0, -2.0, 3.0), "angle": 1.2}

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import swarm
-from swarm.run import knows
 from swarm.run.options import RunOptions
+from swarm.run.preflight import knows
 
 CAVITY = swarm.Scene([swarm.Sphere(0.5)])
 PISTON = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.1, side="outside", mass=1.0)])

@@ -5,7 +5,7 @@ import pytest
 from test_sessions import stopped_at
 
 import swarm
-from swarm.catalog import OBSERVABLES
+from swarm.common.catalog import OBSERVABLES
 from swarm.run import machine
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])

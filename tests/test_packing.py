@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm import packing
 from swarm.ball_numbers import balls_volume
-from swarm.colliding.growing import Growth
+from swarm.events import growing_run as growing
+from swarm.events import packing
+from swarm.events.colliding.growing import Growth
 from swarm.kernel.vector import Vec, dot, square
 from swarm.placing.cells import overlaps_of
-from swarm.run import growing
 
 CELL = swarm.Scene([], period=(1.0, 1.0, 1.0))
 BOX = swarm.Scene([swarm.Box((0.5, 0.5, 0.5))])

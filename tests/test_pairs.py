@@ -12,8 +12,8 @@ import pytest
 
 from bench import cells, outcomes
 from bench.cells import Cell
-from swarm.run import knows
 from swarm.run.cluster import Sharded, shards
+from swarm.run.preflight import knows
 
 FOLDER = Path(__file__).parent / "reference"
 _SPEC = importlib.util.spec_from_file_location("pairs", FOLDER / "pairs.py")

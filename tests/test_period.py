@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm import scene_file, summary
-from swarm.surfaces.images import images_of
+from swarm import scene_file
+from swarm.commands import summary
+from swarm.surfaces.periodic.images import images_of
 
 BALL = swarm.Sphere(0.1, (0.5, 0.5, 0.5), side="outside")
 FLOOR, CEILING = swarm.Plane((0.0, 0.0, -1.0), 0.0), swarm.Plane((0.0, 0.0, 1.0), 1.0)

@@ -7,11 +7,12 @@ import pytest
 import trimesh
 
 import swarm
-from swarm import scene_file, tables
+from swarm import scene_file
 from swarm.kernel.random import flux_maxwellian, uniforms
 from swarm.kernel.vector import Vec, cross, dot
-from swarm.output.shapes import shapes_of
+from swarm.serialization import tables
 from swarm.surfaces.shapes.slab import AXES
+from swarm.triangles.shapes import shapes_of
 
 ACROSS = {"x": 0, "y": 1, "z": 2}
 CIRCLE = swarm.Sphere(0.5)

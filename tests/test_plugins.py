@@ -12,8 +12,10 @@ import swarm
 from examples.own_law import Viscoelastic
 from examples.own_method import Mirror
 from examples.own_surface import Superellipsoid
-from swarm import plugins, run_tables, scene_file, summary, tables
+from swarm import scene_file
+from swarm.commands import summary
 from swarm.run.simulation import carry_out
+from swarm.serialization import tables
 
 LAW, SURFACE, METHOD = "examples.own_law", "examples.own_surface", "examples.own_method"
 FILE = """

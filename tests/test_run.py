@@ -8,6 +8,7 @@ import pytest
 
 import swarm
 from swarm import observables
+from swarm.common.status import Status
 from swarm.contact import events
 from swarm.kernel.arrays import next_of
 from swarm.kernel.jit import kernel
@@ -15,7 +16,6 @@ from swarm.lanes import arrays as lanes
 from swarm.lanes.share import Draws, Share, ThreadPlace
 from swarm.lanes.table import LANES
 from swarm.run.engine import Run
-from swarm.status import Status
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 

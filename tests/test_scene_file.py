@@ -8,9 +8,10 @@ import pytest
 import tomli_w
 
 import swarm
-from swarm import scene_file, tables
+from swarm import scene_file
 from swarm.bodies.elastic import block
 from swarm.bodies.table import table_of
+from swarm.serialization import tables
 
 GOOD = """
 [particles]

@@ -14,8 +14,8 @@ from conftest import METHODS, rarely
 
 import swarm
 from examples import long_run
+from swarm.files import checkpoint, paths
 from swarm.lanes import block as blocks
-from swarm.output import checkpoint, paths
 from swarm.run import progress
 from swarm.run.engine import Run
 from swarm.run.progress import lines

@@ -5,14 +5,14 @@ import threading
 import numpy as np
 from children import python
 
-from swarm.run.bodies import threads_with
+from swarm.bodies.body_run import threads_with
 
 # In a process of its own: what is tested ends in a segmentation fault.
 LARGE = """
 import numba
 import numpy as np
 from swarm.kernel import arrays
-from swarm.run.bodies import threads_with
+from swarm.bodies.body_run import threads_with
 
 @numba.njit(nogil=True)
 def sum_of(size):

@@ -8,7 +8,7 @@ from conftest import SURFACES, every_surface
 from test_cli import command
 
 import swarm
-from swarm.run.starts import require_inside
+from swarm.run.preflight.starts import require_inside
 
 DEPTH = 0.02
 ROOM = swarm.Box((5.0, 5.0, 5.0))

@@ -6,8 +6,11 @@ import pytest
 from conftest import edited
 
 import swarm
-from swarm import summary
-from swarm.output import graphs, playback, plots, recorded, recording, series, sheet
+from swarm.commands import summary
+from swarm.pictures import graphs, plots
+from swarm.recording import playback, recorded, sheet
+from swarm.recording import writer as recording
+from swarm.words import series
 
 HOT = swarm.Scene([swarm.Sphere(0.5, temperature=300.0), swarm.Sphere(0.2, side="outside")])
 FRAMES = 3

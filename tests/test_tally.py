@@ -9,7 +9,7 @@ from test_impacts import BALLS, DOWN, LISTED, SCENES, SPHERE, table_of
 from test_sessions import stopped_at
 
 import swarm
-from swarm.lanes.counts import PARTS, Sums
+from swarm.lanes.watching.counts import PARTS, Sums
 from swarm.run.engine import Run
 from swarm.run.state import Seeding
 from swarm.run.tally import Tally, Units, Watched, value_of

@@ -10,12 +10,12 @@ from children import python
 from conftest import METHODS, SPENT, SURFACES, every_surface
 
 import swarm
+from swarm.bodies.body_run import BodyRun
 from swarm.kernel import cache
 from swarm.run import tiers
-from swarm.run.admission import task_of
-from swarm.run.bodies import BodyRun
 from swarm.run.engine import Run
 from swarm.run.options import RunOptions
+from swarm.run.preflight.admission import task_of
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: there is one tier")
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])

@@ -10,9 +10,9 @@ from numba.core import event
 
 import swarm
 from swarm.commands.run import run as command
+from swarm.files import checkpoint
+from swarm.files.background import Background
 from swarm.kernel.cache import kernels_compiled
-from swarm.output import checkpoint
-from swarm.output.background import Background
 from swarm.run.engine import Run
 from swarm.run.options import RunOptions
 from swarm.run.session import Session

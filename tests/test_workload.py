@@ -9,7 +9,7 @@ import pytest
 
 import swarm
 from swarm.lanes import block as blocks
-from swarm.run import workload
+from swarm.run.preflight import workload
 
 THIN = 1e-12
 BOX = swarm.Box((0.5, 0.5, 0.5))

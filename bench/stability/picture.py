@@ -24,7 +24,7 @@ def table(cells: Sequence[Cell], x: str, y: str, value: str) -> tuple[list[float
 
 def heat(axes: Any, columns: list[str], rows: list[str], values: np.ndarray, low: float, high: float) -> Any:
     """Colours of log10(values) from low to high; a cross where a value is infinite."""
-    from swarm.output.style import CAVITY, MAP, ink
+    from swarm.pictures.style import CAVITY, MAP, ink
 
     with np.errstate(divide="ignore"):
         logarithms = np.log10(np.where(np.isfinite(values), values, np.nan))
@@ -42,7 +42,7 @@ def heat(axes: Any, columns: list[str], rows: list[str], values: np.ndarray, low
 
 def words(axes: Any, image: Any, values: np.ndarray, wording: Callable[[float], str]) -> None:
     """Each finite value in its cell, dark on light and light on dark."""
-    from swarm.output.style import ink
+    from swarm.pictures.style import ink
 
     for row, column in zip(*np.nonzero(np.isfinite(values)), strict=True):
         light = image.get_array()[row, column] > 0.5 * (image.norm.vmin + image.norm.vmax)

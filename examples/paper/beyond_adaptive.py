@@ -39,7 +39,7 @@ def energy_error(loop: swarm.ContactHistory) -> float:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Constraint and energy over the sweeps."""
-    from swarm.output.style import BLUE, GREY, RED
+    from swarm.pictures.style import BLUE, GREY, RED
 
     file = folder / FILE
     title = "Beyond the paper 3: steps that are cut at the impact converge"

@@ -72,7 +72,7 @@ def energy_left(motion: Motion) -> float:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Both paths in the hole, from the dot, and the energies over time."""
-    from swarm.output.style import BLUE, CAVITY_LINE, RED, ink
+    from swarm.pictures.style import BLUE, CAVITY_LINE, RED, ink
 
     file = folder / FILE
     title = "Beyond the paper 5: a pin loose in a hole keeps its energy by Penalty, not by fixed steps of Uzawa"

@@ -57,7 +57,7 @@ def mean_sweeps(result: swarm.Result) -> float:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """The energy error of the worst particle over time, and how many sweeps the loops take."""
-    from swarm.output.style import BLUE, GREEN, RED
+    from swarm.pictures.style import BLUE, GREEN, RED
 
     file = folder / FILE
     title = "Beyond the paper 4: 10 000 particles keep their energy to the last digit over 1000 impacts"

@@ -66,7 +66,7 @@ def sweeps_at_tolerance(numbers: Numbers) -> list[int]:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Constraint and energy over the sweeps, a line a contact."""
-    from swarm.output.style import BLUE, GREY
+    from swarm.pictures.style import BLUE, GREY
 
     file = folder / FILE
     title = f"Beyond the paper 2: on a torus, which is no quadric, all {CONTACTS} contacts converge"

@@ -33,7 +33,7 @@ def numbers() -> Numbers:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Phi over g."""
-    from swarm.output.style import BLUE, GREEN, PINK, RED
+    from swarm.pictures.style import BLUE, GREEN, PINK, RED
 
     file = folder / FILE
     with page(file, "Fig. 3: the constraint has a corner for a = 1") as (axes,):

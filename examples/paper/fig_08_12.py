@@ -32,7 +32,7 @@ def numbers() -> Numbers:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Six panels over the sweeps."""
-    from swarm.output.style import BLUE, GREY, RED
+    from swarm.pictures.style import BLUE, GREY, RED
 
     file = folder / FILE
     title = "Figs. 8 to 12: a step from the surface of a sphere (State I): a = 1 converges, a = 1.5 does not"

@@ -59,7 +59,7 @@ def draw(numbers: Numbers, folder: Path) -> Path:
 
 
 def _path(axes: Any, numbers: Numbers) -> None:
-    from swarm.output.style import BLUE, CAVITY_LINE, RED
+    from swarm.pictures.style import BLUE, CAVITY_LINE, RED
 
     angle = np.linspace(0.0, 2.0 * np.pi, 2001)
     axes.plot(0.5 * np.cos(angle), 0.5 * np.sin(angle), color=CAVITY_LINE, label="wall of the sphere")

@@ -30,7 +30,7 @@ def numbers() -> Numbers:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Four panels over the sweeps."""
-    from swarm.output.style import BLUE, GREY, RED
+    from swarm.pictures.style import BLUE, GREY, RED
 
     file = folder / FILE
     title = "Figs. 14 to 17: a step from inside the sphere (State II) does not converge"

@@ -46,7 +46,7 @@ def numbers() -> Numbers:
 
 def draw(numbers: Numbers, folder: Path) -> Path:
     """Four panels over the sweeps, with the paper's numbers on them."""
-    from swarm.output.style import BLUE, GREY, RED
+    from swarm.pictures.style import BLUE, GREY, RED
 
     file = folder / FILE
     title = "Figs. 19 to 22: with the mean-value gradient, on an ellipsoid, the loop does not converge"

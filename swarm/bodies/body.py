@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import checks
+from ..common import checks
 from ..errors import SceneError
 from ..motion import Motion
 from ..state import Floats

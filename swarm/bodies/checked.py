@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import checks
+from ..common import checks
 from ..errors import SceneError
 from ..state import Floats
 from . import room

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import checks
+from ..common import checks
 from ..errors import SceneError
 from ..state import Floats
 from . import checked, room

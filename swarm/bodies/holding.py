@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import checks
+from ..common import checks
 from ..errors import SceneError
 from ..motion import Motion
 from ..state import Floats

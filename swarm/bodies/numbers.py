@@ -4,9 +4,6 @@ import math
 
 import numpy as np
 
-from ..lanes.bodies.arrays import Ties, Touching
-from ..lanes.bodies.contacts import MOST_CONTACTS
-from ..lanes.bodies.penalty_contact import Soft
 from ..methods import AugmentedLagrangian
 from ..methods.base import Method
 from ..scene import Scene
@@ -14,6 +11,9 @@ from ..state import Floats
 from ..surfaces.surface import Surface
 from .body import Body
 from .checked import Pairs
+from .lanes.arrays import Ties, Touching
+from .lanes.contacts import MOST_CONTACTS
+from .lanes.penalty_contact import Soft
 
 
 def ties_of(body: Body, penalty: float | None = None) -> Ties:

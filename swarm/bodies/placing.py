@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from .. import checks
+from ..common import checks
 from ..errors import SceneError
-from ..filling import bounding_box
+from ..placing.filling import bounding_box
 from ..scene import Scene
 from ..state import Floats
 from .body import Body

@@ -1,6 +1,6 @@
 """The largest size of a body: its matrices are full, so its number of points counts squared."""
 
-from .. import checks
+from ..common import checks
 from ..errors import SceneError
 
 # Bytes of the matrices of one body: of a chain, 3200 points. More would take minutes before the first step.

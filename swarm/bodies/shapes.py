@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import checks
+from ..common import checks
 from ..errors import SceneError
 from ..state import Floats
 from . import checked, covering, room
@@ -151,7 +151,7 @@ def _flat(corners: Floats) -> SceneError:
 
 def _hull(corners: Floats) -> Pairs:
     """The triangles of the convex hull, anticlockwise seen from outside."""
-    from ..extras import needed_by
+    from ..common.extras import needed_by
 
     with needed_by("a rigid body without faces", "bodies"):
         from scipy.spatial import ConvexHull, QhullError

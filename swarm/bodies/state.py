@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import checks
+from ..common import checks
 from ..errors import SceneError
 from ..particles import Particles
 from ..state import Floats

@@ -11,12 +11,13 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from .. import checks, tables
-from ..checks import Vector
+from ..common import checks
+from ..common.checks import Vector
 from ..errors import SceneError
 from ..motion import Oscillation, Rotation, Translation
 from ..motion import table_of as motion_table
 from ..scene import Scene
+from ..serialization import tables
 from ..state import Floats
 from ..surfaces import ALL_SURFACES
 from . import room, shapes

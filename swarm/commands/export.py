@@ -36,7 +36,7 @@ def export(
     from rich.console import Console
     from rich.progress import Progress
 
-    from ..output.trajectory import load
+    from ..files.trajectory import load
 
     chosen = None if frames is None else _frames(frames)
     hidden = not sys.stderr.isatty()

@@ -18,7 +18,7 @@ def info(
     ] = False,
 ) -> None:
     """Show what a trajectory, a log of impacts or a recording holds."""
-    from .. import summary
+    from . import summary
 
     if file.suffix == ".rrd":
         table(summary.of_recording(file, repair))

@@ -20,12 +20,13 @@ def record(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing recording.")] = False,
 ) -> None:
     """Make a Rerun recording of a trajectory."""
-    from ..extras import needed_by
+    from ..common.extras import needed_by
 
     with needed_by("a recording", "record"):
-        from ..output import recorded, recording
-    from ..output import paths
-    from ..output.trajectory import load
+        from ..recording import recorded
+        from ..recording import writer as recording
+    from ..files import paths
+    from ..files.trajectory import load
 
     target = paths.target_of("recording", output or file.with_suffix(".rrd"))
     paths.check_distinct({"recording": target}, {"trajectory": file})
@@ -48,12 +49,12 @@ def view(
     ] = None,
 ) -> None:
     """Draw a contact sheet of a recording; no screen and no GPU are needed."""
-    from ..extras import needed_by
+    from ..common.extras import needed_by
 
     with needed_by("a contact sheet", "record"):
-        from ..output.playback import Playback
+        from ..recording.playback import Playback
     with needed_by("a contact sheet", "plot"):
-        from ..output import sheet
+        from ..recording import sheet
 
     target = _picture(output or file.with_suffix(".png"), file)
     by = sheet.draw_sheet(Playback(file), target, None if times is None else _numbers("--times", times), viewer)
@@ -62,11 +63,11 @@ def view(
 
 def plot(file: TrajectoryFile, output: Picture = None) -> None:
     """Draw energy error, penetration, impacts, pressure, speeds and the particles or bodies of a trajectory."""
-    from ..extras import needed_by
+    from ..common.extras import needed_by
 
     with needed_by("a plot", "plot"):
-        from ..output import plots
-    from ..output.trajectory import load
+        from ..pictures import plots
+    from ..files.trajectory import load
 
     target = _picture(output or file.with_suffix(".png"), file)
     with load(file) as trajectory:
@@ -85,7 +86,7 @@ def animate(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing film.")] = False,
 ) -> None:
     """Make a film of the particles or bodies of a trajectory among their walls."""
-    from ..output.trajectory import load
+    from ..files.trajectory import load
 
     target = output or file.with_suffix(".mp4")
     with load(file) as trajectory:
@@ -98,8 +99,8 @@ def _picture(output: Path, source: Path) -> Path:
 
     A picture of swarm is cheap to draw again, so it is replaced without an option.
     """
-    from ..output.marks import check_target
-    from ..output.paths import check_distinct, target_of
+    from ..files.marks import check_target
+    from ..files.paths import check_distinct, target_of
 
     target = target_of("picture", output)
     if target.suffix.lower() not in (".png", ".pdf", ".svg"):

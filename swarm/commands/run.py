@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .. import interrupt
+from ..common import interrupt
 from ..errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
 
@@ -65,10 +65,10 @@ def run(  # noqa: PLR0913  one argument an option
     # An exception in the middle of an import may be lost; nothing is open yet.
     with interrupt.at_once():
         from .. import scene_file as files
-        from ..checks import duration
-        from ..output import paths
+        from ..common.checks import duration
+        from ..files import paths
         from ..run.simulation import carry_out
-        from ..summary import numbers, of_result
+        from .summary import numbers, of_result
 
     def report(status: str, written: Path | None = None, **more: Any) -> None:
         if as_json:
@@ -137,7 +137,7 @@ def _check_outputs(job: "Job", options: "RunOptions", alone: list[str]) -> None:
 
     What the scene file names alone is not overwritten: --overwrite is meant for files of the command line.
     """
-    from ..output import marks, paths
+    from ..files import marks, paths
     from ..scene_file import OUTPUTS
 
     paths.check_distinct({**options.files(), "recording": options.recording}, job.inputs())
@@ -157,7 +157,7 @@ def _check_outputs(job: "Job", options: "RunOptions", alone: list[str]) -> None:
 
 def _stopped(reason: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:
     """Print how to resume a run that was stopped; the command, or None if there is nothing to resume from."""
-    from ..output import paths
+    from ..files import paths
 
     if not (has_frames or (on_cluster and paths.checkpoint_of(target).exists())):
         print(f"{reason}: no frame was finished, and nothing was written", file=sys.stderr)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .. import interrupt
+from ..common import interrupt
 from ..errors import SwarmError
 from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
 
@@ -47,7 +47,7 @@ def sweep(  # noqa: PLR0913  one argument an option
 ) -> None:
     """Carry out the runs of a sweep file, and write one table of their results."""
     with interrupt.at_once():
-        from ..checks import duration
+        from ..common.checks import duration
         from ..ensemble import sweeping
 
     try:

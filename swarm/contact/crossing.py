@@ -10,9 +10,9 @@ from ..kernel.vector import Vec, dot, highest, lowest, norm, square
 from ..surfaces.fields.foam import Foam
 from ..surfaces.fields.grid import block_of, over_block
 from ..surfaces.fields.members import member
-from ..surfaces.moving import Carried
-from ..surfaces.patched import Patched
-from ..surfaces.posed import Posed
+from ..surfaces.in_motion.moving import Carried
+from ..surfaces.in_motion.posed import Posed
+from ..surfaces.presence.patched import Patched
 from ..surfaces.walls import Field
 from .path import StepPath, at_part, bisected, members_of
 from .rooms import leaving

@@ -3,8 +3,8 @@
 from ..kernel.gravity import accelerated
 from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, dot, norm, square
-from ..surfaces.openings import Doorway, is_open
-from ..surfaces.rooms import gaps_in
+from ..surfaces.presence.openings import Doorway, is_open
+from ..surfaces.presence.rooms import gaps_in
 
 # Of the slack, how far beyond its wall a particle goes on: it is in the other room alone then.
 _THROUGH = 2.0

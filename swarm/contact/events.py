@@ -6,7 +6,7 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, norm, square
-from ..surfaces import flights
+from ..surfaces.time_of_impact import flights
 from . import hold, sliding, touching
 from .hold import One, Two
 from .laws import NONE

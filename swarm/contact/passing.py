@@ -5,10 +5,10 @@ import math
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, norm, square
-from ..surfaces.doors import Timed
 from ..surfaces.fields.grid import over_block
 from ..surfaces.fields.members import member
-from ..surfaces.openings import Doorway, outside
+from ..surfaces.presence.doors import Timed
+from ..surfaces.presence.openings import Doorway, outside
 from ..surfaces.walls import Field
 from .crossing import block_of_path
 from .doorways import is_pressed, leads_on, lets_through

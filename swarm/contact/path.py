@@ -4,8 +4,8 @@ from typing import Any
 
 from ..kernel.record import Record
 from ..kernel.vector import Vec
-from ..surfaces.moving import Moving
-from ..surfaces.posed import Posed
+from ..surfaces.in_motion.moving import Moving
+from ..surfaces.in_motion.posed import Posed
 
 # Halvings down to an instant.
 _HALVINGS = 60

@@ -11,8 +11,8 @@ import numpy as np
 from ..kernel.arrays import scratch
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, square
-from ..surfaces.patched import Patched
-from ..surfaces.rooms import gap_in, gaps_in
+from ..surfaces.presence.patched import Patched
+from ..surfaces.presence.rooms import gap_in, gaps_in
 from .path import at_part, bisected, members_of
 
 # Of the slack, how deep in another room what slides flies: at the start of a step, where a step is cut, and where it

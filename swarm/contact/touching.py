@@ -14,7 +14,7 @@ from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, column, dot, largest, moves, norm, put, square, total
-from ..surfaces import flights
+from ..surfaces.time_of_impact import flights
 from . import reflection
 from .laws import Laws
 from .projection import ALLOWED, Touch, along, project, put_normals, velocity_along

@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from ..catalog import MAIN, NAMES, OBSERVABLES
-from ..output import style
-from ..output.amounts import plain
-from ..output.page.pictures import PagePicture, svg
+from ..common.catalog import MAIN, NAMES, OBSERVABLES
+from ..pictures import style
+from ..report.pictures import PagePicture, svg
+from ..words.amounts import plain
 from .folder import SweepFolder
 
 # Graphs of each parameter, curves of another parameter in one, and values of a parameter that are numbers on an axis.

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..common.extras import needed_by
 from ..errors import SceneError
-from ..extras import needed_by
 from .plan import STEM
 from .results import KEPT, TABLES
 

@@ -14,10 +14,10 @@ import numpy as np
 import tomli_w
 
 from .. import scene_file
-from ..checks import count, listed, number, one_of
+from ..common.checks import count, listed, number, one_of
 from ..errors import SceneError
-from ..plugins import allowed, checked_modules
 from ..scene import Scene
+from ..serialization.plugins import allowed, checked_modules
 
 # More runs than this are a mistake in a list: their files alone would be a burden to a folder.
 _MOST = 1_000_000

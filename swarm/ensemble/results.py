@@ -8,11 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ..columns import flattened
+from ..common.columns import flattened
+from ..common.extras import needed_by
 from ..errors import SceneError
-from ..extras import needed_by
-from ..output import marks, paths
-from ..output.replaced import replaced
+from ..files import marks, paths
+from ..files.replaced import replaced
 from .plan import STEM, Plan, Variant
 
 TABLES = ("csv", "parquet")
@@ -28,7 +28,7 @@ def final(observables: dict[str, Any]) -> dict[str, int | float]:
 
 def of_trajectory(path: Path, until: float) -> dict[str, int | float] | None:
     """The observables of the last frame, or None if the trajectory does not reach its end."""
-    from ..output.trajectory import load
+    from ..files.trajectory import load
 
     try:
         with load(path) as trajectory:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .. import checks, interrupt
-from ..checks import path_of
+from ..common import checks, interrupt
+from ..common.checks import path_of
+from ..common.extras import needed_by
 from ..errors import FileError, SceneError
-from ..extras import needed_by
-from ..output.lock import only_writer
-from ..plugins import checked_modules
+from ..files.lock import only_writer
 from ..run.options import cores
+from ..serialization.plugins import checked_modules
 from .plan import Plan, read
 from .pool import Pool
 from .results import TABLES, Results, require_written

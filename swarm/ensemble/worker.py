@@ -101,9 +101,9 @@ def _carried_out(order: dict[str, Any], line: _Line) -> dict[str, Any]:
     """Carry out a run, or go on with it: from its checkpoint if it has one, else from the start."""
     from .. import scene_file
     from ..errors import SceneError
-    from ..output import paths
-    from ..output.lock import only_writer
-    from ..plugins import allowed
+    from ..files import paths
+    from ..files.lock import only_writer
+    from ..serialization.plugins import allowed
     from .results import of_trajectory
 
     target, source, text = Path(order["trajectory"]), Path(order["source"]), order["text"]

@@ -5,7 +5,7 @@ import math
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import dot, square
-from ..surfaces.posed import Posed
+from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
 from .arrays import (
     AFTER,

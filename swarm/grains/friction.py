@@ -16,7 +16,7 @@ import math
 from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, cross, dot, square
-from ..surfaces.posed import Posed
+from ..surfaces.in_motion.posed import Posed
 from .arrays import (
     AFTER,
     BEFORE,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..kernel.arrays import index
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
-from ..surfaces.posed import Posed
+from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
 from .arrays import FACE, RADIUS, X, vector_at
 from .cell import nearest

@@ -9,14 +9,14 @@ met, for contacts are looked for at the ends of steps alone.
 import math
 from typing import Any
 
+from ..common.status import Status
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import norm, square
-from ..status import Status
 from ..surfaces.balls.rounded import part_within
 from ..surfaces.fields.members import member
-from ..surfaces.posed import Posed
+from ..surfaces.in_motion.posed import Posed
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
 from .arrays import AFTER, BEFORE, BEGIN, END, RADIUS, X, vector_at

@@ -8,11 +8,11 @@ how well they are solved.
 import math
 from typing import Any, NamedTuple
 
+from ..common.status import Status
 from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
-from ..status import Status
 from .arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall

@@ -4,7 +4,7 @@ import math
 
 from ..kernel.arrays import index
 from ..kernel.jit import select
-from ..surfaces.moving import Carried
+from ..surfaces.in_motion.moving import Carried
 from ..surfaces.walls import Field, Listed
 
 

@@ -11,8 +11,8 @@ from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import Vec, column, put
 from ..methods import contract as methods
-from ..surfaces import flights
-from ..surfaces.moving import Carried
+from ..surfaces.in_motion.moving import Carried
+from ..surfaces.time_of_impact import flights
 from .table import EIGHT, STRIDE, Advanced, Number, Rows, copy_lane, table
 
 _named = Rows()

@@ -7,15 +7,14 @@ depend on which lane or block a particle is in.
 
 import math
 
+from ..common.status import Status
 from ..contact.events import FLYING
 from ..kernel.arrays import index
 from ..kernel.jit import kernel, outlined
 from ..kernel.record import Record
 from ..kernel.vector import put
 from ..methods import contract as methods
-from ..status import Status
-from ..surfaces.moving import Carried
-from . import log as impact_log
+from ..surfaces.in_motion.moving import Carried
 from .accounts import add_to_rows, add_work
 from .escape import let_out_lanes
 from .flight import go
@@ -24,6 +23,7 @@ from .periodic import return_lanes
 from .sending import send_off
 from .solve import count_sweeps, keep_failure, solution, solve
 from .table import LANES, LOOK, marked_lanes, with_distances
+from .watching import log as impact_log
 
 # Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
 MOST_HITS = 1e8

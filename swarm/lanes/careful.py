@@ -10,14 +10,14 @@ from ..kernel.arrays import scratch
 from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import ZERO, column, put, square
-from ..surfaces.moving import Carried
+from ..surfaces.in_motion.moving import Carried
 from .accounts import book_step, lose
 from .arrays import booked, speed2_scale
 from .carried import NOT_CARRIED, carry
-from .crossings import ParticleMoment
 from .escape import come_through, leave
 from .one_by_one import one_by_one
 from .periodic import return_particle
+from .watching.crossings import ParticleMoment
 
 # Short steps of a particle in a frame: seconds.
 _MOST_SHORT_STEPS = 1e7

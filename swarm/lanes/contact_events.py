@@ -16,12 +16,12 @@ from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined, select
 from ..kernel.random import Stream
 from ..kernel.vector import column, put, square
-from . import log as impact_log
 from .accounts import book, book_sent, book_work
 from .arrays import speed2_scale
 from .carried import is_carried
 from .escape import absorb, come_through, end_frame, leave
 from .one_by_one import one_by_one
+from .watching import log as impact_log
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
 _OFTEN, _MOST = 64.0, 1e6

@@ -9,10 +9,10 @@ from ..contact.passing import hit_wall, open_wall_of
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import norm, put
-from ..surfaces.openings import is_open
-from . import log as impact_log
-from .crossings import ParticleMoment
+from ..surfaces.presence.openings import is_open
 from .table import marked_lanes
+from .watching import log as impact_log
+from .watching.crossings import ParticleMoment
 
 
 def escape(share, p, wall, r, v, remaining):

@@ -12,13 +12,13 @@ from ..kernel.arrays import copy_row, index, unwritten
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
-from ..surfaces import flights
-from ..surfaces.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.facets.members import Facets
 from ..surfaces.fields.foam import Foam
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import gathered, member, width
-from ..surfaces.period import on_time
+from ..surfaces.periodic.period import on_time
+from ..surfaces.time_of_impact import flights
+from ..surfaces.time_of_impact.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.walls import Walls
 from .arrays import Flying
 from .from_cell_to_cell import go_through

@@ -1,11 +1,11 @@
 """A flight of every lane of a block: to its next contact, or to the end of the frame."""
 
 from ..kernel.arrays import index
-from ..surfaces import flights, safe, strides
-from ..surfaces.course import MORE_STEPS, SAFE_STEPS
-from ..surfaces.moving import Carried, Marched, Strided
-from ..surfaces.period import cut
-from ..surfaces.rooms import at_the_end, inside_of
+from ..surfaces.in_motion.moving import Carried, Marched, Strided
+from ..surfaces.periodic.period import cut
+from ..surfaces.presence.rooms import at_the_end, inside_of
+from ..surfaces.time_of_impact import flights, safe, strides
+from ..surfaces.time_of_impact.course import MORE_STEPS, SAFE_STEPS
 from .field_hits import hit_of_lane, keep_hit, seek
 from .table import marked_lanes
 

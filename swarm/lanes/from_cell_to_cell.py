@@ -11,11 +11,11 @@ from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
-from ..surfaces import flights
 from ..surfaces.facets.cells import here_in, passes, until_out
 from ..surfaces.facets.room import FULL, KIND, FreeCells, all_away, room_of
 from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import member
+from ..surfaces.time_of_impact import flights
 from .table import STRIDE
 
 # The hit of a lane, in rows of `course`.

@@ -12,7 +12,7 @@ from ..kernel.arrays import copy_row, index, scratch
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..surfaces.fields.members import gathered, width
-from ..surfaces.moving import Carried
+from ..surfaces.in_motion.moving import Carried
 from ..surfaces.walls import Field, Walls
 from .table import STRIDE
 

@@ -2,10 +2,10 @@
 
 import math
 
+from ..common.status import Status
 from ..kernel.jit import select
-from ..status import Status
-from . import log as impact_log
 from .table import LANES
+from .watching import log as impact_log
 
 
 def one_by_one(phase, advance, scene, share):

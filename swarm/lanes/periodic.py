@@ -6,8 +6,8 @@ from ..contact.events import ARRIVED, EDGE, FLYING, HELD
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import column, dot, put
-from ..surfaces.axes import length_of
-from ..surfaces.period import has_left, into, keeps_walls
+from ..surfaces.periodic.axes import length_of
+from ..surfaces.periodic.period import has_left, into, keeps_walls
 from .sliding import AGAIN
 from .table import marked_lanes
 

@@ -7,23 +7,23 @@ ends at the instant to round-off. A lane writes what it gives its walls step by 
 
 import numpy as np
 
+from ..common.status import Status
 from ..contact import events, hold
 from ..contact.events import ARRIVED, CAREFUL, FLYING
 from ..contact.reflection import wall_velocity
 from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import column, put, square
-from ..status import Status
-from ..surfaces.rooms import inside_of
-from . import log as impact_log
+from ..surfaces.presence.rooms import inside_of
 from .arrays import speed2_scale
-from .counted_lanes import Began
-from .crossings import ParticleMoment
 from .periodic import return_particle, return_sliding
 from .sliding import AGAIN, Slide
 from .sliding_ends import decide, set_going
 from .sliding_step import compose, end_steps
 from .table import LANES, LOOK, with_distances
+from .watching import log as impact_log
+from .watching.counted_lanes import Began
+from .watching.crossings import ParticleMoment
 
 
 @long_kernel

@@ -9,8 +9,8 @@ from ..contact import sliding as slides
 from ..contact.events import EDGE, HELD
 from ..kernel.jit import Array, outlined
 from ..kernel.record import Record
-from .counted_lanes import BEGAN
 from .table import STRIDE, Advanced, Rows, copy_lane, table
+from .watching.counted_lanes import BEGAN
 
 # What a step may end with.
 LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES, PASSES, ENDS = 1, 2, 4, 8, 16, 32, 64, 128

@@ -12,7 +12,7 @@ from ..contact.rooms import ended_wall, have_ends, part_until_end, wall_after
 from ..kernel.gravity import potential
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, square
-from ..surfaces.period import part_until
+from ..surfaces.periodic.period import part_until
 from .escape import is_at_opening
 from .sliding import ENDS, FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK
 from .sliding_step import SHORTEST, twice_after

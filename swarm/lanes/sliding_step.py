@@ -13,7 +13,7 @@ from ..contact.rooms import have_ends, may_end
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, either, square
-from ..surfaces.period import is_beyond
+from ..surfaces.periodic.period import is_beyond
 from .sliding import ENDS, FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK
 
 # A step of this part of a crossing, or of the size, is the shortest.

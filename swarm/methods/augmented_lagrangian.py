@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from .. import checks
+from ..common import checks
 from ..contact import uzawa
 from ..contact.discrete_gradient import form_of, reaction_needs
 from ..contact.reflection import CHORD_NEEDS

@@ -9,7 +9,7 @@ from ..kernel.jit import select
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import required
-from ..surfaces.moving import lacks_bend
+from ..surfaces.in_motion.moving import lacks_bend
 
 # Where a contact step begins: at the impact, or half of it before.
 CONTACT_STARTS = ("impact", "centred")

@@ -16,13 +16,13 @@ functions of Uzawa's loop. examples/own_method.py is a complete method.
 
 from typing import Any, NamedTuple
 
+from ..common.status import Status
 from ..contact.impulse import LoopRecord
 from ..contact.laws import NONE
 from ..contact.reflection import ReflectedVelocity
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec
-from ..status import Status
 
 # A wall's number this low asks for `hard_pass`: HARD - wall is the wall.
 HARD = -2.0

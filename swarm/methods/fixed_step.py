@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import checks
+from ..common import checks
+from ..common.status import Status
 from ..contact import medial
 from ..contact.discrete_gradient import MeanValue
 from ..contact.laws import Moves
@@ -18,10 +19,9 @@ from ..kernel.jit import outlined, select
 from ..kernel.vector import Vec, dot, square
 from ..particles import Particles
 from ..scene import Scene
-from ..status import Status
-from ..surfaces import flights, safe
-from ..surfaces.drive import drive_of
+from ..surfaces.in_motion.drive import drive_of
 from ..surfaces.surface import Surface
+from ..surfaces.time_of_impact import flights, safe
 from . import base, contract
 
 # A frame may miss a whole number of steps by this part of a step: decimal times are not binary ones.

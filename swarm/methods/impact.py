@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import checks
+from ..common import checks
 from ..contact import sliding, touching
 from ..contact.laws import NONE, Laws
 from ..contact.reflection import CHORD_NEEDS, Energy, chord_end, chord_step, chord_turn, exact, restore, speed2_at
@@ -17,8 +17,8 @@ from ..kernel.jit import select
 from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces import flights
 from ..surfaces.surface import Surface
+from ..surfaces.time_of_impact import flights
 from . import base, contract
 
 # Of the sliding tolerance: round-off, and steps that no longer follow the wall.

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..common.status import Status
 from ..contact import uzawa
 from ..contact.discrete_gradient import MeanValue
 from ..contact.impulse import Step
@@ -19,9 +20,8 @@ from ..kernel.arrays import kept, scratch
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import outlined, select
 from ..kernel.vector import square
-from ..status import Status
-from ..surfaces import flights
 from ..surfaces.lowered import lowered
+from ..surfaces.time_of_impact import flights
 from . import base, contract, penalty
 
 RAISE, COUNT, IMPACT = 0, 1, 2

@@ -11,8 +11,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import checks
-from ..checks import Vector
+from ..common import checks
+from ..common.checks import Vector
 from ..errors import SceneError
 
 Floats = NDArray[np.float64]

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import checks
-from ..checks import Vector
+from ..common import checks
+from ..common.checks import Vector
 from ..errors import SceneError
 from .given import (
     Floats,

@@ -11,25 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import observables
+from ..common.status import Status
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, HELD, PHASES
 from ..contact.hold import One, Two
 from ..errors import RunError
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..lanes import careful, contact_events, slide, sliding, table
-from ..lanes import log as impact_log
 from ..lanes.sending import Sending
 from ..lanes.share import Draws, Share, take
+from ..lanes.watching import log as impact_log
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
 from ..state import Contacts, Crossed, Multipliers, State
-from ..status import Status
 from . import failures
 from .base import Arrays, BaseRun, result_of
-from .counting import counters_of, crossed_of
 from .impacts import ThreadLog
 from .observed import gone_of, poses_of
+from .preflight.counting import counters_of, crossed_of
 from .present import Presence
 from .state import Seeding, begin, have_lasted, holders_of_resting, state_of
 from .tally import Watched

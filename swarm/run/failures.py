@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from ..common.status import Status
 from ..errors import RunError
+from ..grains import sinking
 from ..kernel.random import Stream
 from ..kernel.vector import ZERO, column
 from ..methods.base import Method
 from ..scene import Scene
 from ..state import State
-from ..status import Status
 from ..surfaces.wall_law import leave_of, mirrored, said_of, why_wrong
-from . import sinking
 from .state import Seeding
 
 _UNSEEDED = Seeding()

@@ -9,12 +9,12 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
+from ..common.status import Status
 from ..errors import RunError
-from ..lanes.log import GOING, Log
 from ..lanes.share import Share
 from ..lanes.table import LANES, STRIDE
+from ..lanes.watching.log import GOING, Log
 from ..scene import Scene
-from ..status import Status
 from .options import Task
 
 # Rows of one log, and how many logs there are besides the two of each thread: one is written while others are filled.

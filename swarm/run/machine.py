@@ -11,34 +11,34 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import interrupt
-from ..catalog import CHUNK_SUMS
-from ..frames import Frame
+from ..bodies.body_run import BodyRun
+from ..common import interrupt
+from ..common.catalog import CHUNK_SUMS
+from ..common.frames import Frame
+from ..common.snapshot import NOTHING, Read, Snapshot
+from ..events.balls_run import CollidingRun
+from ..events.heavy_run import HeavyRun
+from ..events.walls_run import ReactingRun
+from ..grains.grains_run import GrainsRun
 from ..kernel.cache import kernels_compiled
+from ..kernel.compiling import Compilations
 from ..particles import Particles
-from ..snapshot import NOTHING, Read, Snapshot
 from ..state import Absorbed, Multipliers
-from . import hints
 from .base import BaseRun
-from .bodies import BodyRun
-from .colliding import CollidingRun
-from .compiling import Compilations
 from .doors import DoorRun
 from .engine import Run
-from .grains import GrainsRun
-from .heavy import HeavyRun
 from .impacts import log_of
 from .measures import Measures
 from .options import Task
 from .outputs import recorder_of, writer_of
+from .preflight import hints
 from .progress import Display, display
-from .reacting import ReactingRun
 from .session import Session
 from .state import Seeding
 from .tally import Watched, tally_of
 
 if TYPE_CHECKING:
-    from ..output.background import Background
+    from ..files.background import Background
 
 _LOG = logging.getLogger("swarm")
 _OF_PARTICLES = "position", "velocity", "mass", "image", "radius", "spin"
@@ -173,7 +173,7 @@ def _measures_of(task: Task, session: Session) -> Measures:
     if made and session.first == 0:
         made.begin(0, 0.0, start_of(task))
     elif made:
-        from ..output.trajectory import load
+        from ..files.trajectory import load
 
         with load(task.options.trajectory) as written:
             made.expect({name: values.shape[1:] for name, values in written.observables_of(slice(1)).items()})
@@ -253,7 +253,7 @@ def _require_room(task: Task, session: Session, more: int) -> None:
 
 def read_back(trajectory: Path) -> dict[str, NDArray[Any]]:
     """The observables of all frames of all sessions."""
-    from ..output.trajectory import load
+    from ..files.trajectory import load
 
     with load(trajectory) as written:
         return written.observables

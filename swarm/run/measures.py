@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..catalog import NAMES
-from ..checks import shown
+from ..common.catalog import NAMES
+from ..common.checks import shown
+from ..common.frames import Frame
+from ..common.snapshot import Snapshot
 from ..errors import RunError, SceneError
-from ..frames import Frame
-from ..snapshot import Snapshot
 
 Function = Callable[[Frame], Any]
 # What a file has of an observable are numbers, vectors and matrices, and tables of these.

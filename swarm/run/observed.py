@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..reacting.described import Observed
+from ..events.reacting.described import Observed
 from ..scene import Scene
 from ..state import State
 

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from .. import checks
 from ..bodies.state import Bodies
+from ..common import checks
+from ..common.frames import FrameTimes
 from ..errors import SceneError
-from ..frames import FrameTimes
+from ..files import paths
+from ..files.storage import Storage
 from ..methods.base import Method
-from ..output import paths
-from ..output.colours import BY as COLOURS
-from ..output.storage import Storage
 from ..particles import Particles
+from ..pictures.colours import BY as COLOURS
 from ..scene import Scene
 from ..sources.source import checked_sources
 from ..surfaces.counter import checked_counters

@@ -8,7 +8,7 @@ from .options import Task
 from .session import Session
 
 if TYPE_CHECKING:
-    from ..output.background import Background, Writer
+    from ..files.background import Background, Writer
 
 
 def recorder_of(task: Task) -> "Writer | None":
@@ -21,10 +21,10 @@ def recorder_of(task: Task) -> "Writer | None":
             "recording and live cannot continue a run that was stopped; leave them out, and make the recording from "
             "the trajectory: swarm record RUN.h5 -o OUT.rrd"
         )
-    from ..extras import needed_by
+    from ..common.extras import needed_by
 
     with needed_by("a recording", "record"):
-        from ..output.recording import RecordingWriter, Settings  # rerun takes half a second
+        from ..recording.writer import RecordingWriter, Settings  # rerun takes half a second
 
     settings = Settings(options.record_particles, options.record_color, options.record_megabytes, options.live)
     body = None if task.bodies is None else task.bodies.body
@@ -45,7 +45,7 @@ def writer_of(task: Task, session: Session, recorder: "Writer | None", log: Impa
     used = [(one, kept) for one, kept in outputs if one is not None]
     if not used:
         return None
-    from ..output.background import Background, Several
+    from ..files.background import Background, Several
 
     n = len(task.particles)
     born = None if task.particles.births is None else task.particles.births.time
@@ -59,7 +59,7 @@ def writer_of(task: Task, session: Session, recorder: "Writer | None", log: Impa
 def _impacts(task: Task, session: Session, log: Impacts | None) -> "Writer | None":
     if log is None:
         return None
-    from ..output.impacts import ImpactWriter, about
+    from ..files.impacts import ImpactWriter, about
 
     texts = about(task.scene, task.method, log.kept, {"particles": len(task.particles), **session.identity})
     start = (session.first, log.total) if session.first > 0 else None
@@ -72,8 +72,8 @@ def _trajectory(task: Task, session: Session) -> "Writer | None":
     options = task.options
     if options.trajectory is None:
         return None
-    from ..output.provenance import Course
-    from ..output.writer import TrajectoryWriter  # h5py takes 0.2 s to import
+    from ..files.provenance import Course
+    from ..files.writer import TrajectoryWriter  # h5py takes 0.2 s to import
 
     writer = TrajectoryWriter(
         options.trajectory, options.storage, task.scene, task.method, task.bodies or task.particles,

@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import notebook
 from ..bodies.state import Bodies
-from ..columns import frame_of
+from ..common import notebook
+from ..common.columns import frame_of
 from ..errors import SceneError
 from ..methods.base import Method
-from ..output.views import view
 from ..particles import Particles
 from ..scene import Scene
 from ..state import Multipliers
+from ..views import view
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-    from ..output.content import Content
-    from ..output.page.html import Page
-    from ..output.sequence import Frames
-    from ..output.shown_film import Film
+    from ..pictures.shown_film import Film
+    from ..report.html import Page
+    from ..words.content import Content
+    from .sequence import Frames
 
 
 @dataclass(frozen=True, repr=False)
@@ -157,8 +157,8 @@ class Result:
             SceneError: the run has no trajectory, or it is gone or damaged.
         """
         path = self._written("frames are", ", or take what is needed of each frame by progress= or observables=")
-        from ..output.sequence import Frames
-        from ..output.trajectory import load
+        from ..files.trajectory import load
+        from .sequence import Frames
 
         return Frames(load(path))
 
@@ -180,7 +180,7 @@ class Result:
                 its range, or matplotlib or scikit-image is not installed.
         """
         path = self._written("the frames of a film are")
-        from ..output.trajectory import load
+        from ..files.trajectory import load
 
         with load(path) as written:
             return written.film(frames=frames, fps=fps, size=size, particles=particles)
@@ -224,7 +224,7 @@ class Result:
         ('10 particles in a sphere: Impact, 2 s', '<!DOCTYPE html>')
         """
         if self.trajectory is not None and self.trajectory.is_file():
-            from ..output.trajectory import load
+            from ..files.trajectory import load
 
             with load(self.trajectory) as written:
                 return written.report(path, overwrite=overwrite)

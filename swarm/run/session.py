@@ -10,19 +10,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from .. import run_tables
+from ..common.frames import FrameTimes
 from ..errors import CompleteError, SceneError, WallTimeError
-from ..frames import FrameTimes
+from ..files import checkpoint, marks, paths
+from ..files.lock import only_writer
 from ..kernel.cache import Spent
-from ..output import checkpoint, marks, paths
-from ..output.lock import only_writer
+from ..serialization import run_tables
 from ..version import VERSION
 from .base import BaseRun
 from .impacts import Impacts
 from .options import RunOptions, Task
 
 if TYPE_CHECKING:
-    from ..output.background import Background
+    from ..files.background import Background
 
 
 class Session:
@@ -95,7 +95,7 @@ class Session:
 
     def _hold(self, task: Task, log: Impacts | None) -> None:
         """Lock the files of the run, and describe it."""
-        from ..output.writer import body_text, descriptions
+        from ..files.writer import body_text, descriptions
 
         overwrite, impacts = task.options.overwrite, task.options.impacts
         self._owners = task.scene.members()
@@ -133,7 +133,7 @@ class Session:
         """Raise a SceneError if the run cannot go on with its log of impacts, or begin it anew."""
         if self.first == 0 and (overwrite or not path.exists()):
             return
-        from ..output.impact_log import load_impacts
+        from ..files.impact_log import load_impacts
 
         with load_impacts(path) as before:
             there = dataclasses.replace(self._job, **before.identity)
@@ -145,7 +145,7 @@ class Session:
 
     def _refuse_to_restart(self, until: float) -> None:
         """Raise an error that says what the trajectory without a checkpoint is."""
-        from ..output.trajectory import load
+        from ..files.trajectory import load
 
         trajectory = self._trajectory
         with load(trajectory) as before:
@@ -169,7 +169,7 @@ class Session:
         )
 
     def _resume(self, until: float) -> None:
-        from ..output.trajectory import load
+        from ..files.trajectory import load
 
         trajectory = self._trajectory
         saved, arrays = checkpoint.read(self._path)

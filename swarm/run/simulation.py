@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..bodies.state import Bodies
-from ..frames import Frame
+from ..common.frames import Frame
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
@@ -15,8 +15,8 @@ from ..sources.source import Source
 from ..surfaces.counter import Counter
 from ..surfaces.surface import Surface
 from . import machine
-from .admission import task_of
 from .options import RunOptions, Task
+from .preflight.admission import task_of
 from .result import Result
 from .session import Session
 

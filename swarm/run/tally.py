@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lanes.counts import PARTS, Counts, Sums
+from ..lanes.watching.counts import PARTS, Counts, Sums
 from ..state import Absorbed
 from ..surfaces.counter import Counter
 from .impacts import Impacts

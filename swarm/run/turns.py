@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.status import Status
 from ..contact.events import ARRIVED, FLYING
 from ..lanes.arrays import Halted
 from ..lanes.share import Draws
 from ..state import Contacts
-from ..status import Status
 from .watch import Watch
 
 # So often a particle may go from one kernel to another without time passing. A wedge, a cusp and a chatter stay in the

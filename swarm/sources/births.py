@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .. import checks
 from .. import motion as motions
+from ..common import checks
 from ..errors import SceneError
 from ..particles import Births, Particles
 from ..scene import Scene

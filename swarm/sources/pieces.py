@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..kernel.vector import vec
-from ..plane import along
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many
 from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.outlines.polygon import Prism
+from ..surfaces.plane import along
 from ..surfaces.rotation import matrix
 from ..surfaces.shapes.capsule import Capsule
 from ..surfaces.shapes.plane import PlaneNumbers

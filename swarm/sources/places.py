@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..scene import Scene
-from ..surfaces.doors import Opening
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many
 from ..surfaces.instant import gaps_of, side_of
 from ..surfaces.outlines.outlined import Outlined
+from ..surfaces.presence.doors import Opening
 from ..surfaces.shapes.plane import Plane
 from ..surfaces.surface import Surface, volume_of
 from ..surfaces.union import Joined, surfaces_of

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import checks
+from ..common import checks
 from ..errors import SceneError
-from ..surfaces.doors import Opening
+from ..surfaces.presence.doors import Opening
 from ..surfaces.surface import Surface
 
 _HALF_TURN = np.pi

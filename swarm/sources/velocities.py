@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..plane import along
+from ..surfaces.plane import along
 from .pieces import Floats, Random
 from .source import Source
 

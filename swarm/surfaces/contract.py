@@ -13,10 +13,11 @@ q is then a discrete gradient of anything built on phi (the composite gradient),
 from ..kernel.gravity import Gravity, as_vector
 from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, absolute, dot, norm, square, times, total
-from . import curvature, march, newton
-from .approach import Approach
-from .at_rest import AtRest
-from .course import Fall, close, first_rise, rise_near, rise_time, safe_rise_time
+from . import curvature, newton
+from .in_motion.at_rest import AtRest
+from .time_of_impact import march
+from .time_of_impact.approach import Approach
+from .time_of_impact.course import Fall, close, first_rise, rise_near, rise_time, safe_rise_time
 
 # Newton steps of the chord.
 _CHORD_SWEEPS = 50

@@ -7,11 +7,11 @@ from ..kernel.gravity import as_vector
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import absolute, dot, square, total
-from . import flights
 from .depth import penetration
 from .frames import Framed
-from .openings import is_in_any
+from .presence.openings import is_in_any
 from .shapes.plane import PlaneNumbers
+from .time_of_impact import flights
 
 
 class Crossing(Record):

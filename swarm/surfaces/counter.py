@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..checks import parts_of, shown
+from ..common.checks import parts_of, shown
 from ..errors import SceneError
 from .surface import Surface
 

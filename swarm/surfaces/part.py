@@ -3,7 +3,7 @@
 from dataclasses import fields, replace
 from typing import Any
 
-from .. import checks
+from ..common import checks
 from ..errors import SceneError
 from .shapes.plane import Plane
 from .surface import Surface

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Vector, number, parts_of, shown, vector
+from ..common.checks import Vector, number, parts_of, shown, vector
 from ..errors import SceneError
 from ..kernel.gravity import Gravity, as_vector
 from ..kernel.vector import Vec, dot, vec

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import checks
 from .. import motion as motions
-from ..checks import Vector, array, magnitude, number, one_of, positive, vector
+from ..common import checks
+from ..common.checks import Vector, array, magnitude, number, one_of, positive, vector
 from ..errors import SceneError
 from ..kernel.vector import Vec, vec
 from . import rotation as rotations
-from .doors import Opening, Spans, checked_spans, is_there
+from .presence.doors import Opening, Spans, checked_spans, is_there
 from .wall_law import checked_laws
 
 # A tilt of an axis this small is the round-off of a rotation.

@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import motion as motions
-from ..checks import Vector
+from ..common.checks import Vector
 from ..errors import SceneError
 from .facets.mesh import Mesh
 from .fields.many import Many
 from .instant import side_of
 from .part import checked_parts, handed_down, other_side
+from .presence.seams import Seam, joined, seams_of
 from .room import Floats, Room, has_volume, lasting, may_have_volume, room_bounds
-from .seams import Seam, joined, seams_of
 from .surface import UNBOUNDED, Box, Surface
 
 # The number of a part, and of a part of this.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import shown
+from ..common.checks import shown
 from ..errors import SceneError
 from ..kernel.random import Stream
 from ..kernel.record import Record

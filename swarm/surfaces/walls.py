@@ -10,7 +10,7 @@ from ..kernel.arrays import scratch
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
-from .rooms import owner_of
+from .presence.rooms import owner_of
 
 
 class Field(Record):

@@ -17,10 +17,10 @@ from test_cli import command
 import swarm
 from swarm import scene_file
 from swarm.run import machine
-from swarm.run.admission import task_of
 from swarm.run.cluster import client as of_client
 from swarm.run.cluster import connection, local, shards, worker
 from swarm.run.options import RunOptions
+from swarm.run.preflight.admission import task_of
 from swarm.run.progress import lines
 from swarm.run.simulation import carry_out
 

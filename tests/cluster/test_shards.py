@@ -10,13 +10,14 @@ from children import python
 import swarm
 from bench.shards import carry_out
 from bench.shards import same as the_same
-from swarm import plugins, scene_file
-from swarm.output import paths
+from swarm import scene_file
+from swarm.files import paths
 from swarm.run import machine
-from swarm.run.admission import task_of
 from swarm.run.cluster import Sharded
 from swarm.run.options import RunOptions
+from swarm.run.preflight.admission import task_of
 from swarm.run.session import Session
+from swarm.serialization import plugins
 
 N = 520  # three chunks, the last one not whole
 TIMES = {"until": 0.2, "every": 0.1, "compile": "never"}
@@ -275,7 +276,7 @@ import numpy as np, swarm
 from swarm.run.cluster import joined, shards, worker
 from swarm.run.cluster.sharded import Sharded
 from swarm.run.options import RunOptions
-from swarm.run.admission import task_of
+from swarm.run.preflight.admission import task_of
 
 path, resume, dies = sys.argv[1], sys.argv[2] == "resume", int(sys.argv[3])
 joined._AT_ONCE = 2

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 import swarm
-from swarm.run.colliding import CollidingRun
+from swarm.events.balls_run import CollidingRun
 from swarm.run.state import Seeding
 from swarm.run.tally import Watched
 

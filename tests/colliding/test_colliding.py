@@ -8,8 +8,8 @@ import pytest
 from colliding.gases import BOX, depth, frames, gas, run_of
 
 import swarm
-from swarm.colliding.clock import LENGTH, REACH
-from swarm.colliding.queue import FIRST
+from swarm.events.colliding.clock import LENGTH, REACH
+from swarm.events.colliding.queue import FIRST
 
 
 @pytest.mark.parametrize("restitution", [1.0, 0.5, 0.0])

@@ -9,8 +9,8 @@ import pytest
 from colliding.gases import depth, frames, gas
 
 import swarm
-from swarm.colliding.heavy import STRIKES, Heavy
-from swarm.run.heavy import HeavyRun
+from swarm.events.colliding.heavy import STRIKES, Heavy
+from swarm.events.heavy_run import HeavyRun
 from swarm.run.state import Seeding
 from swarm.run.tally import Watched
 

@@ -8,8 +8,8 @@ import pytest
 from colliding.gases import frames, gas, run_of
 
 import swarm
-from swarm.colliding.queue import FIRST, SPARE, build, requeue
-from swarm.colliding.rows import FLOATS, LEAVES, NOBODY, PARTNER, WHOLES, Flock
+from swarm.events.colliding.queue import FIRST, SPARE, build, requeue
+from swarm.events.colliding.rows import FLOATS, LEAVES, NOBODY, PARTNER, WHOLES, Flock
 from swarm.kernel import cache
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.colliding.clock import CLOCK, LENGTH, RESTED
-from swarm.colliding.resting import LEAST_RATE, repose_of
+from swarm.events.colliding.clock import CLOCK, LENGTH, RESTED
+from swarm.events.colliding.resting import LEAST_RATE, repose_of
 from swarm.kernel.vector import dot
 
 G = (0.0, 0.0, -9.81)

@@ -17,7 +17,7 @@ from sweep_sessions import RUNNING, assert_the_same_table, until_there_is, write
 import swarm
 from swarm.ensemble import results, sweeping
 from swarm.ensemble.sweeping import SweepOptions, carry_out
-from swarm.output import paths
+from swarm.files import paths
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_a_folder_that_holds_runs_is_not_replaced(whole):
 
 def test_another_sweep_waits_for_no_folder(whole):
     folder, _frame, path = whole
-    from swarm.output.lock import only_writer
+    from swarm.files.lock import only_writer
 
     with only_writer(folder / "results.csv", "table"), pytest.raises(swarm.FileError, match="another run"):
         swarm.sweep(path, folder, resume=True)

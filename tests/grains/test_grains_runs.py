@@ -6,8 +6,8 @@ from grains_runs import ROOM, cloud, ran
 
 import swarm
 from swarm.errors import RunError, SceneError
-from swarm.output import checkpoint
-from swarm.run.grains import GrainsRun
+from swarm.files import checkpoint
+from swarm.grains.grains_run import GrainsRun
 from swarm.run.state import Seeding
 from swarm.run.tally import Watched
 

@@ -8,11 +8,11 @@ from grains_runs import ran
 
 import swarm
 from swarm import RunError, SceneError
-from swarm.output.content import Content
-from swarm.output.series import lines_of
-from swarm.output.verdicts import judged
-from swarm.run import sinking
-from swarm.summary import numbers, of_trajectory
+from swarm.commands.summary import numbers, of_trajectory
+from swarm.grains import sinking
+from swarm.words.content import Content
+from swarm.words.series import lines_of
+from swarm.words.verdicts import judged
 
 ROOM = swarm.Box((50.0, 50.0, 50.0))
 # A plate of 5 mm, as a box and as a mesh.

@@ -11,7 +11,7 @@ import pytest
 
 import swarm
 from swarm.kernel.vector import vec
-from swarm.surfaces import flights
+from swarm.surfaces.time_of_impact import flights
 
 pytestmark = pytest.mark.long
 

@@ -26,11 +26,11 @@ from exact import EARLY, EXACT, MISSED, NEAR, TOUCH, TOUCHED, Course, Terms, exa
 from roots import Courses, judge_all
 
 import swarm
-from swarm import tables
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.jit import kernel
 from swarm.kernel.vector import column, square, vec
-from swarm.surfaces.flights import first_hit
+from swarm.serialization import tables
+from swarm.surfaces.time_of_impact.flights import first_hit
 from swarm.surfaces.walls import all_walls
 
 pytestmark = pytest.mark.long

@@ -7,14 +7,14 @@ import numpy as np
 from conftest import call
 
 import swarm
+from swarm.common.status import Status
 from swarm.contact import energy as energies
 from swarm.contact import uzawa
 from swarm.contact.energy import contact_energy
 from swarm.kernel.gravity import potential
 from swarm.kernel.vector import vec
 from swarm.methods import contract
-from swarm.status import Status
-from swarm.surfaces import flights
+from swarm.surfaces.time_of_impact import flights
 
 
 class Pass(NamedTuple):

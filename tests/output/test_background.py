@@ -5,8 +5,8 @@ import threading
 import numpy as np
 import pytest
 
-from swarm.output import background
-from swarm.output.background import Background
+from swarm.files import background
+from swarm.files.background import Background
 from swarm.state import State
 
 

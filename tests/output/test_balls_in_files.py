@@ -6,20 +6,21 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import swarm
-from swarm.output import drawing, facts, framed, style
-from swarm.output.background import Background
-from swarm.output.balls import Discs
-from swarm.output.drawn import Drawn
-from swarm.output.layout import COLLISIONS, RADII
-from swarm.output.playback import Playback
-from swarm.output.raster import Raster
-from swarm.output.shapes import shapes_of
-from swarm.output.storage import Storage
-from swarm.output.writer import TrajectoryWriter
-from swarm.snapshot import Snapshot
+from swarm.commands.summary import numbers
+from swarm.common.snapshot import Snapshot
+from swarm.files.background import Background
+from swarm.files.layout import COLLISIONS, RADII
+from swarm.files.storage import Storage
+from swarm.files.writer import TrajectoryWriter
+from swarm.pictures import drawing, framed, style
+from swarm.pictures.balls import Discs
+from swarm.pictures.drawn import Drawn
+from swarm.pictures.raster import Raster
+from swarm.recording.playback import Playback
 from swarm.state import Balls as BallsOfState
 from swarm.state import State
-from swarm.summary import numbers
+from swarm.triangles.shapes import shapes_of
+from swarm.words import facts
 
 N = 8
 RADIUS = np.linspace(0.05, 0.12, N)
@@ -136,7 +137,7 @@ def test_spins_and_some_particles_only(precision, tmp_path):
 
 
 def test_the_digest_of_a_start_has_radii(tmp_path):
-    from swarm.output.checkpoint import digest_of
+    from swarm.files.checkpoint import digest_of
 
     one = swarm.Particles(np.zeros((3, 2)), np.zeros((3, 2)), radius=0.1)
     assert digest_of(one) != digest_of(swarm.Particles(one.position, one.velocity, radius=0.2))

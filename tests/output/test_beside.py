@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output import driver, stored, writer
+from swarm.files import driver, stored, writer
 
 SCENE = swarm.Scene(surfaces=[swarm.Sphere(0.5)])
 START = swarm.fill(SCENE, 4, speed=0.5, seed=1)

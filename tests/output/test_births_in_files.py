@@ -5,9 +5,9 @@ import pytest
 from conftest import edited
 
 import swarm
-from swarm.output import facts
+from swarm.commands.summary import numbers
 from swarm.scene_file import read
-from swarm.summary import numbers
+from swarm.words import facts
 
 BOX = swarm.Scene([swarm.Box((0.5, 0.5, 0.5))])
 # One more at each frame.
@@ -162,9 +162,9 @@ def test_pictures(path, tmp_path):
 
 def test_recordings(path, tmp_path):
     pytest.importorskip("rerun")
-    from swarm.output.playback import Playback
-    from swarm.output.recorded import record
-    from swarm.output.recording import Settings
+    from swarm.recording.playback import Playback
+    from swarm.recording.recorded import record
+    from swarm.recording.writer import Settings
 
     n = given(path)
     with swarm.load(path) as trajectory:

@@ -11,24 +11,17 @@ from conftest import edited
 from matplotlib.collections import LineCollection
 
 import swarm
-from swarm import observables, scene_file, summary
+from swarm import observables, scene_file
 from swarm.bodies.elastic import block
-from swarm.output import (
-    checkpoint,
-    colours,
-    drawing,
-    graphs,
-    playback,
-    plots,
-    recorded,
-    recording,
-    series,
-    sheet,
-    writer,
-)
-from swarm.output.drawn import Drawn
-from swarm.output.storage import Storage
+from swarm.commands import summary
+from swarm.files import checkpoint, writer
+from swarm.files.storage import Storage
+from swarm.pictures import colours, drawing, graphs, plots
+from swarm.pictures.drawn import Drawn
+from swarm.recording import playback, recorded, sheet
+from swarm.recording import writer as recording
 from swarm.state import State
+from swarm.words import series
 
 BOX = swarm.Scene([swarm.Box((0.5, 0.5, 0.5))], gravity=(0.0, 0.0, -1.0))
 METHOD = swarm.Impact()

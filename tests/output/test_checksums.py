@@ -10,8 +10,8 @@ import pytest
 from conftest import edited
 
 import swarm
-from swarm import summary
-from swarm.output import checksums
+from swarm.commands import summary
+from swarm.files import checksums
 
 VALVE = swarm.Sphere(0.3, center=(0.0, 0.0, 0.5))
 SCENE = swarm.Scene([swarm.Sphere(0.5, openings=[VALVE])], gravity=(0.0, 0.0, -1.0))

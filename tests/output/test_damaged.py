@@ -14,9 +14,12 @@ import pytest
 from conftest import edited
 
 import swarm
-from swarm import scene_file, summary
-from swarm.commands import pictures
-from swarm.output import checkpoint, paths, playback, plots, recorded, recording, superblock
+from swarm import scene_file
+from swarm.commands import pictures, summary
+from swarm.files import checkpoint, paths, superblock
+from swarm.pictures import plots
+from swarm.recording import playback, recorded
+from swarm.recording import writer as recording
 
 SCENE = swarm.Scene([swarm.Sphere(0.5)])
 METHOD = swarm.Impact()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output import playback, recorded, recording, sheet
+from swarm.recording import playback, recorded, sheet
+from swarm.recording import writer as recording
 
 WALL = swarm.Sphere(0.5)
 FLOOR = swarm.Plane((0.0, 0.0, -1.0))

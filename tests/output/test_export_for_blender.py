@@ -9,7 +9,8 @@ import trimesh
 from children import python
 
 import swarm
-from swarm.output import obj, replaced
+from swarm.exports import obj
+from swarm.files import replaced
 
 CAVITY = swarm.Scene(surfaces=[swarm.Ellipsoid((0.3, 0.3, 0.6)), swarm.Sphere(0.1, (0.0, 0.0, 0.1), "outside")])
 CELL = swarm.Scene(surfaces=[swarm.Sphere(0.2, side="outside"), swarm.Slab((0, 0, 1), 0.4)], period=(1.0, 1.0, None))

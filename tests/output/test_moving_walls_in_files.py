@@ -5,9 +5,10 @@ import pytest
 
 import swarm
 from swarm.motion import pose
-from swarm.output import drawing, playback, plots, sheet
-from swarm.output.shapes import shapes_of
+from swarm.pictures import drawing, plots
+from swarm.recording import playback, sheet
 from swarm.surfaces.rotation import matrix
+from swarm.triangles.shapes import shapes_of
 
 MOVING = swarm.Scene(
     [

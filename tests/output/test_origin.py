@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output import origin, playback, recorded, recording, sheet
+from swarm.files import origin
+from swarm.recording import playback, recorded, sheet
+from swarm.recording import writer as recording
 
 # East and north of a map [m], and a height.
 PLACE = (7e5, 5.2e6, 120.0)

@@ -9,10 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 import swarm
-from swarm import plugins
-from swarm.cli import app
-from swarm.output import marks, paths
+from swarm.commands.cli import app
+from swarm.files import marks, paths
 from swarm.run.cluster import shards
+from swarm.serialization import plugins
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 START = swarm.fill(SPHERE, 3, speed=1.0, seed=1)

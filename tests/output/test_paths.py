@@ -8,7 +8,7 @@ import h5py
 import pytest
 
 import swarm
-from swarm.output import paths
+from swarm.files import paths
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 START = swarm.fill(SPHERE, 3, speed=1.0, seed=1)

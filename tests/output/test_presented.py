@@ -12,10 +12,13 @@ from matplotlib.text import Text
 from PIL import Image
 
 import swarm
-from swarm import columns, notebook
+from swarm.common import columns, notebook
 from swarm.errors import FileError, SceneError
-from swarm.output import film, framed, labelled, playback, recorded, recording, widget
-from swarm.output.shapes import shapes_of
+from swarm.exports import labelled
+from swarm.pictures import film, framed
+from swarm.recording import playback, recorded, widget
+from swarm.recording import writer as recording
+from swarm.triangles.shapes import shapes_of
 
 RATE, FRAMES = 1.5, 5
 SCENE = swarm.Scene(

@@ -10,7 +10,9 @@ import rerun as rr
 from children import python
 
 import swarm
-from swarm.output import colours, graphs, playback, plots, recorded, recording, sheet, viewer
+from swarm.pictures import colours, graphs, plots
+from swarm.recording import playback, recorded, sheet, viewer
+from swarm.recording import writer as recording
 
 SCENE = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
 METHOD = swarm.Impact()
@@ -284,7 +286,7 @@ def test_a_full_disk_ends_the_run(tmp_path):
 
 
 def test_without_rerun_one_sentence_says_what_to_install(monkeypatch, tmp_path):
-    monkeypatch.delitem(sys.modules, "swarm.output.recording")
+    monkeypatch.delitem(sys.modules, "swarm.recording.writer")
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(swarm.SceneError, match=r"a recording needs the package 'rerun'.*pip install rerun-sdk"):
         swarm.simulate(SCENE, swarm.fill(SCENE, 5, speed=0.3), METHOD, until=1.0, recording=tmp_path / "run.rrd")

@@ -12,10 +12,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pages import Read
 
 import swarm
-from swarm import summary
-from swarm.output import drawing, paths, style
-from swarm.output.page import html, pictures
-from swarm.output.shapes import shapes_of
+from swarm.commands import summary
+from swarm.files import paths
+from swarm.pictures import drawing, style
+from swarm.report import html, pictures
+from swarm.triangles.shapes import shapes_of
 
 SCENE = """
 gravity = [0.0, 0.0, -9.81]

@@ -10,12 +10,12 @@ from matplotlib.collections import PathCollection
 from matplotlib.text import Text
 
 import swarm
-from swarm.output import colours, drawing, film, flat, framed, plots, style, triad
-from swarm.output.eye import eye_at, eye_for
-from swarm.output.raster import Raster
-from swarm.output.scenery import Scenery
-from swarm.output.shapes import cell_of, shapes_of
-from swarm.output.silhouette import silhouette
+from swarm.pictures import colours, drawing, film, flat, framed, plots, style, triad
+from swarm.pictures.eye import eye_at, eye_for
+from swarm.pictures.raster import Raster
+from swarm.pictures.scenery import Scenery
+from swarm.pictures.silhouette import silhouette
+from swarm.triangles.shapes import cell_of, shapes_of
 
 NOWHERE = np.zeros((3, 1))
 RED = 0xFF0000FF

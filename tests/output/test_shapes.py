@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output.shapes import shapes_of
+from swarm.triangles.shapes import shapes_of
 
 NOWHERE = np.zeros((3, 1))
 SCENES = {

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import swarm
-from swarm.output.shapes import shapes_of
+from swarm.triangles.shapes import shapes_of
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: minutes for phi")
 

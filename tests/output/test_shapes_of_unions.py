@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output.shapes import shapes_of
+from swarm.triangles.shapes import shapes_of
 
 NOWHERE = np.zeros((3, 1))
 BOX, BALL = swarm.Box((0.5, 0.5, 0.5)), swarm.Sphere(0.5)

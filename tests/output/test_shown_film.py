@@ -12,7 +12,7 @@ from PIL import Image
 
 import swarm
 from swarm.errors import FileError, SceneError
-from swarm.output import film, shown_film
+from swarm.pictures import film, shown_film
 
 FRAMES = 5
 

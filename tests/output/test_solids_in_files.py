@@ -9,7 +9,9 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import swarm
-from swarm.output import playback, recorded, recording, solids
+from swarm.recording import playback, recorded
+from swarm.recording import writer as recording
+from swarm.triangles import solids
 
 RANDOM = np.random.default_rng(3)
 N = 12

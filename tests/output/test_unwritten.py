@@ -7,7 +7,9 @@ import pytest
 from children import python
 
 import swarm
-from swarm.output import plots, recorded, recording
+from swarm.pictures import plots
+from swarm.recording import recorded
+from swarm.recording import writer as recording
 
 
 @pytest.fixture

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output import plots, verdicts
+from swarm.pictures import plots
+from swarm.words import verdicts
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
 

@@ -9,7 +9,8 @@ from conftest import METHODS, WALLS, row, surface_of
 
 import swarm
 from swarm.bodies.elastic import block
-from swarm.output import nouns, words
+from swarm.words import nouns
+from swarm.words import titles as words
 
 SOFT = swarm.elastic(block((0.1, 0.1, 0.1), (2, 2, 2)), young=1e4, poisson=0.3, density=100.0)
 DOWN = (0.0, 0.0, -9.81)

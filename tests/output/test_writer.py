@@ -9,8 +9,8 @@ import pytest
 from conftest import files_limited_to
 
 import swarm
-from swarm.output import appended, superblock, writer
-from swarm.output.storage import Storage
+from swarm.files import appended, superblock, writer
+from swarm.files.storage import Storage
 from swarm.state import State
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.run.bodies import BodyRun
+from swarm.bodies.body_run import BodyRun
 
 ROOT = Path(__file__).parents[2]
 STEP = 5e-3

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.run import passing
+from swarm.bodies import passing
 
 CUBE = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
 VESSEL = swarm.Sphere(10.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.run.bodies import BodyRun
+from swarm.bodies.body_run import BodyRun
 
 SPHERE, BOX = [swarm.Sphere(1.0)], [swarm.Box((1.0, 0.9, 0.8))]
 # The same beside a wall out of reach: one kind of scene, which is compiled once.

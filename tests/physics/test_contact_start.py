@@ -11,8 +11,8 @@ from methods.passes import one_pass, simulate
 
 import swarm
 from bench import order as chart
-from swarm import tables
 from swarm.kernel.vector import vec
+from swarm.serialization import tables
 
 pytestmark = pytest.mark.physics
 

@@ -10,7 +10,7 @@ import swarm
 from swarm.kernel.vector import vec
 from swarm.methods import fixed_step
 from swarm.motion import pose
-from swarm.surfaces import safe
+from swarm.surfaces.time_of_impact import safe
 
 pytestmark = pytest.mark.physics
 

@@ -16,7 +16,7 @@ from examples import fermi
 from swarm.kernel.vector import ZERO, Vec, vec
 from swarm.lanes import block
 from swarm.motion import pose
-from swarm.surfaces import safe
+from swarm.surfaces.time_of_impact import safe
 
 G = 9.81
 DOWN = (0.0, 0.0, -G)

@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 
 import swarm
 from examples import heavy_piston
-from swarm.run.admission import task_of
 from swarm.run.machine import run_of
 from swarm.run.options import RunOptions
+from swarm.run.preflight.admission import task_of
 
 DOWN = (0.0, 0.0, -1.0)
 UP = (0.0, 0.0, 1.0)

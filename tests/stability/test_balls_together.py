@@ -17,8 +17,8 @@ from stability.interrupted import require_same_bits
 from stability.test_against_an_event_loop import SOLIDS, VESSELS, a_motion
 
 import swarm
-from swarm.colliding import events
-from swarm.run.colliding import CollidingRun
+from swarm.events.balls_run import CollidingRun
+from swarm.events.colliding import events
 
 UNTIL, FRAMES, NUMBER = 1.0, 8, 7
 REFUSED = []

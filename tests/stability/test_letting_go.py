@@ -15,7 +15,7 @@ from conftest import every_pair
 import swarm
 from swarm.kernel.vector import Vec
 from swarm.surfaces.data import flight
-from swarm.surfaces.march import march
+from swarm.surfaces.time_of_impact.march import march
 
 pytestmark = pytest.mark.physics
 

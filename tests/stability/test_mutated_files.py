@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import swarm
-from swarm.cli import app
+from swarm.commands.cli import app
 
 SCENE = """
 gravity = [0.0, 0.0, -9.81]

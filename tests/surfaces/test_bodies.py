@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.surfaces import rotation
-from swarm.surfaces.flights import first_hit
 from swarm.surfaces.shapes.plane import PlaneNumbers
 from swarm.surfaces.shapes.slab import SlabNumbers
+from swarm.surfaces.time_of_impact.flights import first_hit
 from swarm.surfaces.walls import all_walls
 
 TURN = {"axis": (1.0, 2.0, 3.0), "angle": 0.7}

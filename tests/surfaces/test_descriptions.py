@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import swarm
-from swarm import tables
+from swarm.serialization import tables
 from swarm.surfaces import ALL_FIELDS, ALL_SURFACES
 
 # Made of several walls: test_bodies.py, test_union.py, test_outlines.py.

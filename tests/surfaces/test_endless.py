@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.output.shapes import shapes_of
+from swarm.triangles.shapes import shapes_of
 
 AREA = 2.0 * math.pi  # of an ellipse with semi-axes 2 and 1
 PLANES = "xyz"

@@ -7,8 +7,9 @@ from conftest import rarely
 from thorny import aimed, hollow, slivered, thorny
 
 import swarm
-from swarm import scene_file, tables
+from swarm import scene_file
 from swarm.kernel.vector import Vec
+from swarm.serialization import tables
 from swarm.surfaces.facets import cells, room
 
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
@@ -325,6 +326,6 @@ def test_a_solid_that_reaches_over_a_face_of_a_cell_that_repeats():
 
 
 def test_the_picture_of_a_mesh_is_the_mesh():
-    shapes = pytest.importorskip("swarm.output.shapes")
+    shapes = pytest.importorskip("swarm.triangles.shapes")
     (shape,) = shapes.shapes_of(swarm.Scene([box_of_triangles()]), np.zeros((3, 1)))
     assert shape.area() == pytest.approx(22.0)

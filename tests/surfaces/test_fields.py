@@ -9,12 +9,15 @@ import tomli_w
 from conftest import compiled
 
 import swarm
-from swarm import checks, scene_file, tables
+from swarm import scene_file
+from swarm.common import checks
 from swarm.errors import SceneError
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import vec
-from swarm.surfaces import ALL_SURFACES, flights
+from swarm.serialization import tables
+from swarm.surfaces import ALL_SURFACES
 from swarm.surfaces.fields import grid as grids
+from swarm.surfaces.time_of_impact import flights
 
 EPSILON = np.finfo(np.float64).eps
 # Hits that are looked for: later a flight is far away.

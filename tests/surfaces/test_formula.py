@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import swarm
-from swarm import tables
+from swarm.serialization import tables
 from swarm.surfaces.formulas import derivatives, numbers
 from swarm.surfaces.formulas.interval import Interval, bounds_of
 from swarm.surfaces.surface import UNBOUNDED

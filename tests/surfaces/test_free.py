@@ -5,9 +5,9 @@ import pytest
 
 import swarm
 from swarm.lanes import block
-from swarm.surfaces.axes import Free
-from swarm.surfaces.gaps import Beside, Gap
-from swarm.surfaces.period import Period
+from swarm.surfaces.periodic.axes import Free
+from swarm.surfaces.periodic.gaps import Beside, Gap
+from swarm.surfaces.periodic.period import Period
 
 EPSILON = float(np.finfo(np.float64).eps)
 CELL = (1.0, 1.0, 1.0)

@@ -7,7 +7,7 @@ import swarm
 from swarm.kernel.gravity import Gravity, accelerated, displacement
 from swarm.kernel.vector import vec
 from swarm.surfaces import rotation as rotations
-from swarm.surfaces.flights import first_hit
+from swarm.surfaces.time_of_impact.flights import first_hit
 
 EPSILON = float(np.finfo(float).eps)
 _LEGS = 200

@@ -8,11 +8,12 @@ import pytest
 import tomli_w
 
 import swarm
-from swarm import tables
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import vec
-from swarm.surfaces import ALL_SURFACES, flights
+from swarm.serialization import tables
+from swarm.surfaces import ALL_SURFACES
 from swarm.surfaces.outlines.outline import Outline
+from swarm.surfaces.time_of_impact import flights
 
 L = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
 CURVED = [(0, 0), (2, 0, -0.4), (2, 1), (1, 1, 0.6), (1, 2, -0.3), (0, 2)]

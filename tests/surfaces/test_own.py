@@ -15,10 +15,10 @@ import pytest
 from conftest import call, compiled
 
 import swarm
-from swarm import tables
 from swarm.kernel import frozen
 from swarm.kernel.vector import Vec
 from swarm.lanes import block as blocks
+from swarm.serialization import tables
 from swarm.surfaces.formulas import code, numbers
 from swarm.surfaces.surface import UNBOUNDED
 

@@ -15,9 +15,9 @@ from swarm.kernel.vector import Symmetric, dot, square
 from swarm.lanes import block as blocks
 from swarm.methods import base as methods
 from swarm.surfaces import contract, rotation
-from swarm.surfaces.course import Quartic
 from swarm.surfaces.shapes.solid import body
 from swarm.surfaces.surface import Surface, box_around, side_sign
+from swarm.surfaces.time_of_impact.course import Quartic
 
 SHIPPED = {
     **SURFACES,

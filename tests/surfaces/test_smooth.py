@@ -10,9 +10,9 @@ from walls import falling, hit_of, start, straight
 
 import swarm
 from swarm.kernel.gravity import Gravity
-from swarm.surfaces import march as marches
 from swarm.surfaces import rotation as rotations
 from swarm.surfaces.shapes.capsule import CapsuleNumbers
+from swarm.surfaces.time_of_impact import march as marches
 
 every_march = pytest.mark.parametrize("name", [name for name in ITERATED if name not in SAMPLED_WALLS])
 DEPTHS = [0.1, 1e-3, 1e-9, 1e-12, 1e-15, 0.0, -1e-15]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import swarm
 from swarm.kernel.gravity import Gravity
-from swarm.surfaces import flights
+from swarm.surfaces.time_of_impact import flights
 from swarm.surfaces.walls import Walls, all_walls
 
 every_chain = pytest.mark.parametrize(

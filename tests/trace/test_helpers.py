@@ -14,10 +14,10 @@ import swarm
 from swarm.kernel import cache, jit
 from swarm.kernel.compilers import deep
 from swarm.kernel.trace import helpers
-from swarm.run.admission import task_of
 from swarm.run.engine import Run
 from swarm.run.machine import run_of
 from swarm.run.options import RunOptions
+from swarm.run.preflight.admission import task_of
 
 pytestmark = compiled_only
 

@@ -21,13 +21,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ... import interrupt
+from ...common import interrupt
+from ...common.frames import Frame
 from ...errors import RunError, WallTimeError
-from ...frames import Frame
-from .. import hints
 from ..machine import RunEnd, start_of, warn_open
 from ..measures import Measures
 from ..options import Task
+from ..preflight import hints
 from ..progress import Display, display
 from . import connection, joined, shards, worker
 from .sharded import Sharded

@@ -13,18 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import observables
-from ...catalog import CHUNK_SUMS, OBSERVABLES
+from ...bodies import energies
+from ...common.catalog import CHUNK_SUMS, OBSERVABLES
+from ...common.snapshot import Snapshot
+from ...files.layout import UNIT, UNITS
+from ...files.trajectory import Trajectory, load
+from ...files.writer import TrajectoryWriter
 from ...lanes.arrays import booked
-from ...output.layout import UNIT, UNITS
-from ...output.sequence import values_of
-from ...output.trajectory import Trajectory, load
-from ...output.writer import TrajectoryWriter
-from ...snapshot import Snapshot
-from .. import energies
 from ..machine import Columns
 from ..measures import NONE, Measures
 from ..options import Task
 from ..present import total_of
+from ..sequence import values_of
 from ..tally import OBSERVED, units_of, value_of
 from . import shards
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SceneError
-from ...output import checkpoint, paths
+from ...files import checkpoint, paths
 from ..options import Task
 from ..session import Session
 from . import shards

@@ -18,15 +18,15 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import plugins
 from ...bodies.body import Body
 from ...bodies.state import Bodies
 from ...errors import SceneError
+from ...files import marks, paths
 from ...methods.base import Method
 from ...observables import CHUNK
-from ...output import marks, paths
 from ...particles import Births, Particles
 from ...scene import Scene
+from ...serialization import plugins
 from ...state import Absorbed, Multipliers
 from ..machine import RunEnd, birth_times
 from ..options import RunOptions, Task

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ...errors import SwarmError
-from ...output import paths
-from ...output.lock import only_writer
+from ...files import paths
+from ...files.lock import only_writer
 from .. import machine
 from ..progress import Display
 from ..session import Session

@@ -9,7 +9,7 @@ import math
 from ...kernel.jit import kernel, outlined, select
 from ...kernel.vector import Symmetric, Vec, column, dot, norm, square, times
 from .. import contract
-from ..course import rise_time_inside
+from ..time_of_impact.course import rise_time_inside
 from .rounded import Rounded
 
 # Newton's steps to a foot and to a hit; near both each one doubles the digits.

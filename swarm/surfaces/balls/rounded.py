@@ -15,8 +15,8 @@ from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, absolute, dot, norm, square, total
 from .. import contract
-from ..approach import place
-from ..course import rise_time, under_way
+from ..time_of_impact.approach import place
+from ..time_of_impact.course import rise_time, under_way
 
 # The last step is shorter than this fraction of the radius plus round-off of a place. The square of the fraction is
 # below round-off.

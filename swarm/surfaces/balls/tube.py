@@ -6,9 +6,9 @@ import numpy as np
 
 from ...kernel.jit import select
 from ...kernel.vector import Vec, absolute, dot, norm, square, times, total
-from ..course import Quartic, ball_rise_time, level_and_window, rise_time, rise_time_inside
-from ..rising import Level
 from ..shapes.common import Distance, ExactChord
+from ..time_of_impact.course import Quartic, ball_rise_time, level_and_window, rise_time, rise_time_inside
+from ..time_of_impact.rising import Level
 
 
 class Tube(Distance, ExactChord):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import checks
+from ...common import checks
 from ...errors import SceneError
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,7 @@ def _of_npy(path: Path) -> Floats:
 def _of_hdf5(path: Path) -> Floats:
     import h5py
 
-    from ... import links
+    from ...common import links
 
     with h5py.File(path, "r") as file:
         links.require_none(file, path)

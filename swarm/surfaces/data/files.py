@@ -4,7 +4,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from ...checks import closest, listed
+from ...common.checks import closest, listed
 from ...errors import SceneError
 from ..surface import Surface
 from .arrays import read_samples

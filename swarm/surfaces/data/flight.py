@@ -12,8 +12,8 @@ import numpy as np
 
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, dot, norm, total
-from ..course import rise_time
-from ..march import LOOKS, SafeStep, lets_go
+from ..time_of_impact.course import rise_time
+from ..time_of_impact.march import LOOKS, SafeStep, lets_go
 from .numbers import CellNumbers, known, least_of
 
 _EPSILON = float(np.finfo(np.float64).eps)

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from ... import checks
-from ...checks import path_of
+from ...common import checks
+from ...common.checks import path_of
+from ...common.extras import needed_by
 from ...errors import SceneError
-from ...extras import needed_by
-from . import triangles
-from .mesh_files import Floats
+from ..facets import triangles
+from ..facets.mesh_files import Floats
 from .sampled import Sampled
 from .thickness import require_resolved
 

@@ -9,7 +9,7 @@ from ...kernel.arrays import index
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Symmetric, Vec, absolute, dot, lowest, norm, square, times, total
 from .. import contract
-from ..course import rise_time
+from ..time_of_impact.course import rise_time
 from .cells import SPREAD, SampleCells
 from .spline import MARGIN, Spline
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import checks
-from ...checks import Vector
+from ...common import checks
+from ...common.checks import Vector
 from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations

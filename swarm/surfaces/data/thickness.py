@@ -19,12 +19,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...common.extras import needed_by
 from ...errors import SceneError
-from ...extras import needed_by
+from ..facets.mending import components, neighbours
+from ..facets.mesh_files import Floats, Indices
+from ..facets.triangles import TriangleMesh
 from ..surface import shown
-from .mending import components, neighbours
-from .mesh_files import Floats, Indices
-from .triangles import TriangleMesh
 
 # The thickness that is resolved, in spacings.
 RESOLVED = 1.25

@@ -7,8 +7,8 @@ from ...kernel.gravity import displacement
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot
-from ..course import rise_time
 from ..shapes.plane import Flat
+from ..time_of_impact.course import rise_time
 
 # As deep behind a facet as this many times the round-off of places a step may end that has come through it.
 _BEHIND = 1e4

@@ -5,18 +5,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import checks
+from ...common import checks
 from ...errors import SceneError
 from ...kernel.vector import Vec
 from ..balls.facet import RoundTriangle
-from ..data.mesh_files import Floats, Soup
-from ..data.triangles import TriangleMesh as Closed
 from ..fields.grid import aligned
 from ..fields.many import field_of
 from ..fields.members import Members
 from .members import Facets
+from .mesh_files import Floats, Soup
 from .nearest import nearest
 from .room import CLOSED, FREE, KIND, rooms_of, with_blocks
+from .triangles import TriangleMesh as Closed
 
 # Bits of a place along each axis, by which triangles are sorted.
 _BITS = 20

@@ -6,11 +6,11 @@ from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, displacement
 from ...kernel.jit import outlined
 from ...kernel.vector import cross, dot, square
-from .. import flights
 from ..fields.grid import cell_of, until_next
 from ..fields.members import Members, member
-from ..patched import Patched
+from ..presence.patched import Patched
 from ..shapes.plane import PlaneNumbers
+from ..time_of_impact import flights
 from .cells import here_in, passes, until_out
 from .room import FULL, KIND, room_of
 

@@ -9,14 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ... import checks
-from ...checks import Vector
+from ...common import checks
+from ...common.checks import Vector
+from ...common.extras import needed_by
 from ...errors import SceneError
-from ...extras import needed_by
 from ...kernel.vector import Vec
 from .. import rotation as rotations
-from ..data.mesh_files import Floats, Indices, read_soup
-from ..data.triangles import closed
 from ..fields.members import Members
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .cells import cells_around
@@ -24,7 +22,9 @@ from .faces import faces_of
 from .facet import FacetNumbers, Shared
 from .made import given_arrays, sorted_by_place, table_of_facets, triangles_of_balls, with_room
 from .members import Facets
+from .mesh_files import Floats, Indices, read_soup
 from .nearest import boxes_of, nearest, within
+from .triangles import closed
 
 # The round-off of places, as a part of the farthest coordinate: far above that of numbers, and of a hit.
 _ROOM = 2.0**-40

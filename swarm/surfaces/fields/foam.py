@@ -6,8 +6,8 @@ from ...kernel.arrays import index
 from ...kernel.gravity import displacement
 from ...kernel.jit import outlined
 from ...kernel.vector import absolute, total
-from .. import flights
-from ..patched import Patched
+from ..presence.patched import Patched
+from ..time_of_impact import flights
 from .grid import cell_of, until_next
 from .members import Members, entries_at, member
 

@@ -7,8 +7,8 @@ from ...kernel.arrays import index
 from ...kernel.jit import Array, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec
-from ..course import rise_time
-from ..rising import Bounds
+from ..time_of_impact.course import rise_time
+from ..time_of_impact.rising import Bounds
 
 # A flight ends this part of a cell beyond the cell's wall, where no round-off takes it back; what reaches into a cell
 # is what comes nearer to it than twice that.

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 from ...motion import Placed
-from ..doors import walls_then
 from ..facets.mesh import Mesh
-from ..joined import with_rooms
-from ..moving import walls_of
+from ..in_motion.moving import walls_of
+from ..presence.doors import walls_then
+from ..presence.joined import with_rooms
 from ..surface import Surface
 from ..walls import Field, Listed, Walls, all_walls
 from .many import Many

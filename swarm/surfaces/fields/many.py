@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ... import motion as motions
+from ...common.rows import balls, bodies, directions, lengths, quaternions, widths
 from ...errors import SceneError
 from ...kernel import cache
 from ...kernel.arrays import index
 from ...kernel.jit import kernel
 from ...kernel.vector import Vec, vec
-from ...rows import balls, bodies, directions, lengths, quaternions, widths
-from ..patched import Patched
+from ..presence.patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
 from .grid import MARGIN, Floats, Grid, cells_of, one_cell

@@ -11,7 +11,6 @@ from ...kernel.arrays import index
 from ...kernel.jit import Array, kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, put
-from .. import flights
 from ..facets.facet import Shared
 from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers
@@ -19,6 +18,7 @@ from ..shapes.quadratic import QuadricNumbers
 from ..shapes.slab import AXES, SlabNumbers
 from ..shapes.solid import SolidNumbers
 from ..shapes.sphere import SphereCavity, SphereNumbers, ball, cavity
+from ..time_of_impact import flights
 from .grid import Grid, aligned, cell_of, until_next
 
 # The rows of a rotation that turns nothing.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ... import checks
+from ...common import checks
 from ...errors import SceneError
 from ...kernel.frozen import Frozen
 from ...kernel.jit import _INLINE, inlined

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, NoReturn
 
-from ...checks import closest
+from ...common.checks import closest
 from ...errors import SceneError
 
 COORDINATES = ("x", "y", "z")

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import checks
-from ...checks import Vector
+from ...common import checks
+from ...common.checks import Vector
 from ...errors import SceneError
 from ...kernel.vector import Vec, vec
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, shown, side_sign

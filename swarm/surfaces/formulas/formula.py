@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
-from ... import checks
-from ...checks import Vector
+from ...common import checks
+from ...common.checks import Vector
 from ...errors import SceneError
 from .code import class_of
 from .derivatives import derived

@@ -8,8 +8,8 @@ import numpy as np
 from ...kernel.jit import outlined, select
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, dot, largest, square, total
 from .. import contract
-from ..course import rise_time
-from ..march import SafeStep, Search, first_met
+from ..time_of_impact.course import rise_time
+from ..time_of_impact.march import SafeStep, Search, first_met
 
 _EPSILON = 2.220446049250313e-16
 # Points this close, relative to the size, are joined by Gauss's rule, whose error is the 7th power; its outer node.

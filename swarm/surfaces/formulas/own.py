@@ -9,7 +9,7 @@ import numba
 from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numpy.typing import ArrayLike
 
-from ...checks import Vector
+from ...common.checks import Vector
 from ...errors import SceneError
 from ...kernel.jit import kernel
 from ...kernel.vector import ZERO, total

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import magnitude, number, parts_of, shown
+from ...common.checks import magnitude, number, parts_of, shown
 from ...errors import SceneError
 from .apart import Edges, along, require_apart
 

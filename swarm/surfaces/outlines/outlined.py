@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Vector
+from ...common.checks import Vector
 from ...errors import SceneError
 from ...kernel.vector import Vec, vec
 from .. import rotation as rotations

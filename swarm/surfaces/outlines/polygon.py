@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from ...checks import Vector, at_least, length
+from ...common.checks import Vector, at_least, length
 from ...errors import SceneError
 from .outline import Outline
 from .outlined import Outlined

@@ -8,8 +8,8 @@ from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, either, norm, square, times
 from .. import contract
 from ..balls.tube import Tube
-from ..course import ball_rise_time
 from ..rotation import Rotated
+from ..time_of_impact.course import ball_rise_time
 from .sides import Side
 
 # What an arc bends away from within this part of its radius is a point.

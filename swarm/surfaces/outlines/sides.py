@@ -6,12 +6,12 @@ from ...kernel.arrays import index
 from ...kernel.gravity import as_vector
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, dot, norm, square, times
-from ..course import Fall, Quartic, close, rise_time, under_way
 from ..fields.members import Members, member
 from ..frames import Unturned
-from ..patched import Patched
+from ..presence.patched import Patched
 from ..rotation import Rotated
 from ..shapes.quadratic import QuadricNumbers, form
+from ..time_of_impact.course import Fall, Quartic, close, rise_time, under_way
 
 # How often a fall may cross the whole of a round wall, and how often it may need more steps between.
 _CROSSINGS = 12

@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ...checks import Vector, length, one_of, parts_of, shown, vector
+from ...common.checks import Vector, length, one_of, parts_of, shown, vector
 from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...checks import Vector, at_least, length
+from ...common.checks import Vector, at_least, length
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
-from ..approach import Border, LevelBound
-from ..course import ball_rise_time
 from ..surface import Box, box_around, farthest, side_sign
+from ..time_of_impact.approach import Border, LevelBound
+from ..time_of_impact.course import ball_rise_time
 from .common import Distance
 from .revolved import Revolved
 

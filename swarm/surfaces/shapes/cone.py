@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ...checks import Vector, number
+from ...common.checks import Vector, number
 from ...errors import SceneError
 from ...kernel.vector import Vec, vec
 from .. import rotation as rotations

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ...checks import Vector
-from ...checks import length as checked_length
+from ...common.checks import Vector
+from ...common.checks import length as checked_length
 from ...kernel.vector import vec
 from .. import rotation as rotations
 from ..balls.rounded import RoundCan

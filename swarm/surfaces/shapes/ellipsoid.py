@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Vector, length, vector
+from ...common.checks import Vector, length, vector
 from ...kernel.jit import select
 from ...kernel.vector import cross, norm, times, total, vec
 from .. import rotation as rotations
 from ..balls.egg import EggCavity, EggSolid, distances_from
-from ..course import level_and_window, rise_time_inside
 from ..surface import Box, Surface, box_around, farthest, rotated_box, side_sign
+from ..time_of_impact.course import level_and_window, rise_time_inside
 from .quadratic import QuadricNumbers, form, turning, widths
 
 

@@ -3,7 +3,7 @@
 import itertools
 from dataclasses import dataclass
 
-from ...checks import Vector, length
+from ...common.checks import Vector, length
 from ..surface import UNBOUNDED, Box, HalfSpace, farthest
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents

@@ -4,13 +4,13 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ...checks import Vector, number
+from ...common.checks import Vector, number
 from ...kernel.jit import select
 from ...kernel.vector import Vec, dot, vec
-from ..course import rise_time
-from ..rising import Level
 from ..rotation import turned, unit
 from ..surface import UNBOUNDED, Box, HalfSpace, Surface, is_along
+from ..time_of_impact.course import rise_time
+from ..time_of_impact.rising import Level
 from .common import ExactChord
 
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import Vector
+from ...common.checks import Vector
 from ...kernel.jit import select
 from ...kernel.vector import Vec, absolute, cross, dot, largest, norm, square, times, total, vec
 from .. import contract
-from ..course import Quartic, level_and_window, rise_time_by, rise_time_inside
-from ..rising import Level
 from ..surface import side_sign
+from ..time_of_impact.course import Quartic, level_and_window, rise_time_by, rise_time_inside
+from ..time_of_impact.rising import Level
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
 _CHORD_SWEEPS = 12

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Vector, entries, number, vector
+from ...common.checks import Vector, entries, number, vector
 from ...errors import SceneError
 from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, box_around, extents, farthest, side_sign

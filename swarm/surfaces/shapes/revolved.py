@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import Vector
+from ...common.checks import Vector
 from .. import rotation as rotations
 from ..surface import HalfSpace, Surface, is_along, is_on_axis
 

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import Vector, length
+from ...common.checks import Vector, length
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, dot, vec
-from ..course import rise_time
-from ..rising import Between, Level, level_step
 from ..rotation import turned, unit
 from ..surface import TILT, Box, HalfSpace, Surface, box_around, farthest, is_along, side_sign
+from ..time_of_impact.course import rise_time
+from ..time_of_impact.rising import Between, Level, level_step
 from .common import Distance, ExactChord
 
 

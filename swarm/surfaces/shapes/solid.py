@@ -14,9 +14,9 @@ from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
 from .. import contract
-from ..approach import place
-from ..course import under_way
-from ..rising import LevelStep
+from ..time_of_impact.approach import place
+from ..time_of_impact.course import under_way
+from ..time_of_impact.rising import LevelStep
 
 _EPSILON = 2.220446049250313e-16
 # A step that is no hit has a length, even if it is of none.

@@ -3,12 +3,12 @@
 import math
 from dataclasses import dataclass
 
-from ...checks import Vector, length
+from ...common.checks import Vector, length
 from ...kernel.jit import select
 from ...kernel.vector import ZERO, Vec, absolute, dot, highest, norm, square, total, vec
-from ..course import Quartic, ball_rise_time, level_and_window, rise_time, rise_time_inside
-from ..rising import Bounds, Level
 from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
+from ..time_of_impact.course import Quartic, ball_rise_time, level_and_window, rise_time, rise_time_inside
+from ..time_of_impact.rising import Bounds, Level
 from .common import Distance, ExactChord
 
 # Trials of a time for which the fall is bounded.

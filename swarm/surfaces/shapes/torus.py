@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...checks import Vector, length
+from ...common.checks import Vector, length
 from ...errors import SceneError
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
-from ..approach import LevelBound
 from ..rotation import turned
 from ..surface import Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign
+from ..time_of_impact.approach import LevelBound
 from .common import Distance
 
 # The last step leaves this part of 4 R^2 a^2, what F is in the middle of the tube.

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 import swarm
-from swarm.surfaces.data import mending, triangles
-from swarm.surfaces.data.mesh_files import Soup, read_soup
+from swarm.surfaces.facets import mending, triangles
+from swarm.surfaces.facets.mesh_files import Soup, read_soup
 
 BOX = trimesh.creation.box((1.0, 1.0, 1.0))
 CORNERS, FACES = np.array(BOX.vertices), np.array(BOX.faces)

@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 import swarm
-from swarm import scene_file, summary
+from swarm import scene_file
+from swarm.commands import summary
 
 
 def written(folder, mesh, name="part.stl"):

@@ -7,7 +7,8 @@ from conftest import EPSILON, METHODS
 from samples import ball, bumpy, grid
 
 import swarm
-from swarm import scene_file, tables
+from swarm import scene_file
+from swarm.serialization import tables
 
 AXIS, POINTS = grid(8)
 SQUARE = sum(x * x for x in POINTS) - 0.16

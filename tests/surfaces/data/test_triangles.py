@@ -6,7 +6,7 @@ import trimesh
 
 import swarm
 from swarm import scene_file
-from swarm.surfaces.data import triangles
+from swarm.surfaces.facets import triangles
 
 BALL = trimesh.creation.icosphere(3, radius=0.5)
 CORNERS, FACES = np.array(BALL.vertices), np.array(BALL.faces)

@@ -1,0 +1,283 @@
+"""The run of copies of a body."""
+
+import math
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from ..common.status import Status
+from ..errors import RunError
+from ..methods.base import Method
+from ..observables import CHUNK
+from ..particles import Particles
+from ..run.base import Arrays, BaseRun
+from ..run.tally import Tally
+from ..run.tiers import Tier
+from ..scene import Scene
+from ..state import Floats, State
+from .energies import BodyEnergies, summed
+from .lanes.advance import advance_bodies
+from .lanes.arrays import BodyState, StepRule
+from .lanes.contacts import MOST_CONTACTS
+from .numbers import led_points, most_contacts_of, own_surfaces, ties_of, touching_of, walls_of
+from .state import Bodies
+
+# Round-off of a position on a wall, as a part of the scene's size.
+_ROUND_OFF = 8.0 * np.finfo(np.float64).eps
+# Bytes of the lanes of a thread, which are on its stack, if one lane takes no more, and the most lanes.
+_STACK, _MOST_LANES = 1 << 20, 32
+# What else a stack holds; and stacks are whole pages.
+_REST, _PAGE = 8 << 20, 1 << 16
+# Bodies that a thread draws at a time.
+_AT_ONCE = 256
+# Suzuki's composition: five steps of second order are one of fourth.
+_OUTER = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
+STAGES = {2: (1.0,), 4: (_OUTER, _OUTER, 1.0 - 4.0 * _OUTER, _OUTER, _OUTER)}
+
+
+class BodyRun(BaseRun):
+    """The run of bodies; `particles` are all their points, whose arrays become a part of its state."""
+
+    # Where impacts are counted by walls.
+    tally: Tally | None = None
+
+    def __init__(
+        self, scene: Scene, bodies: Bodies, particles: Particles, method: Method, threads: int,
+        block_size: int | None = None, compile: str = "always", first: int = 0,
+    ) -> None:  # fmt: skip
+        law, looped, soft = method.law(), method.has_multipliers(), walls_of(method)
+        n, points, own = len(bodies), len(bodies.body), own_surfaces(bodies.body)
+        self._body = bodies.body
+        self._ties = ties_of(bodies.body, law.alpha if looped else None)
+        self._touching = touching_of(bodies.body, self._ties, scene)
+        self._carried = [Scene([surface]) for surface, _carrier, _point in bodies.body.cavities]
+        self._walls = scene.walls(own=()), scene.walls(own=own)
+        self._energies = BodyEnergies(scene, self._carried, bodies.body, self._ties, law)
+        rows, walls = len(self._ties.ends) + len(bodies.body.guides), len(scene.owners()) + len(own)
+        self._bodies = _state_of(bodies, particles, rows, walls)
+        none = np.zeros(0)
+        # What files take of a run.
+        self.state = State(
+            particles.position, particles.velocity, particles.mass, none, none, np.zeros(points * n, np.int64),
+            np.zeros((walls, 0)), none, None,
+        )  # fmt: skip
+        contacts = most_contacts_of(self._touching, soft)
+        per_lane = 8 * (24 * points + 10 * rows + rows * rows + 20 * contacts)
+        lanes = max(1, min(_MOST_LANES, _STACK // per_lane, n))
+        self._size = max(1, block_size or _AT_ONCE)
+        self._threads = min(threads, math.ceil(n / self._size))
+        # Matrices of ties, and of contacts, of one body.
+        pressed = max(contacts, 3 * MOST_CONTACTS)
+        at_once = 8 * (rows * rows + pressed * (pressed + 3 * rows))
+        # In plain Python a step takes some milliseconds: it never pays.
+        tier = Tier("always" if compile == "auto" else compile, self._walls, n * points)
+        super().__init__(scene, method, n, threads_with(self._threads, lanes * per_lane + at_once), tier, first)
+        size, gravity = scene.finite_size(), np.array(scene.gravity or (0.0, 0.0, 0.0))
+        room = _ROUND_OFF * max(size, scene.extent())
+        noise = room / math.sqrt(min([*(self._link_lengths() ** 2), size * size]))
+        strict = getattr(method, "on_unconverged", "") == "raise"
+        dt, stages = method.dt, np.array(STAGES[getattr(method, "order", 2)])  # type: ignore[attr-defined]
+        # More gain in a compiled kernel alone.
+        lanes = 1 if tier.is_plain else lanes
+        self._rule = StepRule(dt, stages, gravity, 0.0, room, noise, lanes, soft, contacts, looped, strict)
+        # Frames of fixed steps are counted in steps.
+        self._unit = 1.0 if soft is None or soft.is_cut else dt
+        pull = math.hypot(*gravity) * self._ties.mass.sum()
+        self._led_start, self._start, self._scale = np.zeros((3, n))
+        for some, r, v in self._blocks():
+            kinetic = self._energies.kinetic(v)
+            self._led_start[some] = self._energies.led(r, v)
+            self._start[some] = start = kinetic + self._energies.fall(r) + self._energies.stored(r)
+            self._scale[some] = np.maximum(np.abs(start), kinetic) + pull * size
+        self._bodies.energy[:] = self._start
+        self._seen: dict[str, Any] = {}
+        self._sums = np.zeros((0, 0))
+
+    def calls(self) -> list[tuple[Any, tuple[Any, ...]]]:
+        return [(advance_bodies, self._arguments(0, np.zeros(1, np.int64)))]
+
+    def _arguments(self, thread: int, ticket: Any) -> tuple[Any, ...]:
+        """Arguments of `advance_bodies`, with the counts of a thread."""
+        both, bodies = (self._ties, self._touching), self._bodies
+        if self.tally is not None:
+            bodies = bodies._replace(counts=self.tally.of_thread(thread).impacts)
+        return both, self._walls, self._rule, bodies, ticket, self._size, self._watch.passes
+
+    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+        if not self._cut_short:
+            self._bodies.remaining.fill(span * self._unit)
+        self._rule = self._rule._replace(end=moment)
+        threads, ticket = 1 if self._tier.is_plain else self._threads, np.zeros(1, np.int64)
+        calls = [self._arguments(thread, ticket) for thread in range(threads)]
+        status, number = max(self._called(advance_bodies, calls, latest))
+        self._watch.end()
+        self._cut_short = status == Status.INTERRUPTED
+        if status not in (Status.DONE, Status.INTERRUPTED):
+            raise RunError(self._failure(Status(status), number, moment))
+        if not self._cut_short:
+            self.observe()
+        return not self._cut_short
+
+    def _failure(self, status: Status, number: int, moment: float) -> str:
+        time_of = moment - self._bodies.remaining[number]
+        sentence = f"the frame at {moment:g} s failed at body {self._first + number}, at {time_of:.6g} s: "
+        if status == Status.UNSOLVED:
+            return sentence + (
+                f"its ties have no solution even in a step of 1e-6 of dt = {self._rule.dt:g} s; lengths at its start "
+                f"are off by {self._link_error():.2g} of themselves; a shorter dt helps if the body turns far in a step"
+            )
+        if status == Status.UNCONVERGED:
+            method: Any = self._method
+            return sentence + (
+                f"{method.max_sweeps} sweeps of a step left V above tolerance = {method.tolerance:g} J. The loop "
+                'converges from the surface: use adaptive=True, a larger penalty, or on_unconverged="count"'
+            )
+        return sentence + (
+            "a point meets its walls without end, as in a cusp; start it elsewhere, or take a shorter dt"
+        )
+
+    def share_done(self, span: float) -> float:
+        return float((1.0 - self._bodies.remaining / (span * self._unit)).mean())
+
+    # --- What is observed --------------------------------------------------------------------------------
+
+    def _blocks(self) -> Iterator[tuple[slice, Floats, Floats]]:
+        """The bodies by chunks: which they are, their positions and velocities.
+
+        BLAS rounds a column by how many there are, and NumPy a sum by where its numbers lie: with arrays of its own a
+        chunk has the same bits in every run that it is a part of.
+        """
+        for begin in range(0, len(self._bodies.remaining), CHUNK):
+            some = slice(begin, begin + CHUNK)
+            both = self._bodies.position[..., some], self._bodies.velocity[..., some]
+            yield some, np.ascontiguousarray(both[0]), np.ascontiguousarray(both[1])
+
+    def _link_error(self) -> float:
+        r, ends = self._bodies.position, self._body.links
+        if not len(ends):
+            return 0.0
+        length2 = ((r[:, ends[:, 0]] - r[:, ends[:, 1]]) ** 2).sum(axis=0)
+        return float(0.5 * np.abs(length2 / self._link_lengths()[:, None] ** 2 - 1.0).max())
+
+    def _link_lengths(self) -> Floats:
+        tied = self._body.points[self._body.links]
+        return np.asarray(np.sqrt(((tied[:, 0] - tied[:, 1]) ** 2).sum(axis=1)))
+
+    def _out_of_own(self) -> Iterator[Floats]:
+        """The distance of points outside of the cavities that others carry."""
+        r = self._bodies.position
+        for scene, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
+            yield scene.distances_outside(r[:, point] - r[:, carrier])
+
+    def observe(self) -> None:
+        bodies, surfaces = self._bodies, len(self._scene.surfaces)
+        self.state.impacts[:] = np.tile(bodies.impacts, len(self._body))
+        sums, errors, depths = zip(*(self._observed(*block) for block in self._blocks()), strict=True)
+        self._sums = np.ascontiguousarray(np.array(sums).T)
+        self._seen = {
+            **summed(self._sums, self._owners, surfaces, len(self._body.cavities)),
+            "energy_error": max(errors),
+            "max_penetration": float(max([*depths, *(out.max() for out in self._out_of_own())])),
+            "impacts": int(bodies.impacts.sum()),
+            "sliding": int(np.count_nonzero(bodies.lasting)),
+            "unconverged": int(bodies.unconverged.sum()),
+            "escaped": 0,
+            "link_error": self._link_error(),
+        }
+        if self._rule.loop:
+            self._seen["sweeps"] = int(bodies.sweeps.sum())
+
+    def _observed(self, some: slice, r: Floats, v: Floats) -> tuple[list[float], float, float]:
+        """Of one chunk: what is summed, as `summed` takes it, the largest error of the energy, how far it is out."""
+        energies, bodies = self._energies, self._bodies
+        kinetic, fall, elastic = energies.kinetic(v), energies.fall(r), energies.stored(r)
+        total, lost = kinetic + fall + elastic, bodies.dissipated[some]
+        work = bodies.work[some] + energies.led(r, v) - self._led_start[some]
+        error, scale = np.abs(total + lost - work - self._start[some]), self._scale[some]
+        scaled = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0.0)
+        numbers = (kinetic, fall, elastic, total, lost, bodies.sliding[some], work)
+        pushed = np.ascontiguousarray(bodies.impulse[:, some]).sum(axis=1)
+        points = energies.contact_points(r).reshape(3, -1)
+        depth = self._scene.distances_outside(points).max(initial=0.0) if points.size else 0.0
+        return (
+            [*(one.sum() for one in numbers), *np.concatenate([*energies.momenta(r, v), pushed])],
+            scaled.max().item(),
+            float(depth),
+        )
+
+    def chunk_sums(self) -> Floats:
+        return self._sums
+
+    def seen(self) -> dict[str, Any]:
+        return dict(self._seen)
+
+    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
+        r = self._bodies.position
+        if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
+            good = np.isfinite(r).all(axis=(0, 1)) & np.isfinite(self._bodies.velocity).all(axis=(0, 1))
+            failed = f"the frame at {moment:g} s failed at body {self._first + int(np.argmin(good))}"
+            raise RunError(f"{failed}: {Status.NOT_FINITE.sentence}")
+        if seen["max_penetration"] > self._deepest:
+            raise RunError(
+                f"the frame at {moment:g} s failed: a point of a body is {seen['max_penetration']:.3g} m outside its "
+                "walls"
+            )
+
+    def arrays(self) -> Arrays:
+        held = {name: array for name, array in self._bodies._asdict().items() if array is not None}
+        return held if self.tally is None else {**held, **self.tally.arrays()}
+
+    def restore(self, arrays: Arrays, cut_short: bool) -> None:
+        super().restore(arrays, cut_short)
+        if self.tally is not None:
+            self.tally.restore(arrays)
+
+
+def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
+    """A pool of `count` threads, all of them begun, each with room for so many bytes of scratch arrays.
+
+    Scratch memory that is not used costs nothing: the system maps a stack page by page.
+    """
+    before = threading.stack_size(-(-(scratch + _REST) // _PAGE) * _PAGE)
+    try:
+        pool = ThreadPoolExecutor(count, thread_name_prefix="swarm")
+        # Each waits for all the others, so none takes the turn of two.
+        together = threading.Barrier(count)
+        for begun in [pool.submit(together.wait) for _ in range(count)]:
+            begun.result()
+    finally:
+        threading.stack_size(before)
+    return pool
+
+
+def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int) -> BodyState:
+    """All copies at the start, with so many rows of multipliers and of walls."""
+    n, body = len(bodies), bodies.body
+    anchors = [(q, body.anchors[q]) for q in led_points(body)]
+    paths = [[motion.harmonic(start) for start in bodies.position[:, q].T] for q, motion in anchors]  # type: ignore[union-attr]
+    # (A, 13, n) start, velocity, cosine, sine and rate of each led point of each copy.
+    path = np.array([[np.hstack(one) for one in copies] for copies in paths]).reshape(-1, n, 13).transpose(0, 2, 1)
+    guess = np.full((3, rows, n), math.nan)
+    guess[0] = 0.0
+    whole = np.zeros((5, n), np.int64)
+    return BodyState(
+        position=particles.position.reshape(bodies.position.shape),
+        velocity=particles.velocity.reshape(bodies.position.shape),
+        remaining=np.zeros(n),
+        guess=guess,
+        path=np.ascontiguousarray(path),
+        short=whole[0],
+        lasting=np.zeros(n, np.int8),
+        impacts=whole[1],
+        impulse=np.zeros((walls, n)),
+        dissipated=np.zeros(n),
+        work=np.zeros(n),
+        sliding=np.zeros(n),
+        steps=whole[2],
+        sweeps=whole[3],
+        unconverged=whole[4],
+        energy=np.zeros(n),
+    )

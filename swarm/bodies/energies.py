@@ -1,0 +1,106 @@
+"""The energies and momenta of the copies of a body, and their sums."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..contact.energy import contact_energy
+from ..kernel.vector import column
+from ..scene import Scene
+from ..state import Floats
+from .body import Body
+from .lanes.arrays import Ties
+from .numbers import led_points
+
+
+class BodyEnergies:
+    """Energies from positions and velocities of n copies (3, P, n), each (n,) [J].
+
+    Args:
+        scene: the walls.
+        carried: a scene for each cavity of the body.
+        body, ties: the body.
+        law: what walls that are springs push with; None of rigid ones.
+    """
+
+    def __init__(self, scene: Scene, carried: Sequence[Scene], body: Body, ties: Ties, law: Any) -> None:
+        self._scene, self._carried, self._body, self._ties, self._law = scene, carried, body, ties, law
+        self._gravity = np.array(scene.gravity or (0.0, 0.0, 0.0))
+
+    def kinetic(self, v: Floats) -> Floats:
+        """Of all points."""
+        moving = np.tensordot(self._ties.mass, v, axes=(1, 1))  # (P, 3, n)
+        return np.asarray(0.5 * (moving.transpose(1, 0, 2) * v).sum(axis=(0, 1)))
+
+    def fall(self, r: Floats) -> Floats:
+        """In the field of gravity."""
+        center = np.tensordot(self._ties.mass.sum(axis=1), r, axes=(0, 1))
+        return np.asarray(-(self._gravity @ center))
+
+    def stored(self, r: Floats) -> Floats:
+        """Of springs, of the strain, and of walls that are springs."""
+        return np.asarray(self._elastic(r) + self._in_walls(r))
+
+    def _elastic(self, r: Floats) -> Floats:
+        total = np.zeros(r.shape[2])
+        for i, j, k, length in self._body.springs:
+            total += 0.5 * k * (np.sqrt(((r[:, i] - r[:, j]) ** 2).sum(axis=0)) - length) ** 2
+        if self._body.strain is not None:
+            edges = self._body.strain.edges
+            strain = ((r[:, edges[:, 0]] - r[:, edges[:, 1]]) ** 2).sum(axis=0)
+            strain = strain - self._ties.rest[-len(edges) :, None]
+            total += 0.5 * (strain * (self._body.strain.stiffness @ strain)).sum(axis=0)
+        return total
+
+    def _in_walls(self, r: Floats) -> Floats:
+        total = np.zeros(r.shape[2])
+        if self._law is not None:
+            places = [(self._scene, self.contact_points(r))]
+            for scene, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
+                places.append((scene, (r[:, point] - r[:, carrier])[:, None, :]))
+            for scene, points in places:
+                walls, flat = scene.walls(), points.reshape(3, -1)
+                for k in np.flatnonzero((scene.gaps(flat) > 0.0).any(axis=0)) if flat.size else ():
+                    total[k % total.size] += contact_energy(self._law, walls, 1.0, column(flat, 0, k))
+        return total
+
+    def led(self, r: Floats, v: Floats) -> Floats:
+        """Kinetic and potential energy of led points themselves."""
+        led = led_points(self._body)
+        r, v, mass = r[:, led], v[:, led], self._ties.mass[np.ix_(led, led)]
+        moving = np.tensordot(mass, v, axes=(1, 1)).transpose(1, 0, 2)
+        fall = np.tensordot(mass.sum(axis=1), r, axes=(0, 1))
+        return np.asarray(0.5 * (moving * v).sum(axis=(0, 1)) - self._gravity @ fall)
+
+    def momenta(self, r: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """The momentum of all copies together, and their angular momentum."""
+        momentum = np.tensordot(self._ties.mass, v, axes=(1, 1)).transpose(1, 0, 2)
+        return momentum.sum(axis=(1, 2)), np.cross(r, momentum, axis=0).sum(axis=(1, 2))
+
+    def contact_points(self, r: Floats) -> Floats:
+        """(3, K, n)."""
+        return np.tensordot(self._body.contacts, r, axes=(1, 1)).transpose(1, 0, 2)
+
+
+def summed(sums: Floats, owners: list[int], surfaces: int, cavities: int) -> dict[str, Any]:
+    """The observables that are sums over bodies, from those of all chunks (quantities, chunks).
+
+    `owners` says which surface each wall belongs to; the last `cavities` rows are the impulse of those of the bodies.
+    """
+    kinetic, fall, elastic, total, lost, sliding, work, *vectors = (totals := sums.sum(axis=1))[:13].tolist()
+    pushed = totals[13:]
+    return {
+        "kinetic_energy": kinetic,
+        "potential_energy": fall,
+        "contact_energy": elastic,
+        "total_energy": total,
+        "dissipated_energy": lost,
+        "momentum": np.array(vectors[:3]),
+        "angular_momentum": np.array(vectors[3:]),
+        "impulse": np.bincount(owners, weights=pushed[: len(owners)], minlength=surfaces),
+        "sliding_time": sliding,
+        "wall_heat": np.zeros(surfaces),
+        "work": work,
+        **({"cavity_impulse": pushed[len(pushed) - cavities :]} if cavities else {}),
+    }

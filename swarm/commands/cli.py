@@ -1,0 +1,68 @@
+"""The command line: the commands, and what their errors and signals become."""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from ..common import interrupt
+from ..errors import SceneError, SwarmError
+from ..version import VERSION
+from .export import export
+from .info import info
+from .pictures import animate, plot, record, view
+from .report import report
+from .run import run
+from .sweep import sweep
+
+_FAILED, _BAD_INPUT = 1, 2
+_CODES = (
+    "Exit codes: 0 done, 1 a run failed, 2 bad input, 75 the wall time is over, go on with --resume, 130 interrupted"
+)
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Simulate particles and bodies bouncing in rigid cavities and off solids, with energy conserved to round-off.",
+    epilog=f"Examples:  swarm run examples/scenes/cavity.toml  |  swarm info cavity.h5\n\n{_CODES}",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"swarm {VERSION}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+app.command(epilog=f"Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2\n\n{_CODES}")(run)
+app.command(epilog=f"Example:  swarm sweep examples/sweeps/cooling.toml -o cooling\n\n{_CODES}")(sweep)
+app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")(info)
+app.command(epilog="Example:  swarm record cavity.h5 -o cavity.rrd")(record)
+app.command(epilog="Example:  swarm view cavity.rrd -o cavity.png --times 0,5,10")(view)
+app.command(epilog="Example:  swarm plot cavity.h5 -o cavity.png")(plot)
+app.command(epilog="Example:  swarm report cavity.h5 -o cavity.html, or swarm report FOLDER of a sweep")(report)
+app.command(epilog="Example:  swarm animate cavity.h5 -o cavity.mp4 --frames 100")(animate)
+app.command(epilog="Example:  swarm export cavity.h5 -o cavity.vtkhdf --frames ::10")(export)
+
+
+def main() -> None:
+    """Run the command line; its exit codes: `_CODES`."""
+    try:
+        app()
+    except SwarmError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(_BAD_INPUT if isinstance(error, SceneError) else _FAILED)
+    finally:
+        interrupt.leave_at_once()

@@ -1,0 +1,288 @@
+"""Checks of arguments: each returns the value in its final type or raises a `SceneError` that names it."""
+
+import difflib
+import errno
+import functools
+import itertools
+import math
+import operator
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SceneError
+
+Vector = tuple[float, float, float]
+# Magnitudes whose squares and inverse squares are finite.
+SMALLEST, LARGEST = 1e-100, 1e100
+# Bytes of a particle in a run (`python -m bench bars`); and a number of particles that fits on every machine.
+_PARTICLE, FEW = 146, 1_000_000
+_DOUBLE = 8
+# Characters of a value that are shown in a sentence.
+_SHOWN = 200
+_SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+
+
+def shown(value: Any) -> str:
+    """A value in a line of a sentence.
+
+    >>> shown(np.zeros((2, 2)))
+    'array([[0., 0.], [0., 0.]])'
+    """
+    try:
+        said = repr(value)
+    except Exception:  # of an object of others, or a number of too many digits
+        return f"a {type(value).__name__}"
+    return " ".join(said.split())[:_SHOWN]
+
+
+def assign(frozen: Any, **values: Any) -> None:
+    """Give a frozen dataclass the values of its fields as they have been checked."""
+    for name, value in values.items():
+        object.__setattr__(frozen, name, value)
+
+
+def of_class(name: str, value: Any, cls: type[Any]) -> None:
+    """Raise a `SceneError` unless `value` is an object of a public class."""
+    if not isinstance(value, cls):
+        raise SceneError(f"{name} must be a swarm.{cls.__name__}, got {shown(value)}")
+
+
+def number(name: str, value: Any, expected: str = "a finite number") -> float:
+    """`value` as a finite float."""
+    try:
+        # float() accepts the last two, without the imaginary part and without the mask.
+        if isinstance(value, (bool, str, bytes, np.complexfloating, np.ma.MaskedArray)):
+            raise TypeError
+        result = float(value)
+    except Exception:  # of float(), or of an object of others
+        raise SceneError(f"{name} must be {expected}, got {shown(value)}") from None
+    if not math.isfinite(result):
+        raise SceneError(f"{name} must be {expected}, got {result}")
+    return result
+
+
+def positive(name: str, value: Any) -> float:
+    """`value` as a finite float above zero."""
+    result = number(name, value, "a finite number above 0")
+    if result <= 0.0:
+        raise SceneError(f"{name} must be above 0, got {result:g}")
+    return result
+
+
+def at_least(name: str, value: Any, bound: float) -> float:
+    """`value` as a finite float not below `bound`."""
+    result = number(name, value, f"a finite number, {bound:g} or more")
+    if result < bound:
+        raise SceneError(f"{name} must be {bound:g} or more, got {result:g}")
+    return result
+
+
+def length(name: str, value: Any) -> float:
+    """`value` as a length [m] above zero whose square is finite and not zero."""
+    result = positive(name, value)
+    if not SMALLEST <= result <= LARGEST:
+        raise SceneError(f"{name} must be between {SMALLEST:g} and {LARGEST:g} m, got {result:g}")
+    return result
+
+
+def magnitude(name: str, value: Any) -> float:
+    """`value` as a number, 0 or more, whose square is finite."""
+    result = at_least(name, value, 0.0)
+    if result > LARGEST:
+        raise SceneError(f"{name} must be at most {LARGEST:g}, got {result:g}")
+    return result
+
+
+def bounded(name: str, value: Any) -> float:
+    """`value` as a number of either sign, whose square is finite."""
+    result = number(name, value)
+    magnitude(f"|{name}|", abs(result))
+    return result
+
+
+def count(name: str, value: Any, least: int = 1) -> int:
+    """`value` as an integer not below `least`."""
+    try:
+        if isinstance(value, (bool, np.bool_, np.ma.MaskedArray)):
+            raise TypeError
+        result = operator.index(value)
+    except TypeError:
+        raise SceneError(f"{name} must be a whole number, {least} or more, got {shown(value)}") from None
+    if result < least:
+        raise SceneError(f"{name} must be {least} or more, got {shown(result)}")
+    return result
+
+
+def seed(name: str, value: Any) -> int:
+    """`value` as a key of random numbers: an integer that 64 bits hold."""
+    result = count(name, value, least=0)
+    if result >= 1 << 64:
+        raise SceneError(f"{name} must be below 2**64, got {min(result, 10**300):.6g}")
+    return result
+
+
+@functools.cache
+def memory() -> int:
+    """Memory of this machine [bytes]."""
+    import psutil
+
+    return int(psutil.virtual_memory().total)
+
+
+def in_bytes(size: float) -> str:
+    """A number of bytes in a suitable unit.
+
+    >>> in_bytes(1.46e14)
+    '146 TB'
+    """
+    units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"]
+    while size >= 999.5 and len(units) > 1:
+        size, units = size / 1000.0, units[1:]
+    return f"{size:.3g} {units[0]}"
+
+
+def _too_large(name: str, given: str, size: float) -> SceneError:
+    return SceneError(f"{name} must fit in memory{given} {in_bytes(size)}; this machine has {in_bytes(memory())}")
+
+
+def require_memory(name: str, given: str, size: float) -> None:
+    """Raise a `SceneError` if what is given, of so many bytes, does not fit in the memory of this machine."""
+    if size > memory():
+        raise _too_large(name, given, size)
+
+
+def particles_fit(name: str, count: int) -> None:
+    """Raise a `SceneError` if this many particles do not fit in the memory of this machine."""
+    count = min(count, 10**300)  # which float() can convert
+    if count > FEW:
+        require_memory(name, f", got {count:.6g} particles, which take", _PARTICLE * count)
+
+
+def duration(name: str, value: str) -> float:
+    """A time such as "2h", "1h30m", "45 min" or "90" (seconds), in seconds above 0."""
+    parts = re.findall(r"(\d+\.?\d*)\s*([a-z]*)\s*", value)
+    known = all(unit in _SECONDS for _number, unit in parts)
+    if not known or not re.fullmatch(r"(\d+\.?\d*\s*[a-z]*\s*)+", value):
+        raise SceneError(f'{name} must be a time such as "2h", "1h30m" or "90s", got {value!r}')
+    return positive(name, sum(float(number) * _SECONDS[unit] for number, unit in parts))
+
+
+def path_of(name: str, value: Any) -> Path:
+    """The argument `name` as the path of a file.
+
+    Raises:
+        SceneError: it is not a path, it is empty, or it is too long for the system.
+    """
+    text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else value
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise SceneError(f"{name} must be the path of a file, got {shown(text)}")
+    path = Path(text)
+    require_short(name, path, path)
+    return path
+
+
+def require_short(name: str, path: Path, longest: Path) -> None:
+    """Raise a `SceneError` if the system finds the name of a file too long."""
+    try:
+        os.lstat(longest)
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise SceneError(
+                f"{name} must be the path of a file, got one of {len(str(path))} characters, which is too long for "
+                f"this system, {path!s:.40}...; choose a shorter name"
+            ) from None
+
+
+def flag(name: str, value: Any) -> bool:
+    """`value` as true or false."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise SceneError(f"{name} must be true or false, got {shown(value)}")
+    return bool(value)
+
+
+def parts_of(value: Any) -> tuple[Any, ...] | None:
+    """The parts of a list or of anything that can be gone through; None of a text and of what has no parts.
+
+    >>> parts_of(np.array(5.0)) is None, parts_of([1, 2])
+    (True, (1, 2))
+    """
+    if isinstance(value, (str, bytes, type)):
+        return None
+    try:
+        return tuple(value)
+    except Exception:  # an array without axes, or an object of others
+        return None
+
+
+def brackets(value: Any) -> str:
+    """A hint where a class came in place of an object, or nothing.
+
+    >>> brackets(float)
+    '; to make one of the class, call it: float(...)'
+    """
+    return f"; to make one of the class, call it: {value.__name__}(...)" if isinstance(value, type) else ""
+
+
+def entries(name: str, value: Any, count: int, expected: str) -> tuple[Any, ...]:
+    """`value` as a tuple of so many parts; `expected` says what they are."""
+    try:
+        # One more than there should be: what has no end is refused as well.
+        parts = tuple(itertools.islice(value, count + 1))
+    except Exception:  # it has no parts, or is an object of others
+        raise SceneError(f"{name} must be {expected}, got {shown(value)}") from None
+    if len(parts) != count:
+        came = len(value) if isinstance(value, (list, tuple)) else len(parts) if len(parts) < count else "more"
+        raise SceneError(f"{name} must be {expected}, got {came}: {shown(value)}")
+    return parts
+
+
+def vector(name: str, value: Any) -> Vector:
+    """`value` as three finite floats."""
+    if isinstance(value, (str, bytes)):
+        raise SceneError(f"{name} must be three numbers, got {shown(value)}")
+    x, y, z = (number(f"{name}[{i}]", part) for i, part in enumerate(entries(name, value, 3, "three numbers")))
+    return x, y, z
+
+
+def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """`value` as an array of floats."""
+    parts = value if isinstance(value, (list, tuple)) else (value,)
+    if any(isinstance(part, np.ma.MaskedArray) for part in parts):
+        raise SceneError(f"{name} must be an array without a mask, got a masked one; remove or fill the masked entries")
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "iufO":
+            raise TypeError
+        # A view of one number may say that it has any shape: nothing of that size is copied.
+        if _DOUBLE * given.size <= memory():
+            return given.astype(np.float64, copy=False)
+    except Exception:  # of float(), or of an object of others
+        came = value.dtype.name if isinstance(value, np.ndarray) else type(value).__name__
+        raise SceneError(f"{name} must be an array of numbers, got {came}") from None
+    raise _too_large(name, f", got shape {given.shape}, which takes", _DOUBLE * given.size)
+
+
+def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
+    """`value` if it is one of `choices`; otherwise the error names the closest of them."""
+    known = list(choices)
+    if isinstance(value, str) and value in known:
+        return value
+    raise SceneError(f"{name} must be one of {listed(known)}, got {shown(value)}{closest(value, known)}")
+
+
+def closest(value: Any, known: Iterable[str]) -> str:
+    """A hint "; did you mean ...?" or nothing."""
+    found = difflib.get_close_matches(value if isinstance(value, str) else shown(value), list(known), n=1, cutoff=0.5)
+    return f"; did you mean {found[0]!r}?" if found else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """'a', 'b' and 'c'."""
+    quoted = [repr(name) for name in names]
+    return " and ".join([", ".join(quoted[:-1]), quoted[-1]]) if len(quoted) > 1 else "".join(quoted)

@@ -1,0 +1,1 @@
+"""Runs in order of events: balls that meet one another, walls with a mass."""

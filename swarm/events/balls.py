@@ -1,0 +1,81 @@
+"""Checks of particles with a radius before a run starts."""
+
+import numpy as np
+
+from ..errors import SceneError
+from ..grains.soft import require_soft_balls
+from ..methods.base import Method
+from ..pairs import MOST_PRESSED
+from ..particles import Particles
+from ..placing.cells import overlaps_of
+from ..placing.sequential import require_size
+from ..placing.shapes import require_shapes
+from ..run.preflight.starts import error_of
+from ..scene import Scene
+
+# Balls overlap by round-off of their places at the start: this many times that of the largest coordinate.
+_ROUND_OFF = 64.0 * np.finfo(np.float64).eps
+
+
+def require_balls(scene: Scene, particles: Particles | None, method: Method) -> None:
+    """Raise a `SceneError` where balls do not fit the scene, the cell or the steps.
+
+    Where contacts turn balls that have no spin, they get one of 0.
+    """
+    if particles is None or particles.radius is None:
+        return
+    require_shapes(scene, particles.radius)
+    require_size(scene, particles.radius)
+    _require_cell(scene, particles, method)
+    require_soft_balls(scene, particles, method)
+    if particles.spin is None and _may_turn(scene, method):
+        particles.spin = np.zeros_like(particles.position)
+
+
+def _may_turn(scene: Scene, method: Method) -> bool:
+    if method.is_rigid():
+        return False
+    return (scene.pairs is not None and scene.pairs.friction > 0.0) or any(one.friction for one in scene.surfaces)
+
+
+def _require_cell(scene: Scene, particles: Particles, method: Method) -> None:
+    """Raise a `SceneError` where a ball that meets at instants could meet two images of another one."""
+    largest = 2.0 * float(particles.radius.max())  # type: ignore[union-attr]
+    for k, length in enumerate(scene.period or () if method.is_rigid() else ()):
+        if length is not None and length < 2.0 * largest:
+            raise SceneError(
+                f"period[{k}] must be two diameters of the largest particle or more, {2.0 * largest:g} m, got "
+                f"{length:g}; give a longer period, or smaller particles"
+            )
+
+
+def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
+    """Raise a `SceneError` where balls overlap one another, or are outside their walls, at the start."""
+    radius = particles.radius
+    assert radius is not None
+    magnitude = max(float(np.abs(particles.position).max()), scene.finite_size())
+    if scene.surfaces:
+        _require_within(scene, particles, radius, _ROUND_OFF * magnitude, method.is_rigid())
+    found = overlaps_of(particles.position, radius, scene.period)
+    if found is None:
+        return
+    i, k = found.pair
+    smaller = min(radius[i], radius[k])
+    if found.depth <= (_ROUND_OFF * magnitude if method.is_rigid() else MOST_PRESSED * smaller):
+        return
+    pressed = "" if method.is_rigid() else f" (soft balls may by {MOST_PRESSED:g} of the smaller radius)"
+    raise SceneError(
+        f"particles must not overlap at the start{pressed}, got {found.number} pairs that do, most particles {i} and "
+        f"{k}, by {found.depth:.6g} m: their centres are {radius[i] + radius[k] - found.depth:.6g} m apart, their "
+        f"radii {radius[i]:g} and {radius[k]:g} m; move them apart, or let swarm.fill or swarm.pack place them"
+    )
+
+
+def _require_within(scene: Scene, particles: Particles, radius: np.ndarray, close: float, is_rigid: bool) -> None:
+    distances = scene.distances_outside(particles.position, 0.0, radius)
+    # Where phi is not a number a ball is outside.
+    wrong = ~(distances <= (close if is_rigid else close + MOST_PRESSED * radius))
+    outside = np.flatnonzero(wrong.any(axis=0))
+    if not outside.size:
+        return
+    raise error_of(scene, particles, outside, distances[:, outside])

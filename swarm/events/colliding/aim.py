@@ -1,0 +1,287 @@
+"""The next collision of a ball with another one, and the time at which it meets a wall.
+
+A ball has one collision of its own, the soonest. One that its partner would have after another does not count: then
+the partner has another flight, or looks again. So of two balls at least one knows of their collision, or has another
+one before it.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...kernel.arrays import fetch, index, unwritten
+from ...kernel.jit import Array, outlined, select
+from ...kernel.record import Record
+from ...kernel.vector import Vec, dot, square
+from ...surfaces.time_of_impact.flights import Hit
+from .heavy import meet_heavy
+from .rows import DUE, FACE, FLOATS, MEETS, NOBODY, PARTNER, RADIUS, SEEN, STAMP, WALL, WHOLES
+from .window import UNKNOWN, next_hit
+
+# So many balls of a cell are copied without a branch, and so many are looked at at once.
+_FEW, _MOST = 4, 128
+# Of the cells around a ball: those beyond no face alone.
+_ANY = 6
+
+
+class NextCollision(NamedTuple):
+    """A collision of a ball: its time [s since the epoch], and the other ball."""
+
+    time: Any
+    mate: Any
+
+
+class Alike(Record):
+    """Balls of one radius and one mass."""
+
+    radius: float
+    mass: float
+    reach2: float  # the square of a diameter
+
+    def radius_of(self, i):
+        """Its radius [m]."""
+        return self.radius
+
+    def mass_of(self, i):
+        """Its mass [kg]."""
+        return self.mass
+
+    def share(self, i, j):
+        """The part that ball j has of the mass of both."""
+        return 0.5
+
+    def touching2(self, i, j):
+        """The square of the distance at which two touch."""
+        return self.reach2
+
+
+class Various(Record):
+    """Balls of any radii and masses."""
+
+    flight: Array  # rows of flights
+    mass: Array  # (N,)
+
+    def radius_of(self, i):
+        """Its radius [m]."""
+        return self.flight[index(FLOATS * i + RADIUS)]
+
+    def mass_of(self, i):
+        """Its mass [kg]."""
+        return self.mass[index(i)]
+
+    def share(self, i, j):
+        """The part that ball j has of the mass of both."""
+        other = self.mass_of(j)
+        return other / (self.mass_of(i) + other)
+
+    def touching2(self, i, j):
+        """The square of the distance at which two touch."""
+        reach = self.radius_of(i) + self.radius_of(j)
+        return reach * reach
+
+
+def between(grid, r, other):
+    """The way from one place to the nearest image of another one."""
+    return Vec(*(axis.nearest(b - a) for axis, a, b in zip(grid.axes(), r, other, strict=True)))
+
+
+def meeting(closing, gap, discriminant):
+    """How long two balls fly before they touch, without cancellation; where they are too near by round-off, 0."""
+    time = gap / (math.sqrt(discriminant) - closing)
+    return select(time > 0.0, time, 0.0)
+
+
+class Sight(NamedTuple):
+    """Two balls, as one sees the other: b.u, b^2 less what it is where they touch, and a fourth of a discriminant."""
+
+    closing: Any
+    gap: Any
+    discriminant: Any
+
+    def meets(self):
+        """Whether they will touch."""
+        return (self.closing < 0.0) & (self.discriminant > 0.0)
+
+
+def sight(b, u, touching2):
+    """The `Sight` of a ball that is b away and moves by u."""
+    closing, gap = dot(b, u), square(b) - touching2
+    return Sight(closing, gap, closing * closing - square(u) * gap)
+
+
+def _sight_in(box, b, u, touching2, now):
+    """The `Sight` of balls that may grow."""
+    return sight(b, u, touching2) if box.growth is None else box.growth.sight(b, u, touching2, now)
+
+
+@outlined
+def _meeting_of_any(box, r, other, u, touching2, now):
+    """When a ball meets any image of another one, where these are few and far from one another."""
+    soonest, grid = math.inf, box.grid
+    for kx in range(3):
+        for ky in range(3):
+            for kz in range(3):
+                shifts = tuple(
+                    float(k - 1) * (0.0 if axis.period is None else axis.period)
+                    for k, axis in zip((kx, ky, kz), grid.axes(), strict=True)
+                )
+                b = Vec(*(one - two + shift for one, two, shift in zip(other, r, shifts, strict=True)))
+                seen = _sight_in(box, b, u, touching2, now)
+                if seen.meets():
+                    soonest = min(meeting(*seen), soonest)
+    return soonest
+
+
+@outlined
+def _soonest(box, flock, i, now, near, count, known):
+    """The soonest collision of ball i: that which is `known`, or one with the first `count` balls `near` it.
+
+    First come those that fly to one another, without a branch, then the roots of these few.
+    """
+    grid, pull, found = box.grid, box.pull, 0
+    r, v = flock.at(pull, i, now)
+    some, seen = unwritten(_MOST, np.int32), unwritten((3, _MOST), np.float64)
+    for k in range(count):
+        j = near[index(k)]
+        other, w = flock.at(pull, j, now)
+        one = _sight_in(box, between(grid, r, other), w - v, box.kinds.touching2(i, j), now)
+        some[index(found)] = j
+        for row, value in enumerate(one):
+            seen[row, index(found)] = value
+        found += select(one.meets(), 1, 0)
+    first, mate = known
+    for k in range(found):
+        j = some[index(k)]
+        time = now + meeting(seen[0, index(k)], seen[1, index(k)], seen[2, index(k)])
+        sooner = (time < first) | ((time == first) & (j < mate))
+        if sooner and time <= flock.event[index(FLOATS * j + MEETS)]:
+            first, mate = time, j
+    return NextCollision(first, mate)
+
+
+@outlined
+def _soonest_of_images(box, flock, i, now, near, count, known):
+    """`_soonest` where a ball may meet several images of another one."""
+    r, v = flock.at(box.pull, i, now)
+    first, mate = known
+    for k in range(count):
+        j = near[index(k)]
+        other, w = flock.at(box.pull, j, now)
+        time = now + _meeting_of_any(box, r, other, w - v, box.kinds.touching2(i, j), now)
+        sooner = (time < first) | ((time == first) & (j < mate))
+        if sooner and time < math.inf and time <= flock.event[index(FLOATS * j + MEETS)]:
+            first, mate = time, j
+    return NextCollision(first, mate)
+
+
+def _looked_at(box, flock, i, now, near, count, known):
+    ask = _soonest if box.grid.few is None else _soonest_of_images
+    return ask(box, flock, i, now, near, count, known)
+
+
+@outlined
+def _look_through(box, flock, i, now, near, row, known):
+    """The `NextCollision` with those of a cell too, at this row, beyond the first few."""
+    count, done = flock.room[index(row)], _FEW
+    while done < count:
+        some = min(count - done, _MOST)
+        for k in range(some):
+            near[index(k)] = flock.room[index(row + 1 + done + k)]
+        known = _looked_at(box, flock, i, now, near, some, known)
+        done += some
+    return known
+
+
+def _around(box, flock, i, now, face, known):
+    """The `NextCollision` of ball i with all balls in the cells around its own, or only in those beyond a face.
+
+    The first few of each cell are copied at once, also where there are less, so that no branch of the processor is
+    foretold from how many balls are in a cell.
+    """
+    grid, room, found = box.grid, flock.room, 0
+    near, rest = unwritten(27 * _FEW + _FEW, np.int32), unwritten(_MOST, np.int32)
+    step = 2 * (face & 1) - 1
+    lows = tuple(select((face >> 1) == k, step, -1) for k in range(3))
+    highs = tuple(select((face >> 1) == k, step + 1, 2) for k in range(3))
+    cx, cy, cz = flock.cell(i)
+    for kx in range(cx + lows[0], cx + highs[0]):
+        plane = grid.x.offset[index(kx)]
+        for ky in range(cy + lows[1], cy + highs[1]):
+            line = grid.y.offset[index(ky)] + plane
+            for kz in range(cz + lows[2], cz + highs[2]):
+                row = grid.stride * (grid.z.offset[index(kz)] + line)
+                count = room[index(row)]
+                for k in range(_FEW):
+                    j = room[index(row + 1 + k)]
+                    near[index(found + k)] = j
+                    fetch(flock.flight, FLOATS * j)
+                found += min(count, _FEW)
+                if count > _FEW:
+                    known = _look_through(box, flock, i, now, rest, row, known)
+    return _looked_at(box, flock, i, now, near, found, known)
+
+
+def _keep(flock, i, known):
+    flock.event[index(FLOATS * i + MEETS)], flock.tag[index(WHOLES * i + PARTNER)] = known.time, known.mate
+    if known.mate >= 0:
+        flock.tag[index(WHOLES * i + SEEN)] = flock.tag[index(WHOLES * known.mate + STAMP)]
+
+
+@outlined
+def find_partner(box, flock, i, now):
+    """Find the next collision of a ball."""
+    _keep(flock, i, _around(box, flock, i, now, _ANY, NextCollision(math.inf, NOBODY)))
+
+
+@outlined
+def look_ahead(box, flock, i, now):
+    """Look whether a ball that has come into a cell collides sooner with those that are near now: whether it does."""
+    row = FLOATS * i + MEETS
+    if box.grid.few is None:
+        face = flock.tag[index(WHOLES * i + FACE)]
+        before = NextCollision(flock.event[index(row)], flock.tag[index(WHOLES * i + PARTNER)])
+        known = _around(box, flock, i, now, face, before)
+        sooner = (known.time < before.time) | (known.mate != before.mate)
+        if sooner:
+            _keep(flock, i, known)
+        return sooner
+    find_partner(box, flock, i, now)
+    return True
+
+
+def tell_partner(flock, i):
+    """Give the collision of a ball to its partner too, if it is its soonest too. Return the partner or `NOBODY`."""
+    mate, time = flock.tag[index(WHOLES * i + PARTNER)], flock.event[index(FLOATS * i + MEETS)]
+    told = NOBODY
+    if mate >= 0 and time < flock.event[index(FLOATS * mate + MEETS)]:
+        flock.event[index(FLOATS * mate + MEETS)] = time
+        flock.tag[index(WHOLES * mate + PARTNER)] = i
+        flock.tag[index(WHOLES * mate + SEEN)] = flock.tag[index(WHOLES * i + STAMP)]
+        told = mate
+    return told
+
+
+def forget_wall(box, flock, i):
+    """The next wall of a ball is not known any more."""
+    flock.event[index(FLOATS * i + DUE)], flock.event[index(FLOATS * i + WALL)] = math.inf, UNKNOWN
+
+
+def _given_hit(box, flock, i, now):
+    """The next `Hit` on a wall without a mass, if the cell is near one."""
+    time, wall = math.inf, UNKNOWN
+    # Without walls `next_hit` is not compiled.
+    if len(box.walls.each) > 0 and box.grid.near[index(box.grid.number(i, flock))]:
+        time, wall = next_hit(box, flock, i, now)
+    return Hit(time, wall)
+
+
+@outlined
+def find_wall(box, flock, i, now):
+    """Find when a ball meets a wall, if its cell is near one and that is not known."""
+    row = FLOATS * i
+    if box.heavy is not None:
+        meet_heavy(box, flock, i, now, _given_hit(box, flock, i, now))
+    elif box.grid.near[index(box.grid.number(i, flock))] and flock.event[index(row + WALL)] == UNKNOWN:
+        hit = next_hit(box, flock, i, now)
+        flock.event[index(row + DUE)], flock.event[index(row + WALL)] = now + hit.time, hit.wall

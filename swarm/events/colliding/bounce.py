@@ -1,0 +1,194 @@
+"""The impact of a ball on a wall: it is turned round, sent off by a law, or gone; it never stays there."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...common.status import Status
+from ...contact.reflection import Energy, exact, given, relative, wall_velocity
+from ...contact.sending import Arriving, send
+from ...kernel.arrays import index
+from ...kernel.gravity import accelerated, potential
+from ...kernel.jit import outlined, select
+from ...kernel.random import Stream
+from ...kernel.record import Record
+from ...kernel.vector import ZERO, Vec, dot, either, norm, square
+from ...surfaces.presence.openings import is_open
+from .clock import moment_of
+from .journal import note_wall
+from .meet import squared
+from .rows import FLOATS, WALL
+from .window import walls_at
+
+# Besides a status that ends the run: it flies on, or is no more among the walls.
+FLIES, GONE = Status.DONE.value, -1
+# Of a radius, how far a closed wall may be from a ball that an open one lets out.
+_TOUCH = 1e-9
+# Of its speed, that with which a ball leaves a wall at least: four roundings.
+_PARTS = 2.0**-50
+# And at most, where a wall bends away under it.
+_ENOUGH = 0.25
+
+
+class Gates(Record):
+    """Where balls leave the walls, and when they did."""
+
+    openings: Any  # None, or each `Opened`
+    escape_time: Any  # (N,) [s], or None
+    absorbed_time: Any = None  # (N,) [s], or None
+    absorbed_wall: Any = None  # (N,) int32, or None
+
+
+class RandomSource(Record):
+    """The random numbers of walls that send balls off."""
+
+    seed: Any
+    first: Any  # the number of the first ball of this run
+
+
+class BouncedBall(Record):
+    """A ball after its impact; energies are twice those per mass, and `wait` is that of `Sent`."""
+
+    v: Vec
+    impulse: float  # per mass
+    lost: float
+    heat: float
+    work: float
+    wait: float
+    twice: float  # its energy then
+
+
+@outlined
+def bounce(box, flock, books, clock, i, now):
+    """The impact of a ball on a wall: FLIES, GONE, or a status that ends the run."""
+    r, v = flock.at(box.pull, i, now)
+    wall, walls = flock.event[index(FLOATS * i + WALL)], walls_at(box, i, now)
+    if box.gates is not None and box.gates.openings is not None:
+        closed = _closed_wall(box, walls, wall, i, r, v)
+        if closed < 0.0:
+            box.gates.escape_time[index(i)] = moment_of(clock, now)
+            flock.put(i, now, r, v)
+            note_wall(box, books, clock, (i, now, wall), (r, v, v), 0.0)
+            return GONE
+        wall = closed
+    after = _turned(box, flock, books, walls, wall, (i, now, r, v))
+    _book(box, books, walls, wall, i, after)
+    if box.repose is not None:
+        box.repose.count(clock, after.impulse * after.impulse, now)
+    ended = FLIES if box.laws.own is None else _end(box, clock, wall, i, now, after)
+    v1 = either(ended == FLIES, after.v, v)
+    flock.put(i, now, r, v1)
+    flock.kept.keep(i, flock.stamp(i), after.twice)
+    note_wall(box, books, clock, (i, now, wall), (r, v, v1), box.kinds.mass_of(i) * after.impulse)
+    return ended
+
+
+def _end(box, clock, wall, i, now, after):
+    """What becomes of a ball that the laws of a wall have sent off."""
+    ended = FLIES
+    if math.isnan(after.v.x):
+        ended = Status.SENT_WRONG.value
+    elif after.wait > 0.0:
+        ended = Status.WAITS.value
+        if box.gates is not None and box.gates.absorbed_time is not None and after.wait == math.inf:
+            box.gates.absorbed_time[index(i)], box.gates.absorbed_wall[index(i)] = moment_of(clock, now), np.int32(wall)
+            ended = GONE
+    return ended
+
+
+def _turned(box, flock, books, walls, wall, ball):
+    """`BouncedBall`, by the laws of a wall, of a ball: its number, the time, its position and its velocity."""
+    i, now, r, v = ball
+    fall = 2.0 * potential(box.pull, r)
+    twice = flock.kept.at(i, flock.stamp(i), square(v) + fall)
+    energy = Energy(twice, select(twice > 0.0, 0.5 / select(twice > 0.0, twice, 1.0), 0.0))
+    hit = exact(box.laws, walls, box.pull, wall, r, v, energy)
+    if box.loss is not None and box.loss.spares(flock, i, now):
+        hit = exact(box.laws._replace(restitution=None), walls, box.pull, wall, r, v, energy)
+    v1 = squared(hit.v, hit.twice_energy - fall)
+    turned = BouncedBall(v1, hit.impulse, twice - (hit.twice_energy - hit.work), 0.0, hit.work, 0.0, hit.twice_energy)
+    if box.laws.send_off:
+        random = Stream(box.source.seed, box.source.first + i, books.impacts[index(i)], 0, box.laws.across)
+        sent = send(box.laws, walls, wall, Arriving(r, v, twice - fall, 0.0, box.kinds.mass_of(i)), random)
+        if sent.happens:
+            # The energy decides the speed, as of a mirror: the square of a velocity that is drawn has a bias.
+            left = select(sent.keeps, twice + sent.work, square(sent.v) + fall)
+            heat = select(sent.keeps, 0.0, left - sent.work - twice)
+            v1 = either(sent.keeps, squared(sent.v, left - fall), sent.v)
+            turned = BouncedBall(v1, sent.impulse, *_shares(box.laws, heat, sent.lost), sent.work, sent.wait, left)
+    return _lifted(box, walls, wall, r, turned)
+
+
+def _shares(laws, heat, lost):
+    """What of the energy that a law gives is lost, negative where it gives, and what is heat."""
+    if laws.dissipate_all:
+        return -heat, 0.0
+    if not laws.may_dissipate:
+        return 0.0, heat
+    all_of_it = lost == math.inf
+    taken = select(all_of_it, -heat, lost)
+    return taken, select(all_of_it, 0.0, heat + taken)
+
+
+@outlined
+def _lifted(box, walls, wall, r, turned):
+    """The same, so fast away from the wall that what pulls the ball back takes the shortest flight to do so.
+
+    What it gets so is a loss below 0, which the next impact takes back; along the wall nothing changes. Where nothing
+    is lost, it is turned, with the speed that it has.
+    """
+    n, u = walls.unit_normal(wall, r), wall_velocity(box.laws.moving, walls, wall, r)
+    w = relative(u, turned.v)
+    pull = accelerated(box.pull, ZERO, 1.0)
+    held = walls.outward_acceleration(wall, r, turned.v, pull)
+    # Where the wall bends away within that flight, a part of its speed is enough.
+    most = max(_ENOUGH * norm(w), 0.5 * norm(pull) * box.shortest)
+    # At least so fast that its own velocity has digits of it
+    least, away = max(min(0.5 * held * box.shortest, most), _PARTS * norm(turned.v)), -dot(n, w)
+    # An absorbed ball stays as it is.
+    if away < least and turned.wait == 0.0:
+        lift = least - away
+        v, gained, work, speed2 = turned.v - lift * n, lift * (least + away), given(u, -lift * n), square(turned.v)
+        if not box.laws.change_energy and speed2 > 4.0 * least * least:
+            v, gained = squared(v * math.sqrt(speed2 / square(v)), speed2), 0.0
+        return turned._replace(
+            v=v, impulse=turned.impulse + lift, lost=turned.lost - gained, work=turned.work + work,
+            twice=turned.twice + gained + work,
+        )  # fmt: skip
+    return turned
+
+
+def _book(box, books, walls, wall, i, after):
+    m, row, k = box.kinds.mass_of(i), index(int(walls.row(wall))), index(i)
+    books.impulse[row, 0] += m * after.impulse
+    if box.laws.moving is not None:
+        books.impulse[index(walls.length()) + row, 0] += 0.5 * m * after.work
+    if books.dissipated.size > 0:
+        books.dissipated[k] += 0.5 * m * after.lost
+    if books.heat is not None:
+        books.heat[row, 0] += 0.5 * m * after.heat
+    books.impacts[k] += after.impulse > 0.0
+    if books.counts is not None:
+        books.counts.add(wall, after.impulse > 0.0)
+        if books.heat is not None:
+            books.counts.give(wall, 0.5 * m * after.heat, 0.0)
+
+
+@outlined
+def _closed_wall(box, walls, wall, i, r, v):
+    """The wall that turns a ball round that meets this one, -1 for none: its foot is in an opening."""
+    if not _is_open(box, walls, wall, i, r):
+        return wall
+    number, touch = walls.numbers_near(r), _TOUCH * box.kinds.radius_of(i)
+    for k in range(number.size):
+        w = relative(wall_velocity(box.laws.moving, walls, number[k], r), v)
+        here = dot(walls.unit_normal(number[k], r), w) > 0.0 and walls.distance(number[k], r) >= -touch
+        if here and number[k] != wall and not _is_open(box, walls, number[k], i, r):
+            return number[k]
+    return -1.0
+
+
+def _is_open(box, walls, wall, i, r):
+    foot = r + box.kinds.radius_of(i) * walls.unit_normal(wall, r)
+    return is_open(box.gates.openings, wall, foot, 0.0)

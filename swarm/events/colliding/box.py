@@ -1,0 +1,44 @@
+"""What balls are in, and what is booked of them, as the kernels of collisions take it."""
+
+from typing import Any, NamedTuple
+
+from ...kernel.jit import Array
+from ...kernel.record import Record
+
+
+class Domain(Record):
+    """What the balls are in: walls and their laws, gravity, cells, kinds of balls, what is lost of their energy."""
+
+    walls: Any
+    laws: Any
+    pull: Any
+    grid: Any
+    kinds: Any
+    loss: Any  # None, or `Loss`
+    shortest: float  # the time that a flight from a wall back to it takes at least [s]
+    log: Any = None
+    growth: Any = None  # `Growth` of balls that are packed
+    window: Any = None  # of walls that move, come or go: see window.py
+    gates: Any = None  # None, or `Gates` where balls may leave the walls
+    heavy: Any = None  # None, or `Heavy` where walls have a mass
+    source: Any = None  # None, or `Source` where walls send them off
+    repose: Any = None  # None, or `Repose` where balls may come to rest
+
+
+class CollisionTotals(NamedTuple):
+    """What is booked: of each ball, and of all."""
+
+    impulse: Array  # (2 walls, 1)
+    dissipated: Array  # (N,), or none
+    impacts: Array  # (N,)
+    virial: Array  # (1,)
+    image: Any = None  # (3, N) where the scene repeats
+    counts: Any = None  # `Counts` of each wall, where they are counted
+    heat: Any = None  # (walls, 1) that walls gave [J], or None
+
+
+class CollisionRule(NamedTuple):
+    """The end of the frame [s], and when to stop."""
+
+    end: float
+    halt: Array  # (1,) events

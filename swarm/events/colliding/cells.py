@@ -1,0 +1,165 @@
+"""Cells, each with the balls whose centres are in it: which balls meet before one of them leaves its cell.
+
+No cell is shorter than the largest diameter, so that balls that touch are in the same cell or in neighbours. Each axis
+has one cell more at either end, which is empty, or stands for the one at the other end where the scene repeats. The
+outermost cells have no end where it does not.
+"""
+
+import math
+from typing import Any
+
+from ...kernel.arrays import index
+from ...kernel.jit import Array, select
+from ...kernel.record import Record
+from ...kernel.vector import Vec
+from ...surfaces.time_of_impact.course import rise_time
+from ...surfaces.walls import Field
+from .rows import CELL, FACE, FLOATS, LEAVES, WHOLES
+from .window import middle_of, swept
+
+
+class Axis(Record):
+    """The cells along an axis: numbers 1 to `count`."""
+
+    low: float  # where the first one begins [m]
+    width: float  # [m]
+    count: int
+    offset: Array  # (count + 2) int32: what each adds to the number of a cell
+    period: Any  # [m], or None
+    last: Any  # the number before the period, or None
+
+    def nearest(self, b):
+        """The shortest of the distances along this axis of a particle and the images of another one."""
+        if self.period is None:
+            return b
+        half = 0.5 * self.period
+        return select(b > half, b - self.period, select(b < -half, b + self.period, b))
+
+    def until_end(self, x, v, a, cell):
+        """How long a flight stays between the faces of a cell, and whether it leaves by the upper one."""
+        low, high = self.low + (cell - 1) * self.width, self.low + cell * self.width
+        if a is None:
+            up = v > 0.0
+            time = select(up, high - x, low - x) / v
+            time = select(time > 0.0, time, 0.0)
+            ends = (v != 0.0) & self._has_face(cell, up)
+            return select(ends, time, math.inf), up
+        above, below = rise_time(x - high, 0.5 * v, 0.5 * a), rise_time(low - x, -0.5 * v, -0.5 * a)
+        above = select(self._has_face(cell, True), above, math.inf)
+        below = select(self._has_face(cell, False), below, math.inf)
+        up = above <= below
+        return select(up, above, below), up
+
+    def _has_face(self, cell, up):
+        if self.period is not None:
+            return True
+        return select(up, cell < self.count, cell > 1)
+
+
+class BallGrid(Record):
+    """The cells of a scene."""
+
+    x: Axis
+    y: Axis
+    z: Axis
+    near: Array  # bool, whether a ball in a cell may touch a wall
+    stride: int  # of the row of a cell: one more than how many balls it has room for
+    few: Any = None  # 1.0 where some axis has so few cells that two images of a ball may be near another one
+
+    def axes(self):
+        """The three axes."""
+        return self.x, self.y, self.z
+
+    def number(self, i, flock):
+        """The number of the cell of a ball."""
+        found = 0
+        for axis, k in zip(self.axes(), flock.cell(i), strict=True):
+            found = axis.offset[index(k)] + found
+        return found
+
+
+def until_exit(grid, pull, flock, i, now):
+    """Find when and by which face a ball leaves its cell, from a time on."""
+    r, v = flock.at(pull, i, now)
+    first, face, a = math.inf, 0, (None, None, None) if pull is None else pull
+    for k, (axis, cell) in enumerate(zip(grid.axes(), flock.cell(i), strict=True)):
+        time, up = axis.until_end(r[k], v[k], a[k], cell)
+        sooner = time < first
+        first, face = select(sooner, time, first), select(sooner, 2 * k + select(up, 1, 0), face)
+    flock.event[index(FLOATS * i + LEAVES)] = now + first
+    flock.tag[index(WHOLES * i + FACE)] = face
+
+
+def take_out(grid, flock, i, cell):
+    """Remove a ball from its cell; the last one takes its place."""
+    row = grid.stride * cell
+    last = flock.room[index(row)]
+    for k in range(1, last):
+        if flock.room[index(row + k)] == i:
+            flock.room[index(row + k)] = flock.room[index(row + last)]
+    flock.room[index(row)] = last - 1
+
+
+def cross(grid, flock, i):
+    """Bring a ball into the cell that it enters now: (the axis, by how many periods it goes back, whether it has room).
+
+    If the cell has no room, nothing is done.
+    """
+    face, old = flock.tag[index(WHOLES * i + FACE)], grid.number(i, flock)
+    which, step = face >> 1, 2 * (face & 1) - 1
+    new, turns, cell = old, 0, 0
+    for k, (axis, here) in enumerate(zip(grid.axes(), flock.cell(i), strict=True)):
+        if which == k:
+            cell = here + step
+            if axis.period is not None:
+                turns = select(cell > axis.count, 1, select(cell < 1, -1, 0))
+                cell -= turns * axis.count
+            new = old + axis.offset[index(cell)] - axis.offset[index(here)]
+    row = grid.stride * new
+    taken = flock.room[index(row)] + 1
+    fits = taken < grid.stride
+    if fits:
+        take_out(grid, flock, i, old)
+        # Where an axis has one cell it is the same one.
+        taken = flock.room[index(row)] + 1
+        flock.room[index(row)], flock.room[index(row + taken)] = taken, i
+        flock.tag[index(WHOLES * i + CELL + which)] = cell
+        for k, axis in enumerate(grid.axes()):
+            if axis.period is not None and which == k:
+                flock.flight[index(FLOATS * i + k)] -= turns * axis.period
+    return which, turns, fits
+
+
+# --- At the start ----------------------------------------------------------------------------------------
+
+
+def mark_near(box, radius, plane):
+    """Mark the cells of a plane across x in which a ball of at most this radius may touch a wall."""
+    grid, reach = box.grid, radius
+    walls, half = middle_of(box)
+    for axis in grid.axes():
+        reach = 0.5 * axis.width + reach
+    for ky in range(grid.y.count + 2):
+        for kz in range(grid.z.count + 2):
+            where, is_outer = (plane, ky, kz), False
+            r = Vec(*(axis.low + (k - 0.5) * axis.width for axis, k in zip(grid.axes(), where, strict=True)))
+            for axis, k in zip(grid.axes(), where, strict=True):
+                # Of a cell that has no end nothing is known.
+                if axis.period is None:
+                    is_outer = (k <= 1) | (k >= axis.count) | is_outer
+            number = (plane * (grid.y.count + 2) + ky) * (grid.z.count + 2) + kz
+            grid.near[index(number)] = is_outer or not _clear(walls, r, half) > reach
+
+
+def _clear(walls, r, half):
+    """A lower bound of the distance of a place from all walls, within so long before and after where some move."""
+    least = math.inf
+    for wall in walls.each:
+        least = min(_clear_of(wall, r) - swept(wall, r, half), least)
+    return least
+
+
+def _clear_of(wall, r):
+    if isinstance(wall, Field):
+        return 0.0
+    return -wall.distance(r) if wall.flat is True else wall.far(r)

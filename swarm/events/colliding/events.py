@@ -1,0 +1,298 @@
+"""The events of balls in order of time: collisions, impacts on walls, ways from cell to cell.
+
+One thread takes them. An event is the first of all: of equal times that of the ball with the smaller number, and of one
+ball its collision with the smaller partner before a wall, a wall before the end of a cell. So touching balls that are
+hit, as in Newton's cradle, hand the blow on one by one at one time.
+
+Frames look at the balls and change no flight, so that a run has the same bits with more of them or fewer.
+"""
+
+import math
+
+from ...common.status import Status
+from ...kernel.arrays import index
+from ...kernel.jit import long_kernel, outlined, select
+from ...kernel.vector import norm, put, square
+from .again import aim_again, queue_both
+from .ahead import fetch_next
+from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
+from .bounce import FLIES, GONE, bounce
+from .cells import cross, mark_near, take_out, until_exit
+from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, REACH, SAME, fit
+from .heavy import first_number
+from .journal import has_room, note_pair
+from .meet import met
+from .queue import FIRST, build, requeue
+from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NOBODY, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
+from .striking import renew_ended, shift_leases, strike_heavy
+from .window import END, OUT
+
+# So many events a ball between which no time passes: then time does not pass at all.
+_AT_ONCE = 1000
+
+
+# --- Of one ball -------------------------------------------------------------------------------------------
+
+
+@outlined
+def _collide(box, flock, books, clock, i, now):
+    """The collision of a ball, if its partner still has the flight that it had; else it looks for another one."""
+    j = flock.tag[index(WHOLES * i + PARTNER)]
+    if flock.tag[index(WHOLES * j + STAMP)] != flock.tag[index(WHOLES * i + SEEN)]:
+        find_partner(box, flock, i, now)
+        queue_both(flock, i)
+    else:
+        # The one with the smaller number first
+        one, other = min(i, j), max(i, j)
+        r, v = flock.at(box.pull, one, now)
+        there, w = flock.at(box.pull, other, now)
+        blow = met(box, flock, (one, r, v), (other, there, w), now)
+        flock.put(one, now, r, blow.one)
+        flock.put(other, now, there, blow.other)
+        _book(flock, books, clock, (one, other), blow, now)
+        if box.repose is not None:
+            box.repose.count(clock, square((blow.other - blow.one) - (w - v)), now)
+        if box.log is not None:
+            impulse = box.kinds.mass_of(one) * norm(blow.one - v)
+            note_pair(box, books, clock, (one, other, now), (r, v, blow.one), impulse)
+        flock.event[index(FLOATS * other + MEETS)] = math.inf
+        aim_again(box, flock, one, now)
+        queue_both(flock, one)
+        aim_again(box, flock, other, now)
+        queue_both(flock, other)
+
+
+def _book(flock, books, clock, pair, blow, now):
+    clock[COLLISIONS] += 1.0
+    books.virial[0] += blow.virial
+    for k in pair:
+        flock.tag[index(WHOLES * k + MET)] += 1
+        if books.dissipated.size > 0:
+            books.dissipated[index(k)] += 0.5 * blow.lost
+        if flock.last is not None:
+            flock.last[index(k)] = now
+
+
+@outlined
+def _vanish(box, flock, i):
+    """Take out a ball that has left the scene: it stays where it is, and meets no other ball."""
+    take_out(box.grid, flock, i, box.grid.number(i, flock))
+    for k in (MEETS, LEAVES, DUE):
+        flock.event[index(FLOATS * i + k)] = math.inf
+    flock.event[index(FLOATS * i + WALL)] = OUT
+    flock.tag[index(WHOLES * i + PARTNER)] = NOBODY
+    requeue(flock, i)
+
+
+def _at_wall(box, flock, books, clock, i, now):
+    """What comes when a ball may meet a wall: it is reflected, or gone, or looks farther; a status if it goes wrong."""
+    if box.heavy is not None:
+        if flock.event[index(FLOATS * i + WALL)] >= first_number(box):
+            strike_heavy(box, flock, books, clock, i, now)
+            return FLIES
+        if len(box.walls.each) == 0:
+            _look_for_wall(box, flock, i, now)
+            return FLIES
+    # Without walls `_at_given_wall` is not compiled.
+    if len(box.walls.each) == 0:
+        return FLIES
+    return _at_given_wall(box, flock, books, clock, i, now)
+
+
+def _look_for_wall(box, flock, i, now):
+    forget_wall(box, flock, i)
+    find_wall(box, flock, i, now)
+    requeue(flock, i)
+
+
+def _at_given_wall(box, flock, books, clock, i, now):
+    ended = FLIES
+    if flock.event[index(FLOATS * i + WALL)] >= 0.0:
+        ended = bounce(box, flock, books, clock, i, now)
+        if ended == GONE:
+            _vanish(box, flock, i)
+            ended = FLIES
+        elif ended == FLIES:
+            aim_again(box, flock, i, now)
+            queue_both(flock, i)
+    else:
+        _look_for_wall(box, flock, i, now)
+    return ended
+
+
+@outlined
+def _enter(box, flock, books, i, now):
+    """The way of a ball into the next cell: whether there is room for it."""
+    which, turns, fits = cross(box.grid, flock, i)
+    if fits:
+        if books.image is not None:
+            books.image[index(which), index(i)] += turns
+        if turns != 0:
+            # There it meets other images of the walls.
+            forget_wall(box, flock, i)
+            if flock.kept is not None:
+                flock.kept.keep(i, NOBODY, 0.0)
+        found = look_ahead(box, flock, i, now)
+        until_exit(box.grid, box.pull, flock, i, now)
+        find_wall(box, flock, i, now)
+        requeue(flock, i)
+        if found:
+            told = tell_partner(flock, i)
+            if told >= 0:
+                requeue(flock, told)
+    return fits
+
+
+# --- Of all ----------------------------------------------------------------------------------------------
+
+
+@long_kernel
+def mark(box, radius, first, last):
+    """Mark which cells are near walls, in the planes of cells from `first` to before `last`."""
+    for plane in range(first, last):
+        mark_near(box, radius, plane)
+
+
+@long_kernel
+def next_epoch(flock, clock):
+    """Begin the epoch after this one, at its end."""
+    _begin_epoch(flock, clock, clock[LENGTH])
+
+
+@long_kernel
+def begin(box, flock, now, first, last):
+    """Find what is next for the balls from `first` to before `last`, at the start, which is before time 0.
+
+    At the start this is the next event of each ball. Later, where a window begins, it is only the next wall of each.
+    """
+    for i in range(first, last):
+        if box.window is not None and now >= 0.0:
+            if flock.event[index(FLOATS * i + WALL)] != OUT:
+                forget_wall(box, flock, i)
+                find_wall(box, flock, i, now)
+        else:
+            aim_again(box, flock, i, 0.0)
+            tell_partner(flock, i)
+
+
+@long_kernel
+def order(flock):
+    """Order the queue."""
+    build(flock)
+
+
+@outlined
+def _begin_epoch(flock, clock, now):
+    """Count all times from a later one on, so that they keep their digits: how much later [s].
+
+    It is a multiple of a power of two, so that times lose less than the round-off of one epoch.
+    """
+    number = float(int(now / clock[LENGTH]))
+    shift = number * clock[LENGTH]
+    clock[EPOCHS] += number
+    for i in range(flock.number()):
+        row = FLOATS * i
+        flock.flight[index(row + TIME)] -= shift
+        for k in (MEETS, LEAVES, DUE):
+            flock.event[index(row + k)] -= shift
+        if flock.last is not None:
+            flock.last[index(i)] -= shift
+    if flock.freedoms is not None:
+        shift_leases(flock.freedoms, shift)
+    build(flock)
+    return shift
+
+
+def _pass_epoch(box, flock, clock, now):
+    """`_begin_epoch`, and the length of this one, where no window ends with it."""
+    shift = _begin_epoch(flock, clock, now)
+    if box.window is None:
+        fit(clock, _speed2(box, flock, clock))
+    return shift
+
+
+@outlined
+def _speed2(box, flock, clock):
+    """The mean square of the speed, at least that of a fall as far as balls are to fly in an epoch."""
+    whole = 0.0
+    for i in range(flock.number()):
+        whole += square(flock.velocity(i))
+    fall = 0.0 if box.pull is None else norm(box.pull) * clock[REACH]
+    return max(whole / flock.number(), fall)
+
+
+def _first(box, flock, clock, end):
+    """The ball and the time of the first event, with new leases of walls where they end before it."""
+    if box.heavy is not None:
+        renew_ended(box, flock, clock, end)
+    return flock.item[FIRST], flock.key[FIRST]
+
+
+def _is_over(box, end, now):
+    """The status with which no event is taken at a time; -1 where one is."""
+    ended = select(now < end, -1, Status.DONE.value)
+    if box.log is not None:
+        ended = select((ended < 0) & (not has_room(box.log)), Status.LOG_FULL.value, ended)
+    if box.window is not None:
+        ended = select((box.window[END] < end) & (not now < box.window[END]), Status.LEASE_ENDED.value, ended)
+    return ended
+
+
+@long_kernel
+def take(box, flock, books, clock, rule):
+    """Take event after event until the end of the frame: (status, ball).
+
+    LEASE_ENDED where a cell has no room for one ball more: give all cells more, and call it again; with no ball where
+    the window of walls that move has ended. LOG_FULL where the log needs an empty part. INTERRUPTED after so many
+    events as the rule says; it goes on with the same bits.
+    """
+    end, taken = rule.end - clock[EPOCHS] * clock[LENGTH], 0
+    most = float(_AT_ONCE * flock.number())
+    before = -math.inf
+    while True:
+        i, now = _first(box, flock, clock, end)
+        ended = _is_over(box, end, now)
+        if ended >= 0:
+            return ended, NOBODY
+        if taken >= rule.halt[0]:
+            return Status.INTERRUPTED.value, 0
+        taken += 1
+        clock[EVENTS] += 1.0
+        fetch_next(box, flock)
+        if now >= clock[LENGTH]:
+            shift = _pass_epoch(box, flock, clock, now)
+            end -= shift
+            before -= shift
+        else:
+            clock[SAME] = select(now > before, 0.0, clock[SAME] + 1.0)
+            before = now
+            if clock[SAME] > most:
+                return Status.TIMELESS.value, i
+            row = FLOATS * i
+            if flock.event[index(row + MEETS)] <= now:
+                _collide(box, flock, books, clock, i, now)
+            elif flock.event[index(row + DUE)] <= now:
+                status = _at_wall(box, flock, books, clock, i, now)
+                if status != FLIES:
+                    return status, i
+            elif not _enter(box, flock, books, i, now):
+                clock[EVENTS] -= 1.0
+                return Status.LEASE_ENDED.value, i
+
+
+@long_kernel
+def show(box, flock, state, end, first, last):
+    """Write the balls from `first` to before `last` to the arrays of a frame, as they are at a time of the epoch."""
+    for k in range(first, last):
+        i = index(k)
+        r, v = flock.at(box.pull, k, end)
+        if box.gates is not None and flock.event[index(FLOATS * k + WALL)] == OUT:
+            r, v = flock.place(k), flock.velocity(k)
+        for axis, cells in enumerate(box.grid.axes()):
+            x = r[axis]
+            if cells.period is not None:
+                # Round-off at a face
+                x = select(x < 0.0, 0.0, select(x >= cells.period, cells.last, x))
+            state.position[axis, i] = x
+        put(state.velocity, 0, i, v)
+        state.balls.collisions[i] = flock.tag[index(WHOLES * k + MET)]

@@ -1,0 +1,79 @@
+"""Walls with a mass among balls: the balls near them, and when these meet them if nothing strikes the walls before.
+
+A ball that is far is looked at again after a time in which it surely meets none, whatever others do to the walls within
+their leases. What is known of one that is near holds until a wall is struck. All look again where a lease ends.
+"""
+
+import math
+from typing import Any
+
+from ...kernel.arrays import index
+from ...kernel.jit import Array, select
+from ...kernel.record import Record
+from ...kernel.vector import ZERO
+from ..reacting.freedoms import ParticleFlight
+from ..reacting.walls import first_hit, reach_of_all
+from .clock import LENGTH, moment_of
+from .rows import DUE, FLOATS, LEAVES, WALL
+from .window import UNKNOWN
+
+# Of the counts: balls that are listed, strikes of the walls so far, and events before the leases.
+LISTED, STRIKES, SINCE, COUNTS = 0, 1, 2, 3
+
+
+class Heavy(Record):
+    """The walls with a mass; their numbers are after those of the walls that stay or have a given motion."""
+
+    walls: Any  # each `Reacting`
+    ways: Any  # the `Freedom` of each surface with a mass
+    freedoms: Any  # of times of the epoch
+    clock: Array
+    counts: Array  # (3,)
+    near: Array  # (N,) bool, whether what is known of a ball holds only until a wall is struck
+    listed: Array  # (N,) bool, whether it is in `close`
+    close: Array  # (N,) int64, those that are near, and some that were
+    impulse: Array  # (walls of the scene,) [N s]
+
+    def grown(self, radius):
+        """The walls that the centre of a ball meets."""
+        return tuple(wall._replace(body=wall.body.grown(radius)) for wall in self.walls)
+
+    def soon(self, now):
+        """The mean time from one strike to the next.
+
+        A ball that may meet a wall sooner is looked at again after the next strike.
+        """
+        return moment_of(self.clock, now) / (1.0 + self.counts[STRIKES])
+
+
+def first_number(box):
+    """The number of the first wall with a mass."""
+    return float(len(box.walls.each))
+
+
+def meet_heavy(box, flock, i, now, hit):
+    """Find when a ball meets any wall, from its `Hit` on those without a mass."""
+    heavy, row = box.heavy, FLOATS * i
+    r, v = flock.at(box.pull, i, now)
+    due, leaves, known = now + hit.time, flock.event[index(row + LEAVES)], hit.wall
+    target = min(min(due, leaves), now + heavy.clock[LENGTH])
+    # At the end of its cell it looks again anyway.
+    if target < due:
+        due, known = select(leaves <= target, math.inf, target), UNKNOWN
+    flight = ParticleFlight(r, v, ZERO if box.pull is None else box.pull, now, target - now)
+    walls = heavy.grown(box.kinds.radius_of(i))
+    free, is_near = reach_of_all(walls, heavy.freedoms, flight), False
+    if free < flight.longest:
+        if free > heavy.soon(now):
+            due, known = now + free, UNKNOWN
+        else:
+            is_near = True
+            met = first_hit(walls, box.pull, heavy.freedoms, flight)
+            if met.time < flight.longest:
+                due, known = now + met.time, first_number(box) + met.wall
+    flock.event[index(row + DUE)], flock.event[index(row + WALL)] = due, known
+    heavy.near[index(i)] = is_near
+    if is_near and not heavy.listed[index(i)]:
+        heavy.listed[index(i)] = True
+        heavy.close[index(int(heavy.counts[LISTED]))] = i
+        heavy.counts[LISTED] += 1.0

@@ -1,0 +1,83 @@
+"""The collision of two balls: equal and opposite impulses, and the energy of the pair as it is to be."""
+
+import math
+from typing import Any
+
+from ...kernel.arrays import index
+from ...kernel.jit import select
+from ...kernel.record import Record
+from ...kernel.vector import dot, square
+from .aim import between
+
+# What the relative velocity is scaled by to restore its square is 1 within round-off, unless next to nothing is left.
+_NEAR = 1e-6
+# The square of the part of their speeds with which balls part at least: four roundings.
+_PARTS = 2.0**-100
+
+
+class Loss(Record):
+    """The loss of energy in collisions."""
+
+    restitution: float
+    duration: float  # t_c [s]: a ball that met another ball less than this before loses no energy
+
+    def spares(self, flock, i, now):
+        """Whether a ball loses no energy now, neither to a ball nor to a wall."""
+        return now - flock.last[index(i)] < self.duration
+
+
+class Met(Record):
+    """A collision: the velocity of one and the other after it, r_ij . J_ij [J s], and the energy that is lost [J]."""
+
+    one: Any
+    other: Any
+    virial: float
+    lost: float
+
+
+def squared(v, speed2):
+    """A velocity whose square is speed2, from within round-off, without a bias, which 1e8 collisions would show.
+
+    By one Newton step of the square root, as a sum: a factor 1 + x rounds x up and down by different steps.
+    """
+    now = square(v)
+    miss = speed2 - now
+    near = (abs(miss) <= _NEAR * now) & (now > 0.0)
+    return v + select(near, 0.5 * miss / select(near, now, 1.0), 0.0) * v
+
+
+def turned(u, n, closing, distance2, restitution):
+    """The relative velocity after a collision, with |u|^2 less what is lost restored, and twice what is lost."""
+    e = 1.0 if restitution is None else restitution
+    share = (1.0 + e) * closing / distance2
+    w = u - share * n
+    lost = 0.0 if restitution is None else (1.0 - e) * (1.0 + e) * closing * closing / distance2
+    return squared(w, square(u) - lost), lost
+
+
+def _parted(u, b, distance2, speed2):
+    """A relative velocity that parts two balls so fast that their own velocities, |v|^2 + |w|^2, have digits of it.
+
+    Else those that touch and fly on together would collide without end by what is round-off of their velocities.
+    """
+    away, least2 = dot(b, u), _PARTS * speed2 * distance2
+    slow = (away < 0.0) | (away * away < least2)
+    return u + select(slow, (math.sqrt(least2) - away) / distance2, 0.0) * b
+
+
+def met(box, flock, one, two, now):
+    """The `Met` of two balls that touch now, each as its number, its position and its velocity."""
+    (i, r, v), (j, other, w) = one, two
+    b, u = between(box.grid, r, other), w - v
+    closing, distance2 = dot(b, u), square(b)
+    restitution: Any = None
+    if box.loss is not None:
+        spares = box.loss.spares(flock, i, now) | box.loss.spares(flock, j, now)
+        restitution = select(spares, 1.0, box.loss.restitution)
+    after, lost = turned(u, b, closing, distance2, restitution)
+    if box.growth is not None:
+        after = box.growth.turned(u, b, closing, distance2, now)
+    share = box.kinds.share(i, j)
+    mass = box.kinds.mass_of(i) * share
+    change = _parted(after, b, distance2, square(v) + square(w)) - u
+    return Met(v - share * change, w + box.kinds.share(j, i) * change, mass * dot(b, change), 0.5 * mass * lost)

@@ -1,0 +1,117 @@
+"""The queue of events: a heap of four children a node, whose nodes hold the times, so that few balls are looked at.
+
+The order is that of the times; of equal ones that of the smaller ball of a collision, then of the other one (none at a
+wall), so that it does not depend on what was done to the heap before. Nodes are numbered from 3 on, so that children
+are in one line of the cache; behind the last there are some that never come.
+"""
+
+import math
+
+from ...kernel.arrays import fetch, index
+from ...kernel.jit import outlined, select
+from .rows import FLOATS, MEETS, NOBODY, PARTNER, WHOLES
+
+# The first node, of which the children are those from 4 (node - 2) to 4 (node - 2) + 3.
+FIRST, SPARE = 3, 8
+_CHILDREN = 4
+
+
+@outlined
+def _wins(flock, item, other, key):
+    """Whether the event of one ball goes before that of another one at the same time."""
+    low, high = _pair(flock, item, key)
+    least, most = _pair(flock, other, key)
+    alike = (low == least) & (high == most)
+    return (low < least) | ((low == least) & (high < most)) | (alike & (item < other))
+
+
+def _pair(flock, item, key):
+    """The balls of an event, the smaller number first. In an event of one ball the second is `NOBODY`."""
+    mate = flock.tag[index(WHOLES * item + PARTNER)]
+    meets = (flock.event[index(FLOATS * item + MEETS)] == key) & (mate >= 0)
+    return select(meets & (mate < item), mate, item), select(meets, select(mate < item, item, mate), NOBODY)
+
+
+def _comes_before(flock, item, key, other, later):
+    if key == later and key < math.inf:
+        return _wins(flock, item, other, key)
+    return key < later
+
+
+def _set(flock, node, item, key):
+    flock.item[index(node)], flock.key[index(node)] = item, key
+    flock.node[index(item)] = node
+
+
+@outlined
+def _first_of_equals(flock, first, soonest):
+    """The child with this time whose event is first, of those from `first` on."""
+    least = first
+    for child in range(first, first + _CHILDREN):
+        if flock.key[index(child)] == soonest:
+            behind = flock.key[index(least)] > soonest
+            if behind or _wins(flock, flock.item[index(child)], flock.item[index(least)], soonest):
+                least = child
+    return least
+
+
+def _sink(flock, node, item, key):
+    """Put a ball at this node, or below it."""
+    last = flock.number() + FIRST
+    first = _CHILDREN * (node - 2)
+    while first < last:
+        # The children of all of these: the next ones are among them.
+        below = _CHILDREN * (first - 2)
+        fetch(flock.key, below)
+        fetch(flock.key, below + 8)
+        fetch(flock.item, below)
+        a, b = flock.key[index(first)], flock.key[index(first + 1)]
+        c, d = flock.key[index(first + 2)], flock.key[index(first + 3)]
+        one, other = select(b < a, b, a), select(d < c, d, c)
+        soonest = select(other < one, other, one)
+        if key < soonest or soonest == math.inf:
+            break
+        least = first + select(other < one, select(d < c, 3, 2), select(b < a, 1, 0))
+        again = (a == b) | (c == d) | (one == other)
+        if again and soonest < math.inf:
+            least = _first_of_equals(flock, first, soonest)
+        here = flock.item[index(least)]
+        if key == soonest and _wins(flock, item, here, key):
+            break
+        _set(flock, node, here, soonest)
+        node = least
+        first = _CHILDREN * (node - 2)
+    _set(flock, node, item, key)
+
+
+def _rise(flock, node, item, key):
+    """The node, at or above this one, where a ball is to be: those that it passes are moved down."""
+    while node > FIRST:
+        above = (node >> 2) + 2
+        other, later = flock.item[index(above)], flock.key[index(above)]
+        if not _comes_before(flock, item, key, other, later):
+            break
+        _set(flock, node, other, later)
+        node = above
+    return node
+
+
+@outlined
+def requeue(flock, item):
+    """Bring a ball to its place in the queue."""
+    key, node = flock.next_of(item), flock.node[index(item)]
+    top = _rise(flock, node, item, key) if key <= flock.key[index(node)] else node
+    if top < node:
+        _set(flock, top, item, key)
+    else:
+        _sink(flock, node, item, key)
+
+
+def build(flock):
+    """Order the queue by what is next for each ball."""
+    last = flock.number() + FIRST
+    for node in range(FIRST, last):
+        flock.key[index(node)] = flock.next_of(flock.item[index(node)])
+    for k in range(last - FIRST):
+        node = last - 1 - k
+        _sink(flock, node, flock.item[index(node)], flock.key[index(node)])

@@ -1,0 +1,48 @@
+"""Balls that come to rest: their impacts are slow, and ever more of them come in the time of a fall.
+
+Hard spheres that lie on one another or on a wall collide without end. Impacts are counted, not timed, so that a run
+finds the same on any machine, with any number of threads, and after it was resumed.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...kernel.jit import outlined
+from ...kernel.record import Record
+from .clock import IMPACTS, RESTED, SINCE, SLOW, moment_of
+
+# Balls rest that have more impacts than this in the time in which one falls its radius R, nearly all of them slow: with
+# a part of the speed of that fall at most. Balls of that speed have so many where gaps are less than R/500: in no gas.
+LEAST_RATE, _SHARE, _PART = 100.0, 0.9, 0.1
+# So many impacts a ball are looked at in a row; of few balls so many in all, since one that crosses a corner has some.
+_COUNTED, _FEWEST = 32, 256
+
+
+class Repose(Record):
+    """What tells that balls rest. A fall is that of the smallest ball, from rest by its radius."""
+
+    fall: float  # its time [s]
+    slow2: float  # the square of the change of the normal velocity below which an impact is slow [m^2/s^2]
+    counted: float  # impacts from one look to the next
+    within: float  # the time in which so many come where balls rest [s]
+
+    @outlined
+    def count(self, clock: Any, change2: Any, now: Any) -> None:
+        """Count an impact that changes the normal velocity by this square, and look whether balls rest."""
+        clock[IMPACTS] += 1.0
+        clock[SLOW] += change2 < self.slow2
+        if clock[IMPACTS] >= self.counted:
+            moment = moment_of(clock, now)
+            rests = (moment - clock[SINCE] < self.within) & (clock[SLOW] >= _SHARE * clock[IMPACTS])
+            if rests and clock[RESTED] == 0.0:
+                clock[RESTED] = moment
+            clock[IMPACTS], clock[SLOW], clock[SINCE] = 0.0, 0.0, moment
+
+
+def repose_of(pull: float, radius: Any) -> Repose:
+    """Of balls with these radii [m] that fall with this acceleration [m/s^2]."""
+    n, counted = len(radius), float(max(_COUNTED * len(radius), _FEWEST))
+    fall = math.sqrt(2.0 * float(np.min(radius)) / pull)
+    return Repose(fall, (_PART * pull * fall) ** 2, counted, counted / (n * LEAST_RATE) * fall)

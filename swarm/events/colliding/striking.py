@@ -1,0 +1,111 @@
+"""The impact of a ball on a wall with a mass, after which the balls near such walls look for their next wall."""
+
+from ...kernel.arrays import index
+from ...kernel.gravity import potential
+from ...kernel.jit import outlined, select
+from ...kernel.vector import ZERO, square
+from ..reacting.freedoms import ParticleFlight
+from ..reacting.walls import all_stay, strike
+from .again import aim_again, queue_both
+from .aim import find_wall
+from .clock import EVENTS
+from .heavy import LISTED, SINCE, STRIKES, first_number
+from .meet import squared
+from .queue import FIRST, requeue
+from .rows import FLOATS, WALL
+from .window import END
+
+# Leases are too narrow where they end before so many events a ball, too wide where they last longer than that many.
+_TOO_SHORT, _TOO_LONG = 4.0, 32.0
+# The energy is that which it is to be where the square of the speed is off by no more than this part.
+_NEAR = 1e-9
+
+
+@outlined
+def strike_heavy(box, flock, books, clock, i, now):
+    """The impact of a ball on the wall with a mass that it meets now."""
+    heavy, m = box.heavy, box.kinds.mass_of(i)
+    wall = flock.event[index(FLOATS * i + WALL)] - first_number(box)
+    r, v = flock.at(box.pull, i, now)
+    walls = heavy.grown(box.kinds.radius_of(i))
+    if box.loss is not None:
+        spares = box.loss.spares(flock, i, now)
+        walls = tuple(one._replace(restitution=select(spares, 1.0, one.restitution)) for one in walls)
+    twice = flock.kept.at(i, flock.stamp(i), square(v) + 2.0 * potential(box.pull, r))
+    blow = strike(walls, wall, heavy.freedoms, ParticleFlight(r, v, ZERO, now, 0.0), m)
+    # The energy decides the speed: round-off of the impulse has a bias.
+    left, fall = twice - 2.0 * (blow.given + blow.lost) / m, 2.0 * potential(box.pull, blow.r)
+    v1 = squared(blow.v, left - fall)
+    flock.put(i, now, blow.r, v1)
+    # Of a ball that all but stops nothing is restored.
+    is_near = abs(square(v1) + fall - left) <= _NEAR * square(v1)
+    flock.kept.keep(i, flock.stamp(i), select(is_near, left, square(v1) + fall))
+    heavy.impulse[index(blow.owner)] += blow.impulse
+    if books.dissipated.size > 0:
+        books.dissipated[index(i)] += blow.lost
+    books.impacts[index(i)] += blow.impulse > 0.0
+    if box.repose is not None:
+        box.repose.count(clock, (blow.impulse / m) * (blow.impulse / m), now)
+    heavy.counts[STRIKES] += 1.0
+    stays = all_stay(heavy.walls, wall, heavy.freedoms)
+    aim_again(box, flock, i, now)
+    queue_both(flock, i)
+    if stays:
+        _look_again(box, flock, now)
+    else:
+        renew_leases(box, flock, clock, now)
+
+
+@outlined
+def _look_again(box, flock, now):
+    """After a strike: those that are near look for their next wall."""
+    heavy = box.heavy
+    count = int(heavy.counts[LISTED])
+    heavy.counts[LISTED] = 0.0
+    for k in range(count):
+        item = heavy.close[index(k)]
+        heavy.listed[index(item)] = False
+        # Those that are near again are listed before the ones that come.
+        if heavy.near[index(item)]:
+            find_wall(box, flock, item, now)
+            requeue(flock, item)
+
+
+@outlined
+def renew_leases(box, flock, clock, now):
+    """New leases of the walls from now on; all balls look for their next wall."""
+    heavy, freedoms = box.heavy, box.heavy.freedoms
+    each = (clock[EVENTS] - heavy.counts[SINCE]) / flock.number()
+    for freedom in heavy.ways:
+        k = index(freedom.row)
+        width = freedoms.width[k]
+        # A wider one lasts longer, unless it ends where the motion is not known any more.
+        ends = freedoms.until[k] <= now
+        short = freedom.away(freedoms) >= width or (
+            ends and freedom.keeps(freedoms, 2.0 * width) > freedom.keeps(freedoms, width)
+        )
+        if short and each < _TOO_SHORT:
+            freedoms.width[k] = 2.0 * width
+        elif each > _TOO_LONG:
+            freedoms.width[k] = 0.5 * width
+        freedom.renew(freedoms, now)
+    heavy.counts[SINCE] = clock[EVENTS]
+    for i in range(flock.number()):
+        find_wall(box, flock, i, now)
+        requeue(flock, i)
+
+
+def renew_ended(box, flock, clock, end):
+    """New leases at the times at which they end before the next event, and before the frame ends."""
+    until = min(box.heavy.freedoms.until)
+    last = end if box.window is None else min(end, box.window[END])
+    while until <= flock.key[FIRST] and until < last:
+        renew_leases(box, flock, clock, until)
+        until = min(box.heavy.freedoms.until)
+
+
+def shift_leases(freedoms, shift):
+    """Count the times of the walls from a later one on."""
+    for k in range(freedoms.time.size):
+        freedoms.time[index(k)] -= shift
+        freedoms.until[index(k)] -= shift

@@ -1,0 +1,92 @@
+"""The run of balls that meet one another, and walls of which some have a mass."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..kernel.vector import ZERO
+from ..run import failures
+from ..run.base import Arrays
+from ..run.observed import with_walls
+from .balls_run import CollidingRun, balance
+from .colliding.heavy import COUNTS, Heavy
+from .reacting.described import Observed, freedoms_of, observed, scenery_of, walls_now
+from .reacting.freedoms import Freedoms
+
+# The first leases have this part of the balls' speed as their width.
+_WIDTH = 0.1
+
+
+class HeavyRun(CollidingRun):
+    """A `CollidingRun` in which impacts move walls."""
+
+    _freedoms: Freedoms
+    _walls: Observed
+
+    def _with_heavy(self, box: Any) -> Any:
+        state, scene = self.state, self._of
+        n, rows = state.mass.size, len(scene.owners())
+        speed = math.sqrt(float((state.velocity**2).sum(axis=0).mean()))
+        self._freedoms = freedoms_of(scene, _WIDTH * speed or _WIDTH)
+        scenery = scenery_of(scene, 0.0)
+        ways = tuple({wall.freedom.row: wall.freedom for wall in scenery.reacting}.values())
+        self._given_rows = scenery.owners
+        self._given_impulse = np.zeros((2 * max(1, len(scenery.owners)), 1))
+        self._heavy = Heavy(
+            scenery.reacting, ways, self._freedoms, self._clock, np.zeros(COUNTS), np.zeros(n, bool), np.zeros(n, bool),
+            np.zeros(n, np.int64), np.zeros(rows),
+        )  # fmt: skip
+        self._flock = self._flock._replace(freedoms=self._freedoms)
+        return box._replace(heavy=self._heavy)
+
+    def _impulse_of_books(self) -> Any:
+        return self._given_impulse
+
+    def _begin(self) -> None:
+        for freedom in self._heavy.ways:
+            freedom.renew(self._freedoms, 0.0)
+        super()._begin()
+
+    def _show(self, moment: float) -> None:
+        super()._show(moment)
+        impulse, given, rows = self.state.impulse, self._given_rows, len(self._owners)
+        impulse[:rows, 0] = self._heavy.impulse
+        impulse[given, 0] = self._given_impulse[: len(given), 0]
+        impulse[rows + given, 0] = self._given_impulse[len(given) : 2 * len(given), 0]
+
+    def _walls_seen(self, moment: float) -> Any:
+        """The walls are brought to the moment in a copy: a frame is no part of their motion."""
+        freedoms, since = Freedoms(*(array.copy() for array in self._freedoms)), self._since(moment)
+        scenery = scenery_of(self._of, moment)
+        for wall in scenery.reacting:
+            wall.freedom.push(freedoms, since, ZERO, ZERO)
+        freedoms.time.fill(0.0)
+        self._walls = observed(self._of, freedoms, moment)
+        return walls_now(self._of, scenery, freedoms)
+
+    def _summary(self) -> dict[str, Any]:
+        return with_walls(super()._summary(), self._walls)
+
+    def seen(self) -> dict[str, Any]:
+        seen = super().seen()
+        seen |= {"wall_position": self._walls.position, "wall_orientation": self._walls.orientation}
+        scale = seen["kinetic_energy"] + seen["dissipated_energy"] + abs(seen["potential_energy"])
+        scale += float(self._walls.kinetic.sum())
+        seen["energy_error"] = abs(balance(seen) - self._start[0]) / scale if scale > 0.0 else 0.0
+        return seen
+
+    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
+        scene = self._scene
+        if seen["max_penetration"] > self._deepest:
+            scene = scene.placed(seen["wall_position"], seen["wall_orientation"])
+        failures.require_admissible(scene, self.state, seen, self._deepest, moment, self._first)
+
+    def arrays(self) -> Arrays:
+        heavy = self._heavy
+        freedoms = {f"walls.{name}": array for name, array in self._freedoms._asdict().items()}
+        own = {name: getattr(heavy, name) for name in ("counts", "near", "listed", "close")}
+        return {
+            **super().arrays(), **freedoms, **{f"heavy.{name}": array for name, array in own.items()},
+            "heavy.impulse": heavy.impulse, "given_impulse": self._given_impulse,
+        }  # fmt: skip

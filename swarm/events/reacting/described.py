@@ -1,0 +1,155 @@
+"""A scene with walls that react as kernels take it, from its description."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...contact.laws import NONE
+from ...kernel.vector import Vec, vec
+from ...motion import Guide, Rotation, Translation, pose, unit_axis
+from ...scene import Scene
+from ...surfaces.surface import Surface
+from ...surfaces.walls import Walls
+from .freedoms import Freedoms, Shifted
+from .pendulum import TERMS, Hinged, Pendulum
+from .queue import SceneWalls
+from .walls import Reacting
+
+Floats = NDArray[np.float64]
+
+
+def scenery_of(scene: Scene, moment: float) -> SceneWalls:
+    """The walls of a scene in the frame that ends at a moment [s]."""
+    owners = np.array(scene.owners())
+    rest = [surface for surface in scene.surfaces if not surface.reacts()]
+    given = scene.of_some(rest).ungrouped("walls that react") if rest else None
+    reacts = np.array([surface.reacts() for surface in scene.surfaces])[owners]
+    return SceneWalls(
+        Walls(()) if given is None else given.walls(moment),
+        (given.laws() if given else None) or NONE,
+        np.flatnonzero(~reacts),
+        _reacting(scene),
+        scene.pull(),
+    )
+
+
+def _reacting(scene: Scene) -> tuple[Reacting, ...]:
+    """The walls that react, in the order of the scene's walls; rows of freedoms are in that of its surfaces."""
+    rows = [i for i, surface in enumerate(scene.surfaces) if surface.reacts()]
+    made, number = [], 0
+    for i in dict.fromkeys(scene.owners()):
+        surface = scene.surfaces[i]
+        walls = scene.walls_of(surface)
+        if surface.reacts():
+            freedom = _freedom(surface, rows.index(i), scene.gravity or (0.0, 0.0, 0.0))
+            made += [Reacting(wall, freedom, number + k, surface.restitution) for k, wall in enumerate(walls)]
+        number += len(walls)
+    return tuple(made)
+
+
+def _freedom(surface: Surface, row: int, gravity: tuple[float, float, float]) -> Any:
+    motion = surface.motion
+    if surface.inertia is not None:
+        return _turning(surface, row, np.array(gravity))
+    assert surface.mass is not None
+    lightness = 1.0 / surface.mass
+    if not isinstance(motion, Guide):
+        return Shifted(row, lightness, vec(gravity), None, None)
+    axis = unit_axis(motion)
+    pull = _vector(float((axis * gravity).sum()) * axis)
+    rate = math.sqrt(motion.stiffness * lightness) if motion.stiffness > 0.0 else None
+    return Shifted(row, lightness, pull, _vector(axis), rate)
+
+
+def _turning(surface: Surface, row: int, gravity: Floats) -> Hinged | Pendulum:
+    """The freedom of a wall on an axis: its weight is at its centre."""
+    motion, lightness = surface.motion, 1.0 / (surface.inertia or 1.0)
+    k, pivot = unit_axis(motion), np.array(motion.center)
+    if surface.mass is not None:
+        arm = np.array(surface.center) - pivot  # type: ignore[attr-defined]
+        arm = arm - (arm * k).sum() * k
+        # The torque k.(A l x M G) = M (k.(l x G) cos theta - l.G sin theta), over the inertia
+        sine, cosine = ((k * np.cross(arm, gravity)).sum(), (arm * gravity).sum())
+        stiffness = surface.mass * lightness * math.hypot(sine, cosine)
+        if stiffness > 0.0:
+            return Pendulum(row, lightness, _vector(k), _vector(pivot), stiffness, math.atan2(sine, cosine))
+    return Hinged(row, lightness, _vector(k), _vector(pivot))
+
+
+def _vector(values: Floats) -> Vec:
+    return vec(values.tolist())
+
+
+def freedoms_of(scene: Scene, width: float) -> Freedoms:
+    """The walls that react at the start, with leases of this width [m/s]."""
+    surfaces = [surface for surface in scene.surfaces if surface.reacts()]
+    count = len(surfaces)
+    shift, velocity, rest, middle = np.zeros((4, 3, count))
+    angle, rate, rate_rest, time, turning, widths, until = np.zeros((7, count))
+    for k, surface in enumerate(surfaces):
+        motion = surface.motion
+        if isinstance(motion, Translation):
+            velocity[:, k] = motion.velocity
+        elif isinstance(motion, Guide):
+            velocity[:, k] = motion.speed * unit_axis(motion)
+        elif isinstance(motion, Rotation):
+            rate[k] = motion.rate
+        size = surface.size() if math.isfinite(surface.size()) else scene.finite_size()
+        widths[k] = width if surface.inertia is None else width / size
+    series = np.zeros((3 * TERMS, count))
+    made = Freedoms(shift, velocity, rest, angle, rate, rate_rest, series, time, middle, turning, widths, until)
+    for wall in _reacting(scene):
+        if isinstance(wall.freedom, Pendulum):
+            wall.freedom.expand(made)
+    return made
+
+
+class Observed(NamedTuple):
+    """The surfaces of a scene as observed: those that react where they are, and how they move."""
+
+    position: Floats  # (surfaces, 3) where what is given at the origin is [m]
+    orientation: Floats  # (surfaces, 4) quaternions (w, x, y, z)
+    velocity: Floats  # (surfaces, 3) [m/s]
+    spin: Floats  # (surfaces, 3) [rad/s]
+    kinetic: Floats  # (surfaces,) [J]
+    potential: Floats  # (surfaces,) of gravity and springs, 0 at the start [J]
+
+
+def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
+    """The surfaces of a scene at a moment [s], at which the walls that react have been brought to the time 0."""
+    count, row = len(scene.surfaces), 0
+    poses, gravity = scene.poses(moment), np.array(scene.gravity or (0.0, 0.0, 0.0))
+    found = Observed(
+        np.array([pose.position() for pose in poses]), np.array([pose.quaternion for pose in poses]),
+        *np.zeros((2, count, 3)), *np.zeros((2, count)),
+    )  # fmt: skip
+    for i, surface in enumerate(scene.surfaces):
+        if not surface.reacts():
+            continue
+        motion, shift, v = surface.motion, freedoms.shift[:, row], freedoms.velocity[:, row]
+        found.position[i], found.orientation[i] = shift, (1.0, 0.0, 0.0, 0.0)
+        if surface.mass is not None and surface.inertia is None:
+            found.velocity[i] = v
+            found.kinetic[i] = 0.5 * surface.mass * (v**2).sum()
+            stiffness = motion.stiffness if isinstance(motion, Guide) else 0.0
+            found.potential[i] = 0.5 * stiffness * (shift**2).sum() - surface.mass * (gravity * shift).sum()
+        elif surface.inertia is not None:
+            rate = freedoms.rate[row]
+            turned = pose(Rotation(motion.axis, freedoms.angle[row], motion.center), 1.0)
+            found.position[i], found.orientation[i] = turned.position(), turned.quaternion
+            found.spin[i], found.kinetic[i] = rate * unit_axis(motion), 0.5 * surface.inertia * rate**2
+            if surface.mass is not None:
+                center = np.array(surface.center)  # type: ignore[attr-defined]
+                fallen = turned.placed(center[:, None])[:, 0] - center
+                found.potential[i] = -surface.mass * (gravity * fallen).sum()
+        row += 1
+    return found
+
+
+def walls_now(scene: Scene, scenery: SceneWalls, freedoms: Freedoms) -> Walls:
+    """All walls of a scene, in its order, at the end of the frame of `scenery`."""
+    given = iter(scenery.given.at(0.0).each)
+    reacting = (wall.freedom.posed(wall.body, freedoms, 0.0) for wall in scenery.reacting)
+    return Walls(tuple(next(reacting if scene.surfaces[i].reacts() else given) for i in scene.owners()))

@@ -1,0 +1,253 @@
+"""The ways in which a wall that reacts may move: freely without turning, along a guide, on a spring, about an axis.
+
+Between two impacts its motion is known. What impacts may make of it is bounded by a lease: until the wall has left it,
+the velocity stays within a width of a middle one, so that what was said of far particles holds.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from ...kernel.arrays import index
+from ...kernel.jit import Array, select
+from ...kernel.record import Record
+from ...kernel.vector import ZERO, Vec, column, dot, norm, put, square
+from ...surfaces.in_motion.drive import Drive, PoseDerivatives, Swing
+from ...surfaces.in_motion.moving import Moving
+from ...surfaces.in_motion.posed import Posed
+from ...surfaces.time_of_impact import flights, safe
+from ...surfaces.time_of_impact.rising import flight_of
+from ...surfaces.walls import Walls
+
+
+class Freedoms(NamedTuple):
+    """The motion of the walls that react: arrays of one column a wall."""
+
+    shift: Array  # (3, K) the displacement at `time` [m]
+    velocity: Array  # (3, K) [m/s]
+    rest: Array  # (3, K) what round-off took of it: a heavy wall is struck a million times by what is light
+    angle: Array  # (K,) [rad]
+    rate: Array  # (K,) [rad/s]
+    rate_rest: Array  # (K,)
+    series: Array  # (.., K) of pendulums, the Taylor coefficients of the angle from that time on
+    time: Array  # (K,) since the start of the frame [s]
+    middle: Array  # (3, K) of the velocities of its lease
+    turning: Array  # (K,) of the rates of its lease
+    width: Array  # (K,) by how much both may differ from that, [m/s] or [rad/s]
+    until: Array  # (K,) when it may leave the lease by what pulls it [s]
+
+
+class ParticleFlight(NamedTuple):
+    """A particle at a time of the frame, and how far ahead of it matters [s]."""
+
+    r: Vec
+    v: Vec
+    pull: Vec
+    time: float
+    longest: float
+
+
+class Lease(Record):
+    """A particle in the frame that moves with the middle velocity of a lease, which the wall leaves by little.
+
+    There the wall stays within the width times the time of where it is: for a plane and a ball the first time at which
+    a flight is as near as that is the root of a parabola.
+    """
+
+    r: Vec
+    v: Vec
+    a: Vec
+    width: float
+    axis: Any  # along which the wall may leave it, or None
+    longest: float
+
+    def width_along(self, n):
+        """The width along a unit vector."""
+        return self.width if self.axis is None else self.width * abs(dot(self.axis, n))
+
+
+class Falling(Posed):
+    """A wall at one instant of a free motion with a constant acceleration, or none."""
+
+    def first_hit(self, r, v):
+        return self.body.first_hit(r - self.pose.shift, v - self.pose.velocity)
+
+    def falling_hit(self, r, v, pull):
+        way, speed = r - self.pose.shift, v - self.pose.velocity
+        return self.body.falling_hit(way, speed, pull - self.pose.acceleration)
+
+
+_AT_REST = Drive(ZERO, ZERO, (), None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
+
+
+class Freedom(Record):
+    """A way to move of a wall, by its `row` among the `walls` and its `lightness`, 1/M or 1/I; times are of a frame."""
+
+    def pose(self, walls, t):
+        """Its `PoseDerivatives` at a time."""
+        raise NotImplementedError
+
+    def drive(self, walls, t):
+        """Its motion from a time on as that of a wall whose motion is given, whose frame ends then."""
+        raise NotImplementedError
+
+    def posed(self, body, walls, t):
+        """The wall at a time, as a surface."""
+        drive = self.drive(walls, t)
+        here = drive.pose(0.0)
+        return Posed(body, here, here, drive, 0.0, 0.0)
+
+    def arm(self, r):
+        """From the centre of the rotation to a point."""
+        return r
+
+    def mobility(self, n, arm):
+        """The velocity along n that a unit impulse along n gives the wall at the end of the arm [1/kg]."""
+        raise NotImplementedError
+
+    def push(self, walls, t, impulse, arm):
+        """Give the wall an impulse at a time, at the end of an arm from its centre."""
+        raise NotImplementedError
+
+    def begin_lease(self, walls, t):
+        """Make the velocity at a time the middle of a lease."""
+        raise NotImplementedError
+
+    def away(self, walls):
+        """The distance of the velocity from the middle of its lease."""
+        raise NotImplementedError
+
+    def keeps(self, walls, more):
+        """The time that the wall stays in its lease [s] by its pull, while its velocity may change by so much more."""
+        raise NotImplementedError
+
+    def renew(self, walls, t):
+        """A new lease from a time on, about the velocity that the wall has."""
+        k = index(self.row)
+        self.begin_lease(walls, t)
+        walls.until[k] = t + self.keeps(walls, walls.width[k])
+
+    def stays(self, walls):
+        """Whether a wall that was just struck is within its lease; says until when."""
+        k, away = index(self.row), self.away(walls)
+        walls.until[k] = walls.time[k] + self.keeps(walls, walls.width[k] - away)
+        return away < walls.width[k]
+
+    def reach(self, body, walls, flight):
+        """A time during which the flight surely does not meet this wall, at most the longest that matters."""
+        raise NotImplementedError
+
+    def hit(self, body, gravity, walls, flight):
+        """When a flight meets the wall: (time, whether it does then)."""
+        return march(Moving(body, self.drive(walls, flight.time)), flight, flight.longest)
+
+
+def march(wall, flight, longest):
+    """`Freedom.hit` of a wall that is met by safe steps, within so long [s]."""
+    found = safe.march_moving(Walls((wall,)), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
+    return found.time, found.wall >= 0.0
+
+
+# --- Without turning -------------------------------------------------------------------------------------
+
+
+class Shifted(Freedom):
+    """A wall that does not turn, pulled by its weight: in any direction, or along a guide, where it may have a spring.
+
+    The spring is relaxed where the wall is given.
+    """
+
+    row: int
+    lightness: float
+    pull: Vec  # along the axis, if there is one
+    axis: Any  # of the guide, or None
+    rate: Any  # of the vibration on the spring [rad/s], or None
+
+    def pose(self, walls, t):
+        k = index(self.row)
+        t = t - walls.time[k]
+        if self.rate is not None:
+            # s = s_e + (s0 - s_e) cos wt + V/w sin wt about the equilibrium s_e = a/w^2
+            rate, (away, speed) = self.rate, self.swing(column(walls.shift, 0, k), column(walls.velocity, 0, k))
+            c, s = math.cos(rate * t), math.sin(rate * t)
+            here = c * away + s * speed
+            return PoseDerivatives(
+                self.equilibrium() + here, rate * (c * speed - s * away), (-rate * rate) * here, None
+            )
+        # s = s0 + V t + a t^2/2
+        v, pull = column(walls.velocity, 0, k), self.pull
+        return PoseDerivatives(column(walls.shift, 0, k) + t * (v + (0.5 * t) * pull), v + t * pull, pull, None)
+
+    def equilibrium(self):
+        """The displacement at which the spring holds it."""
+        return self.pull / (self.rate * self.rate)
+
+    def swing(self, shift, velocity):
+        """Its distance from there, and its velocity over the rate."""
+        return shift - self.equilibrium(), velocity / self.rate
+
+    def drive(self, walls, t):
+        found, rate = self.pose(walls, t), self.rate
+        away, speed = self.swing(found.shift, found.velocity)
+        most = math.sqrt(square(away) + square(speed))
+        bounds = rate * most, rate * rate * most, rate * rate * rate * most
+        swings, jerks = (Swing(away, speed, rate),), Vec(bounds[2], bounds[2], bounds[2])
+        return Drive(found.shift, ZERO, swings, None, None, None, ZERO, *bounds, math.inf, 0.0, jerks)
+
+    def posed(self, body, walls, t):
+        if self.rate is not None:
+            return super().posed(body, walls, t)
+        here = self.pose(walls, t)
+        return Falling(body, here, here, _AT_REST, 0.0, 0.0)
+
+    def mobility(self, n, arm):
+        if self.axis is None:
+            return self.lightness * square(n)
+        along = dot(n, self.axis)
+        return self.lightness * along * along
+
+    def push(self, walls, t, impulse, arm):
+        change = self.lightness * impulse
+        if self.axis is not None:
+            change = (self.lightness * dot(impulse, self.axis)) * self.axis
+        k, here = index(self.row), self.pose(walls, t)
+        velocity, rest = exact_sum(here.velocity, change + column(walls.rest, 0, k))
+        put(walls.shift, 0, k, here.shift)
+        put(walls.velocity, 0, k, velocity)
+        put(walls.rest, 0, k, rest)
+        walls.time[k] = t
+
+    def hardest(self, walls):
+        """A bound of the wall's acceleration between impacts [m/s^2]."""
+        if self.rate is None:
+            return norm(self.pull)
+        k = index(self.row)
+        away, speed = self.swing(column(walls.shift, 0, k), column(walls.velocity, 0, k))
+        return self.rate * self.rate * math.sqrt(square(away) + square(speed))
+
+    def begin_lease(self, walls, t):
+        put(walls.middle, 0, index(self.row), self.pose(walls, t).velocity)
+
+    def away(self, walls):
+        k = index(self.row)
+        return norm(column(walls.velocity, 0, k) - column(walls.middle, 0, k))
+
+    def keeps(self, walls, more):
+        most = self.hardest(walls)
+        return select(most > 0.0, more / select(most > 0.0, most, 1.0), math.inf)
+
+    def reach(self, body, walls, flight):
+        k = index(self.row)
+        r, v = flight.r - self.pose(walls, flight.time).shift, flight.v - column(walls.middle, 0, k)
+        return body.reach(Lease(r, v, flight.pull, walls.width[k], self.axis, flight.longest))
+
+    def hit(self, body, gravity, walls, flight):
+        if self.rate is not None:
+            return super().hit(body, gravity, walls, flight)
+        return flights.hit(gravity, self.posed(body, walls, flight.time), flight.r, flight.v)
+
+
+def exact_sum(a, b):
+    """a + b and what round-off takes of it (Knuth)."""
+    found = a + b
+    other = found - a
+    return found, (a - (found - other)) + (b - other)

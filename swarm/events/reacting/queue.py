@@ -1,0 +1,291 @@
+"""Impacts in order of time: what is next for each particle waits in a heap, and one thread takes the first of all.
+
+A particle that is far from every wall that reacts is looked at again after its reach, or at its next impact on another
+wall. One that is near has the time of its impact, which holds until a wall that reacts is struck: then those that are
+near are looked at again, and all of them only when a wall leaves its lease. So an impact costs some operations of the
+heap, not a prediction for every particle.
+"""
+
+from typing import Any, NamedTuple
+
+from ...common.status import Status
+from ...contact.laws import Laws
+from ...contact.reflection import Energy, exact
+from ...kernel.arrays import index
+from ...kernel.gravity import accelerated, displacement, potential
+from ...kernel.heap import Heap, build, change
+from ...kernel.jit import Array, long_kernel, outlined, select
+from ...kernel.vector import ZERO, column, put, square
+from ...surfaces.in_motion.moving import Marched
+from ...surfaces.time_of_impact import flights, safe
+from .freedoms import ParticleFlight
+from .walls import all_stay, first_hit, reach_of_all, strike
+
+# What is next for a particle besides the impact on a wall that reacts, whose number is 0 or more: nothing that was
+# found, so that it is looked at again.
+NONE = -1.0
+# Of a clock: the time in the frame; of the run, the time before the frame and the strikes of walls that react; how many
+# events were taken since the leases began.
+NOW, BEFORE, STRIKES, TAKEN, CLOCK = 0, 1, 2, 3, 4
+# Impacts of one particle in one frame after which it is given up.
+MOST_HITS = 10_000_000
+# Each of those between which no time passes is as many: an inelastic collapse ends sooner, the tip of a wedge does not.
+AT_ONCE = 1000
+# |v|^2 is restored where it is off by no more than this part: of a particle that all but stops nothing is left.
+_NEAR = 1e-6
+
+
+class SceneWalls(NamedTuple):
+    """The walls of a scene: those that do not react, their laws and their numbers in the scene; those that do."""
+
+    given: Any  # None, or the walls
+    laws: Laws
+    owners: Array  # (given walls,)
+    reacting: Any
+    pull: Any  # gravity, or None
+
+
+class Queue(NamedTuple):
+    """The particles between two impacts, and what is next for each: arrays of one column a particle."""
+
+    position: Array  # (3, N) at `time`
+    velocity: Array  # (3, N)
+    mass: Array  # (N,)
+    energy: Array  # (N,) per mass
+    impulse: Array  # (2 walls, N) then the work of walls that move
+    dissipated: Array  # (N,)
+    impacts: Array  # (N,)
+    time: Array  # (N,) of the frame [s]
+    wait: Array  # (N,) from then until it meets a wall that does not react [s]
+    due: Array  # (N,) when that is
+    wall: Array  # (N,) that wall, or -1 where only so much is known
+    struck: Array  # (N,) the wall that reacts that it meets at its key, or NONE
+    near: Array  # (N,) bool, whether its key holds only until a wall that reacts is struck
+    hits: Array  # (N,) of this frame
+    listed: Array  # (N,) bool, whether it is in `close`
+    close: Array  # (N,) those that are near, and some that were
+    heap: Heap
+    counts: Any = None  # (walls,) int64, impacts on each, where they are counted
+
+
+class ReactionRule(NamedTuple):
+    """The end of the frame [s], and when to stop."""
+
+    end: float
+    halt: Array  # (1,) events
+
+
+# --- Of one particle -------------------------------------------------------------------------------------
+
+
+def _aim(scenery, queue, i, end):
+    """Find when particle i meets a wall that does not react, from where it is."""
+    walls, t, r, v = scenery.given, queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
+    if isinstance(walls, Marched):
+        hit = safe.first_hit_moving(walls, scenery.pull, r, v, end - t)
+    else:
+        hit = flights.first_hit(walls.at(end - t), scenery.pull, r, v)
+    queue.wait[i], queue.due[i], queue.wall[i] = hit.time, t + hit.time, hit.wall
+
+
+def _seen(scenery, queue, i, now, end):
+    """The `ParticleFlight` of particle i at a time."""
+    t, r, v = now - queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
+    pull, target = scenery.pull, select(queue.due[i] < end, queue.due[i], end)
+    here = r + displacement(pull, v, t)
+    return ParticleFlight(here, accelerated(pull, v, t), ZERO if pull is None else pull, now, target - now)
+
+
+def _next(scenery, walls, queue, i, now, end, soon):
+    """The time at which something may happen to particle i: by its reach if that is far, else as it is now."""
+    flight = _seen(scenery, queue, i, now, end)
+    target = now + flight.longest
+    free = reach_of_all(scenery.reacting, walls, flight)
+    queue.near[i], queue.struck[i] = False, NONE
+    if not free < flight.longest:
+        return target
+    if free > soon:
+        return now + free
+    queue.near[i] = True
+    hit = first_hit(scenery.reacting, scenery.pull, walls, flight)
+    if not hit.time < flight.longest:
+        return target
+    queue.struck[i] = hit.wall
+    return now + hit.time
+
+
+def _fly(scenery, queue, i, t, way):
+    """Bring particle i to a time, which is so long from where it is."""
+    v, pull = column(queue.velocity, 0, i), scenery.pull
+    put(queue.position, 0, i, column(queue.position, 0, i) + displacement(pull, v, way))
+    put(queue.velocity, 0, i, accelerated(pull, v, way))
+    queue.time[i] = t
+
+
+@outlined
+def _bounce(scenery, queue, i, wall, remaining):
+    """The impact of particle i on a wall that does not react."""
+    r, v, m, twice = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i], 2.0 * queue.energy[i]
+    energy = Energy(twice, select(twice > 0.0, 0.5 / select(twice > 0.0, twice, 1.0), 0.0))
+    bounce = exact(scenery.laws, scenery.given.at(remaining), scenery.pull, wall, r, v, energy)
+    put(queue.velocity, 0, i, bounce.v)
+    owner = index(scenery.owners[int(wall)])
+    queue.impulse[owner, i] += m * bounce.impulse
+    queue.impulse[index(queue.impulse.shape[0] // 2) + owner, i] += 0.5 * m * bounce.work
+    queue.dissipated[i] += 0.5 * m * (twice - (bounce.twice_energy - bounce.work))
+    queue.energy[i] = 0.5 * bounce.twice_energy
+    queue.impacts[i] += bounce.impulse > 0.0
+    if queue.counts is not None:
+        queue.counts[owner] += bounce.impulse > 0.0
+
+
+@outlined
+def _strike(scenery, walls, queue, i, now):
+    """The impact of particle i on a wall that reacts."""
+    r, v, m = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i]
+    blow = strike(scenery.reacting, queue.struck[i], walls, ParticleFlight(r, v, ZERO, now, 0.0), m)
+    # The energy decides the speed, as for walls that stay: round-off of J has a bias, 1e-16 of the energy an impact.
+    energy = queue.energy[i] - (blow.given + blow.lost) / m
+    speed2 = 2.0 * (energy - potential(scenery.pull, blow.r))
+    error = speed2 - square(blow.v)
+    near = (abs(error) <= _NEAR * speed2) & (speed2 > 0.0)
+    turned = blow.v * (1.0 + select(near, 0.5 * error / select(near, speed2, 1.0), 0.0))
+    put(queue.position, 0, i, blow.r)
+    put(queue.velocity, 0, i, turned)
+    queue.energy[i] = select(near, energy, 0.5 * square(turned) + potential(scenery.pull, blow.r))
+    queue.impulse[index(blow.owner), i] += blow.impulse
+    queue.dissipated[i] += blow.lost
+    queue.impacts[i] += blow.impulse > 0.0
+    if queue.counts is not None:
+        queue.counts[index(blow.owner)] += blow.impulse > 0.0
+
+
+# --- Of all ----------------------------------------------------------------------------------------------
+
+
+def _soon(clock):
+    """The mean time from one strike of a wall that reacts to the next.
+
+    A particle that may meet such a wall sooner is looked at again after the next strike.
+    """
+    return (clock[BEFORE] + clock[NOW]) / (1.0 + clock[STRIKES])
+
+
+@long_kernel
+def predict(scenery, freedoms, queue, clock, rule, first, last):
+    """Find the next events of the particles from `first` to before `last`; no other is touched.
+
+    At the start of a frame also when they meet walls that do not react.
+    """
+    now = clock[NOW]
+    for k in range(first, last):
+        i = index(k)
+        if now == 0.0:
+            queue.time[i], queue.hits[i] = 0.0, 0
+            _aim(scenery, queue, i, rule.end)
+        queue.heap.key[i] = _next(scenery, freedoms, queue, i, now, rule.end, _soon(clock))
+
+
+@long_kernel
+def arrive(scenery, queue, rule, first, last):
+    """Bring the particles from `first` to before `last` to the end of the frame."""
+    for k in range(first, last):
+        _fly(scenery, queue, index(k), rule.end, rule.end - queue.time[index(k)])
+
+
+@long_kernel
+def lease(scenery, freedoms, clock):
+    """New leases of the walls, from the time of the clock on."""
+    for wall in scenery.reacting:
+        wall.freedom.renew(freedoms, clock[NOW])
+    clock[TAKEN] = 0.0
+
+
+@long_kernel
+def settle(scenery, freedoms, t):
+    """Bring the walls to a time of the frame, which their motions are counted from."""
+    for wall in scenery.reacting:
+        wall.freedom.push(freedoms, t, ZERO, ZERO)
+
+
+def _list(queue, close, i):
+    """The number of those that are listed, with particle i if it is near."""
+    if queue.near[i] and not queue.listed[i]:
+        queue.listed[i] = True
+        queue.close[close] = i
+        close += 1
+    return close
+
+
+@outlined
+def _look_again(scenery, freedoms, queue, clock, rule, close):
+    """After a strike: what is next for those that are near; how many are."""
+    heap, kept = queue.heap, 0
+    for k in range(close):
+        item = queue.close[k]
+        i = index(item)
+        if queue.near[i]:
+            change(heap, item, _next(scenery, freedoms, queue, i, clock[NOW], rule.end, _soon(clock)))
+        queue.listed[i] = queue.near[i]
+        queue.close[kept] = item
+        kept += queue.near[i]
+    return kept
+
+
+def _carry_out(scenery, freedoms, queue, i, now, end):
+    """The impact of particle i that is due, on whichever wall, and when it meets the next that does not react."""
+    queue.hits[i] += select(now > queue.time[i], 1, AT_ONCE)
+    # The time of the frame has fewer digits than the flight.
+    way = select(queue.struck[i] >= 0.0, now - queue.time[i], queue.wait[i])
+    _fly(scenery, queue, i, now, way)
+    if queue.struck[i] >= 0.0:
+        _strike(scenery, freedoms, queue, i, now)
+    elif queue.wall[i] >= 0.0:
+        _bounce(scenery, queue, i, queue.wall[i], end - now)
+    _aim(scenery, queue, i, end)
+    return queue.hits[i] <= MOST_HITS
+
+
+def _listed(queue):
+    """List those that are near; how many there are."""
+    close = 0
+    for k in range(queue.near.size):
+        queue.listed[index(k)] = False
+        close = _list(queue, close, index(k))
+    return close
+
+
+@long_kernel
+def take(scenery, freedoms, queue, clock, rule):
+    """Take event after event until the end of the frame: (status, particle).
+
+    LEASE_ENDED at the time of the clock: call `lease` and `predict`, and then this again. INTERRUPTED after so many
+    events as the rule says; it goes on with the same bits.
+    """
+    heap, end, taken = queue.heap, rule.end, 0
+    build(heap)
+    close = _listed(queue)
+    # When the first lease may end without a strike
+    until = min(freedoms.until)
+    while True:
+        item = heap.item[0]
+        i = index(item)
+        now = heap.key[i]
+        if not now < min(until, end):
+            clock[NOW] = min(until, end)
+            return (Status.LEASE_ENDED.value if until < end else Status.DONE.value), 0
+        if taken >= rule.halt[0]:
+            return Status.INTERRUPTED.value, 0
+        taken += 1
+        clock[NOW], clock[TAKEN] = now, clock[TAKEN] + 1.0
+        wall = queue.struck[i]
+        if (wall >= 0.0 or queue.due[i] <= now) and not _carry_out(scenery, freedoms, queue, i, now, end):
+            return Status.STALLED.value, item
+        if wall >= 0.0:
+            clock[STRIKES] += 1.0
+            if not all_stay(scenery.reacting, wall, freedoms):
+                return Status.LEASE_ENDED.value, 0
+            until = min(freedoms.until)
+            close = _look_again(scenery, freedoms, queue, clock, rule, close)
+        change(heap, item, _next(scenery, freedoms, queue, i, now, end, _soon(clock)))
+        close = _list(queue, close, i)

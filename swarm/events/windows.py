@@ -1,0 +1,61 @@
+"""The windows of a run of balls: spans of time in which its walls have one description, whatever the frames are."""
+
+from typing import Any
+
+import numpy as np
+
+from ..scene import Scene
+from ..state import Floats
+from .colliding.clock import EPOCHS, LENGTH
+from .colliding.window import END, MOMENT, PASSED, WINDOW
+from .reacting.described import scenery_of
+
+
+class Windows:
+    """The windows of a scene whose walls move, come or go: each is an epoch, or a part of one between two instants.
+
+    Attributes:
+        numbers: of the window, as kernels take them.
+    """
+
+    def __init__(self, scene: Scene, clock: Floats) -> None:
+        self._scene, self._clock = scene, clock
+        self._instants = scene.instants
+        self.numbers = np.zeros(WINDOW)
+
+    def is_at_epoch(self) -> bool:
+        """Whether the window ends with the epoch."""
+        return bool(self.numbers[END] == self._clock[LENGTH])
+
+    def instant(self) -> float | None:
+        """The instant at which the window ends [s], if that is why it does."""
+        passed = int(self.numbers[PASSED])
+        return self._instants[passed - 1] if passed and self._instants[passed - 1] == self.numbers[MOMENT] else None
+
+    def begin(self, now: float) -> None:
+        """The window that begins at a time of the epoch [s]."""
+        epochs, length = self._clock[EPOCHS], self._clock[LENGTH]
+        end, moment, passed = length, (epochs + 1.0) * length, int(self.numbers[PASSED])
+        if passed < len(self._instants) and self._instants[passed] <= moment:
+            moment = self._instants[passed]
+            # By round-off none is without length.
+            end = min(moment - epochs * length, length)
+            passed += 1
+        self.numbers[:] = end, end - now, passed, moment
+
+    def walls(self) -> Any:
+        """The walls as kernels take them in this window."""
+        moment = float(self.numbers[MOMENT])
+        return scenery_of(self._scene, moment).given if self._scene.reacts() else self._scene.walls(moment)
+
+    def openings(self) -> Any:
+        """The openings in it."""
+        return self._scene.openings(float(self.numbers[MOMENT]))
+
+
+def windows_of(scene: Scene, clock: Floats) -> Windows | None:
+    """The windows of a scene, None where its walls are always the same."""
+    moves = scene.moves()
+    if scene.reacts():
+        moves = any(surface.motion is not None for surface in scene.surfaces if not surface.reacts())
+    return Windows(scene, clock) if moves or scene.has_doors() else None

@@ -1,0 +1,1 @@
+"""Trajectories and walls in the formats of other programs."""

@@ -1,0 +1,115 @@
+"""The part of a trajectory that is exported: some of its frames, and some of its particles or bodies."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common import checks
+from ..errors import SceneError
+from ..files.stored import whole
+
+# A function of the number of frames that are written and of the number of all frames to write.
+Progress = Callable[[int, int], None]
+
+
+class ExportedFrame(NamedTuple):
+    """A frame; rows are particles, as in files."""
+
+    number: int
+    time: float  # [s]
+    position: NDArray[Any]  # (n, 3) [m]
+    velocity: NDArray[Any]  # (n, 3) [m/s]
+    # Further columns by their names, (n,) or (n, 3): "impacts"; where there are some, "image", "escape_time",
+    # "absorbed_time"; of balls "collisions" and "spin".
+    more: dict[str, NDArray[Any]]
+    ids: NDArray[np.int64]  # (n,) numbers of the particles
+    mass: NDArray[np.float64]  # (n,) [kg]
+
+
+class Exported:
+    """The chosen frames and particles of a trajectory.
+
+    Attributes:
+        trajectory: what is exported.
+        numbers, times: of the frames, times in [s].
+        ids: (n,) numbers of the particles; mass: (n,) [kg]; radius: (n,) of balls [m], else None.
+        bonds: (B, 2) rows that are tied, of bodies.
+        periods: the lengths of the cell, 0 along directions in which it does not repeat.
+    """
+
+    def __init__(self, trajectory: Any, frames: slice | int | None, particles: int, progress: Progress | None) -> None:
+        """Choose: `frames` is a slice or one number, `particles` k is every k-th particle or body.
+
+        Raises:
+            SceneError: there is no such frame, or the file keeps no particles.
+        """
+        self.trajectory, self._progress = trajectory, progress
+        trajectory.require_frames()
+        self.numbers = numbers_of(frames, len(trajectory))
+        self.times = trajectory.times[list(self.numbers)]
+        checks.count("particles", particles)
+        ids, size = trajectory.ids, trajectory.copies
+        # Point p of body i is particle p n + i: a body is exported whole, or not.
+        some = np.arange(len(ids)) % particles == 0 if not size else ids % size % particles == 0
+        self._rows: Any = slice(None) if some.all() else np.flatnonzero(some)
+        self.ids = ids[self._rows]
+        self.mass = trajectory.frame(self.numbers[0]).mass[self._rows]
+        radius = trajectory.radius
+        self.radius = None if radius is None else radius[self._rows]
+        self.bonds = _among(self.ids, trajectory.bonds)
+        self.periods = np.array([length or 0.0 for length in trajectory.scene.period or (None,) * 3])
+
+    def __len__(self) -> int:
+        """Number of particles of the frame with the most."""
+        return len(self.ids)
+
+    @property
+    def counts(self) -> list[int]:
+        """The number of particles of each frame: those that come during the run are the last, in this order."""
+        if not self.trajectory.has_births():
+            return [len(self)] * len(self.numbers)
+        born = self.trajectory.birth_time[self._rows]
+        return [int((born <= time).sum()) for time in self.times.tolist()]
+
+    def moments(self) -> Iterator[ExportedFrame]:
+        """The frames one after the other, each of which is written when the next is asked for.
+
+        Particles that are not yet born in a run with sources are left out.
+        """
+        for done, (number, time) in enumerate(zip(self.numbers, self.times.tolist(), strict=True)):
+            held = {name: column[self._rows] for name, column in self.trajectory.columns(number).items()}
+            there = ~np.isnan(held["position"][:, 0])
+            if not there.all():
+                held = {name: column[there] for name, column in held.items()}
+            position, velocity = held.pop("position"), held.pop("velocity")
+            yield ExportedFrame(number, time, position, velocity, held, self.ids[there], self.mass[there])
+            if self._progress is not None:
+                self._progress(done + 1, len(self.numbers))
+
+
+def numbers_of(frames: slice | int | None, n: int) -> range:
+    """The numbers of the chosen ones of n frames."""
+    if frames is None:
+        return range(n)
+    if isinstance(frames, slice):
+        try:
+            found = range(n)[frames]
+        except (TypeError, ValueError) as error:
+            raise SceneError(
+                f"frames must be a slice of whole numbers with a step other than 0, got {frames}"
+            ) from error
+        if not found:
+            raise SceneError(f"frames must hold one of the frames 0 to {n - 1}, got {frames}")
+        return found if found.step > 0 else found[::-1]
+    k = whole("frames", frames)
+    if not -n <= k < n:
+        raise SceneError(f"frames must lie between {-n} and {n - 1}, got {k}")
+    return range(k % n, k % n + 1)
+
+
+def _among(ids: NDArray[np.int64], bonds: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The pairs of particles, of which both are exported, as rows."""
+    rows = np.searchsorted(ids, bonds).clip(max=len(ids) - 1)
+    return np.asarray(rows[(ids[rows] == bonds).all(axis=1)])

@@ -1,0 +1,98 @@
+"""Wavefront OBJ: the walls at one frame, each surface an object of its own, for Blender, game engines and CAD.
+
+Corners have all digits, in [m]. The triangles of an object face out of what it encloses, as programs of CAD have it:
+those of a cavity away from the particles, those of a solid towards them. The materials `cavity`, which is translucent,
+and `solid` are in the .mtl file beside it. Surfaces of more than 20 000 bodies are left out, which a comment says.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from ..pictures import colours
+from ..scene import Scene
+from ..state import Floats
+from ..surfaces.instant import side_of
+from ..triangles.shape import Shape
+from ..triangles.shapes import bodies_of, shapes_of, since_start
+
+# Bodies of one surface that are drawn: each has some 200 vertices.
+_MOST = 20_000
+# How far beside a triangle it is asked on which side of it the particles are, of its size.
+_BESIDE = 1e-3
+_OPACITY = {"cavity": 0.3, "solid": 1.0}
+
+
+def materials_of(target: Path) -> Path:
+    """The name of the file of materials."""
+    return target.with_suffix(".mtl")
+
+
+def write_objects(trajectory: Any, number: int, path: Path, materials: Path) -> None:
+    """Write the walls at a frame, and their materials."""
+    scene, time = trajectory.scene, float(trajectory.times[number])
+    encode = msgspec.json.Encoder().encode
+    with open(path, "wb") as file:
+        file.write(f"# swarm: walls at frame {number}, {time!r} s, in m\nmtllib {materials.name}\n".encode())
+        first = 1
+        for shape in walls_at(trajectory, number, time):
+            count = bodies_of(scene.surfaces[shape.surface])
+            if not len(shape.triangles):
+                if count > _MOST:
+                    file.write(f"# {shape.name}: {count} bodies, more than {_MOST}, are left out\n".encode())
+                continue
+            corners = encode(shape.vertices.tolist())[2:-2].replace(b"],[", b"\nv ").replace(b",", b" ")
+            triangles = encode((shape.triangles + first).tolist())[2:-2].replace(b"],[", b"\nf ").replace(b",", b" ")
+            material = f"usemtl {'solid' if shape.solid else 'cavity'}".encode()
+            file.write(f"o {shape.name}\nv ".encode() + corners + b"\n" + material + b"\nf " + triangles + b"\n")
+            first += len(shape.vertices)
+    with open(materials, "w", encoding="ascii") as out:
+        for name, colour in (("cavity", colours.CAVITY), ("solid", colours.SOLID)):
+            shade = " ".join(f"{int(colour[k : k + 2], 16) / 255.0:.4f}" for k in (1, 3, 5))
+            out.write(f"newmtl {name}\nKd {shade}\nd {_OPACITY[name]:g}\nillum 1\n")
+
+
+def walls_at(trajectory: Any, number: int, time: float) -> list[Shape]:
+    """The walls at a frame, where they are then, if they are there; their triangles face outwards."""
+    scene = trajectory.scene
+    positions = trajectory.frame(number).position if trajectory.has_particles() else np.zeros((3, 1))
+    if not any(surface.reacts() for surface in scene.surfaces):
+        drawn = shapes_of(scene, positions, time, most=_MOST)
+        return [replace(shape, triangles=outwards(scene, shape, time)) for shape in drawn]
+    # Where impacts have moved them is known from the file alone.
+    seen, found = trajectory.observables, []
+    places = seen["wall_position"][number], seen["wall_orientation"][number]
+    for shape in shapes_of(scene, positions, most=_MOST):
+        turn, way = since_start(scene, shape, time, places)
+        faces = outwards(scene, shape, 0.0)
+        found.append(replace(shape, vertices=shape.vertices @ turn.T + way, triangles=faces))
+    return found
+
+
+def outwards(scene: Scene, shape: Shape, time: float) -> NDArray[np.int64]:
+    """The triangles of a shape, turned so that those of a cavity face away from the particles, of a solid to them."""
+    if not len(shape.triangles):
+        return shape.triangles
+    a, b, c = (shape.vertices[shape.triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    size = np.sqrt(np.sqrt((normals**2).sum(axis=1, keepdims=True)))
+    steps = _BESIDE * normals / np.maximum(size, np.finfo(np.float64).tiny)
+    middles = (a + b + c) / 3.0
+    with np.errstate(all="ignore"):
+        ahead, behind = (_gap(scene, shape.surface, place, time) for place in (middles + steps, middles - steps))
+        rises = np.nan_to_num((ahead - behind) / size[:, 0], posinf=0.0, neginf=0.0)
+    # Slivers, of which round-off decides, face as most do.
+    clear = abs(rises) > 0.1 * np.median(abs(rises))
+    sign = np.where(clear, np.sign(rises), np.sign(np.sign(rises).sum()))
+    return np.where((sign < 0.0)[:, None] ^ shape.solid, shape.triangles[:, ::-1], shape.triangles)
+
+
+def _gap(scene: Scene, i: int, points: Floats, time: float) -> Floats:
+    """The gap of surface i at points (N, 3)."""
+    if scene.period is not None:
+        return np.asarray(scene.gaps(points.T, time)[i])
+    return np.asarray(side_of(scene.surfaces[i]) * scene.surfaces[i].phi(points.T, time))

@@ -1,0 +1,144 @@
+"""The walls of a trajectory as VTKHDF: triangles, and the solids of large fields, at rest or where they are in a frame.
+
+Cells of triangles have the data "surface", the place in `scene.surfaces`, and "solid", 1 where particles are kept out
+of it; where there are unions also "part", the number of the part among those of all of them, or -1.
+
+The solids of fields of more than 2000 are points of a file of their own: with "surface", "kind" (0 spheres, 1 boxes,
+2 cylinders, 3 capsules, 4 ellipsoids), "radius" [m] of what has one, "halves", half of the extent along their axes
+[m], and "orientation", a quaternion (w, x, y, z). ParaView draws spheres as Point Gaussian, or by Glyph of a Sphere of
+radius 1 that is scaled by "radius", others by Glyph of a Box, Cylinder or Sphere of half widths 1 that is scaled by
+"halves" and turned by "orientation", in mode Quaternion. A million take 120 MB.
+"""
+
+import bisect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from ..scene import Scene
+from ..triangles.shape import Shape
+from ..triangles.shapes import shapes_of, since_start
+from ..triangles.solids import MANY, Solids, is_many, solids_of
+from . import vtkhdf
+from .exported import Exported
+
+KINDS = ("spheres", "boxes", "cylinders", "capsules", "ellipsoids")
+
+
+def shapes(chosen: Exported) -> list[Shape]:
+    """The walls at the start, as far as there were particles in the first frame that is exported."""
+    positions = chosen.trajectory.frame(chosen.numbers[0]).position
+    return shapes_of(chosen.trajectory.scene, positions, most=MANY)
+
+
+def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
+    """Write the walls. Where walls or openings change with time, each frame has the walls of its time."""
+    if chosen.trajectory.scene.instants:
+        _write_changing(chosen, path)
+        return
+    firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
+    triangles = _triangles(drawn)
+    with h5py.File(path, "w") as file:
+        root = vtkhdf.begin(file, {"Polygons": triangles}, [int(firsts[-1])])
+        counts = [len(shape.triangles) for shape in drawn]
+        for name, numbers in _data_of(chosen.trajectory.scene, drawn).items():
+            root[f"CellData/{name}"] = np.repeat(numbers, counts)
+        if not chosen.trajectory.scene.moves():
+            root["Points"] = np.concatenate([shape.vertices for shape in drawn])
+            return
+        steps = vtkhdf.timed(root, chosen, int(firsts[-1]) * np.arange(len(chosen.numbers)))
+        for name in root["CellData"]:
+            steps[f"CellDataOffsets/{name}"] = np.zeros(len(chosen.numbers), np.int64)
+        points = root.create_dataset("Points", (len(chosen.numbers) * firsts[-1], 3), np.float64)
+        seen = chosen.trajectory.observables
+        for done, number in enumerate(chosen.numbers):
+            places = seen["wall_position"][number], seen["wall_orientation"][number]
+            for shape, first in zip(drawn, done * firsts[-1] + firsts[:-1], strict=True):
+                turn, way = since_start(chosen.trajectory.scene, shape, seen["time"][number], places)
+                points[first : first + len(shape.vertices)] = shape.vertices @ turn.T + way
+
+
+def _data_of(scene: Scene, drawn: list[Shape]) -> dict[str, list[int]]:
+    """The data of the cells of each shape."""
+    data = {"surface": [shape.surface for shape in drawn], "solid": [int(shape.solid) for shape in drawn]}
+    if parts := scene.parts:
+        data["part"] = [parts.index((shape.surface, shape.place)) if shape.place else -1 for shape in drawn]
+    return data
+
+
+def _write_changing(chosen: Exported, path: Path) -> None:
+    """Write each state of the walls as a part with cells of its own; a step has the part of its frame."""
+    scene, positions = chosen.trajectory.scene, chosen.trajectory.frame(chosen.numbers[0]).position
+    states: dict[tuple[int, float], int] = {}
+    found, of_steps = list[list[Shape]](), list[int]()
+    for time in chosen.times.tolist():
+        state = bisect.bisect_right(scene.instants, time), time if scene.moves() else 0.0
+        if state not in states:
+            states[state] = len(found)
+            found.append(shapes_of(scene, positions, time, most=MANY))
+        of_steps.append(states[state])
+    points = [sum(len(shape.vertices) for shape in drawn) for drawn in found]
+    counts = [sum(len(shape.triangles) for shape in drawn) for drawn in found]
+    with h5py.File(path, "w") as file:
+        root = vtkhdf.begin(file, {"Polygons": [_triangles(drawn) for drawn in found]}, points)
+        root["Points"] = np.concatenate([shape.vertices for drawn in found for shape in drawn])
+        which = np.array(of_steps)
+        cells = np.cumsum([0, *counts])[which]
+        steps = vtkhdf.timed(root, chosen, np.cumsum([0, *points])[which])
+        steps["PartOffsets"][...] = which
+        steps["ConnectivityIdOffsets"][:, vtkhdf.CELLS.index("Polygons")] = 3 * cells
+        data = [_data_of(scene, drawn) for drawn in found]
+        for name in data[0]:
+            numbers = [
+                np.repeat(one[name], [len(shape.triangles) for shape in drawn])
+                for one, drawn in zip(data, found, strict=True)
+            ]
+            root[f"CellData/{name}"] = np.concatenate(numbers).astype(np.int64)
+            steps[f"CellDataOffsets/{name}"] = cells
+
+
+def _triangles(drawn: list[Shape]) -> Any:
+    """The triangles of shapes, with the numbers of their points among those of all."""
+    firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
+    return np.concatenate([shape.triangles + first for shape, first in zip(drawn, firsts, strict=False)])
+
+
+# Of each solid, with the type of a number and how many there are.
+_DATA: dict[str, tuple[Callable[[Solids], Any], Any, tuple[int, ...]]] = {
+    "surface": (lambda one: np.full(len(one.centers), one.surface), np.int64, ()),
+    "kind": (lambda one: np.full(len(one.centers), KINDS.index(one.kind)), np.int64, ()),
+    "radius": (lambda one: np.where(one.kind in ("boxes", "ellipsoids"), np.nan, one.halves[:, 0]), np.float64, ()),
+    "halves": (lambda one: one.halves, np.float64, (3,)),
+    "orientation": (lambda one: one.turns, np.float64, (4,)),
+    "Points": (lambda one: one.centers, np.float64, (3,)),
+}
+# Of a solid that moves.
+_MOVED = ("orientation", "Points")
+
+
+def write_solids(chosen: Exported, path: Path) -> None:
+    """Write the solids of large fields as points: in each frame the solids that are present."""
+    scene, times = chosen.trajectory.scene, chosen.times.tolist()
+    come = any(surface.present is not None for surface in scene.surfaces if is_many(surface))
+    frames = len(times) if come or scene.moves() else 1
+    counts = [sum(len(one.centers) for one in solids_of(scene, time)) for time in times[:frames]]
+    firsts = np.cumsum([0, *counts])
+    # As of particles: where their number changes each step has a part of its own.
+    parts = counts if len(set(counts)) > 1 else counts[:1]
+    with h5py.File(path, "w") as file:
+        root = vtkhdf.begin(file, {"Vertices": np.arange(max(counts))[:, None]}, parts)
+        steps = vtkhdf.timed(root, chosen, firsts[:-1]) if come or scene.moves() else None
+        for name, (_of_one, kind, width) in _DATA.items():
+            # What does not change is there once.
+            rows = firsts if come or name in _MOVED else firsts[:2]
+            data = root.create_dataset(name if name == "Points" else f"PointData/{name}", (rows[-1], *width), kind)
+            for k in range(len(rows) - 1):
+                there = solids_of(scene, times[k])
+                data[rows[k] : rows[k + 1]] = np.concatenate([np.empty((0, *width)), *map(_of_one, there)])
+            if steps is not None and name != "Points":
+                steps[f"PointDataOffsets/{name}"] = (
+                    firsts[:-1] if come or name in _MOVED else np.zeros(frames, np.int64)
+                )

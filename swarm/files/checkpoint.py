@@ -1,0 +1,219 @@
+"""Checkpoints: what a run needs to continue with the same bits, in one NumPy archive that is replaced atomically.
+
+A line of JSON under "job" describes the run and its progress; the other entries are the arrays of `Run.arrays`. Each
+has a checksum.
+"""
+
+import contextlib
+import hashlib
+import io
+import json
+import math
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..particles import Particles
+from ..serialization import tables
+from ..version import VERSION
+from .replaced import replaced
+from .sources import DAMAGE, DamagedError, reason
+
+Arrays = dict[str, NDArray[Any]]
+# The name of an archive's first entry ends here.
+_FIRST = b"job.npy"
+_HEAD = 30 + len(_FIRST)
+# The array of a checkpoint of a run on a cluster that holds the bounds of its shards.
+SHARDS = "shards"
+# The array that says which surface, and which member of it, each wall of the kernels is, by which rows are in order.
+_OWNERS = "owners"
+# Surfaces that a sentence lists.
+_SHOWN = 12
+_ANEW = "start a new run from the last frame of its trajectory (from = in [particles]), or start again with --overwrite"
+_HINT = "use the inputs that it was started with, or start again with --overwrite"
+
+
+@dataclass(frozen=True)
+class SavedRun:
+    """A run and its progress.
+
+    Attributes:
+        version, scene, method, storage: as text; particles: their number; start: a digest of them at the start.
+        frame, time: the last frame that was written [s].
+        following: time of the frame that is being computed [s], or None.
+        wall_time: used so far [s].
+        seed: of thermal walls.
+        kept: what the log of impacts keeps, as text, or ""; rows: how many it has.
+        sums: checksums of those of the frame that is being computed, by column, as text; "" of older versions.
+        member_impacts: whether the impacts on each member are counted.
+        observables: the names of the user-defined observables, in order.
+        counters: as text, or "".
+        first: of a shard the number of its first particle, or body, in the whole run.
+    """
+
+    version: str
+    scene: str
+    method: str
+    storage: str
+    particles: int
+    start: str
+    frame: int = 0
+    time: float = 0.0
+    following: float | None = None
+    wall_time: float = 0.0
+    seed: int = 0
+    kept: str = ""
+    rows: int = 0
+    sums: str = ""
+    member_impacts: bool = False
+    observables: str = ""
+    counters: str = ""
+    first: int = 0
+
+    def require_same(self, other: "SavedRun", path: Path) -> None:
+        """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""
+        for name, told in _NAMES.items():
+            mine, its = (
+                ", ".join(line for line in str(getattr(job, name)).splitlines() if line) for job in (self, other)
+            )
+            if getattr(self, name) != getattr(other, name):
+                raise SceneError(f"{path} is of another run: its {told} {mine}, got {its}; {_HINT}")
+
+
+_NAMES = {
+    "particles": "number of particles is",
+    "method": "method is",
+    "scene": "scene is",
+    "storage": "trajectory keeps",
+    "start": "particles at the start (seed, speed, mass, file, body) have the digest",
+    "seed": "seed of thermal walls is",
+    "kept": "log of impacts keeps",
+    "member_impacts": "member_impacts is",
+    "observables": "observables of one's own are",
+    "counters": "counters are",
+    "version": "version of swarm is",
+}
+
+
+def digest_of(particles: Particles, body: str = "") -> str:
+    """A digest that identifies particles, or the points of bodies together with the text of the body."""
+    digest = hashlib.sha256(body.encode())
+    born = None if particles.births is None else particles.births.time
+    balls = particles.radius, particles.spin
+    for array in (particles.position, particles.velocity, particles.mass, particles.image, born, *balls):
+        if array is not None:
+            digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()[:16]
+
+
+def save(path: Path, job: SavedRun, arrays: Arrays, owners: NDArray[np.int64] | None = None) -> None:
+    """Replace the checkpoint; the old one stays until the new one is completely on the disk.
+
+    `owners` are those of the rows that the arrays have for walls, as `Scene.members`.
+
+    Raises:
+        FileError: it cannot be written.
+    """
+    arrays = arrays if owners is None else {_OWNERS: owners, **arrays}
+    with replaced(path, "checkpoint") as file:
+        np.savez(file, allow_pickle=False, job=json.dumps(asdict(job)), **arrays)
+
+
+def is_one(path: Path) -> bool:
+    """Whether a file starts like a checkpoint, complete or not."""
+    if not path.is_file():
+        return False
+    with open(path, "rb") as file:
+        return file.read(_HEAD).endswith(_FIRST)
+
+
+def read(path: Path) -> tuple[SavedRun, Arrays]:
+    """A checkpoint.
+
+    Raises:
+        SceneError: it is damaged.
+    """
+    with _reading(path):
+        with zipfile.ZipFile(path) as archive:
+            # Every entry has a checksum, which is checked when it is read to its end.
+            entries = {entry.filename.removesuffix(".npy"): archive.read(entry) for entry in archive.infolist()}
+        # Parsed after the checksums: the header of a damaged array may state any size.
+        arrays = {
+            name: np.lib.format.read_array(io.BytesIO(data), allow_pickle=False) for name, data in entries.items()
+        }
+        job = tables.convert(json.loads(str(arrays.pop("job"))), SavedRun, "job")
+        if job.frame < 0 or not all(map(math.isfinite, (job.time, job.wall_time, job.following or 0.0))):
+            raise ValueError(f"it cannot be at frame {job.frame}, {job.time} s")
+    return job, arrays
+
+
+def require_owners(path: Path, arrays: Arrays, owners: NDArray[np.int64]) -> None:
+    """Raise a SceneError unless the rows of a checkpoint are of the same walls as those of the run; drop `owners`."""
+    saved = arrays.pop(_OWNERS, None)
+    if saved is None:
+        raise SceneError(
+            f"{path} does not say which surface each of its rows is of: an older version of swarm wrote it, whose "
+            f"walls may be in another order; {_ANEW}"
+        )
+    if not np.array_equal(saved, owners):
+        raise SceneError(
+            f"{path} is of a version of swarm with another order of walls: its rows are of surfaces "
+            f"{_shortened(saved[0])}, got {_shortened(owners[0])}; {_ANEW}"
+        )
+
+
+def _shortened(surfaces: NDArray[np.int64]) -> str:
+    return ", ".join(map(str, surfaces[:_SHOWN])) + ", ..." * (len(surfaces) > _SHOWN)
+
+
+def require_fit(path: Path, arrays: Arrays, run: Arrays, written: str = VERSION) -> None:
+    """Raise a SceneError unless the arrays of a checkpoint have the names, types and shapes of the run's own.
+
+    The lanes of a run halted within a frame may hold any number of particles, each once; cells of balls more of them.
+    `written` is the version that wrote it. Checksums are right, so what differs is probably the version; but a list of
+    the entries has no checksum.
+    """
+    same = ", perhaps of another commit," if written == VERSION else ""
+    begin = (
+        f"{path} is of another version of swarm, or damaged: version {written}{same} wrote it, and this is {VERSION}; "
+        "expected"
+    )
+    if arrays.keys() != run.keys():
+        lacking, more = (
+            ", ".join(sorted(names)[:_SHOWN]) or "none"
+            for names in (run.keys() - arrays.keys(), arrays.keys() - run.keys())
+        )
+        raise SceneError(f"{begin} the arrays {lacking} too, got {more} in their place; {_ANEW}")
+    # Bodies leave nothing in lanes.
+    left = arrays["halted.particle"].shape[-1:] if "halted.particle" in run else ()
+    for name, mine in run.items():
+        shape = mine.shape[:-1] + left if name.startswith("halted.") else mine.shape
+        # The cells of balls get more room during a run.
+        if name == "room" and arrays[name].ndim == 1 and arrays[name].size >= mine.size:
+            shape = arrays[name].shape
+        if (arrays[name].dtype, arrays[name].shape) != (mine.dtype, shape):
+            came = f"{arrays[name].dtype} {arrays[name].shape}"
+            raise SceneError(f"{begin} {name} as {mine.dtype} of the shape {shape}, got {came}; {_ANEW}")
+    with _reading(path):
+        if "halted.particle" in run:
+            bounded = np.concatenate([[-1], arrays["halted.particle"], [len(run["mass"])]])
+            if (np.diff(bounded) <= 0).any():
+                raise ValueError("it names particles that do not exist")
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (*DAMAGE, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise DamagedError(
+            f"{path} is damaged: {reason(error)}; the frames in its trajectory are intact: start a new run from the "
+            "last of them (from = in [particles]), or start again, with overwrite and without resume"
+        ) from error

@@ -1,0 +1,329 @@
+"""Logs of impacts, read on demand. impacts.py describes the file and writes it."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common import checks, notebook
+from ..common.columns import flattened
+from ..common.extras import needed_by
+from ..errors import SceneError
+from . import layout
+from .checksums import checksum_of
+from .stored import Stored, finite, in_order, parsed, whole
+
+if TYPE_CHECKING:
+    import pandas
+
+_VECTORS = ("position", "velocity_before", "velocity_after")
+_TEXTS = ("scene", "method", "kept", "start")
+_NEEDED = (
+    "impacts/time", "frames/complete", "frames/time", "frames/rows", "walls/surface", "walls/member",
+    "parameters/scene",
+)  # fmt: skip
+# Rows that are read at once, so that what is left out takes no memory.
+_AT_ONCE = 1 << 20
+
+
+class ImpactLog(Stored):
+    """A log of impacts on disk, read on demand.
+
+    Attributes:
+        times: (frames,) of the complete frames [s].
+        ends: (frames,) how many impacts there are at the end of each.
+        scene, method: as they were run.
+        count: number of particles that were run.
+
+    The impacts are those of complete frames. A log that is being written, or that a killed run left, can be read, with
+    the frames that are complete when it is opened. Inconsistent content raises a SceneError that names the part.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        super().__init__(path, "a log of impacts (.h5)", "swarm.load_impacts")
+        try:
+            with self._reading("its structure") as file:
+                foreign = missing(file)
+                if foreign is None:
+                    self._check(file)
+            if foreign is not None:
+                raise SceneError(f"{self.path} is an HDF5 file, but not a log of impacts of swarm: it has no {foreign}")
+        except SceneError:
+            self.close()
+            raise
+
+    def _check(self, file: Any) -> None:
+        """Read what says which rows there are; a ValueError says what is inconsistent."""
+        for name in _TEXTS:
+            if h5py.check_string_dtype(layout.dataset(file, f"parameters/{name}").dtype) is None:
+                raise ValueError(f"parameters/{name} must be a text")
+        frames, *known = layout.dataset(file, "frames/complete", "iu", (None,))[()].tolist()
+        if frames < 0:
+            raise ValueError(f"frames/complete must be 0 or more, got {frames}")
+        # Files of older versions have no checksum of it.
+        if known and known[0] != checksum_of(np.int64(frames)):
+            raise ValueError(f"frames/complete does not match its checksum, got {frames}")
+        layout.require_fits(layout.dataset(file, "frames/time", "f", (frames,)), frames, self.path)
+        self.times = in_order(self._checked.rows("frames/time", 0, frames))
+        layout.dataset(file, "frames/rows", "iu", (frames,))
+        self.ends = np.array(self._checked.rows("frames/rows", 0, frames), np.int64)
+        if (np.diff(self.ends, prepend=0) < 0).any():
+            raise ValueError(f"frame {int((np.diff(self.ends, prepend=0) < 0).argmax())} has fewer impacts than none")
+        self._rows = int(self.ends[-1]) if frames else 0
+        self._columns: dict[str, Any] = {}
+        for name in file["impacts"]:
+            shape = (self._rows, 3) if name in (*_VECTORS, "slip", "image") else (self._rows,)
+            kinds = "iu" if name in ("particle", "wall", "image", "partner") else "f"
+            self._columns[name] = layout.dataset(file, f"impacts/{name}", kinds, shape)
+            layout.require_fits(self._columns[name], self._rows, self.path)
+        for name in ("time", "particle", "wall", *_VECTORS, "impulse"):
+            if name not in self._columns:
+                raise ValueError(f"it has no impacts/{name}")
+        layout.dataset(file, "walls/member", "iu", layout.dataset(file, "walls/surface", "iu", (None,)).shape)
+        walls = (self._checked.constant(f"walls/{name}").astype(np.int32) for name in ("surface", "member"))
+        self._surface, self._member = walls
+        # How many, whose rows have walls below 0.
+        self._counters = len(self.counters)
+
+    def __len__(self) -> int:
+        """Number of impacts, of complete frames."""
+        return self._rows
+
+    def __repr__(self) -> str:
+        return f"ImpactLog({str(self.path)!r}, {len(self)} impacts)"
+
+    def _repr_html_(self) -> str:
+        rows = {"impacts": f"{len(self)}", "frames": f"{len(self.times)}", "walls": f"{len(self._surface)}"}
+        rows |= {"time": f"{self.times[0]:g} s to {self.times[-1]:g} s"} if len(self.times) else {}
+        return notebook.table(f"ImpactLog {self.path.name}", rows.items())
+
+    @property
+    def kept(self) -> int | list[int]:
+        """The particles whose impacts are kept: k is every k-th one, or their numbers."""
+        with self._reading("which particles it keeps"):
+            kept = parsed(self._text("kept"))["particles"]
+            if kept == "all":
+                return 1
+            return int(kept) if isinstance(kept, int) else sorted({whole("particle", i) for i in kept})
+
+    def counts(self) -> NDArray[np.int64]:
+        """Number of impacts on each surface, no collisions, with a last row of each particle that passed an opening."""
+        return self._counted()[0]
+
+    def crossings(self) -> NDArray[np.int64]:
+        """Number of rows of each counter, (counters, 2), out and back."""
+        return self._counted()[1]
+
+    def _counted(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        self._require_sums(0, self._rows)
+        counts, crossings = np.zeros(self._surfaces(), np.int64), np.zeros(2 * self._counters, np.int64)
+        for k in range(0, self._rows, _AT_ONCE):
+            with self._reading(f"its rows from {k} on"):
+                walls = self._columns["wall"][k : min(k + _AT_ONCE, self._rows)]
+                counts += np.bincount(self._surface[walls[walls >= 0]], minlength=len(counts))
+                if self._counters:
+                    crossings += np.bincount(-1 - walls[walls < 0], minlength=len(crossings))
+        return counts, crossings.reshape(-1, 2)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """The values that identify the run."""
+        texts = {name: self._text(name) for name in ("scene", "method", "kept")}
+        identity = {"particles": self.count, "start": self.start, "seed": self.seed}
+        return {**texts, **identity, "counters": self.counters_text}
+
+    def require_holds(self, frames: int, rows: int, sums: str, checkpoint: Path) -> None:
+        """Raise a SceneError if there are fewer frames, or fewer or other rows with those of the frame after them.
+
+        Args:
+            frames: how many frames are complete.
+            rows: how many rows there are with those of the frame after them.
+            sums: the checksums of the rows after these frames, by column, as text; "": they are not known.
+            checkpoint: the file that says so.
+        """
+        with self._reading("its rows") as file:
+            layout.require_index(file)
+            there = min(column.shape[0] for column in self._columns.values())
+        if len(self.times) < frames or there < rows:
+            raise SceneError(
+                f"{self.path} must hold {frames} frames and {rows} impacts, as {checkpoint} says, got "
+                f"{len(self.times)} and {there}: it was changed since; remove them and the trajectory to start again"
+            )
+        for name, known in json.loads(sums or "{}").items():
+            with self._reading(f"impacts/{name} after frame {frames - 1}"):
+                found = 0
+                for begin in range(int(self.ends[frames - 1]), rows, _AT_ONCE):
+                    found = checksum_of(self._columns[name][begin : min(begin + _AT_ONCE, rows)], found)
+                if found != known:
+                    raise ValueError(f"expected the checksum that {checkpoint} has")
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The dtype of the rows of `table`."""
+        real = self._columns["position"].dtype
+        fields: list[Any] = [("time", "f8"), ("particle", "i4"), ("surface", "i4"), ("member", "i4")]
+        fields += [*((name, real, 3) for name in _VECTORS), ("impulse", real)]
+        fields += [field for field in (("slip", real, 3), ("image", "i4", 3)) if field[0] in self._columns]
+        fields += [("partner", "i4")] * ("partner" in self._columns)
+        fields += [("counter", "i4"), ("sense", "i4")] * (self._counters > 0)
+        return np.dtype(fields)
+
+    def table(
+        self,
+        particles: int | Sequence[int] | None = None,
+        surfaces: int | Sequence[int] | None = None,
+        begin: float | None = None,
+        end: float | None = None,
+    ) -> NDArray[Any]:
+        """The impacts as a structured array, in the order of time, and of particles at the same time.
+
+        The order and every bit are the same for any number of threads. What is not asked for takes no memory; of the
+        file the frames between `begin` and `end` are read.
+
+        Args:
+            particles: only of this particle, or of these; None: all.
+            surfaces: only on this surface of the scene, or on these; None: all, and crossings of counters.
+            begin: only from this time on [s]; None: from the start.
+            end: only before this time [s]; None: to the last frame.
+
+        Returns:
+            One row an impact: `time` [s], `particle`, `surface` (its place in `scene.surfaces`), `member` (the number
+            of the body in that surface if it is many, of the triangle in a mesh, of the part of a union among
+            `scene.parts`; else -1), `position` (3,) [m] of the particle at the impact,
+            `velocity_before` and `velocity_after` (3,) [m/s], `impulse` [N s], given along the wall's normal. Where a
+            surface has friction also `slip` (3,) [m/s], the tangential velocity relative to the wall, before. Where the
+            scene repeats, the position is in the cell and `image` (3,) says how many cells away that is.
+
+            A particle that passes an opening of a surface has its last row there, with an impulse of 0.
+
+            Of particles with a radius a collision of two is a row too, of the one with the smaller number: `partner` is
+            the other one, -1 at a wall, `impulse` what each gives the other, and both `surface` and `member` are -1.
+
+            In a run with counters a crossing is a row too, with an impulse of 0 and the velocity at the crossing twice:
+            `counter` is the place of the counter in `counters` and `sense` 0 out of its admissible side, 1 back, and
+            both `surface` and `member` are -1. Of impacts `counter` and `sense` are -1.
+
+            A contact step begins at the impact, and `velocity_after` is that at its end. After an impact that is the
+            last of a series, `velocity_after` is the velocity along the wall. What slides, rests or is pressed into an
+            edge by several walls has no impacts: its impulse is in the observable alone.
+
+        Raises:
+            SceneError: an argument is out of its range, or the file is damaged.
+        """
+        low = -np.inf if begin is None else checks.number("begin", begin)
+        high = np.inf if end is None else checks.number("end", end)
+        if low > high:
+            raise SceneError(f"end must be begin or later, got {high:g} before {low:g}")
+        wanted = (
+            _among("particles", particles, self.count), _among("surfaces", surfaces, self._surfaces()),
+            surfaces is None,
+        )  # fmt: skip
+        # The rows of the frames that this time is in.
+        begins = np.append(0, self.ends)
+        first = int(begins[np.searchsorted(self.times, low)])
+        last = int(begins[min(int(np.searchsorted(self.times, high)) + 1, len(self.ends))])
+        self._require_sums(first, last)
+        parts = [
+            self._part(slice(k, min(k + _AT_ONCE, last)), wanted, (low, high)) for k in range(first, last, _AT_ONCE)
+        ]
+        table = np.concatenate([np.empty(0, self.dtype), *parts])
+        return table[np.lexsort((table["particle"], table["time"]))]
+
+    def frame(self, **chosen: Any) -> "pandas.DataFrame":
+        """The same as a pandas frame, with columns x, y, z for the vectors' components; arguments as for `table`."""
+        with needed_by("a frame of impacts", "table"):
+            import pandas
+        table = self.table(**chosen)
+        return pandas.DataFrame(flattened({name: table[name] for name in self.dtype.names or ()}))
+
+    def require_intact(self) -> None:
+        """Raise a SceneError that names what does not match its checksum."""
+        with self._reading("its values"):
+            self._checked.require_constants()
+        self._require_sums(0, self._rows)
+
+    def _require_sums(self, first: int, last: int) -> None:
+        """Raise a SceneError if rows of whole frames do not match their checksums."""
+        begins = np.append(0, self.ends)
+        if not self._checked.has_any():
+            return
+        for k in range(int(np.searchsorted(begins, first, side="right")) - 1, len(self.ends)):
+            if begins[k] >= last:
+                return
+            with self._reading(f"its rows {begins[k]} to {begins[k + 1] - 1}"):
+                for name, column in self._columns.items():
+                    self._checked.compare_rows(f"impacts/{name}", column, k, (int(begins[k]), int(begins[k + 1])))
+
+    def _surfaces(self) -> int:
+        return int(self._surface.max()) + 1 if len(self._surface) else 0
+
+    def _part(self, rows: slice, wanted: tuple[Any, Any, bool], span: tuple[float, float]) -> NDArray[Any]:
+        """The wanted ones of some rows."""
+        with self._reading(f"its rows from {rows.start} on"):
+            time = finite(self._columns["time"][rows], "row")
+            particle, wall = self._columns["particle"][rows], self._columns["wall"][rows]
+            lowest = -1 if "partner" in self._columns else -2 * self._counters
+            if len(wall) and not (wall.min() >= lowest and wall.max() < len(self._surface)):
+                raise ValueError(
+                    f"expected walls from {lowest} to {len(self._surface) - 1}, got {wall.min()} to {wall.max()}"
+                )
+            if len(particle) and not (particle.min() >= 0 and particle.max() < self.count):
+                raise ValueError(f"expected particles below {self.count}, got {particle.min()} to {particle.max()}")
+            (particles, surfaces, crossings), (begin, end) = wanted, span
+            is_impact = wall >= 0
+            surface = np.where(is_impact, self._surface[np.maximum(wall, 0)], -1)
+            of_these = np.where(is_impact, surfaces[surface], crossings)
+            taken = (time >= begin) & (time < end) & particles[particle] & of_these
+            k = np.flatnonzero(taken)
+            table = np.empty(len(k), self.dtype)
+            table["time"], table["particle"], table["surface"] = time[k], particle[k], surface[k]
+            table["member"] = np.where(is_impact[k], self._member[np.maximum(wall[k], 0)], -1)
+            if self._counters:
+                table["counter"] = np.where(is_impact[k], -1, (-1 - wall[k]) // 2)
+                table["sense"] = np.where(is_impact[k], -1, (-1 - wall[k]) % 2)
+            if len(k):
+                within = slice(rows.start + int(k[0]), rows.start + int(k[-1]) + 1)
+                for name in (name for name in table.dtype.names[4:] if name in self._columns):
+                    table[name] = finite(self._columns[name][within], "row")[k - k[0]]
+        return table
+
+
+def missing(file: Any) -> str | None:
+    """The first part of a log of impacts that this file lacks, or None."""
+    return next((name for name in _NEEDED if name not in file), None)
+
+
+def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_]:
+    """Whether each of n is wanted."""
+    if numbers is None:
+        return np.ones(n, np.bool_)
+    listed = numbers if isinstance(numbers, (Sequence, np.ndarray)) else [numbers]
+    found = np.zeros(n, np.bool_)
+    for given in listed:
+        i = whole(name, given)
+        if not 0 <= i < n:
+            raise SceneError(f"{name} must be numbers from 0 to {n - 1}, got {i}")
+        found[i] = True
+    return found
+
+
+def load_impacts(path: str | Path) -> ImpactLog:
+    """Open a log of impacts for reading; see `ImpactLog`.
+
+    Raises:
+        SceneError: the file does not exist, or it is not a log of impacts.
+
+    >>> import swarm, tempfile
+    >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     start = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    ...     run = swarm.simulate(cavity, start, swarm.Impact(), until=2.0, impacts=folder + "/impacts.h5")
+    ...     with swarm.load_impacts(folder + "/impacts.h5") as log:
+    ...         log.table()["time"]
+    array([0.5, 1.5])
+    """
+    return ImpactLog(path)

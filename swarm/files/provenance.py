@@ -1,0 +1,73 @@
+"""How a trajectory came to be: its end, its threads and its pace, and the versions of what made it."""
+
+import datetime
+import os
+import platform
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..common.checks import shown
+from ..version import VERSION
+
+_NAME = "swarm"
+_CREATOR = "h5md/creator"
+_CPUS = Path("/proc/cpuinfo")
+
+
+class Course(NamedTuple):
+    """A run as it is carried out: its end [s], its threads, and the seconds that it has taken so far."""
+
+    until: float
+    threads: int
+    clock: Callable[[], float]
+
+
+def makers() -> dict[str, str]:
+    """What makes a trajectory, and when, for the attributes of h5md/creator."""
+    import h5py
+    import numba
+    import numpy
+
+    return {
+        "name": _NAME,
+        "version": VERSION,
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+        "numba": numba.__version__,
+        "hdf5": h5py.version.hdf5_version,
+        "machine": f"{_processor()}, {os.cpu_count()} logical cores, {platform.system()}",
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _processor() -> str:
+    """The name of the processor, or of its kind."""
+    try:
+        told = [line.partition(":")[2].strip() for line in _CPUS.read_text().splitlines() if "model name" in line]
+    except OSError:
+        told = []
+    return told[0] if told else platform.machine()
+
+
+def is_own(file: Any) -> bool:
+    """Whether a file says that swarm made it."""
+    return _CREATOR in file and file[_CREATOR].attrs.get("name") == _NAME
+
+
+def creator_of(file: Any) -> dict[str, str]:
+    """The attributes of h5md/creator, which are texts; fewer of older versions.
+
+    Raises:
+        ValueError: one is not a text in one line, or the date is no date.
+    """
+    found = dict(file[_CREATOR].attrs) if _CREATOR in file else {}
+    for name, value in found.items():
+        if not isinstance(value, str) or not value.isprintable():
+            raise ValueError(f"{name} of {_CREATOR} must be a text in one line, got {shown(value)}")
+    if "date" in found:
+        try:
+            datetime.datetime.fromisoformat(found["date"])
+        except ValueError:
+            raise ValueError(f"date of {_CREATOR} must be a date of ISO 8601, got {shown(found['date'])}") from None
+    return found

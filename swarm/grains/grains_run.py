@@ -1,0 +1,287 @@
+"""The run of soft balls, which press on one another and on walls in fixed steps."""
+
+import math
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from .. import observables
+from ..ball_numbers import BallNumbers
+from ..common.status import Status
+from ..errors import RunError
+from ..events.faces import Fields
+from ..methods import Penalty
+from ..methods.base import Method
+from ..particles import Particles
+from ..run.base import Arrays, BaseRun
+from ..run.observed import poses_of
+from ..run.state import Seeding
+from ..run.tally import Watched
+from ..run.tiers import Tier
+from ..scene import Scene
+from ..state import Balls, State
+from . import arrays, energy, lists, refused
+from .arrays import DONE, LOST, SINCE, SKIN, TAKEN, X
+from .booking import ContactTotals
+from .described import matter_of
+from .drags import kept_drags, set_drags
+from .overlaps import COLUMNS
+from .step import MarchRule, World, march
+
+# The first skin of the lists, of the radius of the smallest ball. In a skin a ball may move by half of it.
+_SKIN = 0.2
+# Room in the lists: so many pairs of each ball, and balls at walls, which become so many times as many.
+_PAIRS, _AT_WALLS, _MORE = 6, 1, 1.5
+# A skin of so many radii of the largest ball is no list any more.
+_WIDEST = 16.0
+
+
+class GrainsRun(BaseRun):
+    """The run of soft balls; the arrays of the particles become a part of its state."""
+
+    def __init__(
+        self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None, compile: str,
+        seeding: Seeding, watched: Watched,
+    ) -> None:  # fmt: skip
+        n, walls = len(particles), len(scene.owners())
+        radius = particles.radius
+        assert radius is not None
+        self._matter = matter_of(scene, method, radius)
+        rubs, spin = self._matter.rubs, particles.spin
+        if spin is None and rubs:
+            spin = np.zeros((3, n))
+        balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
+        loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
+        self.state = State(
+            particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
+            np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None, balls=balls,
+        )  # fmt: skip
+        if particles.image is not None:
+            self.state = self.state._replace(image=particles.image, period=scene.cell())
+        self._image = np.zeros((3, 0), np.int64) if particles.image is None else particles.image.copy()
+        self._fields = Fields(scene, radius)
+        self._walls = self._fields.walls(0.0, 0.0)
+        pool, tier = ThreadPoolExecutor(1, "swarm"), Tier(compile, (self._matter, self._walls), n)
+        super().__init__(scene, method, n, pool, tier)
+        state = self.state
+        books = ContactTotals(
+            balls.collisions,
+            state.impacts,
+            state.impulse,
+            state.dissipated,
+            balls.virial,
+            np.zeros(1, np.int64),
+            np.zeros(1, np.int64),
+            np.zeros(1),
+            np.zeros(COLUMNS),
+        )
+        self._world = World(
+            arrays.grains_of(state.position, state.velocity, radius, state.mass, spin if rubs else None),
+            *self._room(_PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
+        )  # fmt: skip
+        self._clock = np.zeros(arrays.CLOCK)
+        self._clock[SKIN] = _SKIN * radius.min()
+        self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
+        self._start = self._scale = self._stored = math.nan
+        self._moment = 0.0
+        self._numbers = BallNumbers(scene, particles)
+        self._choose_tier()
+        self._list()
+
+    # --- Lists ---------------------------------------------------------------------------------------------
+
+    def _list(self) -> None:
+        """List anew what is near, where all are now."""
+        matter, clock, grains, kernel = self._matter, self._clock, self._world.grains, self._tier.kernel
+        kept = kept_drags(self._world)
+        self._wrap()
+        skin = float(clock[SKIN])
+        reach = 2.0 * float(grains.place[:, arrays.RADIUS].max()) + skin
+        cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, matter.period)
+        for rows in (grains.number, grains.place, grains.speed, grains.spin):
+            if rows is not None:
+                rows[:] = rows[order]
+        near = self._world.near
+        while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:
+            near = self._make_room(pairs, near.slot.size)
+        self._list_walls(kernel, near, skin)
+        set_drags(self._world, kept)
+        clock[SINCE] = 0.0
+
+    def _list_walls(self, kernel: Any, near: arrays.Neighbours, skin: float) -> None:
+        """List what of the walls is near."""
+        if self._fields.reaches(skin):
+            self._walls = self._fields.walls(0.0, skin)
+        faces, grains = self._fields.faces, self._world.grains
+        while True:
+            at = kernel(lists.list_walls)(self._walls, faces, grains, near, skin)
+            members = 0 if near.used is None else int(near.used[0])
+            if at <= near.slot.size and (near.listed is None or members <= near.listed.size):
+                return
+            near = self._make_room(near.mate.size, at, members)
+
+    def _wrap(self) -> None:
+        """Bring all into the cell that repeats."""
+        grains, image = self._world.grains, self.state.image
+        for axis, length in enumerate(self._scene.period or ()):
+            if length is not None:
+                assert image is not None
+                x = grains.place[:, X + axis].copy()
+                cells = np.floor(x / length)
+                inside = x - cells * length
+                grains.place[:, X + axis] = inside
+                grains.place[:, LOST + axis] += (x - inside) - cells * length
+                self._image[axis, grains.number] += cells.astype(np.int64)
+
+    def _show(self) -> None:
+        """Copy where all are, and how fast, into the state."""
+        self._tier.kernel(energy.show)(self._world.grains, self.state)
+        image, position = self.state.image, self.state.position
+        for axis, length in enumerate(self._scene.period or ()):
+            if length is not None and image is not None:
+                cells = np.floor(position[axis] / length)
+                position[axis] -= cells * length
+                # Below 0 by so little that it is at the other face.
+                at_face = position[axis] >= length
+                position[axis, at_face] = 0.0
+                image[axis] = self._image[axis] + cells.astype(np.int64) + at_face
+
+    def _room(self, pairs: int, touching: int, members: int | None) -> tuple[arrays.Neighbours, arrays.Touches]:
+        """Arrays for so many pairs, balls at walls, and members of fields near them, None where there are no fields."""
+        n, walls, rubs = len(self.state.mass), len(self._owners), self._matter.rubs
+        near = arrays.near_of(n, walls, pairs, touching, rubs, members)
+        return near, arrays.touches_of(walls, pairs, touching, rubs, near.listed)
+
+    def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Neighbours:
+        """Make room for so many pairs, balls at walls, and members of fields, and some more."""
+        near = self._world.near
+        have = 0 if near.listed is None else near.listed.size
+        wanted = (pairs, near.mate.size), (touching, near.slot.size), (members, have)
+        pairs, touching, members = (have if need <= have else int(_MORE * need) for need, have in wanted)
+        made, touches = self._room(pairs, touching, None if near.listed is None else members)
+        for old, new in zip(near, made, strict=True):
+            if old is not None:
+                new[: len(old)] = old
+        self._world = self._world._replace(near=made, touches=touches)
+        return made
+
+    def _list_again(self) -> None:
+        """List anew in a step, with a wider skin where the lists do not even hold for one."""
+        if self._clock[SINCE] == 0.0:
+            self._clock[SKIN] *= 2.0
+            largest = self.state.balls.radius.max()  # type: ignore[union-attr]
+            if not self._clock[SKIN] <= _WIDEST * largest:
+                raise RunError(refused.too_far(self._world.grains, 0.5 * _WIDEST, float(largest), self._matter.h))
+        self._list()
+
+    # --- A frame -------------------------------------------------------------------------------------------
+
+    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+        self._moment = self._method.instant(moment)
+        self._walls = self._fields.walls(self._moment, float(self._clock[SKIN]))
+        if not self._cut_short:
+            self._clock[DONE] = 0.0
+            self._world.books.overlap[0] = 0.0
+        self._clock[TAKEN] = 0.0
+        latest = self._limit(latest)
+        status, rule = Status.LEASE_ENDED.value, MarchRule(span, self._watch.passes)
+        began = time.perf_counter()
+        while status == Status.LEASE_ENDED:
+            (status,) = self._called(march, [(self._matter, self._walls, self._world, self._clock, rule)], latest)
+            if status == Status.LEASE_ENDED:
+                self._list_again()
+        self._tier.spend(time.perf_counter() - began)
+        self._watch.end()
+        self._cut_short = status == Status.INTERRUPTED
+        if status not in (Status.DONE, Status.INTERRUPTED):
+            raise RunError(self._refused(status, moment - (span - self._clock[DONE]) * self._matter.h))
+        if not self._cut_short:
+            self._observe(moment)
+        return not self._cut_short
+
+    def _refused(self, status: int, moment: float) -> str:
+        """The sentence about the step at a moment [s]."""
+        if status == Status.UNSOLVED:
+            return refused.unsolved(moment, self._matter.h)
+        assert isinstance(self._method, Penalty)
+        return refused.passed(self._scene, self._method, self._matter, self._world, status, moment)
+
+    def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+        world, matter = self._world, self._matter
+        cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
+        yield lists.list_pairs, (matter.period, world.grains, world.near, cells, 0.0)
+        yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0)
+        yield march, (matter, self._walls, world, self._clock, MarchRule(0.0, self._watch.passes))
+        yield energy.stored, (matter, self._walls, world.grains, world.near)
+        yield energy.show, (world.grains, self.state)
+        yield observables.observe, self._observing()
+
+    def _observing(self) -> tuple[Any, ...]:
+        drawn = np.arange(len(self._partial))
+        return None, self._walls, self._matter.pull, self.state, drawn, observables.CHUNK, self._partial
+
+    def observe(self) -> None:
+        self._observe(0.0)
+        seen = self._summary()
+        self._start, self._scale = _balance(seen), self._scale_of(seen)
+
+    def _observe(self, moment: float) -> None:
+        world, kernel = self._world, self._tier.kernel
+        self._show()
+        stored, overlap = kernel(energy.stored)(self._matter, self._walls, world.grains, world.near)
+        # At the start, where no step was before.
+        self._stored, world.books.overlap[0] = stored, max(overlap, world.books.overlap[0])
+        kernel(observables.observe)(*self._observing())
+        self._numbers.frame(self.state, moment, self._summary()["kinetic_energy"])
+
+    def _summary(self) -> dict[str, Any]:
+        seen = observables.summary(self._partial, self.state, self._owners, lasts=False, parts=self._parts)
+        books = self._world.books
+        seen["contact_energy"], seen["unconverged"] = self._stored, int(books.lagging[0])
+        seen["largest_overlap"] = float(books.overlap[0])
+        seen["total_energy"] += self._stored
+        return self._numbers.added(seen, self.state)
+
+    def _scale_of(self, seen: dict[str, Any]) -> float:
+        """What the error of the energy is relative to: kinetic and contact energy, and what weight may make of them."""
+        pull = 0.0 if self._scene.gravity is None else math.hypot(*self._scene.gravity)
+        weight = float(self.state.mass.sum()) * pull * self._scene.finite_size()
+        return float(seen["kinetic_energy"] + seen["contact_energy"] + weight)
+
+    def seen(self) -> dict[str, Any]:
+        seen = self._summary()
+        scale = max(self._scale, self._scale_of(seen))
+        seen["energy_error"] = abs(_balance(seen) - self._start) / scale if scale > 0.0 else 0.0
+        if self._scene.moves():
+            seen |= poses_of(self._scene, self._moment)
+        return {**seen, "escaped": int((np.sqrt((self.state.position**2).sum(axis=0)) > self._far).sum())}
+
+    def share_done(self, span: float) -> float:
+        return float(self._clock[DONE] / span)
+
+    def arrays(self) -> Arrays:
+        world = self._world
+        kept = {
+            f"{name}.{part}": array
+            for name in ("grains", "near", "books")
+            for part, array in getattr(world, name)._asdict().items()
+            if array is not None
+        }
+        return {**kept, **self._numbers.arrays(), "clock": self._clock, "image": self._image}
+
+    def restore(self, arrays: Arrays, cut_short: bool) -> None:
+        self.observe()
+        members = arrays["near.listed"].size if "near.listed" in arrays else 0
+        self._make_room(arrays["near.mate"].size, arrays["near.slot"].size, members)
+        super().restore(arrays, cut_short)
+        self._show()
+
+
+def _balance(seen: dict[str, Any]) -> float:
+    """The energy of all, with what was lost and without the work of walls that are moved."""
+    work = seen.get("wall_work")
+    kept: float = seen["total_energy"] + seen["dissipated_energy"] - (0.0 if work is None else work.sum())
+    return kept

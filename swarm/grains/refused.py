@@ -1,0 +1,78 @@
+"""Sentences about steps of soft balls that were refused."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..common.status import Status
+from ..kernel.vector import dot, norm, square
+from ..methods import Penalty
+from ..pairs import MOST_PRESSED
+from ..scene import Scene
+from .arrays import AFTER, BEFORE, LIGHTNESS, RADIUS, X, vector_at
+from .contacts import apart
+from .overlaps import BALL, OTHER, SIZE, WALL
+
+_TINY = float(np.finfo(np.float64).tiny)
+
+
+def unsolved(moment: float, dt: float) -> str:
+    """Of impulses that did not converge, in the step of a length [s] at a moment [s]."""
+    return (
+        f"the step at {moment:.9g} s failed: the impulses of its contacts did not converge; a smaller dt than "
+        f"{dt:g} s, or a softer penalty, helps"
+    )
+
+
+def too_far(grains: Any, most: float, largest: float, dt: float) -> str:
+    """Of a move by more than so many radii of the largest ball [m], for which there are no lists."""
+    speed = grains.speed
+    squares = (speed[:, BEFORE : BEFORE + 3] ** 2 + speed[:, AFTER : AFTER + 3] ** 2).sum(axis=1)
+    k = int(np.argmax(np.where(np.isnan(squares), np.inf, squares)))
+    return (
+        f"a step failed at particle {grains.number[k]}: it moves by more than {most:g} radii of the largest ball, "
+        f"{largest:g} m, in a step of {dt:g} s; use a smaller dt"
+    )
+
+
+def passed(scene: Scene, method: Penalty, matter: Any, world: Any, status: int, moment: float) -> str:
+    """Of a ball that passes the surface of another one, or of a wall, in the step at a moment [s]."""
+    grains, failed = world.grains, world.books.failed
+    i, j, wall = (int(failed[k]) for k in (BALL, OTHER, WALL))
+    size, where = float(failed[SIZE]), ", ".join(f"{x:.6g}" for x in grains.place[i, X : X + 3])
+    met = f"particle {grains.number[j]}"
+    if wall >= 0:
+        surface = scene.owners()[wall]
+        met = f"surfaces[{surface}] ({type(scene.surfaces[surface]).__name__})"
+    begin = f"the step at {moment:.9g} s failed at particle {grains.number[i]}, at ({where}) m: it "
+    radii = [grains.place[k, RADIUS] for k in (i, j)[: 1 + (wall < 0)]]
+    if status == Status.TOO_FAST:
+        reach = sum(radii) if wall < 0 else matter.limits.longest
+        room = f"their radii are {reach:.3g} m in all" if wall < 0 else f"the thinnest solid is {reach:.3g} m thick"
+        return (
+            f"{begin}moves by {size:.3g} m against {met} in one step, and {room}, so that it can jump over it; use "
+            f"dt < {reach / size * method.dt:.2g} s, a smaller speed, or Impact"
+        )
+    wanted = _penalty(method, matter, grains, (i, j), size, MOST_PRESSED * min(radii))
+    whose = "the radius of the smaller one" if wall < 0 else "its radius"
+    return (
+        f"{begin}overlaps {met} by {size:.4g} m, more than {whose}, {min(radii):g} m, and what comes after is wrong: "
+        f"contacts are too soft for the speed; use a penalty of {wanted:.1e} or more, got {method.penalty:g}, with a "
+        "dt that fits it, a smaller speed, or Impact"
+    )
+
+
+def _penalty(method: Penalty, matter: Any, grains: Any, ends: tuple[int, int], overlap: float, allowed: float) -> float:
+    """The penalty with which a contact would overlap by what is allowed [m], by its energy at the start of the step."""
+    i, j = ends
+    place, speed = grains.place, grains.speed
+    stored, v, ease = matter.law.stored_energy(overlap), vector_at(speed, i, BEFORE), place[i, LIGHTNESS]
+    if j >= 0:
+        s = apart(matter, place, i, j)
+        stored = matter.law.stored_energy(place[i, RADIUS] + place[j, RADIUS] - norm(s))
+        # Along the line of the centres.
+        v = dot(v - vector_at(speed, j, BEFORE), s) / max(square(s), _TINY) * s
+        ease += place[j, LIGHTNESS]
+    energy = stored + 0.5 * square(v) / ease
+    return float((method.exponent + 1.0) * energy / math.pow(allowed, method.exponent + 1.0))

@@ -1,0 +1,194 @@
+"""How deep soft contacts are at the speeds that are known before a run: said where they are too soft for these."""
+
+import logging
+import math
+
+import numpy as np
+
+from ..methods.base import Method
+from ..pairs import MOST_PRESSED, Pairs
+from ..particles import Particles
+from ..run.options import Task
+from ..scene import Scene
+from ..state import Floats, State
+from ..surfaces.in_motion.drive import drive_of
+from ..surfaces.surface import Surface, side_sign
+from .described import damping_of
+
+_LOG = logging.getLogger("swarm")
+
+
+def warn_of_depths(task: Task) -> None:
+    """Warn where a particle sinks too deep into a wall, or into another particle."""
+    method, particles = task.method, task.particles
+    if task.bodies is not None or method.law() is None or method.is_rigid() or method.has_multipliers():
+        return
+    with np.errstate(all="ignore"):
+        if particles.radius is None:
+            _warn_of_solids(task)
+        elif len(particles):
+            _warn_of_walls(task.scene, particles, particles.radius, method)
+            _warn_of_pairs(task.scene, particles, particles.radius, method)
+
+
+# --- Depths ----------------------------------------------------------------------------------------------
+
+
+def depths_of(method: Method, mass: Floats, speed: Floats, restitution: float = 1.0) -> Floats:
+    """The largest overlaps [m] of contacts that begin at these speeds [m/s], of masses that move alone [kg].
+
+    Without losses that of the energy, alpha d^(a + 1)/(a + 1) = m v^2/2. Phi(d) then is the amplitude of an oscillator
+    (`damping_of` of grains/described.py), which with the part z of critical damping is smaller by
+        exp(-z acos(z)/sqrt(1 - z^2)).
+    """
+    a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
+    damping = damping_of(1.0, restitution)
+    z = 0.0 if damping is None else 0.5 * damping
+    slowed = math.exp(-_turned(z)) ** (2.0 / (a + 1.0))
+    return np.asarray(slowed * (0.5 * mass * speed * speed * (a + 1.0) / alpha) ** (1.0 / (a + 1.0)))
+
+
+def _turned(z: float) -> float:
+    """z acos(z)/sqrt(1 - z^2), beyond 1 with its hyperbolic functions."""
+    if abs(z - 1.0) < 1e-9:
+        return 1.0
+    root = math.sqrt(abs(1.0 - z * z))
+    return z * (math.acos(z) if z < 1.0 else math.acosh(z)) / root
+
+
+def _penalty(method: Method, depth: float, allowed: float) -> float:
+    """The penalty with which a depth is what is allowed [m]."""
+    a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
+    return float(alpha * math.pow(depth / allowed, a + 1.0))
+
+
+# --- Speeds ----------------------------------------------------------------------------------------------
+
+
+def _falls(scene: Scene, position: Floats) -> Floats:
+    """The squares of the speeds that gravity may add to particles at these places [m^2/s^2]."""
+    added = np.zeros(position.shape[1])
+    low, high = scene.bounds()
+    for axis, pull in enumerate(scene.gravity or ()):
+        ways = np.abs((high if pull > 0.0 else low)[axis] - position[axis])
+        added += 2.0 * abs(pull) * np.where(np.isfinite(ways), ways, scene.finite_size() if pull else 0.0)
+    return added
+
+
+def _pace(surface: Surface) -> float:
+    """A bound of the speed of a surface that moves by itself [m/s]."""
+    if surface.motion is None:
+        return 0.0
+    drive = drive_of(surface, 0.0)
+    turns = 0.0 if drive.turn is None else math.hypot(*drive.spin) * (surface.extent() + math.hypot(*drive.center))
+    return drive.fastest + turns
+
+
+def _speeds(scene: Scene, particles: Particles) -> Floats:
+    """The speeds of particles at walls that are known before the run [m/s]: of the start, of a fall, of the walls."""
+    own = np.sqrt((particles.velocity**2).sum(axis=0) + _falls(scene, particles.position))
+    return np.asarray(own + max((_pace(surface) for surface in scene.surfaces), default=0.0))
+
+
+# --- What is said ----------------------------------------------------------------------------------------
+
+
+def _warn_of_walls(scene: Scene, particles: Particles, radius: Floats, method: Method) -> None:
+    """Warn of the ball that sinks deepest into a wall, as a part of its radius."""
+    if not scene.surfaces:
+        return
+    speeds = _speeds(scene, particles)
+    depths = depths_of(method, particles.mass, speeds, max(surface.restitution for surface in scene.surfaces))
+    k = int(np.nanargmax(depths / radius))
+    _warn(method, f"particle {k}, with {speeds[k]:.3g} m/s,", "a wall", float(depths[k]), float(radius[k]))
+
+
+def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: Method) -> None:
+    """Warn of the ball that sinks deepest into the fastest one, as a part of the smaller radius."""
+    fastest = int(np.nanargmax((particles.velocity**2).sum(axis=0)))
+    speeds = np.sqrt(((particles.velocity - particles.velocity[:, [fastest]]) ** 2).sum(axis=0))
+    mass = particles.mass * particles.mass[fastest] / (particles.mass + particles.mass[fastest])
+    depths = depths_of(method, mass, speeds, (scene.pairs or Pairs()).restitution)
+    least = np.minimum(radius, radius[fastest])
+    k = int(np.nanargmax(depths / least))
+    who = f"particle {k}, whose velocity differs from that of particle {fastest} by {speeds[k]:.3g} m/s,"
+    _warn(method, who, "it", float(depths[k]), float(least[k]))
+
+
+def _warn(method: Method, who: str, what: str, depth: float, radius: float) -> None:
+    if depth > MOST_PRESSED * radius:
+        _LOG.warning(
+            "contacts are soft for the speed: %s sinks up to %.2g m into %s, %.2g radii, where %g is small and 1 ends "
+            "the run; use a penalty of %.1e or more (%g here) with a dt that fits it, or Impact",
+            who, depth, what, depth / radius, MOST_PRESSED, _penalty(method, depth, MOST_PRESSED * radius),
+            method.penalty,  # type: ignore[attr-defined]
+        )  # fmt: skip
+
+
+def _warn_of_solids(task: Task) -> None:
+    """Warn of a point that sinks deep into a solid, which it leaves on the other side from the middle on."""
+    scene, particles, method = task.scene, task.particles, task.method
+    solids = [(i, one) for i, one in enumerate(scene.surfaces) if one.is_solid() and math.isfinite(one.size())]
+    if not solids or not len(particles):
+        return
+    i, thinnest = min(solids, key=lambda one: one[1].size())
+    speeds = _speeds(scene, particles)
+    k = int(np.nanargmax(particles.mass * speeds * speeds))
+    # Of phi, which is a length where its slope is 1.
+    slope = float(np.median(np.sqrt((thinnest.gradient(particles.position[:, k : k + 1]) ** 2).sum(axis=0))))
+    depth = float(depths_of(method, particles.mass[k], speeds[k])) / slope if slope > 0.0 else 0.0
+    thickness = 2.0 * thinnest.size()
+    if depth > MOST_PRESSED * thickness:
+        _LOG.warning(
+            "contacts are soft for the speed: particle %d, with %.3g m/s, sinks up to %.2g m into a wall, and "
+            "surfaces[%d] (%s) is %.2g m thick: beyond its middle a particle leaves on the other side; use a penalty "
+            "of %.1e or more (%g here) with a dt that fits it, or Impact",
+            k, speeds[k], depth, i, type(thinnest).__name__, thickness,
+            _penalty(method, depth, MOST_PRESSED * thickness), method.penalty,  # type: ignore[attr-defined]
+        )  # fmt: skip
+
+
+# --- What ended a run -------------------------------------------------------------------------------------
+
+
+def of_passing(scene: Scene, method: Method, state: State, particle: int, moment: float) -> str:
+    """Of a point that goes through the middle of a wall: the state is that at the start of its step."""
+    place, velocity, step = state.position[:, particle], state.velocity[:, particle], float(method.dt)  # type: ignore[attr-defined]
+    ways = place[:, None] + velocity[:, None] * np.linspace(0.0, step, 9)
+    passable = np.array([surface.may_be_passed() for surface in scene.surfaces])
+    outside = np.where(passable[:, None], scene.distances_outside(ways, moment), -np.inf)
+    wall = int(np.argmax(outside.max(axis=1)))
+    surface = scene.surfaces[wall]
+    speed = math.hypot(*velocity) + _pace(surface)
+    energy = 0.5 * float(state.mass[particle]) * speed**2 + _stored(method, surface, place[:, None], moment)
+    # What it would store where it is as deep as is small.
+    entry, inward = _entry(surface, place, velocity, moment)
+    half = surface.size() if surface.is_solid() else float(inward @ (ways[:, 4] - entry))
+    allowed = _stored(method, surface, (entry + 2.0 * MOST_PRESSED * half * inward)[:, None], moment)
+    penalty = float(method.penalty)  # type: ignore[attr-defined]
+    enough = f"a penalty of {penalty * energy / allowed:.1e} or more" if allowed > 0.0 else "a larger penalty"
+    thick = f", which is {2.0 * half:.3g} m thick," if surface.is_solid() else ""
+    return (
+        f", at ({', '.join(f'{x:.6g}' for x in place)}) m: with {speed:.3g} m/s it goes through the middle of "
+        f"surfaces[{wall}] ({type(surface).__name__}){thick} to its other side: contacts are too soft for the speed; "
+        f"use {enough}, got {penalty:g}, with a dt that fits it, a smaller speed, or Impact"
+    )
+
+
+def _stored(method: Method, surface: Surface, place: Floats, moment: float) -> float:
+    """The energy that a wall stores by a point at this place (3, 1) [J]."""
+    gap = side_sign(getattr(surface, "side", "inside")) * float(surface.phi(place, moment)[0])
+    return float(method.law().stored_energy(gap)) if gap > 0.0 else 0.0
+
+
+def _entry(surface: Surface, place: Floats, velocity: Floats, moment: float) -> tuple[Floats, Floats]:
+    """About where a straight way to a place came through the wall, and the unit normal there that leads in."""
+    side, way = side_sign(getattr(surface, "side", "inside")), velocity / math.hypot(*velocity)
+    # From near to far: it may have begun in the wall.
+    lengths = np.concatenate([[-1.0, 0.0], np.geomspace(1e-4, 10.0, 2000)]) * surface.size()
+    back = place[:, None] - lengths * way[:, None]
+    outside = side * surface.phi(back, moment) <= 0.0
+    entered = np.flatnonzero(~outside[:-1] & outside[1:])
+    at = back[:, [int(entered[0]) if len(entered) else 0]]
+    normal = side * surface.gradient(at, moment)[:, 0]
+    return at[:, 0], normal / np.linalg.norm(normal)

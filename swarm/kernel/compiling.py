@@ -1,0 +1,50 @@
+"""Names of what is compiled, in plain words: the kernel of what, and which of how many that the run needs."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from . import cache
+
+# What each kernel computes, in words for users.
+_WORDS = {
+    "advance_block": "flights and impacts",
+    "slide_block": "sliding",
+    "meet_block": "where contacts begin and end",
+    "careful_block": "corners",
+    "observe": "energies and momenta",
+    "count_escaped": "particles that have escaped",
+    "advance_bodies": "bodies",
+    "lease": "walls that react",
+    "predict": "impacts on walls that react",
+    "take": "the order of impacts",
+    "arrive": "the end of a frame",
+    "list_pairs": "balls near one another",
+    "list_walls": "balls near walls",
+    "march": "balls that press on one another",
+    "stored": "the energy of contacts",
+    "show": "frames of balls",
+    "settle": "walls that react, at the end of a frame",
+}
+
+Calls = Iterable[tuple[Any, tuple[Any, ...]]]
+
+
+class Compilations:
+    """The kernels that are compiled for a run.
+
+    Attributes:
+        calls: every kernel that the run is known to need, with its arguments; the run sets it.
+    """
+
+    def __init__(self) -> None:
+        self.calls: Callable[[], Calls] = lambda: ()
+        self._begun = 0
+
+    def sentence(self, kernel: Any) -> str:
+        """The sentence before a kernel is compiled. What slides or rests on the way needs more of them."""
+        left = sum(not cache.is_compiled(*call) for call in self.calls())
+        self._begun += 1
+        name = kernel.__name__
+        words = f"the kernel of {_WORDS[name]}" if name in _WORDS else f"the kernel {name}"
+        number = f"{self._begun} of {self._begun - 1 + max(1, left)}"
+        return f"compiling {words} ({number}) for this kind of scene, once"

@@ -1,0 +1,226 @@
+"""Counters: flights in lanes, and steps of what slides, are looked at after they are done; they change no bit of these.
+
+Each particle has its side of each counter. A flight is looked at from that side, crosses where it leaves it, and is
+looked at from the other side from there on: so crossings out less those back are the change of the number outside,
+exactly. A particle that ends a flight on a counter, within round-off, crosses it in the next flight, or not at all if
+it is turned round there. So a counter at the place of a wall counts no particle, and a counter at a face of a periodic
+cell counts each particle once.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from ...kernel.arrays import index
+from ...kernel.gravity import accelerated, displacement
+from ...kernel.jit import outlined
+from ...kernel.record import Record
+from ...kernel.vector import ZERO, Vec, norm
+from ...state import CROSSED
+from ...surfaces.counted import ReversedCounter
+from ...surfaces.periodic.axes import pulls
+from ...surfaces.periodic.period import has_left, into
+from ..table import copy_lane, marked_lanes
+from .counted_lanes import (
+    BEGAN,
+    ROWS_OF_COUNTER,
+    Began,
+    count_in_lanes,
+    row_of_counter,
+    row_of_sense,
+    velocity_before,
+)
+from .crossings import (
+    AHEAD,
+    Flown,
+    ParticleMoment,
+    beyond_face,
+    book_crossing,
+    come_into_cell,
+    distances_ahead,
+    is_same,
+    look_at_one,
+    sign_of_side,
+    step_over,
+    time_of_face,
+)
+
+
+class Counters(Record):
+    """The counters of a run."""
+
+    each: Any  # `Counted` of each
+    gravity: Any  # None where flights are straight
+    quiet: Any  # whether they stay within one cell, and no crossing is logged; else None
+
+    def rows(self):
+        """The number of rows of a lane."""
+        return BEGAN + ROWS_OF_COUNTER * len(self.each)
+
+    def is_in_lanes(self, one):
+        """Whether crossings of a counter are counted in lanes, without branches: a constant for the compiler."""
+        return self.quiet is not None and isinstance(one, ReversedCounter) and one.most(self.gravity) is not None
+
+    # --- Flights in lanes ---
+
+    def load(self, state, lanes, i, k):
+        """What is known of particle i into lane k."""
+        Began(lanes.began, k).mass = state.mass[i]
+        for c, one in enumerate(self.each):
+            lanes.began[row_of_counter(c), k] = sign_of_side(state, c, i)
+            for s in range(2 if self.is_in_lanes(one) else 0):
+                first = row_of_sense(c, s)
+                lanes.began[first, k] = float(state.crossed.number[2 * c + s, i])
+                for j in range(CROSSED):
+                    lanes.began[first + 1 + j, k] = state.crossed.sums[CROSSED * (2 * c + s) + j, i]
+
+    def retire(self, state, lanes, i, k):
+        """What lane k has crossed back into particle i."""
+        for c, one in enumerate(self.each):
+            if self.is_in_lanes(one):
+                state.crossed.side[c, i] = 0 if lanes.began[row_of_counter(c), k] > 0.0 else 1
+                for s in range(2):
+                    first = row_of_sense(c, s)
+                    state.crossed.number[2 * c + s, i] = np.int64(lanes.began[first, k])
+                    for j in range(CROSSED):
+                        state.crossed.sums[CROSSED * (2 * c + s) + j, i] = lanes.began[first + 1 + j, k]
+
+    def move(self, lanes, source, target):
+        """A lane into another."""
+        copy_lane(lanes.began, source, lanes.began, target, self.rows())
+
+    def keep_before(self, gravity, lanes, live):
+        """Keep every lane as it is before its flight."""
+        for i in range(index(live)):
+            lane, began = lanes.lane(i), Began(lanes.began, i)
+            began.r, began.remaining = lane.r, lane.remaining
+            if gravity is not None:
+                began.v = lane.v
+
+    def count_flights(self, gravity, share, lanes, live):
+        """Count what the flights of all lanes have crossed."""
+        marks = False
+        for c, one in enumerate(self.each):
+            if self.is_in_lanes(one):
+                count_in_lanes(one, c, gravity, lanes, live)
+            else:
+                marks = True
+        if marks:
+            self._look_at_lanes(gravity, share, lanes, live)
+
+    def _look_at_lanes(self, gravity, share, lanes, live):
+        """The lanes that may cross a counter, one by one."""
+        # A fall may leave a cell and come back into it.
+        all_of_them = lanes.period is not None and gravity is not None
+        for i in range(index(live)):
+            lane, began = lanes.lane(i), Began(lanes.began, i)
+            v = velocity_before(gravity, lane, began)
+            time = began.remaining - lane.remaining
+            found = (time > 0.0) if all_of_them else has_left(lanes.period, lane.r)
+            for c, one in enumerate(self.each):
+                if not self.is_in_lanes(one):
+                    found = one.may_cross(lanes.began[row_of_counter(c), i], gravity, began.r, v, time) | found
+            lanes.marked[i] = found
+        for k in range(marked_lanes(lanes, live)):
+            self._look_at_lane(gravity, share, lanes, index(lanes.order[k]))
+
+    @outlined
+    def _look_at_lane(self, gravity, share, lanes, i):
+        lane, began, p = lanes.lane(i), Began(lanes.began, i), index(lanes.particle[i])
+        v = velocity_before(gravity, lane, began)
+        flown = Flown(began.r, v, began.remaining - lane.remaining, began.remaining, lane.r, ZERO)
+        if lanes.period is None:
+            self._look_at(gravity, share, p, flown)
+        else:
+            self._look_at_cells(lanes.period, gravity, share, p, flown)
+        for c, one in enumerate(self.each):
+            if not self.is_in_lanes(one):
+                lanes.began[row_of_counter(c), i] = sign_of_side(share.state, c, p)
+
+    def _look_at(self, gravity, share, p, flown):
+        for c, one in enumerate(self.each):
+            if not self.is_in_lanes(one):
+                look_at_one(one, c, gravity, share, p, flown)
+
+    def _look_at_cells(self, period, gravity, share, p, flown):
+        """The same of a flight over faces, cell by cell: walls and counters are known in one."""
+        back, (gx, gy, gz) = into(period, flown.end), pulls(gravity)
+        r, v, left, remaining, images = flown.r, flown.v, flown.time, flown.remaining, ZERO
+        while True:
+            x = time_of_face(gx, period.x, r.x, v.x)
+            y = time_of_face(gy, period.y, r.y, v.y)
+            z = time_of_face(gz, period.z, r.z, v.z)
+            time = min(x, y, z)
+            ends = not time < left
+            if ends:
+                time = left
+            after = accelerated(gravity, v, time)
+            end = r + displacement(gravity, v, time)
+            if ends and is_same(images, back.images):
+                end = back.r
+            self._look_at(gravity, share, p, Flown(r, v, time, remaining, end, images))
+            step = ZERO
+            if not ends:
+                step = Vec(step_over(x <= time, after.x), step_over(y <= time, after.y), step_over(z <= time, after.z))
+            elif not is_same(images, back.images):
+                # By round-off the flight has ended before a face, or after it.
+                step = back.images - images
+            else:
+                return
+            self._settle_all(gravity, share, p, ParticleMoment(end, after, remaining - time), images)
+            images = images + step
+            r = Vec(
+                beyond_face(period.x, end.x, step.x),
+                beyond_face(period.y, end.y, step.y),
+                beyond_face(period.z, end.z, step.z),
+            )
+            v, left, remaining = after, left - time, remaining - time
+            for c, one in enumerate(self.each):
+                come_into_cell(one, c, share.state, p, r, v)
+            if ends:
+                return
+
+    # --- Steps, and ends ---
+
+    @outlined
+    def count_step(self, share, p, before, after):
+        """Count what a step of particle p has crossed, from one `ParticleMoment` to another, by its ends."""
+        state = share.state
+        for c, one in enumerate(self.each):
+            d0, d1, sign = one.distance(before.r), one.distance(after.r), sign_of_side(state, c, p)
+            if sign * d1 > one.near:
+                part = d0 / (d0 - d1) if (d0 - d1) * d0 > 0.0 else 0.0
+                part = min(part, 1.0)
+                there = ParticleMoment(
+                    before.r + part * (after.r - before.r),
+                    before.v + part * (after.v - before.v),
+                    before.remaining + part * (after.remaining - before.remaining),
+                )
+                time = before.remaining - after.remaining
+                across = abs(d1 - d0) / time if time > 0.0 else 0.0
+                book_crossing(one, c, share, p, there, across, ZERO)
+
+    @outlined
+    def come_back(self, share, p, before, end, after):
+        """The sides of particle p, whose step has left the cell at `end`, and which is back in it `after`."""
+        state = share.state
+        start = before._replace(r=before.r + (after.r - end))
+        for c, one in enumerate(self.each):
+            d = one.distance(start.r)
+            if abs(d) > one.near:
+                state.crossed.side[c, p] = 0 if d < 0.0 else 1
+        self.count_step(share, p, start, after)
+
+    @outlined
+    def settle(self, share, p, there):
+        """Count particle p, a `ParticleMoment`, at a counter, if it goes on from there without another look."""
+        self._settle_all(None, share, p, there, ZERO)
+
+    def _settle_all(self, gravity, share, p, there, images):
+        for c, one in enumerate(self.each):
+            sign = sign_of_side(share.state, c, p)
+            d, ahead = distances_ahead(one, there.r, there.v)
+            if abs(d) <= one.near and sign * (ahead - d) > 0.0:
+                speed = norm(there.v)
+                across = abs(ahead - d) * speed / (AHEAD * one.near) if speed > 0.0 else 0.0
+                book_crossing(one, c, share, p, there, across, images)

@@ -1,0 +1,82 @@
+"""What walls have of the impacts and contacts that one thread has computed: counts, and sums that are as exact.
+
+A run without counts has None in their place, and compiles none of this code.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...kernel.arrays import index
+from ...kernel.jit import Array
+from ...kernel.record import Record
+from .log import BeforeContact
+
+# Units of `Sums.rest` in one of `Sums.whole`.
+PARTS = 2.0**40
+
+
+class Sums(Record):
+    """A sum for each wall in whole numbers, which has the same bits in any order; each term is rounded once.
+
+    In floats the bits would depend on which thread has which particle, and a sum for each particle and wall would not
+    fit in memory.
+    """
+
+    whole: Array  # (walls,) int64, in units
+    rest: Array  # (walls,) int64, in parts of a unit, from 0 to 1
+    unit: float  # a power of two: what is divided by it keeps its digits
+
+    def add(self, wall, value):
+        """Add a value to the sum of a wall."""
+        k, scaled = index(int(wall)), value / self.unit
+        whole = np.int64(math.floor(scaled))
+        rest = self.rest[k] + np.int64((scaled - whole) * PARTS + 0.5)
+        carry = np.int64(rest >= np.int64(PARTS))
+        self.whole[k] += whole + carry
+        self.rest[k] = rest - carry * np.int64(PARTS)
+
+
+class Counts(Record):
+    """Of each wall of the scene what one thread has computed: impacts, and sums, None where there is nothing."""
+
+    impacts: Array  # (walls,) int64
+    stays: Any = None  # `Sums` of the times for which particles were held there [s]
+    heats: Any = None  # `Sums` of the heat that it gave [J]
+
+    def keep_before(self, lanes, live):
+        """Keep of every lane what says whether its contact is an impact."""
+        for i in range(index(live)):
+            before = BeforeContact(lanes.before, i)
+            before.hits, before.wall = lanes.lane(i).hits, lanes.wall[i]
+
+    def note(self, lanes, i, impulse):
+        """Nothing: impulses are not counted."""
+
+    def add_rows(self, method, walls, state, lanes, live):
+        """Count the impacts of a pass."""
+        for i in range(index(live)):
+            before = BeforeContact(lanes.before, i)
+            # A lane without an impact may be at no wall.
+            self.impacts[index(int(max(before.wall, 0.0)))] += np.int64(lanes.lane(i).hits - before.hits)
+
+    def add(self, wall, hits):
+        """Count so many impacts on a wall."""
+        self.impacts[index(int(wall))] += np.int64(hits)
+
+    def add_row(self, method, walls, state, particle, struck):
+        """Count an impact of a particle."""
+        self.impacts[index(int(struck.wall))] += 1
+
+    def stay(self, wall, time):
+        """Count a time in which a wall has held a particle [s]."""
+        if self.stays is not None:
+            self.stays.add(wall, time)
+
+    def give(self, wall, heat, wait):
+        """Count heat that a wall has given [J], and how long a particle is to wait there [s]."""
+        if self.heats is not None:
+            self.heats.add(wall, heat)
+        if self.stays is not None and (wait > 0.0) & (wait < math.inf):
+            self.stays.add(wall, wait)

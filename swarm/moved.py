@@ -1,0 +1,108 @@
+"""Modules that moved: imports of their earlier names find them, with a `DeprecationWarning`."""
+
+import importlib
+import importlib.abc
+import importlib.machinery
+import importlib.util
+import sys
+import warnings
+from collections.abc import Sequence
+from types import ModuleType
+
+# The earlier folder, the present one, and the modules that moved from one to the other.
+_FOLDERS = [
+    ("", "common", "catalog checks columns extras frames interrupt links notebook rows signature snapshot status"),
+    ("", "serialization", "law_tables plugins run_tables tables"),
+    ("", "surfaces", "plane"),
+    ("", "placing", "filling"),
+    ("", "events", "packing colliding reacting"),
+    ("", "commands", "cli summary"),
+    ("", "", "output=pictures"),
+    ("colliding", "events.colliding", "*"),
+    ("reacting", "events.reacting", "*"),
+    ("lanes", "bodies", "bodies=lanes"),
+    ("lanes.bodies", "bodies.lanes", "*"),
+    ("lanes", "lanes.watching", "counted_lanes counters counts crossings log"),
+    ("run", "events", "balls faces resting windows colliding=balls_run growing=growing_run heavy=heavy_run"),
+    ("run", "events", "reacting=walls_run"),
+    ("run", "bodies", "bodies=body_run energies passing with_bodies=steps"),
+    ("run", "grains", "grains=grains_run refused sinking soft"),
+    ("run", "run.preflight", "admission counting hints knows overlaps starts workload"),
+    ("run", "kernel", "compiling"),
+    ("surfaces", "surfaces.facets", "data.mending=mending data.mesh_files=mesh_files data.triangles=triangles"),
+    ("surfaces", "surfaces.in_motion", "at_rest drive moving posed"),
+    ("surfaces", "surfaces.periodic", "axes gaps images period"),
+    ("surfaces", "surfaces.presence", "doors joined openings patched rooms seams"),
+    ("surfaces", "surfaces.time_of_impact", "approach course flights march rising safe strides"),
+    ("output", "", "page=report views"),
+    ("output", "exports", "export exported gsd labelled obj ply spreadsheet vtkhdf walls xyz"),
+    ("output", "files", "appended background checkpoint checksums driver impact_log impacts layout lock marks origin"),
+    ("output", "files", "paths provenance replaced sources storage stored superblock trajectory writer"),
+    ("output", "pictures", "balls colours drawing drawn eye film flat framed graphs plots raster scenery sentences"),
+    ("output", "pictures", "shown_film silhouette speeds style triad"),
+    ("output", "recording", "about instanced looks playback recorded recording=writer sheet sight viewer widget"),
+    ("output", "report", "page.html=html page.pictures=pictures page.reproduce=reproduce page.run=of_run"),
+    ("output", "run", "sequence"),
+    ("output", "triangles", "curves cut given gridded parts planar shape shapes sharp solids"),
+    ("output", "words", "amounts content facts gone named nouns series verdicts words=titles"),
+]
+
+
+def _dotted(*parts: str) -> str:
+    return ".".join((__package__, *filter(None, parts)))
+
+
+# A folder that moved as a whole, and its present name.
+_WHOLE = {_dotted(old): _dotted(new) for old, new, names in _FOLDERS if names == "*"}
+MOVED = {
+    _dotted(old, before): _dotted(new, after or before)
+    for old, new, names in _FOLDERS
+    if names != "*"
+    for before, _, after in (name.partition("=") for name in names.split())
+}
+
+
+def present_name(name: str) -> str | None:
+    """The present name of a module that moved, or None.
+
+    >>> present_name("swarm.output.style")
+    'swarm.pictures.style'
+    >>> present_name("swarm.colliding.cells")
+    'swarm.events.colliding.cells'
+    """
+    folder, _, leaf = name.rpartition(".")
+    return MOVED.get(name) or (f"{_WHOLE[folder]}.{leaf}" if folder in _WHOLE else None)
+
+
+class _Finder(importlib.abc.MetaPathFinder):
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        present = present_name(name)
+        if present is None:
+            return None
+        # Frames of the import system are not counted.
+        warnings.warn(f"the module {name} is now {present}", DeprecationWarning, stacklevel=2)
+        return importlib.util.spec_from_loader(name, _Loader(present))
+
+
+class _Loader(importlib.abc.Loader):
+    """Loads the module of another name."""
+
+    def __init__(self, present: str) -> None:
+        self._present = present
+
+    def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType:
+        module = importlib.import_module(self._present)
+        self._spec = module.__spec__
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        # The import system has put the earlier name into the module.
+        module.__spec__ = self._spec
+
+
+def find() -> None:
+    """Let imports find modules by their earlier names."""
+    # In front: the path of an earlier folder is that of a present one, where others would find a second copy.
+    sys.meta_path.insert(0, _Finder())

@@ -1,1 +1,0 @@
-"""Reports: pages in HTML that need nothing besides themselves."""

@@ -1,0 +1,1 @@
+"""Pictures of runs: plots, films, and the style of both."""

@@ -1,0 +1,206 @@
+"""A run in one picture: time series that show whether it went well, speeds, and the particles."""
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common import checks
+from ..errors import SceneError
+from ..files import marks
+from ..files.replaced import named_when_whole
+from ..triangles.shape import Shape
+from ..triangles.shapes import cell_of, shapes_of
+from ..words import series, verdicts
+from ..words import titles as words
+from ..words.amounts import amount, many
+from ..words.content import Content, content_of
+from ..words.gone import how_many_left
+from . import colours, drawing, graphs, sentences, speeds, style
+from .drawn import Drawn
+from .framed import most_of
+
+# Most particles drawn, or points of bodies.
+SHOWN = 5000
+# [inches]: the width of a picture, and the height of one time series.
+_WIDE, _HIGH = 12.5, 2.35
+# Which part of a picture the time series have beside the particles; and its least height [inches].
+_SERIES, _LEAST = 0.66, 6.4
+# The least part of the width that particles have, and the part of the height that a vessel has of its panel.
+_FEWEST, _TALL = 0.24, 0.8
+# What a vessel has above and below it [inches]: a title, a triad and a colour bar, or axes and a colour bar.
+_AROUND, _AROUND_PLANE = 1.8, 1.8
+
+
+def draw_plot(trajectory: Any, target: Path) -> None:
+    """Draw the time series of a trajectory, its speeds, and its particles at the end.
+
+    Raises:
+        SceneError: the trajectory is damaged, or holds no frame.
+        FileError: the picture cannot be written.
+    """
+    figure = figure_of(content_of(trajectory), None, SHOWN)
+    with named_when_whole(target) as part, style.applied():
+        figure.savefig(part, metadata=marks.of_picture(part))
+
+
+def figure_of_trajectory(trajectory: Any, figsize: Any, particles: int) -> style.Picture:
+    """The picture of a `Trajectory`; see `figure_of`."""
+    return figure_of(content_of(trajectory), figsize, particles)
+
+
+def figure_of(content: Content, figsize: Any, particles: int) -> style.Picture:
+    """The picture, in which at most so many particles are drawn; as high as its plots need where no size is given."""
+    most = checks.count("particles", particles)
+    try:
+        wide, high = (_WIDE, 0.0) if figsize is None else (checks.positive("figsize", side) for side in figsize)
+    except (TypeError, ValueError):
+        raise SceneError(f"figsize must be width and height in inches, got {figsize!r}") from None
+    with style.applied():
+        return _figure_of(content, (wide, high), most)
+
+
+def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.Picture:
+    (wide, high), scene, times = size, content.scene, content.seen["time"]
+    last = "end" if "end" in content.frames else "start"
+    end = content.inside(last) if last in content.frames else None
+    still = scene
+    if scene.reacts():
+        still = scene.placed(content.seen["wall_position"][-1], content.seen["wall_orientation"][-1])
+    shapes = shapes_of(still, np.zeros((3, 1)) if end is None else most_of(end.position), float(times[-1]))
+    plots, spread = _shown(content, shapes), speeds.of_frames(content)
+    count, width = len(plots) + bool(spread), wide * (1.0 if end is None else _SERIES)
+    told = sentences.in_lines(verdicts.marked(content), width)
+    text = sentences.height_of_lines(told)
+    rows = graphs.rows_of(count, width)
+    high = high or max(_LEAST, _HIGH * len(rows) + text + 0.4)
+    picture = style.picture(wide, high)
+    right: Any = picture
+    if end is not None:
+        # As wide as the vessel fills the height, as far as the series have room.
+        aspect = drawing.aspect(shapes, end.position.T, scene.across())
+        part = 1.0 - min(max(aspect * _TALL * high / wide, _FEWEST), 1.0 - _SERIES)
+        left, right = picture.subfigures(1, 2, width_ratios=[1.0 - part, part], squeeze=False).ravel()
+        _places(_middle(left, aspect, scene.across()), content, last, shapes, most)
+    above, below = right.subfigures(2, 1, height_ratios=[max(high - text, 0.1), text], squeeze=False).ravel()
+    cells = []
+    for part, number in zip(above.subfigures(len(rows), 1, squeeze=False).ravel(), rows, strict=True):
+        cells += list(part.subplots(1, number, squeeze=False).ravel()) if number else []
+    _series(cells[: len(plots)], content, plots, rows[-1] - bool(spread))
+    if spread:
+        speeds.draw(cells[-1], content, spread)
+    sentences.write_below(below, told, text)
+    picture.suptitle(words.title(content), fontsize=12)
+    return picture
+
+
+def _shown(content: Content, shapes: list[Shape]) -> dict[str, graphs.Curves]:
+    """The curves of each plot that says something."""
+    times, seen = content.seen["time"], _with_inside(content)
+    drawn = {}
+    for line in series.lines_of(content.scene, content.method, shapes, content.body, seen):
+        values = line.values(times, seen)
+        known = ~np.isnan(values)
+        drawn[line.path] = line.name, times[known], values[known]
+    return {group: curves for group, curves in series.plots_of(drawn).items() if not series.says_nothing(group, curves)}
+
+
+def _series(cells: list[Any], content: Content, plots: dict[str, graphs.Curves], last: int) -> None:
+    """The time series; the `last` of them say what the axes of times are."""
+    soft = content.method.law() is not None and not content.method.has_multipliers()
+    limits = {"penetration": None if soft else verdicts.penetration_limit(content), "overlap": None}
+    errors = verdicts.energy_limit(content)
+    for k, (group, curves) in enumerate(plots.items()):
+        graph = series.GRAPHS[group].across(content.scene.plane)
+        graphs.lines(cells[k], graph, curves, limit=limits.get(group, errors))
+        if k < len(plots) - last:
+            cells[k].set_xlabel("")
+
+
+def _with_inside(content: Content) -> dict[str, NDArray[Any]]:
+    """The observables, with how many are inside where any come or go."""
+    seen = dict(content.seen)
+    gone = np.asarray(seen["escaped"]) + np.sum(seen.get("absorbed", np.zeros((len(seen["time"]), 1))), axis=1)
+    if content.body is None and (np.any(gone) or "born" in seen):
+        born = np.sum(seen["born"], axis=1) if "born" in seen else 0
+        seen["inside"] = verdicts.at_start(content) + born - gone
+    return seen
+
+
+def _middle(figure: Any, aspect: float, across: int | None) -> Any:
+    """The middle of a panel, as high as a vessel of this aspect with its title and its colour bar."""
+    box = figure.bbox
+    wide, high = box.width / figure.dpi, box.height / figure.dpi
+    needed = wide / aspect + (_AROUND_PLANE if across is not None else _AROUND)
+    if needed >= high:
+        return figure
+    beside = 0.5 * (high - needed)
+    return figure.subfigures(3, 1, height_ratios=[beside, needed, beside])[1]
+
+
+def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most: int) -> None:
+    """The particles, or the bodies, of a frame: those that are there."""
+    end = content.inside(name)
+    drawn = Drawn(len(end), content.body, most, end.radius)
+    start = content.frames.get("start", content.frames[name])
+    # The first frame of a run with sources may hold no particle: the scale is then made from the last one.
+    start = end if np.isnan(start.position[0]).any() else start
+    scale, values = colours.colouring("speed", content.scene, content.method, start)
+    position, packed, tints = drawn.coloured(end, scale, values)
+    across = content.scene.across()
+    axes = figure.add_subplot()
+    drawing.frame(
+        axes,
+        position.T,
+        packed,
+        shapes + cell_of(content.scene),
+        *drawn.ties(position.T, packed, tints),
+        across,
+        drawn.radius,
+    )
+    shown = values(drawn.points(end.position), drawn.points(end.velocity))
+    drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high, [packed], shown)
+    count = content.count // (1 if content.body is None else len(content.body))
+    left = how_many_left(content.seen, content.gone.get(name))
+    here = drawn.shown if content.body else int((~np.isnan(position[0])).sum())
+    count -= sum(left.values())
+    told = many(count) if here == count else f"{many(here)} of {many(count)}"
+    noun = drawn.noun if end.radius is None else "balls" if content.scene.plane is None else "discs"
+    noun = noun if count != 1 else {"bodies": "body"}.get(noun, noun.removesuffix("s"))
+    title = f"{told} {noun}{' inside' * bool(left)}, t = {amount(float(content.seen['time'][-1]), 's')}"
+    if (alike := speeds.of_all(content)) is not None:
+        title += f",\neach with {amount(alike, 'm/s')}" if alike else ", all at rest"
+    if left:
+        title += f"\n{' and '.join(f'{many(n)} {how}' for how, n in left.items())}, not drawn"
+    figure.suptitle(title, fontsize=10)
+
+
+# --- Of one thing each, for pages ------------------------------------------------------------------------
+
+
+def graphs_of(content: Content, shapes: list[Shape]) -> list[tuple[str, Callable[[Any], None]]]:
+    """The graphs that say something: what each shows, and the function that draws it in axes."""
+    shown: list[tuple[str, Callable[[Any], None]]] = []
+    for group, curves in _shown(content, shapes).items():
+        title = series.GRAPHS[group].across(content.scene.plane).name
+        shown.append((title, functools.partial(_one, content=content, plot={group: curves})))
+    if spread := speeds.of_frames(content):
+        shown.append(("speeds", functools.partial(speeds.draw, content=content, spread=spread)))
+    return shown
+
+
+def _one(axes: Any, content: Content, plot: dict[str, graphs.Curves]) -> None:
+    _series([axes], content, plot, 1)
+
+
+def picture_of_places(
+    content: Content, name: str, shapes: list[Shape], size: tuple[float, float], most: int
+) -> style.Picture:
+    """The particles, or the bodies, of a frame among their walls, without a title."""
+    picture = style.picture(*size)
+    _places(picture, content, name, shapes, most)
+    picture.suptitle("")
+    return picture

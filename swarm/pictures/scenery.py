@@ -1,0 +1,246 @@
+"""The picture of walls in which particles are placed.
+
+From the back to the front: the far inner sides of cavities and what is seen on them, solids and all that is opaque,
+particles, and what is near of the edges.
+"""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
+from numpy.typing import NDArray
+
+from ..state import Floats
+from ..triangles.shape import Shape
+from .balls import colours_of
+from .colours import Colours
+from .framed import eye_of, window
+from .raster import Raster, corners_of, lit
+from .silhouette import silhouette
+from .style import CAVITY_LINE, SOLID, SOLID_LINE, backdrop
+from .triad import BAR, STRIP, draw_triad, say_beyond
+
+# Around a vessel, as a part of its width or height; pixels of a raster for each of the picture, and the most.
+_ROOM, _FINE, _MOST = 0.025, 1.5, 1600.0
+# What is on a wall is behind its pixels by less than this part of the picture.
+_ON = 0.006
+# The part of its colour that a cavity has where it faces the eye, and where it turns away.
+_CLEAR, _TINTED = 0.30, 0.95
+# Dots of all particles cover this many square points of a picture, a dot at least and at most.
+_DOTS, _SMALL, _LARGE = 2.5e4, 0.3, 24.0
+Ties = tuple[Floats, Colours]
+NO_TIES: Ties = np.empty((0, 0, 3)), np.empty(0, np.uint32)
+
+
+def red_green_blue(packed: Colours) -> Floats:
+    """0xRRGGBBAA as three numbers from 0 to 1: (N, 3)."""
+    return np.stack([(packed >> shift & 0xFF) / 255.0 for shift in (24, 16, 8)], axis=1)
+
+
+class Scenery:
+    """The picture of walls in axes, in which particles are placed; what it draws is in `still`, `solid` and `front`."""
+
+    def __init__(self, axes: Any, shapes: list[Shape], found: list[Floats]) -> None:
+        self.axes, self.shapes = axes, shapes
+        self.eye = eye_of(shapes, found)
+        low, high = window(self.eye, found)
+        room = _ROOM * float((high - low).max())
+        box = axes.get_figure(root=False).bbox
+        dpi = axes.get_figure(root=True).dpi
+        spec = axes.get_subplotspec()
+        rows, columns = (1, 1) if spec is None else spec.get_gridspec().get_geometry()
+        pixels = np.array([box.width / columns, box.height / rows])
+        strip = STRIP * dpi / 72.0
+        # Below the vessel, or beside it where it leaves room there
+        wide, tall = high - low
+        beside = wide * pixels[1] / tall + 3.0 * strip < pixels[0]
+        rest = pixels - ((3.0 * strip, 0.0) if beside else (0.0, min(strip, 0.5 * pixels[1])))
+        scale = float((rest / (high - low)).min())
+        low, high = low - room, high + room
+        self.low = low - np.array([1.5 * strip, 0.0] if beside else [0.0, strip]) / scale
+        self.high = high + np.array([1.5 * strip, 0.0] if beside else [0.0, 0.0]) / scale
+        axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]), aspect="equal")
+        axes.set_axis_off()
+        draw_triad(axes, self.eye, 1.4 * strip / scale if beside else BAR * float(high[0] - low[0]))
+        largest = float((self.high - self.low).max())
+        self._scale = min(_FINE * scale, _MOST / largest)
+        self._on = _ON * largest
+        self._back, self.opaque = self._raster(), self._raster()
+        self.still: list[Any] = []
+        self.front: list[Any] = []
+        self._outside: Any = None
+
+    def _raster(self) -> Raster:
+        return Raster(self.low, self.high, self._scale)
+
+    # --- Walls -------------------------------------------------------------------------------------------
+
+    def walls(self) -> None:
+        """Draw the far inner sides of cavities, and solids, and the lines on them."""
+        self._back, self.opaque = self._raster(), self._raster()
+        for shape in self.shapes:
+            raster, paint = (self.opaque, _solid) if shape.solid else (self._back, _glass)
+            facing = shape.normals @ self.eye.near > 0.0
+            chosen = shape.triangles[facing[shape.triangles].any(axis=1)]
+            if len(chosen):
+                normals = self.eye.seen(shape.normals)
+                raster.triangles(self.eye.seen(shape.vertices), chosen, paint(normals))
+        self._show(self._back, 0.5)
+        far, self._near_curves = self._sorted()
+        for curves, colour, wide, alpha in far:
+            self._lines(curves, colour, wide, alpha, 1.0, self.still)
+        if np.isfinite(self.opaque.depth).any():
+            self._show(self.opaque, 1.5)
+        for shape in self.shapes:
+            if shape.solid and not shape.many:
+                curves = self._cut(shape.edges + silhouette(shape, self.eye), self.opaque)
+                self._lines(curves, SOLID_LINE, 0.9, 1.0, 1.6, self.still)
+                self._lines(self._cut(shape.levels, self.opaque), SOLID_LINE, 0.4, 0.6, 1.6, self.still)
+
+    def _sorted(self) -> tuple[list[tuple[list[Floats], str, float, float]], list[Floats]]:
+        """The lines of cavities that are behind particles, and those that are before them."""
+        far, near = [], list[Floats]()
+        for shape in self.shapes:
+            if shape.solid:
+                continue
+            before, behind = self._split(shape.edges)
+            near += before
+            far += [
+                (behind, CAVITY_LINE, 0.9, 0.9),
+                (self._split(shape.levels)[1], CAVITY_LINE, 0.5, 0.45),
+                ([self.eye.seen(curve) for curve in silhouette(shape, self.eye)], CAVITY_LINE, 1.2, 1.0),
+            ]
+        return far, near
+
+    def _split(self, curves: list[Floats]) -> tuple[list[Floats], list[Floats]]:
+        """The parts of curves that are before the far side, and those on it."""
+        before, behind = list[Floats](), list[Floats]()
+        for curve in curves:
+            seen = self._fine(curve)
+            moved = seen - (0.0, 0.0, 2.0 * self._on)
+            is_near = ~self._back.hides(moved) & self._covered(seen)
+            before += _runs_of(seen, is_near)
+            behind += _runs_of(seen, ~is_near)
+        return before, behind
+
+    def _covered(self, seen: Floats) -> NDArray[np.bool_]:
+        """Whether there is a far side at points as they are seen."""
+        far = seen.copy()
+        far[:, 2] = -np.finfo(np.float64).max
+        return self._back.hides(far)
+
+    def _cut(self, curves: list[Floats], raster: Raster) -> list[Floats]:
+        """The parts of curves that are not hidden."""
+        found = []
+        for curve in curves:
+            seen = self._fine(curve)
+            found += _runs_of(seen, ~raster.hides(seen, self._on))
+        return found
+
+    def _fine(self, curve: Floats) -> Floats:
+        """A curve as it is seen, with points so near to each other that it can be cut."""
+        seen, step = self.eye.seen(curve), float((self.high - self.low).max()) / 250.0
+        pieces = np.sqrt((np.diff(seen, axis=0) ** 2).sum(axis=1))
+        many = np.maximum(1, np.ceil(pieces / step).astype(np.int64))
+        place = np.concatenate([[0.0], np.cumsum(np.repeat(1.0 / many, many))])
+        return np.stack([np.interp(place, np.arange(len(seen)), one) for one in seen.T], axis=1)
+
+    def clear(self) -> None:
+        """Take away what has been drawn of walls."""
+        for artist in (*self.still, *self.front):
+            artist.remove()
+        self.still, self.front = [], []
+
+    def near_lines(self) -> None:
+        """Draw what is before the particles: the near edges of cavities."""
+        self._lines(self._cut_seen(self._near_curves), CAVITY_LINE, 0.8, 0.7, 4.0, self.front)
+
+    def _cut_seen(self, curves: list[Floats]) -> list[Floats]:
+        return [run for seen in curves for run in _runs_of(seen, ~self.opaque.hides(seen, self._on))]
+
+    def _lines(self, curves: list[Floats], colour: Any, wide: float, alpha: float, order: float, to: list[Any]) -> None:
+        if curves:
+            drawn = LineCollection(
+                [curve[:, :2] for curve in curves], colors=colour, linewidths=wide, alpha=alpha, zorder=order,
+                capstyle="round", joinstyle="round",
+            )  # fmt: skip
+            self.axes.add_collection(drawn, autolim=False)
+            to.append(drawn)
+
+    def _show(self, raster: Raster, order: float) -> None:
+        self.still.append(self.axes.imshow(
+            raster.image(), extent=raster.extent, origin="lower", aspect="equal", zorder=order,
+            interpolation="antialiased", interpolation_stage="rgba",
+        ))  # fmt: skip
+        self.axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
+
+    # --- Particles and bodies ----------------------------------------------------------------------------
+
+    def matter(
+        self, points: Floats, packed: Colours, lines: Ties = NO_TIES, faces: Ties = NO_TIES,
+        radius: Floats | None = None,
+    ) -> list[Any]:  # fmt: skip
+        """Draw particles or bodies; returns their artists."""
+        there = (packed & 0xFF > 0) & ~np.isnan(points[:, 0])
+        seen, colour = self.eye.seen(points[there]), red_green_blue(packed[there])
+        drawn: list[Any] = []
+        if len(faces[0]) or radius is not None:
+            raster = self.opaque.copy()
+            if len(faces[0]):
+                tints = red_green_blue(faces[1].ravel()).reshape(-1, 3, 3).mean(axis=1)
+                raster.triangles(*corners_of(self.eye, faces[0], tints))
+            elif radius is not None:
+                raster.balls(seen, radius[there], colour)
+            before = len(self.still)
+            self._show(raster, 2.0)
+            drawn += self.still[before:]
+            del self.still[before:]
+        else:
+            drawn += self._bonds(*lines)
+            drawn.append(self.dots(seen, colour, len(points)))
+        outside = ((seen[:, :2] < self.low) | (seen[:, :2] > self.high)).any(axis=1).sum()
+        drawn += say_beyond(self.axes, int(outside))
+        return drawn
+
+    def dots(self, seen: Floats, colour: Floats, count: int) -> Any:
+        """Dots of those that no solid hides, the nearer ones before others."""
+        kept = np.flatnonzero(~self.opaque.hides(seen))
+        kept = kept[np.argsort(seen[kept, 2])]
+        size = float(np.clip(_DOTS / max(1, count), _SMALL, _LARGE))
+        return self.axes.scatter(
+            *seen[kept, :2].T, c=colours_of(colour[kept], len(kept)), s=size, linewidths=0.0, zorder=2.0
+        )
+
+    def _bonds(self, lines: Floats, packed: Colours) -> list[Any]:
+        """The lines of bodies, wider the fewer there are."""
+        if not len(lines):
+            return []
+        seen = self.eye.seen(lines)
+        kept = np.flatnonzero(~self.opaque.hides(seen.mean(axis=1)))
+        kept = kept[np.argsort(seen[kept].mean(axis=1)[:, 2])]
+        width = float(np.clip(300.0 / len(lines), 0.9, 2.0))
+        drawn = LineCollection(
+            list(seen[kept, :, :2]), colors=red_green_blue(packed)[kept], linewidths=width, zorder=2.0
+        )
+        self.axes.add_collection(drawn, autolim=False)
+        return [drawn]
+
+
+def _solid(normals: Floats) -> Floats:
+    """The colours of a solid with normals (n, 3), as they are seen."""
+    return 0.15 + 0.85 * lit(np.broadcast_to(to_rgb(SOLID), normals.shape), normals)
+
+
+def _glass(normals: Floats) -> Floats:
+    """The colours of the inner side of a cavity: clear where it faces the eye."""
+    part = (_CLEAR + (_TINTED - _CLEAR) * (1.0 - normals[:, 2].clip(0.0)) ** 1.5)[:, None]
+    part = part * (1.0 - 0.25 * normals[:, 1:2])
+    paper, tint = (np.array(to_rgb(colour)) for colour in backdrop())
+    return np.asarray((1.0 - part) * paper + part * tint)
+
+
+def _runs_of(seen: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
+    """The parts of a curve whose points are kept, two points or more each."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
+    return [seen[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]

@@ -1,0 +1,109 @@
+"""How speeds are spread at the start and at the end of a run, beside the law of Maxwell."""
+
+from typing import Any
+
+import numpy as np
+
+from ..state import Floats
+from ..words.amounts import amount, prefixed
+from . import style
+
+# Most bins of a histogram, and fewest; of few speeds so many are in each.
+_BINS, _FEWEST, _EACH = 50, 8, 10
+# Speeds that differ by less than this part of themselves are one: an impact rounds them.
+_ALIKE = 1e-9
+# Up to this largest difference of the cumulated distributions the law of Maxwell says something.
+_NEAR = 0.1
+# A histogram with more than this part in one bin says nothing.
+_ALL = 0.8
+Spread = dict[str, Floats]
+
+
+def of_frames(content: Any) -> Spread:
+    """The known speeds at the start and at the end; {} if all particles have one speed in each of these frames."""
+    found = {}
+    for name, frame in content.frames.items():
+        values = np.sqrt((frame.velocity**2).sum(axis=0))
+        values = values[~np.isnan(values)]
+        if len(values):
+            found[name] = values
+    if not found:
+        return {}
+    top = _top(found)
+    told = [values for values in found.values() if not are_alike(values)]
+    return (
+        found if any(np.histogram(values, _BINS, (0.0, top))[0].max() < _ALL * len(values) for values in told) else {}
+    )
+
+
+def _top(spread: Spread) -> float:
+    """The end of the axis of speeds: beyond a few that are far faster than all others."""
+    return 1.05 * max(min(float(values.max()), 4.0 * float(np.quantile(values, 0.99))) for values in spread.values())
+
+
+def of_all(content: Any) -> float | None:
+    """The common speed of all particles at the end [m/s]; None for a single particle, or if speeds differ."""
+    frame = content.frames.get("end", content.frames.get("start"))
+    if frame is None or content.body is not None:
+        return None
+    values = np.sqrt((frame.velocity**2).sum(axis=0))
+    values = values[~np.isnan(values)]
+    return float(values.mean()) if len(values) > 1 and are_alike(values) else None
+
+
+def maxwell(speeds: Floats, mean_square: float, dimensions: int) -> Floats:
+    """The density of Maxwell's law at speeds, of particles of one mass with this mean square of theirs.
+
+    >>> at = np.linspace(0.0, 10.0, 2001)
+    >>> np.round([maxwell(at, 2.0, d).sum() * at[1] for d in (2, 3)], 4).tolist()
+    [1.0, 1.0]
+    """
+    variance = mean_square / dimensions
+    if dimensions == 2:
+        return np.asarray(speeds / variance * np.exp(-(speeds**2) / (2.0 * variance)))
+    return np.asarray(np.sqrt(2.0 / np.pi) * speeds**2 / variance**1.5 * np.exp(-(speeds**2) / (2.0 * variance)))
+
+
+def draw(axes: Any, content: Any, spread: Spread) -> None:
+    """Histograms of the speeds, and the law of Maxwell of the same mean energy where they are near it."""
+    top, bins = _top(spread), min(_BINS, max(_FEWEST, min(map(len, spread.values())) // _EACH))
+    factor, unit = prefixed(top, "m/s")
+    for name, values in spread.items():
+        colour = style.GREY if name == "start" and len(spread) > 1 else style.BLUE
+        when = "at the start" if name == "start" else "at the end"
+        if are_alike(values):
+            place = float(values.mean()) * factor
+            axes.axvline(place, color=colour, linewidth=1.4, linestyle="--",
+                         label=f"{when} all {amount(float(values.mean()), 'm/s', 3)}")  # fmt: skip
+            continue
+        counts, edges = np.histogram(values, bins=bins, range=(0.0, top))
+        look: dict[str, Any] = {"fill": True, "alpha": 0.35} if colour == style.GREY else {"linewidth": 1.6}
+        axes.stairs(100.0 * counts / len(values), edges * factor, color=colour, label=when, **look)
+    _law(axes, content, spread, top / bins, factor)
+    axes.set_xlim(0.0, top * factor)
+    axes.set_ylim(0.0, 1.35 * axes.get_ylim()[1])
+    axes.set_title("Speeds" if content.body is None else "Speeds of points")
+    axes.set_ylabel(f"% in each of {bins} bins")
+    axes.set_xlabel(f"speed [{unit}]")
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _law(axes: Any, content: Any, spread: Spread, bin_width: float, factor: float) -> None:
+    """The law of Maxwell of the last speeds, where these are near it."""
+    values, frame = list(spread.values())[-1], list(content.frames.values())[-1]
+    masses = frame.mass
+    if content.body is not None or np.ptp(masses) > 1e-9 * masses.max() or are_alike(values) or len(values) < _BINS:
+        return
+    dimensions = 3 if content.scene.plane is None else 2
+    at = np.linspace(0.0, _top(spread), 400)
+    density = maxwell(at, float((values**2).mean()), dimensions)
+    law = np.cumsum(density) * at[1]
+    measured = np.searchsorted(np.sort(values), at) / len(values)
+    if np.abs(law - measured).max() < _NEAR:
+        axes.plot(at * factor, 100.0 * density * bin_width, color=style.RED, linewidth=1.2, linestyle=":",
+                  label="Maxwell, same energy")  # fmt: skip
+
+
+def are_alike(values: Floats) -> bool:
+    """Whether all values, such as speeds, are the same up to round-off."""
+    return bool(np.ptp(values) <= _ALIKE * np.abs(values).max())

@@ -1,0 +1,165 @@
+"""Random particles, uniform in the admissible volume of a scene."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..common import checks
+from ..errors import SceneError
+from ..particles import Particles
+from ..scene import Scene
+from ..state import Floats
+from .sequential import VolumeBox, place_balls, require_packing, require_size
+from .shapes import require_shapes
+
+_BATCH = 1 << 18
+# The search ends after this many points if fewer than one in a million was admissible.
+_TRIES = 20_000_000
+# Of balls the volume is estimated from as many admissible points, to 0.1 %.
+_POINTS = 1 << 18
+_INSTEAD = "the particles as arrays or a CSV file"
+
+
+def fill(
+    scene: Scene,
+    n: int,
+    *,
+    speed: float | None = None,
+    temperature: float | None = None,
+    mass: ArrayLike = 1.0,
+    seed: int = 0,
+    exact: bool = False,
+    radius: ArrayLike | None = None,
+) -> Particles:
+    """N particles, uniform in the admissible volume, with isotropic or Maxwellian velocities.
+
+    Args:
+        scene: its volume must be bounded.
+        n: number of particles, 1 or more.
+        speed: |v| of every particle [m/s], from 0 to 1e100, in a direction uniform on the sphere; or
+        temperature: k_B T [J], from 0 to 1e100: each component of v is normal with variance temperature/mass. The mean
+            kinetic energy of n particles is 3/2 of it by expectation only, with a relative standard deviation of
+            sqrt(2/(3 n)): 26 % of 10 particles, 0.8 % of 10 000. In a scene with a plane there are two components, the
+            energy is k_B T, and its deviation sqrt(1/n).
+        mass: one number or (n,) [kg], above 0.
+        seed: the same seed gives the same particles.
+        exact: True: the velocities are scaled together, so that the mean kinetic energy is 3/2 temperature (in a plane
+            1 temperature) to round-off. Their mean momentum stays as it is drawn, of the order of
+            sqrt(mass temperature/n): walls change it, and to take it out would leave fewer than 3 n degrees of freedom.
+        radius: one number or (n,) [m], above 0: balls, at places where they overlap neither one another nor the walls,
+            one after the other, the largest first; None: points, which do not meet one another.
+
+    Returns:
+        The particles; their `volume` is the admissible volume of points [m^3], estimated from the random points; in a
+        scene with a plane all of them are in it, and it is the admissible area [m^2].
+
+    Raises:
+        SceneError: an argument is out of its range, both or neither of speed and temperature are given, the
+            volume is open, exact without a temperature, too thin for random points to find it, or too full: balls fill
+            at most 0.35 of it at random places, discs in a plane 0.5; `pack` makes more of them.
+
+    >>> import swarm
+    >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    >>> swarm.fill(cavity, 10, speed=0.5, seed=1)
+    Particles(10)
+    """
+    checks.of_class("scene", scene, Scene)
+    n = checks.count("n", n)
+    checks.particles_fit("n", n)
+    seed = checks.count("seed", seed, least=0)
+    speed, temperature = check_velocities("fill", speed, temperature, exact)
+    random = np.random.default_rng(seed)
+    # Checks the masses too; velocities follow, since a Maxwellian needs the masses.
+    if radius is None:
+        points, volume = _points(scene, n, random)
+        particles = Particles(points, np.zeros((3, n)), mass)
+    else:
+        particles, volume = _balls(scene, Particles(np.zeros((3, n)), np.zeros((3, n)), mass, None, radius), random)
+    particles.volume = volume
+    particles.image = None if scene.period is None else np.zeros((3, n), np.int64)
+    fill_velocities(scene, particles, speed, temperature, exact, random)
+    return particles
+
+
+def check_velocities(
+    user: str, speed: float | None, temperature: float | None, exact: bool
+) -> tuple[float | None, float | None]:
+    """The speed and the temperature as numbers; a `SceneError` unless they say how fast particles are."""
+    if (speed is None) == (temperature is None):
+        came = "neither" if speed is None else "both"
+        raise SceneError(f"{user} needs one of speed and temperature, got {came}")
+    if speed is not None:
+        speed = checks.magnitude("speed", speed)
+    if temperature is not None:
+        temperature = checks.magnitude("temperature", temperature)
+    if checks.flag("exact", exact) and temperature is None:
+        raise SceneError("exact must be False with speed, got True: it scales velocities to a temperature")
+    return speed, temperature
+
+
+def fill_velocities(
+    scene: Scene, particles: Particles, speed: float | None, temperature: float | None, exact: bool,
+    random: np.random.Generator,
+) -> None:  # fmt: skip
+    """Give particles random velocities."""
+    n = len(particles)
+    normal = np.zeros((3, n))
+    normal[scene.axes()] = random.standard_normal((len(scene.axes()), n))
+    if speed is not None:
+        particles.velocity = normal * (speed / np.sqrt((normal**2).sum(axis=0)))
+    elif temperature is not None:
+        if exact:
+            # Of each component, sum(m v^2)/3n = T where the sum of the squares is 3 n; of two in a plane 2 n.
+            normal *= np.sqrt(len(scene.axes()) * n / (normal**2).sum())
+        particles.velocity = normal * np.sqrt(temperature / particles.mass)
+
+
+def _balls(scene: Scene, particles: Particles, random: np.random.Generator) -> tuple[Particles, float]:
+    """Balls where they overlap nothing, and the volume."""
+    assert particles.radius is not None
+    require_shapes(scene, particles.radius)
+    require_size(scene, particles.radius)
+    room = room_of(scene, random, "fill")
+    require_packing(scene, particles.radius, room)
+    particles.position = place_balls(scene, particles.radius, room, random)
+    return particles, room.volume
+
+
+def room_of(scene: Scene, random: np.random.Generator, user: str) -> VolumeBox:
+    """The volume of a scene, from random points, for the `user` that a sentence names."""
+    _points_of_it, volume = _points(scene, _POINTS, random, user)
+    return VolumeBox(*bounding_box(scene, user, _INSTEAD), volume)
+
+
+def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]:
+    """The lower and the upper corner (3, 1) of a box around the admissible volume; a SceneError if that is open."""
+    low, high = (np.array(corner)[:, None] for corner in scene.bounds())
+    if not np.isfinite(high - low).all():
+        raise SceneError(
+            f"{user} needs a bounded volume, got a scene that is open to infinity; add a surface that closes it, or "
+            f"give {instead}"
+        )
+    return low, high
+
+
+def _points(scene: Scene, n: int, random: np.random.Generator, user: str = "fill") -> tuple[Floats, float]:
+    """Admissible points, and the volume from their share of the random points of the bounding box."""
+    low, high = bounding_box(scene, user, _INSTEAD)
+    points, found, tried, admissible = np.empty((3, n)), 0, 0, 0
+    axes = scene.axes()
+    box = float(np.prod((high - low)[axes]))
+    while found < n:
+        trial = np.zeros((3, _BATCH))
+        trial[axes] = low[axes] + (high - low)[axes] * random.random((len(axes), _BATCH))
+        inside = trial[:, scene.admits(trial)]
+        admissible += inside.shape[1]
+        inside = inside[:, : n - found]
+        points[:, found : found + inside.shape[1]] = inside
+        found += inside.shape[1]
+        tried += _BATCH
+        if tried >= _TRIES and found < 1e-6 * tried:
+            raise SceneError(
+                f"{user} found {found} admissible points in {tried} tries, a volume of about "
+                f"{box * found / tried:.2g} m^{len(axes)}: the admissible part of the box {low.ravel()} to "
+                f"{high.ravel()} is below 1e-6 of it; give the particles as arrays or a CSV file"
+            )
+    return points, box * admissible / tried

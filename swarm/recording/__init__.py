@@ -1,0 +1,1 @@
+"""Recordings for Rerun: written, read back, and shown."""

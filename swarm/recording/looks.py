@@ -1,0 +1,105 @@
+"""The parts of a recording that do not change: layout, walls, legend, names and colours of time series."""
+
+from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from ..pictures import colours
+from ..pictures.colours import BACKGROUND, curve_colour, rgb
+from ..pictures.drawn import Drawn
+from ..state import Floats
+from ..triangles.shape import Shape
+from ..words import series
+from .playback import LINES, MESH, PARTICLES
+
+# The colours of matplotlib's pictures.
+_CAVITY, _SOLID = (*rgb(colours.CAVITY), 60), (*rgb(colours.SOLID), 255)
+_CAVITY_WIRE, _SOLID_WIRE = (*rgb(colours.CAVITY_LINE), 255), (*rgb(colours.SOLID_LINE), 255)
+# Plots that are seen at once, and which these are: those of other groups come after them.
+_SEEN = 4
+_FIRST = (
+    "energy",
+    "number",
+    "impacts",
+    "pressure",
+    "force",
+    "crossings",
+    "heat",
+    "energy_error",
+    "penetration",
+    "overlap",
+)
+# Between the faces of bodies, which have no shading.
+_EDGE = (10, 10, 12, 255)
+SOLID_LOOKS = _SOLID, _SOLID_WIRE
+
+
+def path_of(shape: Shape) -> str:
+    """The entity of a wall."""
+    return f"/scene/{'solids' if shape.solid else 'surfaces'}/{shape.name}"
+
+
+def log_static(stream: Any, drawn: Drawn, shapes: list[Shape], center: Floats) -> None:
+    """Log the walls, and how particles and bodies look."""
+    stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    sizes = rr.Radius.ui_points(2.0) if drawn.radius is None else drawn.radius
+    stream.log(PARTICLES, rr.Points3D.from_fields(radii=sizes), static=True)
+    width = rr.Radius.ui_points(1.0)
+    if len(drawn.triangles):
+        stream.log(MESH, rr.Mesh3D.from_fields(triangle_indices=drawn.triangles), static=True)
+        stream.log(LINES, rr.LineStrips3D.from_fields(radii=width, colors=[_EDGE]), static=True)
+    elif len(drawn.lines):
+        stream.log(LINES, rr.LineStrips3D.from_fields(radii=width), static=True)
+    log_walls(stream, shapes, center)
+
+
+def log_walls(stream: Any, shapes: list[Shape], center: Floats, static: bool = True) -> None:
+    """Log the walls, or those from the time of the stream on."""
+    for shape in shapes:
+        face, wire = (_SOLID, _SOLID_WIRE) if shape.solid else (_CAVITY, _CAVITY_WIRE)
+        if len(shape.vertices):
+            mesh = rr.Mesh3D(
+                vertex_positions=shape.vertices - center, triangle_indices=shape.triangles,
+                vertex_normals=shape.normals, albedo_factor=face,
+            )  # fmt: skip
+            stream.log(f"{path_of(shape)}/mesh", mesh, static=static)
+        elif not static:
+            stream.log(f"{path_of(shape)}/mesh", rr.Clear(recursive=False))
+        for part, curves, width in (("wires", shape.edges, 0.8), ("levels", shape.levels, 0.4)):
+            if curves or not static:
+                lines = rr.LineStrips3D(
+                    [curve - center for curve in curves], colors=[wire], radii=rr.Radius.ui_points(width)
+                )
+                stream.log(f"{path_of(shape)}/{part}", lines, static=static)
+
+
+def log_series(stream: Any, lines: list[series.Line]) -> None:
+    """Log the names and the colours of time series."""
+    for together in series.views_of(lines).values():
+        for k, line in enumerate(together):
+            colour = rgb(curve_colour(line.name, k))
+            stream.log(line.path, rr.SeriesLines(colors=[colour], names=[line.name], widths=[1.5]), static=True)
+
+
+def blueprint(lines: list[series.Line], noun: str, eye: Any = None, plane: str | None = None) -> rrb.Blueprint:
+    """The 3-D view, from an eye or from where it shows all, beside the plots, paused at the start."""
+    scene = rrb.Spatial3DView(
+        origin="/scene", name=noun, background=BACKGROUND, line_grid=rrb.LineGrid3D(visible=False), eye_controls=eye
+    )
+    views, plots = series.views_of(lines), []
+    for group in sorted(views, key=lambda group: _FIRST.index(group) if group in _FIRST else len(_FIRST)):
+        graph = series.GRAPHS[group].across(plane)
+        legend = rrb.PlotLegend(rrb.Corner2D.RightTop, visible=len(views[group]) > 1)
+        name = f"{graph.name}, log10" if graph.is_error else graph.name
+        paths = [line.path for line in views[group]]
+        plots.append(rrb.TimeSeriesView(origin="/", contents=paths, name=name, plot_legend=legend))
+    seen, rest = rrb.Vertical(*plots[:_SEEN], name="graphs"), rrb.Vertical(*plots[_SEEN:], name="more graphs")
+    graphs = rrb.Tabs(seen, rest, active_tab=0) if plots[_SEEN:] else seen
+    about = rrb.TextDocumentView(origin="/about", name="what is shown")
+    return rrb.Blueprint(
+        rrb.Horizontal(rrb.Vertical(scene, about, row_shares=[5, 1]), graphs, column_shares=[1, 1]),
+        rrb.TimePanel(timeline="frame", play_state="paused", state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+    )

@@ -1,0 +1,322 @@
+"""Recordings for Rerun (https://rerun.io), written during a run or from its trajectory.
+
+/scene/particles              Points3D, a frame's; coloured; of bodies, their points
+/scene/bodies/lines, .../mesh LineStrips3D and Mesh3D of bodies, a frame's; which points a triangle has is static
+/scene/surfaces/0_KIND/       mesh: Mesh3D, wires (edges) and levels: LineStrips3D; static; /scene/solids/... likewise;
+                              of one that moves also Transform3D, a frame's, from where it is at the start; where there
+                              are doors not static, but from each frame on in which others are there
+                              fields of more than 2000 solids have bodies: Points3D with radii, Boxes3D, ... for mesh
+/energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
+/overlap                      Scalars: of soft balls
+/time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
+/about                        meaning of the colours, as text and as values, the origin, and of a run that has ended
+                              `title` and `verdicts`, the run in words and whether it went well; static
+
+Rerun's positions are float32. Those of a scene that is far from the origin are less its centre, `center` of /about.
+"""
+
+import atexit
+import bisect
+import ctypes
+import math
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from ..bodies.body import Body
+from ..common import checks
+from ..errors import FileError, SceneError
+from ..files import marks
+from ..files.origin import origin_of
+from ..files.replaced import no_room
+from ..files.writer import WriteFrames, Written, rows
+from ..methods import Method
+from ..particles import Particles
+from ..pictures import colours
+from ..pictures.drawn import Drawn
+from ..scene import Scene
+from ..triangles import solids
+from ..triangles.shapes import shapes_of, since_start
+from ..words import series
+from ..words.content import Content
+from . import about, instanced, looks, sight, viewer
+from .playback import LINES, MESH, PARTICLES, is_whole
+
+# Bytes of a particle (position and colour), of a line (ends, where it begins, colour), and at most of a number of a
+# time series, which may be a chunk of its own.
+_PARTICLE_BYTES, _LINE_BYTES, _NUMBER_BYTES = 16, 32, 2000
+_MEGABYTE = 1e6
+# Rows of the time series that are sent together, unless that takes longer than this [s].
+_ROWS, _PATIENCE = 50, 0.5
+# Longest flush [s]: usually milliseconds, but it may never return if the file cannot be written.
+_LONGEST = 10.0
+# Bytes of a blueprint and of what is static besides surfaces, and more.
+_BEGINNING = 1 << 18
+# Rerun counts nanoseconds in 64 bits, 292 years; the exact time is in /time.
+_LATEST = 9.2e9
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The choices of a recording.
+
+    Args:
+        particles: the most that are recorded, evenly chosen; of bodies, the most points, and bodies are whole.
+        color: "speed" or "energy-error".
+        megabytes: the largest size; if there are too many frames, every k-th and the last are recorded.
+        live: True to show it in a viewer on this machine during the run, or the URL of a viewer.
+    """
+
+    particles: int = 5000
+    color: str = "speed"
+    megabytes: float = 100.0
+    live: bool | str = False
+
+    def __post_init__(self) -> None:
+        checks.count("record_particles", self.particles)
+        checks.one_of("record_color", self.color, colours.BY)
+        checks.positive("record_megabytes", self.megabytes)
+
+
+class RecordingWriter:
+    """A context that creates the recording and gives the function that appends frames.
+
+    `start` holds particles, or the points of copies of `body`; `frames` is the number of frames of the run. Without a
+    path and a viewer the recording stays in memory, in `stream`.
+    """
+
+    def __init__(
+        self,
+        path: Path | None,
+        overwrite: bool,
+        scene: Scene,
+        method: Method,
+        start: Particles,
+        frames: int,
+        settings: Settings,
+        body: Body | None = None,
+    ) -> None:
+        if path is not None:
+            marks.check_target(path, overwrite, "recording")
+            # Asked first: a sink of Rerun that fails writes lines of its own.
+            if not os.access(path if path.exists() else path.parent, os.W_OK):
+                raise FileError(f"cannot write the recording {path}: no permission")
+        self._path, self._scene, self._method, self._settings = path, scene, method, settings
+        self._last, self._body, self._start, self.count = frames - 1, body, start, len(start)
+        self._fed = start.births is not None or bool(np.isnan(start.position).any())
+        self._drawn = drawn = Drawn(len(start), body, settings.particles, start.radius)
+        some = {"collisions": start.radius is not None, "rotational_energy": start.spin is not None}
+        some["largest_overlap"] = start.radius is not None and method.law() is not None
+        self._more = [name for name, there in {"source_energy": self._fed, **some}.items() if there]
+        self._at_start, self._center = drawn.points(start.position), origin_of(scene, start)
+        if body is not None and settings.color != "speed":
+            raise SceneError(
+                f"record_color must be 'speed' for bodies, got {settings.color!r}: their points exchange energy"
+            )
+        self.colour_by(start)
+        # The number, the time and the observables of frames whose time series are still to be sent, and of that before.
+        self._rows: list[tuple[int, float, dict[str, Any]]] = []
+        self._before: list[tuple[int, float, dict[str, Any]]] = []
+        self._due = 0.0
+        # The observables of all frames that are recorded, for the words about the run.
+        self._seen: list[dict[str, Any]] = []
+        # Where walls come and go they are sent from each instant on, of which this is the number.
+        self._has_doors, self._instant = scene.has_doors() and not scene.moves(), -1
+        self._failed = False
+        # Where it is written: until it is whole another name, if it is made of a trajectory.
+        self.file = path
+        self._url = viewer.live_url(settings.live) if settings.live else None
+
+    def colour_by(self, shown: Particles) -> None:
+        """The scale of colours is that of these particles, or bodies."""
+        points = self._drawn.points
+        if self._body is None:
+            position = points(shown.position)
+            mass, there = points(shown.mass[None])[0], ~np.isnan(position[0])
+            shown = Particles.of_frame(position, points(shown.velocity), mass, None, there)
+        color, scene, method = self._settings.color, self._scene, self._method
+        self._scale, self._values = colours.colouring(color, scene, method, shown)
+
+    def __enter__(self) -> WriteFrames:
+        self._shapes = shapes_of(self._scene, self._at_start, most=solids.MANY)
+        self._series = series.lines_of(self._scene, self._method, self._shapes, self._body, self._more)
+        fixed = sum(24 * len(s.vertices) + 12 * len(s.triangles) + 12 * sum(map(len, s.wires)) for s in self._shapes)
+        many = solids.solids_of(self._scene, 0.0)
+        fixed += sum(map(instanced.bytes_of, many))
+        lines, triangles = len(self._drawn.lines), len(self._drawn.triangles)
+        points = self._at_start.shape[1] * (2 if triangles else 1)
+        frame = _PARTICLE_BYTES * points + _LINE_BYTES * lines + _NUMBER_BYTES * (4 + len(self._series))
+        fixed += 12 * triangles
+        room = max(self._settings.megabytes * _MEGABYTE - fixed, frame)
+        self._stride = math.ceil((self._last + 1) * frame / room)
+        is_new = self.file is not None and not self.file.exists()
+        # Rerun never returns from a file that has no room for its blueprint.
+        if problem := no_room(self.file, _BEGINNING + fixed):
+            if is_new and self.file is not None:
+                self.file.unlink(missing_ok=True)
+            raise FileError(f"cannot write the recording {self._path}: {problem}")
+        self.stream = rr.RecordingStream("swarm")
+        sinks: list[Any] = [rr.GrpcSink(self._url)] if self._url else []
+        try:
+            sinks += [rr.FileSink(self.file)] if self.file else []
+            plane = self._scene.plane
+            eye = sight.eye_controls(plane, self._shapes, self._at_start.T, self._center)
+            blueprint = looks.blueprint(self._series, self._drawn.noun, eye, plane)
+            if sinks:
+                self.stream.set_sinks(*sinks, default_blueprint=blueprint)
+            else:
+                self.stream.send_blueprint(blueprint)
+            self.stream.flush(timeout_sec=_LONGEST)
+            self._log_static(many)
+            # A full disk is noticed by a flush alone, and what is sent after it may never return.
+            self.stream.flush(timeout_sec=_LONGEST)
+        except (RuntimeError, ValueError) as error:
+            raise self._error(f"cannot write the recording {self._path}", error) from error
+        return self._write
+
+    def _log_static(self, many: list[solids.Solids]) -> None:
+        """Log what does not change."""
+        self.stream.set_log_time_enabled(False)
+        looks.log_static(self.stream, self._drawn, [] if self._has_doors else self._shapes, self._center)
+        if not self._has_doors:
+            self._log_solids(many, static=True)
+        looks.log_series(self.stream, self._series)
+        about.log_about(self.stream, self._drawn, self._scale, self._stride, self._center, self._scene.plane)
+
+    def _error(self, what: str, error: Exception) -> FileError:
+        """The error of a recording that ends here."""
+        self._failed = True
+        # Closing the stream, or Rerun at the exit of the process, would wait forever for its dead thread.
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self.stream))
+        atexit.unregister(rr.rerun_shutdown)
+        return FileError(f"{what}: {no_room(self.file) or error}")
+
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
+        if self._failed:
+            return  # another flush never returns
+        try:
+            self._send_rows()
+            if error is None and self._seen:
+                self._log_outcome()
+            self.stream.flush(timeout_sec=_LONGEST)
+            if self._url or self._path:
+                self.stream.disconnect()
+            # Rerun says nothing of an end that it could not write.
+            if self.file is not None and not is_whole(self.file):
+                raise RuntimeError("its end could not be written")
+        except (RuntimeError, ValueError) as problem:
+            if error is None:
+                raise self._error(f"cannot close the recording {self._path}", problem) from problem
+
+    def _write(self, frames: list[Written]) -> None:
+        chosen = [frame for frame in frames if frame[0] % self._stride == 0 or frame[0] == self._last]
+        if not chosen:
+            return
+        numbers, times = [frame[0] for frame in chosen], [frame[1] for frame in chosen]
+        shown, colour, lines = [], [], []
+        for number, moment, state, seen in chosen:
+            position, packed, tints = self._drawn.coloured(state, self._scale, self._values)
+            shown.append(position - self._center[:, None])
+            colour.append(packed)
+            lines.append(tints)
+            self._rows.append((number, moment, seen))
+            self._seen.append({**seen, "time": moment})
+        points = rows(shown, np.float32)
+        try:
+            self._send_points(numbers, times, points, np.array(colour), np.array(lines))
+            if self._has_doors:
+                self._send_doors(numbers, times)
+            if self._scene.moves():
+                walls = [(seen["wall_position"], seen["wall_orientation"]) for *_, seen in chosen]
+                self._send_walls(numbers, times, walls)
+            self._send("/time", numbers, times, rr.Scalars.columns(scalars=times))
+            # A dozen series cost as much as the points of a few frames: rows are collected, but not for long.
+            if len(self._rows) >= _ROWS or time.monotonic() > self._due:
+                self._send_rows()
+            # Without a flush a full disk is not noticed, and the next `send` to the thread that it ended never returns.
+            self.stream.flush(timeout_sec=_LONGEST)
+        except (RuntimeError, ValueError) as error:
+            raise self._error(f"cannot write frame {numbers[0]} to the recording {self._path}", error) from error
+
+    def _log_outcome(self) -> None:
+        """Log the run in words, as plots have it above and below."""
+        seen = {name: np.array([row[name] for row in self._seen]) for name in self._seen[0]}
+        known = {"start": self._start}
+        about.log_outcome(self.stream, Content("", self._scene, self._method, self._body, self.count, seen, known))
+
+    def _send_points(self, numbers: Any, times: Any, points: Any, colour: Any, lines: Any) -> None:
+        """Send points (frames, n, 3) with their colours, and what ties them together."""
+        drawn, (frames, n, _three) = self._drawn, points.shape
+        columns = rr.Points3D.columns(positions=points.reshape(-1, 3), colors=colour.ravel())
+        self._send(PARTICLES, numbers, times, columns.partition([n] * frames))
+        if len(drawn.lines):
+            strips = points[:, drawn.lines].reshape(-1, 2, 3)
+            tinted = {"colors": lines.ravel()} if lines.size else {}
+            columns = rr.LineStrips3D.columns(strips=strips, **tinted)
+            self._send(LINES, numbers, times, columns.partition([len(drawn.lines)] * frames))
+        if len(drawn.triangles):
+            columns = rr.Mesh3D.columns(vertex_positions=points.reshape(-1, 3), vertex_colors=colour.ravel())
+            self._send(MESH, numbers, times, columns.partition([n] * frames))
+
+    def _send_doors(self, numbers: list[int], times: list[float]) -> None:
+        """Send the walls that are there where these are others than before."""
+        for number, moment in zip(numbers, times, strict=True):
+            instant = bisect.bisect_right(self._scene.instants, moment)
+            if instant != self._instant:
+                self._instant = instant
+                self.stream.set_time("frame", sequence=number)
+                self.stream.set_time("sim_time", duration=min(moment, _LATEST))
+                shapes = shapes_of(self._scene, self._at_start, moment, most=solids.MANY)
+                looks.log_walls(self.stream, shapes, self._center, static=False)
+                self._log_solids(solids.solids_of(self._scene, moment), static=False)
+                self.stream.reset_time()
+
+    def _log_solids(self, many: list[solids.Solids], static: bool) -> None:
+        """Log the fields of many solids, or those that are there from the time of the stream on."""
+        for shape in self._shapes:
+            for one in (one for one in many if one.surface == shape.surface):
+                instanced.log(self.stream, looks.path_of(shape), one, self._center, looks.SOLID_LOOKS, static)
+
+    def _send_walls(self, numbers: Any, times: Any, walls: list[tuple[Any, Any]]) -> None:
+        """Send where the surfaces that move are, (position, orientation) a frame, from where they were drawn."""
+        for shape in self._shapes:
+            surface = self._scene.surfaces[shape.surface]
+            if shape.motion is not None or surface.motion is not None or surface.reacts():
+                moves = [
+                    since_start(self._scene, shape, moment, places) for moment, places in zip(times, walls, strict=True)
+                ]
+                turns, ways = (np.array(parts) for parts in zip(*moves, strict=True))
+                # From the centre: x1 - c = A (x0 - c) + (b + A c - c)
+                ways = ways + (turns @ self._center - self._center)
+                columns = rr.Transform3D.columns(translation=ways, mat3x3=turns)
+                self._send(looks.path_of(shape), numbers, times, columns)
+
+    def sync(self) -> None:
+        """Do nothing: no checkpoint refers to a recording."""
+
+    def _send_rows(self) -> None:
+        """Send the time series of the frames since the last call."""
+        known = self._before + self._rows
+        if self._rows:
+            numbers, times = (np.array([row[part] for row in known]) for part in (0, 1))
+            seen = {name: np.array([row[2][name] for row in known]) for name in known[0][2]}
+            for line in self._series:
+                values = line.values(times, seen)
+                new = ~np.isnan(values)
+                new[: len(self._before)] = False
+                if new.any():
+                    self._send(line.path, numbers[new], times[new], rr.Scalars.columns(scalars=values[new]))
+        self._before, self._rows = known[-1:], []
+        self._due = time.monotonic() + _PATIENCE
+
+    def _send(self, path: str, numbers: Any, times: Any, columns: Any) -> None:
+        indexes = [
+            rr.TimeColumn("frame", sequence=numbers),
+            rr.TimeColumn("sim_time", duration=np.clip(times, -_LATEST, _LATEST)),
+        ]
+        self.stream.send_columns(path, indexes, columns)

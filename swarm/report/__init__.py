@@ -1,0 +1,1 @@
+"""Reports: pages of HTML about a run or a sweep."""

@@ -1,0 +1,169 @@
+"""The report of one run."""
+
+import datetime
+import functools
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..errors import SceneError
+from ..files import paths
+from ..words import facts, verdicts
+from ..words import titles as words
+from ..words.amounts import amount, many
+from ..words.content import Content, content_of
+from . import html, pictures, reproduce
+from .html import Page, filled
+
+
+class Note(NamedTuple):
+    """A sentence that stands above all, and a command that goes with it, or ""."""
+
+    text: str
+    command: str = ""
+
+
+# Rows of `facts` that a page shows in other places.
+_ELSEWHERE = ("surfaces", "gravity", "method", "verdicts")
+
+
+def report(trajectory: Any, path: Any, overwrite: bool) -> Page:
+    """The report of a `Trajectory`, which is written where a path is given; see `Trajectory.report`."""
+    return html.written(functools.partial(of_trajectory, trajectory), path, overwrite, (trajectory.path,))
+
+
+def report_of_content(content: Content, wall_time: float, path: Any, overwrite: bool) -> Page:
+    """The report of a run that wrote no trajectory, which is written where a path is given."""
+    return html.written(functools.partial(of_content, content, wall_time), path, overwrite, ())
+
+
+def of_trajectory(trajectory: Any) -> Page:
+    """The report of a `Trajectory`.
+
+    Raises:
+        SceneError: it is damaged, or holds no frame.
+    """
+    trajectory.require_frames()
+    content = content_of(trajectory)
+    makers, wall_times = trajectory.makers, trajectory.wall_times
+    spent = None if wall_times is None else float(wall_times[-1])
+    size = trajectory.path.stat().st_size
+    about = [trajectory.path.name, *_when(makers, trajectory.path), f"{size / 1e6:.1f} MB"]
+    numbers = facts.of_trajectory(trajectory)
+    told = dict(words.details(content))
+    page = filled(
+        "run.html.j2",
+        title=words.title(content),
+        about=" · ".join(about),
+        notes=_notes(trajectory),
+        verdicts=verdicts.judged(content),
+        places=pictures.of_places(content),
+        series=pictures.of_series(content),
+        scene=list(told.items()),
+        numbers=[(name, value) for name, value in numbers.items() if name not in _ELSEWHERE],
+        speed=_speed(content, spent, trajectory.threads) + _versions(makers, trajectory.seed),
+        again=reproduce.of_trajectory(trajectory),
+    )
+    return Page(words.title(content), page, (trajectory.path,))
+
+
+def of_content(content: Content, wall_time: float) -> Page:
+    """The report of a run that has written no trajectory, which took so many seconds."""
+    from ..files.provenance import makers
+
+    numbers = {"particles": many(content.count), **facts.of_scene(content.scene), **facts.of_run(content.seen)}
+    why = "It cannot be reproduced from this page: it was run in Python and has written no trajectory; keep the script."
+    page = filled(
+        "run.html.j2",
+        title=words.title(content),
+        about="a run without a trajectory",
+        notes=[],
+        verdicts=verdicts.judged(content),
+        places=pictures.of_places(content),
+        series=pictures.of_series(content),
+        scene=words.details(content),
+        numbers=[(name, value) for name, value in numbers.items() if name not in ("surfaces", "gravity")],
+        speed=_speed(content, wall_time, None) + _versions(makers(), None),
+        again=reproduce.Again([why]),
+    )
+    return Page(words.title(content), page)
+
+
+def _when(makers: dict[str, str], path: Path) -> list[str]:
+    """The day of the run."""
+    if "date" in makers:
+        moment = datetime.datetime.fromisoformat(makers["date"])
+        return [f"run on {moment.day} {moment:%B %Y, %H:%M} UTC"]
+    moment = datetime.datetime.fromtimestamp(path.stat().st_mtime, datetime.UTC)
+    return [f"file of {moment.day} {moment:%B %Y, %H:%M} UTC"]
+
+
+def _notes(trajectory: Any) -> list[Note]:
+    """Whether the run goes on, or was cut."""
+    last = float(trajectory.times[-1])
+    until = trajectory.until
+    if until is None and trajectory.scene_text is not None:
+        until = _until_of(trajectory.scene_text)
+    if is_written(trajectory.path):
+        end = "" if until is None else f" of {amount(until, 's')}"
+        return [Note(f"A run writes this file now: this page shows its first {amount(last, 's')}{end}.")]
+    saved = paths.checkpoint_of(trajectory.path)
+    if until is not None and last < until * (1.0 - 1e-9):
+        text = f"This run is not complete: it was stopped at {amount(last, 's')} of {amount(until, 's')}."
+    elif saved.exists():
+        text = f"This run may not be complete: there is the checkpoint {saved.name}, from which it can go on."
+    else:
+        return []
+    if not saved.exists():
+        return [Note(f"{text} There is no checkpoint beside it to go on from.")]
+    if trajectory.scene_text is None:
+        return [Note(f"{text} Go on with it by the script that began it, with resume=True.")]
+    return [Note(f"{text} Go on with it:", f"swarm run {trajectory.path.stem}.toml -o {trajectory.path.name} --resume")]
+
+
+def _until_of(text: str) -> float | None:
+    """The end of the run of a scene file [s]."""
+    import tomllib
+
+    until = tomllib.loads(text).get("run", {}).get("until")
+    return float(until) if isinstance(until, (int, float)) else None
+
+
+def is_written(path: Path) -> bool:
+    """Whether a run writes this file now: it holds the lock beside it."""
+    lock = paths.lock_of(path)
+    if not lock.exists():
+        return False
+    import filelock
+
+    try:
+        with filelock.FileLock(lock, timeout=0.0):
+            return False
+    except (filelock.Timeout, OSError):
+        return True
+
+
+def _speed(content: Content, spent: float | None, threads: int | None) -> list[tuple[str, str]]:
+    """What the run took, as far as is known."""
+    if spent is None:
+        return [("wall time", "not kept: an older version of swarm, or a cluster, has written the file")]
+    events = float(content.seen["impacts"][-1]) + float(content.seen.get("collisions", [0.0])[-1])
+    rows = [("wall time", f"{amount(spent, 's', 3)}, compilation included")]
+    if events and spent > 0.0:
+        rows.append(("impacts a second of it", many(float(f"{events / spent:.3g}"))))
+    return rows + ([] if threads is None else [("threads", str(threads))])
+
+
+def _versions(makers: dict[str, str], seed: int | None) -> list[tuple[str, str]]:
+    """What the run was computed with."""
+    names = {"version": "swarm", "python": "Python", "numpy": "NumPy", "numba": "Numba", "hdf5": "HDF5"}
+    rows = [(told, makers[name]) for name, told in names.items() if name in makers]
+    rows += [("machine", makers["machine"])] if "machine" in makers else []
+    return rows + ([] if seed is None else [("seed of thermal walls", str(seed))])
+
+
+def require_trajectory(path: Path) -> None:
+    """Raise a SceneError if a file is a log of impacts, of which there is no report."""
+    from ..files.stored import is_log
+
+    if is_log(path):
+        raise SceneError(f"{path} is a log of impacts, of which there is no report; take the trajectory of the run")

@@ -1,0 +1,192 @@
+"""Checks before a run starts."""
+
+import numpy as np
+
+from ...bodies import passing
+from ...bodies.state import Bodies
+from ...bodies.steps import require_steps_of_bodies
+from ...errors import SceneError
+from ...events.balls import require_apart, require_balls
+from ...files.origin import require_near
+from ...methods import Impact
+from ...methods.base import Method, check_surfaces
+from ...motion import Path, parts_of
+from ...motion.given import require_angles
+from ...particles import Particles
+from ...scene import Scene
+from ...sources.births import with_births
+from ...surfaces.formulas.own import require_compiled
+from ...surfaces.instant import gaps_of, gradient_of
+from ...surfaces.plane import require_start
+from ...surfaces.shapes.cone import Cone
+from ...surfaces.shapes.quadric import Quadric
+from ..options import RunOptions, Task
+from . import workload
+from .counting import require_counters
+from .knows import Asked, require_known
+from .starts import require_inside
+
+# Of the size of a scene, a place ahead that tells on which side of a wall a flight begins, and of that way, how far
+# outside it is where it begins in a tip.
+_NEAR, _TIP = 1e-6, 1e-2
+# A time this many runs ago leaves float64 a ten-thousandth of the run.
+_LONG_AGO = 1e12
+# Images beyond this are no whole numbers of floats, which files and `Particles` hold.
+_MOST_CELLS = 2.0**53
+
+
+def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, options: RunOptions) -> Task:
+    """The run, checked, with its own copy of the particles, and behind them those that come.
+
+    Raises:
+        SceneError: an argument is wrong, or the arguments do not go together.
+    """
+    kinds = ("scene", scene, (Scene,)), ("particles", particles, (Particles, Bodies)), ("method", method, (Method,))
+    for name, value, allowed in kinds:
+        if not isinstance(value, allowed) and not (name == "particles" and value is None and options.sources):
+            raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
+    require_known(Asked(scene, particles, method, options))
+    if isinstance(particles, Bodies):
+        known = scene if isinstance(method, Impact) else scene.ungrouped("bodies and soft walls")
+        return _task_of_bodies(known, particles.copy(), method, options)
+    if not isinstance(method, Impact) or method.contact_step > 0.0:
+        scene = scene.ungrouped(type(method).__name__ if not isinstance(method, Impact) else "a contact_step")
+    # The arrays of Particles may have been changed since it checked them.
+    start = None if particles is None else _in_the_cell(scene, particles.copy(), options.times.until)
+    check_surfaces(method, scene)
+    require_balls(scene, start, method)
+    scene = scene.of_balls(None if start is None else start.radius)
+    if options.compile != "never":
+        counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
+        walls = [*scene.surfaces, *scene.open_volumes()]
+        require_compiled([*walls, *counters])
+    times = options.times
+    _require_motions(scene, times.until)
+    particles = with_births(scene, start, options.sources, options.seed, times.until)
+    _require_logged(particles, options)
+    _require_precision(scene, particles, options)
+    method.check(scene, particles)
+    require_counters(scene, particles, options)
+    assert times.every is not None
+    method.span("until", times.until)
+    method.span("every", times.every)
+    require_start(scene, particles)
+    # Particles from sources are born later, inside the walls of that time.
+    if start is not None:
+        _require_place(scene, start, method)
+    workload.require_few_impacts(scene, particles, method, times.until, times.every)
+    return Task(scene, particles, method, options)
+
+
+def _require_place(scene: Scene, start: Particles, method: Method) -> None:
+    """Raise a `SceneError` where a particle cannot be where it is at the start, or fly from there."""
+    if start.radius is not None:
+        require_apart(scene, start, method)
+        return
+    require_inside(scene, start)
+    _require_normals(scene, start)
+
+
+def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
+    require_steps_of_bodies(scene, bodies, method, options)
+    for point, motion in bodies.body.anchors.items():
+        require_angles(f"anchors[{point}]", motion, options.times.until)
+    assert method.dt is not None  # type: ignore[attr-defined]
+    passing.warn(scene, bodies.body)
+    workload.check_turns(bodies, method.dt)  # type: ignore[attr-defined]
+    check_surfaces(method, scene)
+    if options.compile != "never":
+        require_compiled(scene.surfaces)
+    if len(bodies.body.contacts):
+        touching = bodies.contact_points().reshape(3, -1)
+        require_inside(scene, Particles(touching, touching))
+    points = bodies.particles()
+    _require_precision(scene, points, options)
+    return Task(scene, points, method, options, bodies)
+
+
+def _require_motions(scene: Scene, until: float) -> None:
+    for i, surface in enumerate(scene.surfaces):
+        require_angles(f"surfaces[{i}].motion", surface.motion, until)
+        for one in parts_of(surface.motion):
+            if isinstance(one, Path) and not one.times[0] <= 0.0 <= until <= one.times[-1]:
+                raise SceneError(
+                    f"surfaces[{i}].motion.times must cover the run from 0 to {until:g} s, got {one.times[0]:g} to "
+                    f"{one.times[-1]:g}; add what is missing, at rest if the wall is so there, or give another until"
+                )
+            # A piece knows the time since its start: of a start long ago, no digits of this run are left.
+            if isinstance(one, Path) and max(t for t in one.times if t <= 0.0) < -_LONG_AGO * until:
+                raise SceneError(
+                    f"surfaces[{i}].motion.times must have one at 0 s or at most {_LONG_AGO:g} times the length of the "
+                    f"run before it, {until:g} s, so that the time since then has digits, got {one.times[0]:g} s; add "
+                    "the time 0"
+                )
+
+
+def _in_the_cell(scene: Scene, particles: Particles, until: float) -> Particles:
+    """The particles, with their positions in the cell and their images where the scene repeats."""
+    if scene.period is None:
+        if particles.image is not None:
+            raise SceneError(
+                "particles.image must be None where the scene has no period, got images; set it to None, or give the "
+                "scene the period that they are of"
+            )
+        return particles
+    _require_countable(scene, particles, until)
+    particles.position, images = scene.wrapped(particles.position)
+    particles.image = images if particles.image is None else images + particles.image
+    return particles
+
+
+def _require_countable(scene: Scene, particles: Particles, until: float) -> None:
+    """Raise a `SceneError` where a particle may come through more cells than a file can count."""
+    for k, length in enumerate(scene.period or ()):
+        if length is None:
+            continue
+        pull = 0.0 if scene.gravity is None else abs(scene.gravity[k])
+        reach = float(abs(particles.position[k]).max()) + until * (particles.fastest() + 0.5 * pull * until)
+        before = 0 if particles.image is None else int(abs(particles.image[k]).max())
+        if not reach / length + before <= _MOST_CELLS:
+            raise SceneError(
+                f"period[{k}] must be so long that particles come through at most 2**53 cells, got {length:g} m, for "
+                f"particles that may be {reach / length + before:.3g} cells away at {until:g} s; give a longer period, "
+                "or a shorter run"
+            )
+
+
+def _require_precision(scene: Scene, start: Particles, options: RunOptions) -> None:
+    """Raise a `SceneError` where files that are asked for in float32 would not tell particles apart."""
+    if options.precision == "float32" and (options.trajectory is not None or options.impacts is not None):
+        require_near(scene, start)
+
+
+def _require_logged(particles: Particles, options: RunOptions) -> None:
+    """Raise a `SceneError` where impacts are asked for of particles that are not there."""
+    numbers = options.impact_particles
+    if isinstance(numbers, tuple) and numbers[-1] >= len(particles):
+        raise SceneError(
+            f"impact_particles must be numbers of particles, from 0 to {len(particles) - 1}, got {numbers[-1]}"
+        )
+
+
+def _require_normals(scene: Scene, particles: Particles) -> None:
+    """Raise a `SceneError` for a flight out of the tip of a cone, where no normal says how it is reflected."""
+    step = _NEAR * scene.finite_size()
+    for i, surface in enumerate(scene.surfaces):
+        if not isinstance(surface, (Cone, Quadric)) or surface.motion is not None:
+            continue
+        on_wall = np.flatnonzero(surface.phi(particles.position) == 0.0)
+        r, v = particles.position[:, on_wall], particles.velocity[:, on_wall]
+        speed = np.sqrt((v**2).sum(axis=0))
+        ahead = r + v * (step / np.where(speed > 0.0, speed, 1.0))
+        # Where there is a normal, what does not fly against it comes outside by a square of the way.
+        against = (gradient_of((surface,), r) * v).sum(axis=0) > 0.0
+        slope = np.sqrt((surface.gradient(ahead) ** 2).sum(axis=0))
+        lost = np.flatnonzero((speed > 0.0) & ~against & (gaps_of((surface,), ahead, 0.0)[0] > _TIP * step * slope))
+        if lost.size:
+            k = int(lost[0])
+            raise SceneError(
+                f"particles must not fly out of a tip of their walls, which has no normal, got particle {on_wall[k]} "
+                f"at {tuple(r[:, k].tolist())}, a tip of surfaces[{i}] ({type(surface).__name__}), with the velocity "
+                f"{tuple(v[:, k].tolist())}; start it beside the tip, or with a velocity into the volume"
+            )

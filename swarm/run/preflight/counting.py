@@ -1,0 +1,200 @@
+"""Counters of a run: checked against its scene, and as kernels take them."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...kernel.vector import vec
+from ...lanes.watching.counters import Counters
+from ...particles import Particles
+from ...scene import Scene
+from ...state import CROSSED, Crossed
+from ...surfaces.counted import Counted, ReversedCounter, Walled
+from ...surfaces.counter import Counter
+from ...surfaces.facets.mesh import Mesh
+from ...surfaces.fields.many import Many
+from ...surfaces.frames import Framed
+from ...surfaces.instant import side_of
+from ...surfaces.outlines.outlined import Outlined
+from ...surfaces.part import other_side
+from ...surfaces.periodic.images import images_of
+from ...surfaces.presence.openings import volumes_in, volumes_of_counter
+from ...surfaces.shapes.ellipsoid import EllipsoidNumbers
+from ...surfaces.shapes.plane import PlaneNumbers
+from ...surfaces.shapes.quadratic import QuadricNumbers
+from ...surfaces.shapes.sphere import SphereNumbers, ball
+from ...surfaces.surface import Surface
+from ...surfaces.union import Joined, Union
+from ..options import RunOptions
+
+# Of the size of a scene and of a counter, a distance that is round-off: rooms that touch are three times 1e-13 apart.
+_NEAR = 1e-12
+# The part by which a ball is larger than what is in it.
+_ROOM = 1e-9
+# The most walls of all counters: each is compiled into the kernels.
+_MOST = 24
+# The most cells that a particle may come through in a frame: seconds.
+_MOST_CELLS = 1e7
+# Particles whose sides are found at a time.
+_AT_ONCE = 65_536
+
+
+def require_counters(scene: Scene, particles: Particles, options: RunOptions) -> None:
+    """Raise a `SceneError` where a surface cannot be a counter in this scene, or is crossed too often."""
+    if options.counters:
+        counters_of(scene, options.counters)
+        _require_few_cells(scene, particles, options)
+
+
+def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) -> None:
+    """Raise a `SceneError` where a flight may cross counters in more cells than can be looked at in a while."""
+    every = options.times.every
+    assert every is not None
+    for k, length in enumerate(scene.period or ()):
+        pull = 0.0 if scene.gravity is None else abs(scene.gravity[k])
+        fastest = particles.fastest() + pull * options.times.until
+        if length is not None and not fastest * every / length <= _MOST_CELLS:
+            raise SceneError(
+                f"period[{k}] must be so long that particles come through at most {_MOST_CELLS:g} cells a frame where "
+                f"there are counters, which are in each, got {length:g} m for {fastest * every / length:.3g} cells; "
+                "give a longer period, or more frames (every)"
+            )
+
+
+def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) -> Counters | None:
+    """The counters as kernels take them, or None if none is given; `logs`: their crossings are logged.
+
+    Raises:
+        SceneError: a surface cannot be a counter in this scene.
+    """
+    if not given:
+        return None
+    walls = sum(len(one.surface.walls()) for one in given if not isinstance(one.surface, Many))
+    if walls > _MOST:
+        raise SceneError(
+            f"counters must have at most {_MOST} walls in all, got {walls}: each is compiled into the kernels; of many "
+            "of one kind make one of many bodies, such as swarm.Spheres"
+        )
+    quiet = 0.0 if scene.period is None and not logs else None
+    each = tuple(_counted(scene, f"counters[{k}]", one) for k, one in enumerate(given))
+    return Counters(each, scene.pull(), quiet)
+
+
+def _counted(scene: Scene, name: str, counter: Counter) -> Counted:
+    _require_no_mesh(name, counter.surface, "count on")
+    if counter.inside is not None:
+        _require_no_mesh(f"{name}.inside", counter.inside, "use")
+    surface = _whole(scene, name, counter.surface)
+    near = _NEAR * max(scene.finite_size(), scene.extent(), _finite(surface.extent()))
+    volumes = None
+    if counter.inside is not None:
+        volumes = volumes_in(volumes_of_counter(counter.inside, scene.period, f"{name}.inside"))
+    if (wall := _one_wall(surface)) is not None:
+        return ReversedCounter(wall, near, volumes)
+    try:
+        other = other_side(surface)
+    except SceneError:
+        raise SceneError(f"{name} must be a surface with two sides, got {surface!r:.200}; count on another") from None
+    inner, outer = (_alone(scene, name, one).walls() for one in (surface, other))
+    return Walled(inner, outer, near, volumes, _ball_around(surface, other, near))
+
+
+def _ball_around(*given: Any) -> Any:
+    """A solid ball around the side of a surface that has bounds, or None."""
+    *sides, near = given
+    for one in sides:
+        low, high = (np.array(corner) for corner in _box_around(one))
+        if np.isfinite([low, high]).all():
+            radius = (1.0 + _ROOM) * float(np.linalg.norm(high - low)) / 2.0 + near
+            return ball(vec(((low + high) / 2.0).tolist()), radius)
+    return None
+
+
+def _box_around(surface: Surface) -> Any:
+    if isinstance(surface, Many):
+        low, high = surface.corners()
+        return low.min(axis=1), high.max(axis=1)
+    return surface.bounds()
+
+
+def _require_no_mesh(name: str, surface: Surface, verb: str) -> None:
+    """Raise a `SceneError` for exact triangles: a kernel does not know how far a place is from these."""
+    parts = surface.surfaces() if isinstance(surface, Joined) else (surface,)
+    if any(isinstance(one, Mesh) for one in parts):
+        raise SceneError(
+            f"{name} must not be of a Mesh, which is known at its triangles only, got {surface!r:.200}; {verb} "
+            "swarm.from_mesh(path, spacing) instead"
+        )
+
+
+def _alone(scene: Scene, name: str, surface: Surface) -> Scene:
+    """The scene of a counter alone."""
+    try:
+        return Scene([surface], scene.gravity, plane=scene.plane)
+    except SceneError as error:
+        raise SceneError(str(error).replace("surfaces[0]", name)) from None
+
+
+def _finite(length: float) -> float:
+    return length if math.isfinite(length) else 0.0
+
+
+def _whole(scene: Scene, name: str, surface: Surface) -> Surface:
+    """The surface with its images, as far as they reach into the cell where the scene repeats."""
+    period, side = scene.period, getattr(surface, "side", None)
+    if period is None or side is None or isinstance(surface, Outlined):
+        return surface
+    solid = surface if side == "outside" else other_side(surface)
+    try:
+        images = images_of(solid, period, name)
+    except SceneError:
+        if all(map(math.isfinite, np.ravel(other_side(solid).bounds()))):
+            raise
+        # It has no end: what of it is in the cell counts.
+        return surface
+    if len(images) == 1:
+        return images[0] if side == "outside" else other_side(images[0])
+    return Union([other_side(image) for image in images], side=side)
+
+
+def _one_wall(surface: Surface) -> Any:
+    """The wall of a surface that is the same from its other side with the sign changed; None of any other."""
+    walls = () if isinstance(surface, (Many, Outlined)) else surface.walls()
+    return _turning(walls[0]) if len(walls) == 1 else None
+
+
+def _turning(wall: Any) -> Any:
+    if isinstance(wall, Framed):
+        body = _turning(wall.body)  # type: ignore[attr-defined]
+        return None if body is None else wall._replace(body=body)
+    if isinstance(wall, PlaneNumbers):
+        return wall if type(wall) is PlaneNumbers else None
+    # Cavities that are convex have hits of their own, which are not those of the other side.
+    kind = next((kind for kind in (SphereNumbers, EllipsoidNumbers, QuadricNumbers) if isinstance(wall, kind)), None)
+    return None if kind is None else kind(*wall)
+
+
+# --- Arrays ----------------------------------------------------------------------------------------------
+
+
+def crossed_of(counters: Counters, given: tuple[Counter, ...], scene: Scene, position: NDArray[Any]) -> Crossed:
+    """The arrays of a run at its start; a particle on a counter is on its admissible side."""
+    n = position.shape[1]
+    side = np.zeros((len(given), n), np.int8)
+    for k, (one, counter) in enumerate(zip(counters.each, given, strict=True)):
+        surface = _whole(scene, f"counters[{k}]", counter.surface)
+        for first in range(0, n, _AT_ONCE):
+            some = slice(first, first + _AT_ONCE)
+            side[k, some] = _distance(surface, position[:, some]) > one.near
+    rows = 2 * len(given)
+    return Crossed(side, np.zeros((rows, n), np.int64), np.zeros((CROSSED * rows, n)))
+
+
+def _distance(surface: Surface, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The distance out of the admissible side of a surface, to first order."""
+    slope = np.sqrt((surface.gradient(points) ** 2).sum(axis=0))
+    with np.errstate(over="ignore"):
+        return np.asarray(side_of(surface) * surface.phi(points) / np.maximum(slope, np.finfo(np.float64).tiny))

@@ -1,0 +1,175 @@
+"""What a user may not have meant, said before a run starts: cavities, times, steps, gravity."""
+
+import logging
+import math
+
+import numpy as np
+
+from ...grains import sinking
+from ...methods import Impact
+from ...methods.verlet import Verlet
+from ...scene import Scene
+from ...surfaces.union import Joined
+from ..options import Task
+from . import workload
+from .overlaps import warn_of_overlap
+
+_LOG = logging.getLogger("swarm")
+# The parts of the time between impacts from which a step, a contact, and the round-off of a time are said.
+_STEP, _CONTACT, _ROUND_OFF = 0.25, 0.5, 1e-4
+# The time between impacts is computed only if a step, a contact or a round-off is longer than this fraction of its part
+# (above) of the time that a crossing of the scene takes.
+_SURELY = 1e-2
+# Explicit steps of a spring are stable up to this many over its angular frequency.
+_STABLE = 2.0
+# Particles that are looked at.
+_LOOKED_AT = 1000
+
+
+def give(task: Task) -> None:
+    """Warn of what the run will do that may not be meant. Nothing of it is wrong."""
+    warn_of_overlap(task.scene)
+    _warn_of_faces(task.scene)
+    _warn_of_fall(task.scene)
+    sinking.warn_of_depths(task)
+    if task.bodies is None and task.particles.radius is None and len(task.particles):
+        # About the fastest: of some.
+        some = task.particles.velocity[:, _some(len(task.particles))]
+        fastest = float(np.sqrt((some**2).sum(axis=0).max()))
+        speed = _speed(task.scene, fastest)
+        if fastest == 0.0:
+            _warn_of_rest(task)
+        with np.errstate(all="ignore"):
+            _warn_of_times(task, speed)
+            _warn_of_steps(task, speed)
+
+
+def _some(count: int) -> slice:
+    """Some of so many particles."""
+    return slice(0, None, max(1, count // _LOOKED_AT))
+
+
+def _takes_energy(scene: Scene) -> bool:
+    """Whether an impact may change the energy of a particle."""
+    pairs = scene.pairs is not None and scene.pairs.restitution < 1.0
+    return pairs or scene.laws() is not None
+
+
+def _warn_of_fall(scene: Scene) -> None:
+    """Warn where gravity pulls along a period, and nothing ends the fall."""
+    pulls = scene.gravity or (0.0, 0.0, 0.0)
+    for k, (length, pull) in enumerate(zip(scene.period or (), pulls, strict=False)):
+        if length is not None and pull and not _takes_energy(scene):
+            _LOG.warning(
+                "gravity[%d] = %g m/s^2 pulls along period[%d] = %g m, and no impact takes energy: each cell gives "
+                "%.3g J for a kg, and particles get faster without end; give walls a restitution, a friction or a "
+                "temperature, or close that direction",
+                k, pull, k, length, abs(pull) * length,
+            )  # fmt: skip
+            return
+
+
+def _warn_of_faces(scene: Scene) -> None:
+    """Warn where parts of a union touch at the start and do not move as one: a face is open where both have it."""
+    for i, surface in enumerate(scene.surfaces):
+        for one, other in surface.moving_apart() if isinstance(surface, Joined) and len(surface.rooms) > 1 else ():
+            _LOG.warning(
+                "surfaces[%d] has parts with a face in common at the start that do not move as one, %.100r and %.100r: "
+                "there is a wall between them while they only touch; let them overlap where they are to be one room",
+                i, one, other,
+            )  # fmt: skip
+
+
+def _warn_of_rest(task: Task) -> None:
+    """Warn where nothing will move."""
+    scene = task.scene
+    is_moved = scene.gravity is not None or scene.moves() or scene.has_doors() or bool(task.options.sources)
+    if not is_moved and task.particles.fastest() == 0.0:
+        _LOG.warning(
+            "all %d particles are at rest, and nothing pulls or pushes them: nothing will move; give them a speed or a "
+            "temperature, or the scene gravity",
+            len(task.particles),
+        )  # fmt: skip
+
+
+def _speed(scene: Scene, fastest: float) -> float:
+    """The speed of the fastest particle after a fall through the scene [m/s]."""
+    return math.hypot(fastest, math.sqrt(2.0 * math.hypot(*(scene.gravity or (0.0,))) * scene.finite_size()))
+
+
+def _crossing(scene: Scene, speed: float) -> float:
+    """The time of a crossing of the scene at a speed [s]."""
+    return scene.finite_size() / speed if speed > 0.0 else math.inf
+
+
+def _warn_of_times(task: Task, speed: float) -> None:
+    """Warn where the last times of a run are so late that float64 does not tell those of impacts apart."""
+    scene, until = task.scene, task.options.until
+    every = task.options.times.every
+    assert every is not None
+    kept = float(np.spacing(until))
+    if scene.moves() or kept < _SURELY * _ROUND_OFF * _crossing(scene, speed):
+        return
+    between = workload.time_between(scene, task.particles)
+    if kept > _ROUND_OFF * between:
+        # Within a frame times are counted from its end.
+        inside = float(np.spacing(every)) > _ROUND_OFF * between
+        flights = "flights too, in frames as long" if inside else "flights are not, each frame counts its own time"
+        _LOG.warning(
+            "the time between impacts is about T = %.2g s; until = %g s is kept to %.1e s, %.1e of it: the instants of "
+            "a log of impacts, of doors, births, escapes and absorptions are that coarse (%s); use until <= %.1g s, or "
+            "go on from the last frame in a run of its own",
+            between, until, kept, kept / between, flights, _ROUND_OFF * between / np.finfo(np.float64).eps,
+        )  # fmt: skip
+
+
+def _warn_of_steps(task: Task, speed: float) -> None:
+    """Warn where a step, or a contact with a soft wall, is a large part of the time between impacts."""
+    scene, particles, method = task.scene, task.particles, task.method
+    name = "contact_step" if isinstance(method, Impact) else "dt"
+    step, law = getattr(method, name, None), method.law()
+    if not step or scene.moves():
+        return
+    contact, depth = (0.0, 0.0) if law is None or method.is_rigid() else _contact(task, speed)
+    if max(step / _STEP, contact / _CONTACT) < _SURELY * _crossing(scene, speed):
+        return
+    between = workload.time_between(scene, particles)
+    said = f"the time between impacts is about T = {between:.2g} s; "
+    if step > _STEP * between:
+        _LOG.warning(
+            "%s%s = %g s is %.2g of it: steps are as long as flights, and impacts come late or not at all; use %s <= "
+            "%.1g s, or Impact() alone",
+            said, name, step, step / between, name, 0.1 * _STEP * between,
+        )  # fmt: skip
+    elif contact > _CONTACT * between and not method.has_multipliers():
+        _LOG.warning(
+            "%sa contact lasts %.2g s, %.2g of it, and the fastest sinks %.2g m into its wall: such walls are no "
+            "walls; use a larger penalty (%g here), or Impact",
+            said, contact, contact / between, depth, method.penalty,  # type: ignore[attr-defined]
+        )  # fmt: skip
+    if isinstance(method, Verlet) and method.exponent == 1.0 and step * math.pi > _STABLE * contact:
+        _LOG.warning(
+            "%sdt = %g s is %.2g of a contact, which lasts %.2g s: beyond %.2g of it Verlet is unstable, its energy "
+            "grows; use dt <= %.1g s, or Penalty, which keeps the energy at any step",
+            said, step, step / contact, contact, _STABLE / math.pi, 0.1 * contact,
+        )  # fmt: skip
+
+
+def _contact(task: Task, speed: float) -> tuple[float, float]:
+    """How long the shortest contact with a soft wall lasts [s], and how deep the fastest sinks in [m].
+
+    Of m g'' = -alpha s^2 g^a, s the slope of phi: see `contact_time` of grains.
+    """
+    scene, particles, method = task.scene, task.particles, task.method
+    a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
+    mass, p = float(particles.mass[_some(len(particles))].min()), 1.0 / (a + 1.0)
+    if speed == 0.0:
+        return 0.0, 0.0
+    some = particles.position[:, _some(len(particles))]
+    slopes = [np.sqrt((one.gradient(some) ** 2).sum(axis=0)) for one in scene.surfaces]
+    nearest = np.argmax(scene.gaps(some), axis=0)
+    slope = float(np.median(np.array(slopes)[nearest, np.arange(some.shape[1])]))
+    if not 0.0 < slope < math.inf:
+        return 0.0, 0.0
+    depth = math.pow(0.5 * mass * speed * speed * (a + 1.0) / alpha, p) / slope
+    return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + p) / math.gamma(0.5 + p) * depth / speed, depth

@@ -1,0 +1,752 @@
+"""What each engine supports, and what to use instead of what it does not support.
+
+A run has one engine, by its particles, its method and whether impacts move a wall. A capability is something that a run
+may ask for: a law of a wall, a source, a period. `CAPABILITIES` has a `Refusal` for each pair that is not supported;
+every other pair is. `require_known` raises the first one that applies, before anything is compiled.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+from ...bodies.state import Bodies
+from ...errors import SceneError
+from ...methods import AugmentedLagrangian, Impact, Penalty
+from ...methods.base import Method
+from ...methods.fixed_step import SoftWalls
+from ...particles import Particles
+from ...scene import BESIDE_MASS, INSTEAD_OF_MASS, MOST_WALLS, Scene
+from ...surfaces.facets.mesh import Mesh
+from ...surfaces.fields.many import Many
+from ...surfaces.in_motion.drive import drive_of
+from ...surfaces.laws.sticky import Sticky
+from ...surfaces.outlines.outlined import Outlined
+from ...surfaces.periodic.images import MASS_AND_PERIOD, WITHOUT_PERIOD
+from ...surfaces.surface import Surface
+from ...surfaces.wall_law import lets_wait
+from ..options import RunOptions
+
+# --- Engines ---------------------------------------------------------------------------------------------
+
+POINTS, CHORDS, MASSIVE = "points with Impact", "points with a contact_step", "points and walls with a mass"
+SOFT, PAPER, BASELINE = "points with Penalty", "points with AugmentedLagrangian", "points with a baseline"
+BALLS, HEAVY, GRAINS = "balls with Impact", "balls and walls with a mass", "balls with Penalty"
+BODIES, SOFT_BODIES, PAPER_BODIES = "bodies with Impact", "bodies with Penalty", "bodies with AugmentedLagrangian"
+# Of methods that balls or bodies do not support, and of user-defined ones, which check by themselves.
+OTHER_POINTS, OTHER_BALLS, OTHER_BODIES = (f"{kind} with another method" for kind in ("points", "balls", "bodies"))
+
+_RIGID_POINTS, _FIXED_STEPS = (POINTS, CHORDS, MASSIVE), (SOFT, PAPER, BASELINE)
+_EVERY_POINT = _RIGID_POINTS + _FIXED_STEPS
+_RIGID_BALLS = (BALLS, HEAVY)
+_EVERY_BALL = (*_RIGID_BALLS, GRAINS)
+_EVERY_BODY = (BODIES, SOFT_BODIES, PAPER_BODIES)
+ENGINES = (*_EVERY_POINT, *_EVERY_BALL, *_EVERY_BODY)
+_ALONE = (*_EVERY_POINT, OTHER_POINTS)
+
+
+class Asked(NamedTuple):
+    """A run as it is asked for, whose arguments are of the right types; no particles where all come from sources."""
+
+    scene: Scene
+    particles: Particles | Bodies | None
+    method: Method
+    options: RunOptions
+
+
+def engine_of(asked: Asked) -> str:
+    """The engine of a run: one of `ENGINES`, or that of a method which this kind of particles does not support."""
+    scene, particles, method, _options = asked
+    if isinstance(particles, Bodies):
+        return _by_method(method, (BODIES, SOFT_BODIES, PAPER_BODIES), OTHER_BODIES)
+    if particles is not None and particles.radius is not None:
+        return _by_method(method, (HEAVY if scene.reacts() else BALLS, GRAINS, OTHER_BALLS), OTHER_BALLS)
+    rigid = POINTS if not isinstance(method, Impact) else CHORDS if method.contact_step > 0.0 else POINTS
+    soft = BASELINE if isinstance(method, SoftWalls) else OTHER_POINTS
+    return _by_method(method, (MASSIVE if rigid == POINTS and scene.reacts() else rigid, SOFT, PAPER), soft)
+
+
+def _by_method(method: Method, engines: tuple[str, str, str], other: str) -> str:
+    kinds = zip((Impact, Penalty, AugmentedLagrangian), engines, strict=True)
+    return next((engine for kind, engine in kinds if isinstance(method, kind)), other)
+
+
+# --- Capabilities ----------------------------------------------------------------------------------------
+
+# Where a run asks for a capability, in the fields that sentences name: `i` the surface, `k` its law, `got` the value.
+Found = Iterator[dict[str, Any]]
+
+
+def _walls(asked: Asked) -> Iterator[tuple[int, Surface]]:
+    """The simple surfaces of a scene, each with the number of the surface that it is a part of."""
+    return zip(asked.scene.owners_of_pieces, asked.scene.pieces, strict=True)
+
+
+def _of_walls(name: str, without: Any) -> Callable[[Asked], Found]:
+    """Walls whose attribute has another value than that of a wall without it."""
+
+    def found(asked: Asked) -> Found:
+        for i, wall in _walls(asked):
+            if (got := getattr(wall, name)) != without:
+                shown = f"{got:g}" if isinstance(got, float) else got
+                yield {"i": i, "got": shown, "count": len(got) if isinstance(got, tuple) else 1}
+
+    return found
+
+
+def _option(name: str) -> Callable[[Asked], Found]:
+    def found(asked: Asked) -> Found:
+        if got := getattr(asked.options, name):
+            yield {"got": got, "count": len(got) if isinstance(got, tuple) else 1}
+
+    return found
+
+
+def _of_scene(name: str) -> Callable[[Asked], Found]:
+    def found(asked: Asked) -> Found:
+        if (got := getattr(asked.scene, name)) is not None:
+            yield {"got": got}
+
+    return found
+
+
+def _argument(name: str, *without: Any) -> Callable[[Asked], Found]:
+    """A method whose argument has another value than these."""
+
+    def found(asked: Asked) -> Found:
+        got = getattr(asked.method, name, without[0])
+        if got not in without:
+            yield {"got": f"{got:g}" if isinstance(got, float) else got}
+
+    return found
+
+
+def _masses(asked: Asked) -> Found:
+    for i, one in enumerate(asked.scene.surfaces):
+        if one.reacts():
+            name = "inertia" if one.mass is None else "mass"
+            value = getattr(one, name)
+            yield {"i": i, "got": one, "name": name, "value": f"{value:g}" if isinstance(value, float) else value}
+
+
+def _rotations(asked: Asked) -> Found:
+    for i, wall in _walls(asked):
+        if wall.motion is not None and drive_of(wall, 0.0).turn is not None:
+            yield {"i": i, "got": wall.motion}
+
+
+def _waits(asked: Asked) -> Found:
+    for i, wall in _walls(asked):
+        for k, law in enumerate(wall.laws):
+            if not isinstance(law, str) and lets_wait(law):
+                yield {"i": i, "k": k, "got": law}
+
+
+def _waits_beside_motions(asked: Asked) -> Found:
+    yield from _waits(asked) if asked.scene.moves() else ()
+
+
+def _sticky(asked: Asked) -> Found:
+    for i, surface in enumerate(asked.scene.surfaces):
+        yield from ({"i": i, "k": k, "got": law} for k, law in enumerate(surface.laws) if isinstance(law, Sticky))
+
+
+def _doors(asked: Asked) -> Found:
+    if asked.scene.has_doors():
+        yield {}
+
+
+def _rubs_that_move(asked: Asked) -> Found:
+    yield from ({"i": i, "got": f"{one.friction:g}"} for i, one in _walls(asked) if one.friction > 0.0 and one.reacts())
+
+
+def _losses_that_fall(asked: Asked) -> Found:
+    for i, wall in _walls(asked):
+        if wall.restitution < 1.0 and asked.scene.gravity is not None:
+            yield {"i": i, "got": f"{wall.restitution:g}"}
+
+
+def _rooms(asked: Asked) -> Found:
+    """Unions of several rooms, and foams."""
+    for i, surface in enumerate(asked.scene.surfaces):
+        if i in asked.scene.unions() or (isinstance(surface, Many) and surface.is_foam()):
+            yield {"i": i, "got": surface}
+
+
+def _fields(asked: Asked) -> Found:
+    yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.fields())
+
+
+def _fields_that_rest(asked: Asked) -> Found:
+    scene = asked.scene
+    for i in scene.order.fields if scene.moves() else ():
+        yield {"i": scene.owners_of_pieces[i], "got": scene.pieces[i]}
+
+
+def _faces(asked: Asked) -> Found:
+    yield from ({"i": i, "got": one} for i, one in _walls(asked) if isinstance(one, (Mesh, Outlined)))
+
+
+def _groups(asked: Asked) -> Found:
+    for i, one in enumerate(asked.scene.surfaces):
+        if isinstance(one, Mesh) and one.groups is not None:
+            yield {"i": i, "got": ", ".join(one.groups)}
+
+
+def _period(asked: Asked) -> Found:
+    is_known = not isinstance(asked.particles, Bodies) and asked.method.knows_period()
+    if asked.scene.period is not None and not is_known:
+        yield {"got": asked.scene.period}
+
+
+def _no_walls(asked: Asked) -> Found:
+    if not asked.scene.surfaces:
+        yield {}
+
+
+def _duration(asked: Asked) -> Found:
+    pairs = asked.scene.pairs
+    if pairs is not None and pairs.contact_duration is not None:
+        yield {"got": f"{pairs.contact_duration:g}"}
+
+
+def _rough_pairs(asked: Asked) -> Found:
+    pairs = asked.scene.pairs
+    if pairs is not None and pairs.friction > 0.0:
+        yield {"got": f"{pairs.friction:g}"}
+
+
+def _spins(asked: Asked) -> Found:
+    if isinstance(asked.particles, Particles) and asked.particles.spin is not None:
+        yield {}
+
+
+def _any(_asked: Asked) -> Found:
+    yield {}
+
+
+def _no_step(asked: Asked) -> Found:
+    if getattr(asked.method, "dt", None) is None:
+        yield {}
+
+
+def _cuts_at_impacts(asked: Asked) -> str | None:
+    """The argument of `AugmentedLagrangian` by which its steps are cut at impacts with walls at rest."""
+    if getattr(asked.method, "adaptive", False):
+        return "adaptive = True"
+    return 'on_unconverged = "impact"' if getattr(asked.method, "on_unconverged", "") == "impact" else None
+
+
+def _motions_at_impacts(asked: Asked) -> Found:
+    if cut := _cuts_at_impacts(asked):
+        yield from ({**one, "cut": cut} for one in _of_walls("motion", None)(asked))
+
+
+def _gravity_at_impacts(asked: Asked) -> Found:
+    if asked.scene.gravity is not None and (cut := _cuts_at_impacts(asked)):
+        yield {"cut": cut, "got": tuple(asked.scene.gravity)}
+
+
+def _members_in_fixed_steps(asked: Asked) -> Found:
+    method: Any = asked.method
+    is_fixed = getattr(method, "on_unconverged", "") == "impact" and not getattr(method, "adaptive", True)
+    yield from _option("member_impacts")(asked) if is_fixed else ()
+
+
+def _cavities(asked: Asked) -> Found:
+    body = asked.particles.body if isinstance(asked.particles, Bodies) else None
+    for k, (surface, _carrier, _point) in enumerate(() if body is None else body.cavities):
+        yield {"k": k, "got": surface}
+
+
+def _lossy_cavities(asked: Asked) -> Found:
+    yield from (one for one in _cavities(asked) if one["got"].restitution != 1.0 or one["got"].friction != 0.0)
+
+
+def _members_beside_cavities(asked: Asked) -> Found:
+    if asked.options.member_impacts and any(_cavities(asked)):
+        yield {}
+
+
+def _part_of_particles(asked: Asked) -> Found:
+    if asked.options.frames not in ("all", "none"):
+        yield {"got": asked.options.frames}
+
+
+def _on_cluster(found: Callable[[Asked], Found]) -> Callable[[Asked], Found]:
+    return lambda asked: found(asked) if asked.options.cluster is not None else iter(())
+
+
+def _no_trajectory(asked: Asked) -> Found:
+    if asked.options.trajectory is None:
+        yield {}
+
+
+def _recorded(asked: Asked) -> Found:
+    options = asked.options
+    if options.recording is not None or options.live:
+        yield {"got": f"live={options.live!r:.50}" if options.live else f"recording={str(options.recording)!r:.200}"}
+
+
+def _measured_in_part(asked: Asked) -> Found:
+    options = asked.options
+    if options.observables and (options.frames, options.precision) != ("all", "float64"):
+        yield {"got": f"{options.frames!r} and {options.precision!r}"}
+
+
+# --- The table -------------------------------------------------------------------------------------------
+
+
+class Refusal(NamedTuple):
+    """What an engine does not support, with what was given, and what to use instead."""
+
+    said: str
+    remedy: str
+
+    def sentence(self) -> str:
+        """The sentence of the error, with its fields in braces."""
+        return f"{self.said}; {self.remedy}"
+
+
+_TO_MOTION = "give that wall a motion instead of a mass"
+_TO_POINTS = "use particles without a radius"
+_TO_EXACT = "use Impact() with contact_step = 0"
+_NO_STEP = "leave contact_step out"
+_WITH_PENALTY = "particles that have a radius and Penalty"
+_NO_METHOD = Refusal(
+    "bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {whole}",
+    "use Impact(dt=...), with dt in seconds",
+)
+_LOSES = Refusal(
+    "contact_step must be 0 where a surface has a restitution below 1, friction, a temperature, laws, a motion or a "
+    "mass, got {step:g}: a contact step conserves the energy",
+    _NO_STEP,
+)
+_CHANGES = Refusal(
+    "contact_step must be 0 where a wall is present, or an opening open, for some times only, got {step:g}", _NO_STEP
+)
+_CLOSES = Refusal(
+    f"surfaces[{{i}}].openings must be left out with {_WITH_PENALTY}, got {{count}}",
+    "use Impact, or build the wall of parts that leave the opening free, such as solid boxes",
+)
+
+
+def _with_method(name: str, without: str, got: str = "got") -> Refusal:
+    """Of a law of a wall that methods of fixed steps do not have."""
+    return Refusal(f"surfaces[{{i}}].{name} must be {without} with {{method}}, got {{{got}}}", "use Impact")
+
+
+def _with_bodies(name: str, without: str, remedy: str = "use particles") -> Refusal:
+    return Refusal(f"surfaces[{{i}}].{name} must be {without} with bodies, got {{got}}", remedy)
+
+
+def _of_one_room(what: str, remedy: str) -> Refusal:
+    return Refusal(f"surfaces[{{i}}] must not be a {{kind}} of several rooms with {what}, got {{got!r:.200}}", remedy)
+
+
+def _listed(what: str, remedy: str) -> Refusal:
+    return Refusal(
+        f"surfaces[{{i}}] must not be {{kind}} with {what}, got {{got}}",
+        f"{remedy}, or list its solids one by one, at most {MOST_WALLS} walls in all",
+    )
+
+
+class Capability(NamedTuple):
+    """Something that a run may ask for.
+
+    Attributes:
+        name: what it is.
+        found: where a run asks for it.
+        refused: what is said for each engine that does not support it. The fields in braces are those of `found`, the
+            `kind` of what was found, the name of the `method`, the `whole` method and its contact `step`.
+        is_argument: whether it is an argument of a method, which other methods do not have.
+        within: the name of the capability that this is a kind of, or "".
+    """
+
+    name: str
+    found: Callable[[Asked], Found]
+    refused: dict[tuple[str, ...], Refusal]
+    is_argument: bool = False
+    within: str = ""
+
+    def sentence(self, engine: str) -> str | None:
+        """The sentence for an engine, with its fields in braces; None if the engine supports this."""
+        return next((one.sentence() for engines, one in self.refused.items() if engine in engines), None)
+
+
+# In the order in which they are looked for.
+CAPABILITIES = (
+    Capability("method", _any, {
+        (OTHER_BODIES,): _NO_METHOD,
+        (OTHER_BALLS,): Refusal(
+            "radius of the particles must be None with {method}, got radii", "use Impact or Penalty"
+        ),
+    }, True),
+    Capability("no step", _no_step, {(BODIES,): _NO_METHOD}, True),
+    Capability("source", _option("sources"), {
+        _EVERY_BODY: Refusal("sources must be left out with bodies, got {count}", "use particles"),
+        _EVERY_BALL: Refusal(
+            "sources must be left out where particles have a radius, got {count}", f"{_TO_POINTS}, and Impact()"
+        ),
+        (CHORDS, *_FIXED_STEPS, OTHER_POINTS): Refusal(
+            "sources must be left out with {whole!r:.200}, got {count}: particles are born at any time, not at the end "
+            "of a step", _TO_EXACT,
+        ),
+        (MASSIVE,): Refusal("sources must be left out where a wall has a mass, got {count}", _TO_MOTION),
+    }),
+    Capability("log of impacts", _option("impacts"), {
+        _EVERY_BODY: Refusal(
+            "impacts must be None with bodies, got {got}: several points of a body meet a wall at once", "use particles"
+        ),
+        (*_FIXED_STEPS, GRAINS, OTHER_POINTS): Refusal(
+            "impacts must be None with {method}, got {got}: its contacts last for a time", "use Impact"
+        ),
+        (MASSIVE, HEAVY): Refusal("impacts must be None where a wall has a mass, got {got}", _TO_MOTION),
+    }),
+    Capability("counter", _option("counters"), {
+        _EVERY_BODY: Refusal("counters must be left out with bodies, got {count}", "use particles"),
+        _EVERY_BALL: Refusal(
+            "counters must be left out where particles have a radius, got {count}", f"{_TO_POINTS}, and Impact()"
+        ),
+        (*_FIXED_STEPS, OTHER_POINTS): Refusal(
+            "counters must be left out with {method}, got {count}: a counter follows flights, not steps", "use Impact()"
+        ),
+        (CHORDS,): Refusal("counters must be left out with a contact_step of {step:g}, got {count}", _NO_STEP),
+        (MASSIVE,): Refusal("counters must be left out where a wall has a mass, got {count}", _TO_MOTION),
+    }),
+    Capability("union", _rooms, {
+        _EVERY_BODY: _of_one_room("bodies", "use particles and Impact()"),
+        (BALLS, GRAINS): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
+        (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
+        (CHORDS,): _of_one_room("a contact_step", _NO_STEP),
+        (MASSIVE, HEAVY): Refusal(BESIDE_MASS, INSTEAD_OF_MASS),
+    }),
+    Capability("field", _fields, {
+        (SOFT_BODIES, PAPER_BODIES): _listed("bodies and soft walls", "use Impact(dt=...)"),
+        (*_FIXED_STEPS, OTHER_POINTS): _listed("{method}", _TO_EXACT),
+        (CHORDS,): _listed("a contact_step", _NO_STEP),
+        (MASSIVE, HEAVY): Refusal(BESIDE_MASS, INSTEAD_OF_MASS),
+    }),
+    Capability("dt of Impact", _argument("dt", None), {
+        (*_RIGID_POINTS, *_RIGID_BALLS): Refusal(
+            "dt of Impact must be left out with particles, got {got}: it is the step of bodies", "leave it out"
+        ),
+    }, True),
+    Capability("contact_step", _argument("contact_step", 0.0), {
+        (BODIES,): Refusal("contact_step must be 0 with bodies, got {got}: their impacts are exact", "leave it out"),
+        _RIGID_BALLS: Refusal("contact_step must be 0 where particles have a radius, got {got}", "leave it out"),
+    }, True),
+    Capability("gradient", _argument("gradient", "composite"), {
+        (SOFT_BODIES, PAPER_BODIES): Refusal(
+            'gradient of {method} must be "composite" with bodies, got "{got}"', "leave it out"
+        ),
+        (GRAINS,): Refusal('gradient must be "composite" where particles have a radius, got "{got}"', "leave it out"),
+    }, True),
+    Capability("acceleration", _argument("acceleration", "none"), {
+        (PAPER_BODIES,): Refusal('acceleration of {method} must be "none" with bodies, got "{got}"', "leave it out"),
+    }, True),
+    Capability("contact_start", _argument("contact_start", "impact"), {
+        (PAPER_BODIES,): Refusal('contact_start of {method} must be "impact" with bodies, got "{got}"', "leave it out"),
+    }, True),
+    Capability("exponent of multipliers", _argument("exponent", 1.0), {
+        (PAPER_BODIES,): Refusal(
+            "exponent of AugmentedLagrangian must be 1 with bodies, got {got}: its loop does not converge for another "
+            "one", "leave it out, or use Penalty",
+        ),
+    }, True),
+    Capability("fixed steps of multipliers", _argument("adaptive", True), {
+        (PAPER_BODIES,): Refusal(
+            "adaptive of AugmentedLagrangian must be True with bodies, got {got}: a loop that does not start from the "
+            "wall does not converge", "give adaptive=True, or use Penalty",
+        ),
+    }, True),
+    Capability("impacts of what did not converge", _argument("on_unconverged", "raise", "count"), {
+        (PAPER_BODIES,): Refusal(
+            'on_unconverged must be "raise" or "count" with bodies, got "{got}"', "leave it out, or use Impact(dt=...)"
+        ),
+    }, True),
+    Capability("period", _period, {
+        (CHORDS, *_FIXED_STEPS, OTHER_POINTS): Refusal(
+            "period must be None with {whole}, got {got}: its steps do not end where a particle leaves the cell",
+            _TO_EXACT,
+        ),
+        _EVERY_BODY: Refusal(
+            "period must be None with bodies, got {got}: a body may lie across a face of the cell",
+            "use particles, or a vessel without a period",
+        ),
+        (MASSIVE, HEAVY): Refusal(f"surfaces[{{i}}].{MASS_AND_PERIOD}", WITHOUT_PERIOD),
+    }),
+    Capability("no wall", _no_walls, {
+        _ALONE: Refusal(
+            "surfaces must hold at least one surface for particles without a radius, got none: such particles do not "
+            "meet one another", "give walls, or give the particles a radius",
+        ),
+    }, True),
+    Capability("law of pairs", _of_scene("pairs"), {
+        _ALONE: Refusal(
+            "pairs must be None where particles have no radius, got {got}: points do not meet one another",
+            "give the particles a radius, or leave pairs out",
+        ),
+        _EVERY_BODY: Refusal(
+            "pairs must be None with bodies, got {got}: bodies do not meet one another",
+            "leave it out, or use particles with a radius",
+        ),
+    }),
+    Capability("contact duration", _duration, {
+        (GRAINS,): Refusal(
+            "pairs.contact_duration must be None with Penalty, got {got} s: its contacts last as long as particles "
+            "overlap", "leave it out, or use Impact",
+        ),
+    }, within="law of pairs"),
+    Capability("friction of pairs", _rough_pairs, {
+        _RIGID_BALLS: Refusal(
+            "pairs.friction must be 0 with Impact, got {got}: its collisions are without friction",
+            "use Penalty, or leave it out",
+        ),
+    }, within="law of pairs"),
+    Capability("spin", _spins, {
+        _RIGID_BALLS: Refusal(
+            "spin must be None with Impact, got spins: its impacts turn no ball", "use Penalty, or leave spin out"
+        ),
+        _ALONE: Refusal(
+            "spin must be None without a radius, got spins: a point does not turn",
+            "give the particles a radius, and use Penalty",
+        ),
+    }),
+    Capability("plane", _of_scene("plane"), {
+        _EVERY_BODY: Refusal(
+            'plane must be None with bodies, got "{got}": bodies turn in space', "use particles, or leave it out"
+        ),
+    }),
+    Capability("restitution", _of_walls("restitution", 1.0), {
+        _FIXED_STEPS: _with_method("restitution", "1"),
+        (SOFT_BODIES, PAPER_BODIES): _with_method("restitution", "1"),
+        (CHORDS,): _LOSES,
+    }),
+    Capability("restitution under gravity", _losses_that_fall, {
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].restitution must be 1 under gravity where a wall has a mass, got {got}: particles would "
+            "come to rest on a wall that moves with them",
+            "leave gravity out, or give the wall a motion instead of a mass",
+        ),
+    }, within="restitution"),
+    Capability("friction", _of_walls("friction", 0.0), {
+        _FIXED_STEPS: _with_method("friction", "0"),
+        (SOFT_BODIES, PAPER_BODIES): _with_method("friction", "0"),
+        (CHORDS,): _LOSES,
+    }),
+    Capability("friction of a wall with a mass", _rubs_that_move, {
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].friction must be 0 where that wall has a mass, got {got}: impacts push it along its normal "
+            "alone", f"leave it out, or {_TO_MOTION}",
+        ),
+    }, within="friction"),
+    Capability("temperature", _of_walls("temperature", None), {
+        _EVERY_BODY: _with_bodies("temperature", "None"),
+        _FIXED_STEPS: _with_method("temperature", "None"),
+        (CHORDS,): _LOSES,
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}].temperature must be None with {_WITH_PENALTY}, got {{got}}", "use Impact"
+        ),
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].temperature must be None where a wall has a mass, got {got}",
+            "heat the particles at the start, or give the wall a motion instead of a mass",
+        ),
+    }),
+    Capability("law of a wall", _of_walls("laws", ()), {
+        _EVERY_BODY: _with_bodies("laws", "left out"),
+        _FIXED_STEPS: _with_method("laws", "left out"),
+        (CHORDS,): _LOSES,
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}].laws must be left out with {_WITH_PENALTY}, got {{got}}",
+            "use restitution and friction, or Impact",
+        ),
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].laws must be left out where a wall has a mass, got {got}",
+            "give the wall a motion instead of a mass",
+        ),
+    }),
+    Capability("laws of groups of a mesh", _groups, {
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}].groups must be None with {_WITH_PENALTY}, got laws of {{got}}",
+            "give the whole mesh one law, or use Impact",
+        ),
+    }, within="law of a wall"),
+    Capability("wait beside walls that move", _waits_beside_motions, {
+        (*_RIGID_POINTS, *_RIGID_BALLS): Refusal(
+            "surfaces[{i}].laws[{k}] must not let particles wait where a wall moves, got {got}: a particle that waits "
+            "would have to move with its wall", "leave that law out, or the motions",
+        ),
+    }, within="law of a wall"),
+    Capability("wait", _sticky, {
+        _RIGID_BALLS: Refusal(
+            "surfaces[{i}].laws[{k}] must not let particles with a radius wait, got {got!r:.200}",
+            "use a law without a wait, such as Lambert, or leave the radius out",
+        ),
+    }, within="law of a wall"),
+    Capability("mass of a wall", _masses, {
+        _EVERY_BODY: Refusal(
+            "surfaces[{i}] must have no mass and no inertia with bodies, got {got}",
+            "make it a body, whose cavities= are walls that move with it",
+        ),
+        _FIXED_STEPS: _with_method("{name}", "None", "value"),
+        (CHORDS,): _LOSES,
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}].{{name}} must be None with {_WITH_PENALTY}, got {{value}}",
+            f"{_TO_MOTION}, or use Impact",
+        ),
+    }),
+    Capability("opening", _of_walls("openings", ()), {
+        _EVERY_BODY: Refusal(
+            "surfaces[{i}].openings must be left out with bodies, got {count}",
+            "use particles, or a box with an open face",
+        ),
+        _FIXED_STEPS: _with_method("openings", "left out", "count"),
+        (GRAINS,): _CLOSES,
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].openings must be left out where a wall has a mass, got {count}",
+            "give the wall a motion instead of a mass",
+        ),
+    }),
+    Capability("opening for a time", _doors, {
+        (CHORDS,): _CHANGES,
+    }, within="opening"),
+    Capability("present", _of_walls("present", None), {
+        _EVERY_BODY: _with_bodies("present", "None", "use particles, or leave it out"),
+        _FIXED_STEPS: _with_method("present", "None"),
+        (CHORDS,): _CHANGES,
+        (GRAINS,): Refusal(f"surfaces[{{i}}].present must be None with {_WITH_PENALTY}, got {{got}}", "use Impact"),
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].present must be None where a wall has a mass, got {got}",
+            "give the wall a motion instead of a mass",
+        ),
+    }),
+    Capability("motion", _of_walls("motion", None), {
+        _EVERY_BODY: _with_bodies("motion", "None", "move a point of the body by an anchor, in the frame of the wall"),
+        (CHORDS,): _LOSES,
+    }),
+    Capability("motion at cut steps", _motions_at_impacts, {
+        (PAPER,): Refusal(
+            "surfaces[{i}].motion must be None with {cut}, got {got}: its steps are cut at impacts on walls at rest",
+            'use fixed steps with on_unconverged="count", Penalty, or Impact',
+        ),
+    }, True),
+    Capability("rotation", _rotations, {
+        _FIXED_STEPS: Refusal(
+            "surfaces[{i}].motion must not turn the surface with {method}, got {got}: its step has no closed form in "
+            "the frame of a wall that turns",
+            "use Impact, a Translation, Oscillation or Path, or a rotation that leaves the surface as it is",
+        ),
+    }, within="motion"),
+    Capability("motion beside a field", _fields_that_rest, {
+        (GRAINS,): Refusal(
+            f"surfaces must not move beside a field or a mesh with {_WITH_PENALTY}, got a motion beside "
+            "surfaces[{i}] ({kind})", "use Impact, or build the field or mesh of single surfaces",
+        ),
+    }, within="motion"),
+    Capability("gravity at cut steps", _gravity_at_impacts, {
+        (PAPER,): Refusal(
+            "gravity must be None with {cut}, got {got}",
+            'use fixed steps with on_unconverged="count", Penalty, or Impact',
+        ),
+    }, True),
+    Capability("mesh or outline", _faces, {
+        _EVERY_BODY: Refusal(
+            "surfaces[{i}] must not be {kind} with bodies, got {got!r:.200}",
+            "use particles, or from_mesh with a spacing",
+        ),
+    }, within="field"),
+    Capability("cavity with losses", _lossy_cavities, {
+        (SOFT_BODIES, PAPER_BODIES): Refusal(
+            "cavities[{k}] must be elastic with {method}, got {got}", "use Impact(dt=...)"
+        ),
+    }),
+    Capability("impacts on members", _option("member_impacts"), {
+        (HEAVY,): Refusal(
+            "member_impacts must be False where particles have a radius and a wall has a mass, got True",
+            f"leave it out, or {_TO_MOTION}",
+        ),
+        (GRAINS,): Refusal(
+            f"member_impacts must be False with {_WITH_PENALTY}, got True", "leave it out, or use Impact"
+        ),
+    }),
+    Capability("impacts on members beside cavities", _members_beside_cavities, {
+        _EVERY_BODY: Refusal(
+            "member_impacts must be False with bodies that have cavities, got True: a cavity is no surface of the "
+            "scene", "leave it out",
+        ),
+    }),
+    Capability("impacts on members in fixed steps", _members_in_fixed_steps, {
+        (PAPER,): Refusal(
+            'member_impacts must be False with on_unconverged = "impact" in fixed steps, got True: such a step may '
+            "have impacts on several walls", 'use adaptive=True, or on_unconverged="count"',
+        ),
+    }, True),
+    Capability("frames of some particles", _part_of_particles, {
+        _EVERY_BODY: Refusal(
+            'frames must be "all" or "none" with bodies, got {got}: a body is written as a whole', 'give frames="all"'
+        ),
+    }),
+    Capability("cluster", _option("cluster"), {
+        _EVERY_BALL: Refusal(
+            "cluster must be left out where particles have a radius, got {got!r:.100}: particles that meet one another "
+            "cannot be in different shards", "run without a cluster",
+        ),
+        (MASSIVE,): Refusal(
+            "cluster must be left out where a wall has a mass, got {got!r:.100}: through such a wall each particle "
+            "depends on all others", f"{_TO_MOTION}, or run without a cluster",
+        ),
+    }),
+    Capability("cluster without a trajectory", _on_cluster(_no_trajectory), {
+        ENGINES: Refusal(
+            "trajectory must be given with a cluster, got none: it joins the files of the shards", "give trajectory="
+        ),
+    }),
+    Capability("cluster and recording", _on_cluster(_recorded), {
+        ENGINES: Refusal(
+            "recording and live must be left out with a cluster, got {got}",
+            "make the recording from the trajectory: swarm record RUN.h5 -o OUT.rrd",
+        ),
+    }),
+    Capability("cluster and log of impacts", _on_cluster(_option("impacts")), {
+        ENGINES: Refusal(
+            "impacts must be None with a cluster, got {got}: its shards keep no common log", "run without a cluster"
+        ),
+    }),
+    Capability("cluster and observables of some particles", _on_cluster(_measured_in_part), {
+        ENGINES: Refusal(
+            'observables need frames = "all" and precision = "float64" with a cluster, got {got}: they are computed '
+            "from the files of its shards", "leave frames and precision out, or run without a cluster",
+        ),
+    }),
+)  # fmt: skip
+
+
+def sentence(engine: str, capability: str) -> str | None:
+    """The sentence for an engine and a capability by its name, with its fields in braces; None if it is supported.
+
+    >>> sentence(POINTS, "source") is None
+    True
+    >>> sentence(BALLS, "spin")
+    'spin must be None with Impact, got spins: its impacts turn no ball; use Penalty, or leave spin out'
+    """
+    one = next(one for one in CAPABILITIES if one.name == capability)
+    return one.sentence(engine) or (sentence(engine, one.within) if one.within else None)
+
+
+def require_known(asked: Asked) -> None:
+    """Raise a `SceneError` with the first sentence that applies to a run."""
+    engine, method = engine_of(asked), asked.method
+    fields = {"method": type(method).__name__, "whole": method, "step": getattr(method, "contact_step", 0.0)}
+    for capability in CAPABILITIES:
+        text = capability.sentence(engine)
+        for one in () if text is None else capability.found(asked):
+            kind = type(one.get("got")).__name__
+            raise SceneError(text.format(**fields, kind=kind, **one))  # type: ignore[union-attr]
+
+
+def markdown() -> list[str]:
+    """The table of the guide, in lines of Markdown: whether each engine supports each capability."""
+    kinds = [engine for engine in ENGINES if engine != BASELINE]
+    rows = [("", *kinds), ("---",) * (1 + len(kinds))]
+    shown = (one for one in CAPABILITIES if not one.is_argument)
+    rows += [(one.name, *("no" if sentence(engine, one.name) else "yes" for engine in kinds)) for one in shown]
+    return [f"| {' | '.join(row)} |" for row in rows]

@@ -1,0 +1,161 @@
+"""Whether particles start inside their walls, and the error about those that do not: where, how far, how to mend it."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...particles import Particles
+from ...scene import Scene
+from ...surfaces.fields.many import Many
+from ...surfaces.instant import box_of, gaps_of, gradient_of
+from ...surfaces.shapes.plane import Plane
+from ...surfaces.surface import Surface
+
+# A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
+_ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
+# Steps along the gradient in which the way to a wall is found; the nudge off a point without one, of the scene's size.
+_WAYS, _NUDGE = 60, 1e-3
+# A way that ends this near to the wall, of its length, has come to it.
+_ARRIVED = 1e-6
+# Particles that are looked at for what would mend it.
+_LOOKED_AT = 1000
+
+Places = NDArray[np.float64]
+
+
+def require_inside(scene: Scene, particles: Particles) -> None:
+    """Raise a `SceneError` where a particle is outside of a wall by more than round-off."""
+    # Their magnitude sets the round-off of a position on a wall.
+    magnitude = max(float(particles.position.max()), -float(particles.position.min()), scene.finite_size())
+    outside = scene.outside(particles.position, _ON_THE_WALL * magnitude)
+    if outside.size:
+        raise error_of(scene, particles, outside, scene.distances_outside(particles.position[:, outside]))
+
+
+def error_of(scene: Scene, particles: Particles, outside: NDArray[np.intp], distances: Places) -> SceneError:
+    """The error about particles, the numbers of those outside and their distances outside of every surface.
+
+    Args:
+        scene: the walls.
+        particles: all at the start.
+        outside: the numbers of those that are outside.
+        distances: how far these are outside of every surface, (surfaces, those) [m].
+    """
+    position = particles.position
+    # Where phi is not a number a particle is outside.
+    walls = np.argmax(np.where(np.isnan(distances), np.inf, distances), axis=0)
+    first, wall = int(outside[0]), int(walls[0])
+    met, counts = np.unique(walls, return_counts=True)
+    told = zip(met.tolist(), counts.tolist(), strict=True)
+    several = "" if len(met) == 1 else f" ({', '.join(f'surfaces[{i}]: {count}' for i, count in told)})"
+    place = position[:, first : first + 1]
+    where = f"{tuple(place[:, 0].tolist())}, "
+    if particles.radius is None:
+        where += f"{_how_far(scene, wall, place)} {_named(scene, wall)}"
+    else:
+        radius, depth = particles.radius[first], distances[wall, 0]
+        where += f"whose radius of {radius:g} m reaches {depth:.6g} m beyond {_named(scene, wall)}"
+    most = int(met[np.argmax(counts)])
+    mend = _mend(scene, most, position, int(counts.max()))
+    error = SceneError(
+        f"particles must start inside their walls, got {outside.size} of {len(particles)} outside{several}; the first "
+        f"is particle {first} at {where}: {_admissible(scene.surfaces[wall], place)}; {mend}"
+    )
+    error.particle = first
+    return error
+
+
+def _named(scene: Scene, wall: int) -> str:
+    surface = scene.surfaces[wall]
+    return f"surfaces[{wall}] ({type(surface).__name__})" + ("" if surface.motion is None else ", as it is at 0 s")
+
+
+def _is_kept_out(surface: Surface) -> bool:
+    """Whether particles are kept out of a surface."""
+    return surface.is_solid() or (isinstance(surface, Many) and not surface.is_foam())
+
+
+def _how_far(scene: Scene, wall: int, place: Places) -> str:
+    """How far a point is on the wrong side, in words."""
+    surface = scene.surfaces[wall]
+    side = "beyond" if isinstance(surface, Plane) else "inside" if _is_kept_out(surface) else "outside"
+    distance = _distance(scene, wall, place)
+    return f"{side}" if math.isnan(distance) else f"{distance:.3g} m {side}"
+
+
+def _distance(scene: Scene, wall: int, place: Places) -> float:
+    """About how far a point is from a wall, along the gradient [m]; NaN where no way leads there."""
+    first = abs(float(scene.distances_outside(place)[wall, 0]))
+    first = first if first < scene.extent() else math.nan
+    if scene.period is not None:
+        return first
+    images, step = (scene.surfaces[wall],), _NUDGE * scene.finite_size()
+    r = place.copy()
+    with np.errstate(all="ignore"):
+        for _way in range(_WAYS):
+            gap, slope = float(gaps_of(images, r, 0.0)[0, 0]), gradient_of(images, r)
+            steep = float((slope**2).sum())
+            # The middle of a surface has no way out.
+            move = -gap / steep * slope if steep > 0.0 else np.array([[0.48], [0.6], [0.64]]) * step
+            r = r + move
+            gone = float(np.sqrt(((r - place) ** 2).sum()))
+            if steep > 0.0 and np.sqrt((move**2).sum()) <= _ARRIVED * gone:
+                return gone
+    return first
+
+
+def _admissible(surface: Surface, place: Places) -> str:
+    """Which side of a surface is admissible, and what its phi is at a point."""
+    phi = float(surface.phi(place)[0])
+    if math.isnan(phi):
+        return "its phi is not a number there"
+    if isinstance(surface, Plane):
+        told = "admissible is normal.r <= offset"
+        here = f", and normal.r = {phi + surface.offset:.6g} m there is more than {surface.offset:.6g} m"
+        return told + (here if surface.motion is None else "")
+    if _is_kept_out(surface):
+        return f"admissible is its outside, where phi is 0 or more, and phi = {phi:.6g} there"
+    return f"admissible is its inside, where phi is 0 or less, and phi = {phi:.6g} there"
+
+
+def _mend(scene: Scene, wall: int, position: Places, outside: int) -> str:
+    """What would likely mend it, tried on particles: a wall elsewhere, or its other side, else other particles."""
+    surface, total = scene.surfaces[wall], position.shape[1]
+    some = position[:, :: max(1, total // _LOOKED_AT)]
+    if total > 1 and (center := _center_around(surface, some)) is not None:
+        return f"give that surface center = {center}, which holds all of them, or move the particles"
+    if 2 * outside > total and (flip := _other_side(scene, wall)):
+        return f"give that surface {flip}, if its other side is meant, or move the particles"
+    these = "it" if outside == 1 else "them"
+    return f"move {these}, or let swarm.fill place all"
+
+
+def _center_around(surface: Surface, position: Places) -> tuple[float, ...] | None:
+    """The centre with which a cavity holds all particles; None if no shift of it does, or it cannot be shifted."""
+    if _is_kept_out(surface) or not hasattr(surface, "center") or surface.motion is not None:
+        return None
+    box = np.array(box_of(surface, 0.0))
+    if not np.isfinite(box).all():
+        return None
+    shift = 0.5 * (position.min(axis=1) + position.max(axis=1)) - box.mean(axis=0)
+    shift = np.array([float(f"{x:.3g}") for x in shift])
+    moved = surface.shifted(tuple(shift.tolist()))
+    if (gaps_of((moved,), position, 0.0) <= 0.0).all():
+        return tuple(round(float(x), 12) for x in moved.center)  # type: ignore[attr-defined]
+    return None
+
+
+def _other_side(scene: Scene, wall: int) -> str | None:
+    """What makes the other side of a surface the admissible one; None where that would leave the scene open."""
+    surface = scene.surfaces[wall]
+    if isinstance(surface, Plane):
+        normal = tuple(0.0 - x for x in surface.normal)
+        return f"the reversed normal, normal = {normal} and offset = {0.0 - surface.offset:g}"
+    if isinstance(surface, Many) or not hasattr(surface, "side"):
+        return None
+    if surface.is_solid():
+        return 'side = "inside"'
+    others = [one for i, one in enumerate(scene.surfaces) if i != wall]
+    return 'side = "outside"' if others and np.isfinite(scene.bounds_of(others)).all() else None

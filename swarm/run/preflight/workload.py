@@ -1,0 +1,166 @@
+"""An estimate of the impacts of a run, from the flights of a few particles, in plain Python."""
+
+import logging
+import math
+from collections import Counter
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...bodies.state import Bodies
+from ...errors import SceneError
+from ...kernel.gravity import Gravity
+from ...kernel.vector import vec
+from ...methods.base import Method
+from ...particles import Particles
+from ...scene import Scene
+from ...surfaces.time_of_impact import flights
+
+_LOG = logging.getLogger("swarm")
+# At some 10 ns an impact: minutes a frame, without a sign of progress; and days of a processor.
+_MOST_A_FRAME, _MANY = 1e10, 1e13
+# A body that turns farther in a step [rad], and how far it may.
+_FAR_TURN, _GOOD_TURN = 1.0, 0.3
+# Particles whose flights are computed, and most parts of a fall until its hit is known.
+_PARTICLES, _PARTS = 8, 8
+# Chords of a walk through the volume, and how many of the last of them count.
+_CHORDS, _COUNTED = 60, 30
+
+
+class Flights(NamedTuple):
+    """Typical time from impact to impact [s], and the wall that is hit most often."""
+
+    between: float
+    wall: int
+
+
+def require_few_impacts(scene: Scene, particles: Particles, method: Method, until: float, every: float) -> None:
+    """Raise a `SceneError` where a frame would take more impacts of one particle than it can; warn of a long run."""
+    impact = method.time_of_impact()
+    # Where energy is lost or given, by heat or by work, the first flights say nothing of the later ones.
+    if impact is None or scene.laws() is not None:
+        return
+    with np.errstate(all="ignore"):
+        found = _of_particles(scene, particles, impact)
+        if not _is_much(found, particles, until, every):
+            return
+        # They may start in a narrow corner and leave it: then the volume around decides.
+        found = max(found, _of_volume(scene, particles, impact))
+    if every > _MOST_A_FRAME * found.between:
+        i = int(scene.members()[0, found.wall])
+        raise SceneError(
+            f"a particle must take at most {_MOST_A_FRAME:g} impacts a frame, got about {every / found.between:.2g}: "
+            f"at its speed it flies {found.between:.2g} s from impact to impact, mostly at surfaces[{i}] "
+            f"({type(scene.surfaces[i]).__name__}), and a frame lasts {every:g} s; make that surface wider, the "
+            f"particles slower, or every at most {_MOST_A_FRAME * found.between:.2g} s"
+        )
+    impacts = len(particles) * (until / found.between)
+    if impacts > _MANY:
+        _LOG.warning(
+            "the run will take about %.1e impacts, %.1e of each particle, which flies %.1e s from impact to impact",
+            impacts, until / found.between, found.between,
+        )  # fmt: skip
+
+
+def time_between(scene: Scene, particles: Particles) -> float:
+    """The typical time of a flight from impact to impact at the start [s]."""
+    with np.errstate(all="ignore"):
+        return _of_particles(scene, particles, 0.0).between
+
+
+def check_turns(bodies: Bodies, dt: float) -> None:
+    """Warn where a tie of a body turns so far in a step that the step is cut, or says little."""
+    ends, r, v = bodies.body.links, bodies.position, bodies.velocity
+    if not len(ends):
+        return
+    length2 = ((r[:, ends[:, 0]] - r[:, ends[:, 1]]) ** 2).sum(axis=0)
+    speed2 = ((v[:, ends[:, 0]] - v[:, ends[:, 1]]) ** 2).sum(axis=0)
+    turns = dt * np.sqrt(speed2 / length2)  # (L, n)
+    link, copy = np.unravel_index(int(np.argmax(turns)), turns.shape)
+    if turns[link, copy] > _FAR_TURN:
+        _LOG.warning(
+            "body %d turns by %.2g rad in a step of %g s (links[%d]): its steps will be cut, which is slow, or say "
+            "little of its motion; use dt = %.1g s or less",
+            copy, turns[link, copy], dt, link, _GOOD_TURN * dt / turns[link, copy],
+        )  # fmt: skip
+
+
+def _is_much(found: Flights, particles: Particles, until: float, every: float) -> bool:
+    return every > _MOST_A_FRAME * found.between or len(particles) * until > _MANY * found.between
+
+
+def _of_particles(scene: Scene, particles: Particles, impact: float) -> Flights:
+    """From the flights of some particles at the start, from the impact before it to the one after it."""
+    walls, pull, seen = scene.walls(), scene.pull(), []
+    for i in _chosen(particles):
+        position, velocity = particles.position[:, i], particles.velocity[:, i]
+        until, wall = _hit(walls, pull, position, velocity)
+        since, _wall = _hit(walls, pull, position, -velocity)
+        # 0 is a particle that rests, or rolls along its wall.
+        if since + until > 0.0:
+            seen.append(Flights(impact + since + until, wall))
+    return _typical(seen)
+
+
+def _of_volume(scene: Scene, particles: Particles, impact: float) -> Flights:
+    """From the chords of the volume around some particles: a random walk from chord to chord.
+
+    Between two chords it moves along the wall, which leads out of a narrow corner, but not out of a narrow slit.
+    """
+    walls, random, seen = scene.walls(), np.random.default_rng(0), []
+    pull = math.hypot(*(scene.gravity or (0.0,)))
+    for i in _chosen(particles):
+        point, velocity = particles.position[:, i], particles.velocity[:, i]
+        for k in range(_CHORDS):
+            way = np.zeros(3)
+            way[scene.axes()] = random.standard_normal(len(scene.axes()))
+            way = way / math.sqrt(way @ way)
+            length, ahead, wall = _chord(walls, point, way)
+            if not length < math.inf:
+                return Flights(math.inf, -1)
+            normal = np.array(walls.unit_normal(float(wall), vec(point + ahead * way)))
+            point = point + (ahead - length * random.random()) * way
+            speed = math.sqrt(velocity @ velocity + pull * length)
+            if k >= _CHORDS - _COUNTED and length > 0.0 and speed > 0.0:
+                seen.append(Flights(impact + length / speed, wall))
+            way = way - (way @ normal) * normal
+            length, ahead, _wall = _chord(walls, point, way)
+            if length < math.inf:
+                point = point + (ahead - length * random.random()) * way
+    return _typical(seen)
+
+
+def _chord(walls: Any, point: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, float, int]:
+    """The chord through a point, in units of the vector along it: its length, the part ahead, and the wall there."""
+    (ahead, wall), (behind, _wall) = _hit(walls, None, point, way), _hit(walls, None, point, -way)
+    return ahead + behind, ahead, wall
+
+
+def _chosen(particles: Particles) -> list[int]:
+    return sorted({round(k * (len(particles) - 1) / (_PARTICLES - 1)) for k in range(_PARTICLES)})
+
+
+def _hit(
+    walls: Any, pull: Gravity | None, position: NDArray[np.float64], velocity: NDArray[np.float64]
+) -> tuple[float, int]:
+    """The time to the first hit and its wall, infinite if it is not found in a few parts."""
+    total = 0.0
+    gravity = np.zeros(3) if pull is None else np.array(pull)
+    for _part in range(_PARTS):
+        time, wall = flights.first_hit(walls, pull, vec(position), vec(velocity))
+        total += float(time)
+        if wall >= 0.0 or not time < math.inf:
+            return total, int(wall)
+        position = position + time * velocity + 0.5 * time * time * gravity
+        velocity = velocity + time * gravity
+    return math.inf, -1
+
+
+def _typical(seen: list[Flights]) -> Flights:
+    """Their median, and the wall of most of them."""
+    if not seen:
+        return Flights(math.inf, -1)
+    between = sorted(one.between for one in seen)[len(seen) // 2]
+    met = Counter(one.wall for one in seen if one.wall >= 0)
+    return Flights(between, met.most_common(1)[0][0] if met else -1)

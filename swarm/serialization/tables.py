@@ -1,0 +1,233 @@
+"""Surfaces, scenes and methods to and from plain tables, the form that scene files and trajectories hold.
+
+Every error names the key by its full path, such as surface[1].radius.
+"""
+
+import dataclasses
+import hashlib
+import re
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.checks import closest, listed, one_of
+from ..errors import SceneError
+from ..methods import ALL_METHODS, Method
+from ..motion import table_of as motion_table
+from ..pairs import Pairs
+from ..scene import Scene
+from ..surfaces import ALL_SURFACES, OwnSurface, Surface
+from ..surfaces.presence.doors import Opening
+from . import plugins
+from .law_tables import table_of_group, table_of_law, with_laws
+
+T = TypeVar("T")
+# What in the table of a surface are tables of surfaces.
+NESTED = ("openings", "part")
+# An array of more numbers is not written as text: HDF5 loses texts of 100 MB, and a million balls take 10 s to write.
+_LONG, _ARRAY = 1000, "sha256:"
+
+
+def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None, pairs: Any = None) -> Scene:
+    """A scene from its tables: a list of surface tables; gravity, the period, the plane and the pairs, or None."""
+    # Balls need none.
+    surfaces = [] if surfaces is None else surfaces
+    if not isinstance(surfaces, list):
+        raise SceneError(
+            "surface: expected at least one [[surface]] table, or none for balls in free space, got something else"
+        )
+    built = [surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
+    met = None if pairs is None else _pairs_of(pairs)
+    return Scene(surfaces=built, gravity=gravity, period=period, plane=plane, pairs=met)
+
+
+def _pairs_of(table: Any) -> Pairs:
+    """What particles with a radius do to one another, from the table [pairs]."""
+    try:
+        return convert(table, Pairs, "pairs")
+    except SceneError as error:
+        # The checks of `Pairs` name the key by its full path.
+        raise SceneError(str(error).replace("pairs.pairs.", "pairs.")) from None
+
+
+def surface_of(table: Any, where: str) -> Surface:
+    """A surface from its table, in which those of its openings and of its parts may be."""
+    for key in NESTED if isinstance(table, Mapping) else ():
+        if key in table:
+            given = table[key]
+            if not isinstance(given, list):
+                raise SceneError(f"{where}.{key}: expected [[surface.{key}]] tables, got {given!r:.200}")
+            made = opening_of if key == "openings" else surface_of
+            table = {**table, key: [made(one, f"{where}.{key}[{k}]") for k, one in enumerate(given)]}
+    return of_kind(with_laws(table, where), where, ALL_SURFACES, Surface)
+
+
+def opening_of(table: Any, where: str) -> Surface | Opening:
+    """An opening from its table, in which may be what it has besides a surface."""
+    mine = {key: table[key] for key in ("times", "between") if key in table} if isinstance(table, Mapping) else {}
+    if not mine:
+        return surface_of(table, where)
+    surface = surface_of({key: value for key, value in table.items() if key not in mine}, where)
+    try:
+        return Opening(surface, **mine)
+    except SceneError as error:
+        raise SceneError(f"{where}.{error}") from None
+
+
+def method_of(table: Any) -> Method:
+    """A method from its table."""
+    return of_kind(table, "method", ALL_METHODS, Method)
+
+
+def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The table of a surface or a method: its kind, and every argument that is not None.
+
+    Of a long array it holds the name, a digest, under which `arrays` get it; None: the numbers themselves.
+    """
+    if isinstance(described, OwnSurface):
+        return _with_nested(described.table(), described, arrays)
+    kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
+    given = {field.metadata.get("key", field.name): getattr(described, field.name) for field in _kept(type(described))}
+    table = {key: value for key, value in given.items() if value is not None and not _is_left_out(described, key)}
+    table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
+    mine = type(described)
+    kind = kinds.get(mine, f"{mine.__module__}:{mine.__qualname__}")
+    return _with_nested({"kind": kind, **table}, described, arrays)
+
+
+def _with_nested(table: dict[str, Any], described: Surface | Method, arrays: dict[str, Any] | None) -> dict[str, Any]:
+    """The table of a surface, with the tables of its motion, openings and parts, and the names of user-defined laws."""
+    if isinstance(described, Surface):
+        del table["openings"], table["laws"]
+        if described.motion is not None:
+            table["motion"] = motion_table(described.motion)
+        if described.laws:
+            table["laws"] = [table_of_law(law) for law in described.laws]
+        if isinstance(table.get("groups"), Mapping):
+            table["groups"] = {name: table_of_group(group) for name, group in table["groups"].items()}
+        if described.openings:
+            table["openings"] = [table_of_opening(opening, arrays) for opening in described.openings]
+        if "part" in table:
+            table["part"] = [table_of(part, arrays) for part in table["part"]]
+    return table
+
+
+def table_of_opening(opening: Surface | Opening, arrays: dict[str, Any] | None) -> dict[str, Any]:
+    """The table of an opening."""
+    if isinstance(opening, Surface):
+        return table_of(opening, arrays)
+    mine = {"times": opening.times, "between": opening.between or None}
+    return {**table_of(opening.surface, arrays), **{key: value for key, value in mine.items() if value is not None}}
+
+
+def _written(values: NDArray[Any], arrays: dict[str, Any] | None) -> Any:
+    if arrays is None or values.size <= _LONG:
+        return values.tolist()
+    name = _ARRAY + hashlib.sha256(repr((values.shape, values.dtype.str)).encode() + values.tobytes()).hexdigest()
+    arrays[name] = values
+    return name
+
+
+def with_arrays(table: dict[str, Any], arrays: Mapping[str, Any]) -> dict[str, Any]:
+    """A surface's table with the long arrays that it names.
+
+    Raises:
+        SceneError: it names a file, as no trajectory does: to read it would open any file of the machine.
+    """
+    named = {key for key, value in table.items() if isinstance(value, str) and value.startswith(_ARRAY)}
+    held = {key: np.asarray(arrays[value]) if key in named else value for key, value in table.items()}
+    for key, what in (("values", "the samples"), ("vertices", "the corners")):
+        if isinstance(held.get(key), str):
+            raise SceneError(f"surface.{key}: expected {what}, got {held[key]!r:.80}; a trajectory names no file")
+    for key in NESTED:
+        if key in held:
+            held[key] = [with_arrays(one, arrays) for one in held[key]]
+    return held
+
+
+def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The tables of a scene; `arrays` as of `table_of`."""
+    gravity = {} if scene.gravity is None else {"gravity": scene.gravity}
+    # TOML has no None.
+    period = {} if scene.period is None else {"period": [length or False for length in scene.period]}
+    plane = {} if scene.plane is None else {"plane": scene.plane}
+    given = {} if scene.pairs is None else {key: one for key, one in vars(scene.pairs).items() if one is not None}
+    pairs = {} if scene.pairs is None else {"pairs": given}
+    return {**gravity, **period, **plane, **pairs, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
+
+
+def _is_left_out(described: Surface | Method, key: str) -> bool:
+    """Whether an argument is at the default that it has in files that are older than it."""
+    field = next((one for one in dataclasses.fields(described) if one.name == key), None)
+    return field is not None and field.metadata.get("younger", False) and getattr(described, key) == field.default
+
+
+def _kept(cls: type[Any]) -> list[dataclasses.Field[Any]]:
+    """The fields of a dataclass that a file has: not the options of a session, and nothing that is made of others."""
+    return [field for field in dataclasses.fields(cls) if field.metadata.get("in_file", True)]
+
+
+def convert(table: Any, cls: type[T], where: str) -> T:
+    """A dataclass from a table: no unknown key, no missing one, every value of its type."""
+    if not isinstance(table, Mapping):
+        raise SceneError(f"{where}: expected a table, got {table!r}")
+    names = {field.metadata.get("key", field.name): field for field in _kept(cls)}
+    for key in table:
+        if key not in names:
+            at_top = key in ("gravity", "period", "plane")
+            hint = f"; {key} belongs at the top, before the first table" if at_top else closest(key, names)
+            raise SceneError(f"{where}.{key}: unknown key, expected {listed(names)}{hint}")
+    for key, field in names.items():
+        if field.default is dataclasses.MISSING and key not in table:
+            raise SceneError(f"{where}.{key}: expected {_type_name(field.type)}, got nothing; add {key} = ...")
+    try:
+        return msgspec.convert({names[key].name: value for key, value in table.items()}, cls)
+    except msgspec.ValidationError as error:
+        raise SceneError(
+            _sentence(str(error), where, table, {field.name: key for key, field in names.items()})
+        ) from None
+
+
+def of_kind(table: Any, where: str, kinds: Mapping[str, type[T]], base: type[Any] | None = None) -> T:
+    """A dataclass from a table whose kind says which: one of `kinds`, or code derived from `base`."""
+    if not isinstance(table, Mapping):
+        raise SceneError(f"{where}: expected a table with a kind, got {table!r}")
+    if "kind" not in table:
+        raise SceneError(f"{where}.kind: expected one of {listed(kinds)}, got nothing")
+    if table["kind"] == "own":
+        raise SceneError(
+            f"{where}.kind: 'own' is a phi in Python, which no file holds; build the scene in Python, as the run's "
+            "script does"
+        )
+    if base is not None and plugins.is_named(table["kind"]):
+        cls = plugins.class_of(f"{where}.kind", table["kind"], base, f"a {base.__name__.lower()}")
+    else:
+        cls = kinds[one_of(f"{where}.kind", table["kind"], kinds)]
+    made: T = convert({key: value for key, value in table.items() if key != "kind"}, cls, where)
+    return made
+
+
+def _type_name(kind: Any) -> str:
+    if "..." in str(kind):
+        return "a list"
+    return {"float": "a number", "int": "a whole number", "Vector": "three numbers"}.get(
+        getattr(kind, "__name__", str(kind)), "three numbers" if "tuple" in str(kind) else "a value"
+    )
+
+
+def _sentence(message: str, where: str, table: Mapping[str, Any], keys: Mapping[str, str]) -> str:
+    """A message of msgspec, "Expected `float`, got `str` - at `$.radius`", with the key first, and the value."""
+    match = re.fullmatch(r"(.*?)(?: - at `\$\.?(.*)`)?", message)
+    assert match is not None
+    reason, path = match.groups()
+    if not path:
+        # From our own checks, which begin with the argument's name.
+        return f"{where}.{reason}"
+    name = re.split(r"[.\[]", path)[0]
+    key = keys.get(name, name)
+    path = key + path.removeprefix(name)
+    value = f" (in {key} = {table[key]!r})" if key in table else ""
+    return f"{where}.{path}: {reason[0].lower()}{reason[1:].replace('`', '')}{value}"

@@ -1,0 +1,142 @@
+"""A closed mesh of triangles from a file: read, its corners joined, its parts turned, or refused with a place."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.extras import needed_by
+from ...errors import SceneError
+from ..surface import shown
+from .mending import edges_of, groups_of, joined, neighbours, seams_closed, turned_alike, without_flat
+from .mesh_files import Floats, Indices, Soup, read_soup
+
+# Corners of a part that are looked up in another one, about.
+_LOOKED_UP = 16
+# So many holes are listed.
+_LISTED = 5
+
+
+class TriangleMesh(NamedTuple):
+    """Triangles that enclose a volume.
+
+    Attributes:
+        vertices: (V, 3) [m].
+        triangles: (T, 3) their corners, counter-clockwise seen from outside.
+        weld: how far a corner was moved at most to close seams [m].
+        group: (T,) the number of the group of each triangle.
+        names: of the groups.
+    """
+
+    vertices: Floats
+    triangles: Indices
+    weld: float
+    group: Indices
+    names: tuple[str, ...]
+
+
+def read_mesh(path: Path, scale: float, weld: float | None) -> TriangleMesh:
+    """The mesh in a file.
+
+    Args:
+        path: of the file.
+        scale: what a unit of the file is in metres.
+        weld: the distance within which corners of open edges are one [m]; None: one that suits the mesh.
+
+    Raises:
+        SceneError: the file holds no mesh, or one that is not closed, whose triangles cannot be turned the same way, or
+            whose parts intersect.
+    """
+    return closed(path, read_soup(path, scale), weld)
+
+
+def closed(path: Path, soup: Soup, weld: float | None) -> TriangleMesh:
+    """The mesh that triangles make; see `read_mesh`."""
+    soup, moved, within = seams_closed(joined(soup), weld)
+    edges, counts = edges_of(soup.triangles)
+    if not len(soup.triangles) or (counts != 2).any():
+        # A triangle along an edge, of no area, that closes nothing
+        soup = without_flat(soup)
+        edges, counts = edges_of(soup.triangles)
+        if not len(soup.triangles) or (counts != 2).any():
+            _refuse_open(path, soup.vertices, edges, counts, within)
+    soup, wrong = turned_alike(soup)
+    if len(wrong):
+        raise SceneError(
+            f"the mesh {path} must have an outside, got triangles that cannot all be turned the same way, as those of "
+            f"a Klein bottle: neighbours are not at {len(wrong)} edges, one at "
+            f"{shown(soup.vertices[wrong[0]].mean(axis=0))}; mend it, for example with MeshLab"
+        )
+    soup = _outward(path, soup)
+    used, turned = np.unique(soup.triangles, return_inverse=True)
+    return TriangleMesh(soup.vertices[used], turned.reshape(-1, 3), moved, soup.group, soup.names)
+
+
+# --- Whether it is closed --------------------------------------------------------------------------------
+
+
+def _refuse_open(path: Path, vertices: Floats, edges: Indices, counts: Indices, weld: float | None) -> None:
+    """Raise the error of a mesh that is not closed."""
+    said = []
+    rims = edges[counts == 1]
+    if len(rims):
+        corners, ends = np.unique(rims, return_inverse=True)
+        holes = [vertices[corners[which]] for which in groups_of(ends.reshape(-1, 2), len(corners))]
+        sizes = [float(np.linalg.norm(np.ptp(hole, axis=0))) for hole in holes]
+        order = np.argsort(sizes)[::-1].tolist()
+        others = f" and {len(holes) - 1} more place{'s' if len(holes) > 2 else ''}; the largest hole"
+        others = others if len(holes) > 1 else "; the hole"
+        said.append(f"open at {shown(holes[order[0]].mean(axis=0))}{others} is {sizes[order[0]]:.3g} m across")
+        if len(holes) > 1:
+            listed = (f"{sizes[k]:.3g} m at {shown(holes[k].mean(axis=0))}" for k in order[1:_LISTED])
+            said.append(f"then {', '.join(listed)}{', ...' if len(holes) > _LISTED else ''}")
+    many = edges[counts > 2]
+    if len(many):
+        said.append(f"three or more triangles meet at {shown(vertices[many[0]].mean(axis=0))}")
+    if weld is not None:
+        said.append(f"corners of open edges within weld = {weld:.3g} m of each other are joined")
+    raise SceneError(
+        f"the mesh {path} must be closed (watertight), with two triangles at each edge, got {len(rims)} edges of one "
+        f"triangle and {len(many)} of more than two: {'; '.join(said)}; close its holes, for example with "
+        "trimesh.repair or MeshLab"
+    )
+
+
+# --- Which side is outside -------------------------------------------------------------------------------
+
+
+def _outward(path: Path, soup: Soup) -> Soup:
+    """The triangles seen from outside: a part within an odd number of others is a cavity, however it is turned."""
+    vertices, triangles = soup.vertices, soup.triangles
+    which = groups_of(neighbours(triangles)[1], len(triangles))
+    parts = [triangles[some] for some in which]
+    for k, part in enumerate(parts):
+        a, b, c = np.moveaxis(vertices[part] - vertices[part[0, 0]], 1, 0)
+        if (a * np.cross(b, c)).sum() < 0.0:
+            parts[k] = part[:, ::-1]
+    if len(parts) == 1:
+        return soup._replace(triangles=np.ascontiguousarray(parts[0]))
+    corners = [vertices[np.unique(part)] for part in parts]
+    low, high = (np.array([getattr(one, end)(axis=0) for one in corners]) for end in ("min", "max"))
+    turned = []
+    for i, part in enumerate(parts):
+        near = np.flatnonzero((low <= high[i]).all(axis=1) & (high >= low[i]).all(axis=1))
+        depth = sum(_is_within(path, corners[i], vertices, parts[j]) for j in near if j != i)
+        turned.append(part if depth % 2 == 0 else part[:, ::-1])
+    return soup.of(np.ascontiguousarray(np.concatenate(turned)), np.concatenate(which))
+
+
+def _is_within(path: Path, points: Floats, vertices: Floats, part: Indices) -> bool:
+    """Whether corners of a part lie within another one; an error if only some do."""
+    with needed_by("from_mesh", "mesh"):
+        import igl
+    some = np.ascontiguousarray(points[:: max(1, len(points) // _LOOKED_UP)])
+    turns = igl.winding_number(vertices, np.ascontiguousarray(part), some)
+    inside, outside = turns > 0.75, turns < 0.25  # on the other one itself: a half
+    if inside.any() and outside.any():
+        raise SceneError(
+            f"the mesh {path} must have parts that do not intersect, got one with a corner at {shown(some[inside][0])} "
+            f"within another part and one at {shown(some[outside][0])} outside of it; unite them, for example with "
+            "trimesh.boolean.union"
+        )
+    return bool(inside.any())

@@ -1,0 +1,1 @@
+"""Walls that move, as kernels take them."""

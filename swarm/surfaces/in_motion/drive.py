@@ -1,0 +1,242 @@
+"""The motion of a wall as kernels take it in one frame, and its pose at one instant.
+
+A wall xi of the frame is at x = c + d + A (xi - c), with the displacement d(t) and the rotation A(t) about c. Times
+count back from the end of the frame under way, so that they have the digits of a frame and not those of the run.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ... import motion as motions
+from ...kernel.angle import sine_and_versine
+from ...kernel.jit import Array, select
+from ...kernel.record import Record
+from ...kernel.vector import ZERO, Vec, cross, dot, vec
+from ..surface import Surface
+
+# A motion changes little in this part of a radian, or of a piece of a path.
+_SLOW = 0.05
+
+
+class RotationRows(Record):
+    """The rows of the matrix of a rotation A."""
+
+    x: Vec
+    y: Vec
+    z: Vec
+
+    def out(self, a):
+        """A a"""
+        return Vec(dot(self.x, a), dot(self.y, a), dot(self.z, a))
+
+    def back(self, a):
+        """A^T a"""
+        return self.x * a.x + self.y * a.y + self.z * a.z
+
+
+class PoseDerivatives(Record):
+    """The pose of a wall at one instant: d, d', d'' and the rows of A, or None."""
+
+    shift: Vec
+    velocity: Vec
+    acceleration: Vec
+    turn: Any
+
+    def out(self, a):
+        """A direction of the frame of the wall in the scene."""
+        return a if self.turn is None else self.turn.out(a)
+
+    def back(self, a):
+        """A direction of the scene in the frame of the wall."""
+        return a if self.turn is None else self.turn.back(a)
+
+    def place_out(self, center, r):
+        """A point of the frame of the wall in the scene: c + d + A (r - c)."""
+        return (r if self.turn is None else center + self.turn.out(r - center)) + self.shift
+
+    def place_back(self, center, r):
+        """A point of the scene in the frame of the wall."""
+        r = r - self.shift
+        return r if self.turn is None else center + self.turn.back(r - center)
+
+
+class Swing(Record):
+    """C (cos(w t) - 1) + S sin(w t), with the time t since the end of the frame."""
+
+    cosine: Vec
+    sine: Vec
+    rate: float
+
+    def added(self, t, d, v, a):
+        """A displacement and its first two derivatives with those of the swing added."""
+        s, versine = sine_and_versine(self.rate * t)
+        c = 1.0 - versine
+        return (
+            d + self.sine * s - self.cosine * versine,
+            v + self.rate * (self.sine * c - self.cosine * s),
+            a - (self.rate * self.rate) * (self.sine * s + self.cosine * c),
+        )
+
+    def mean_velocity(self, middle, h):
+        """w sinc(w h/2) (S cos w m - C sin w m) over a time h around the middle m."""
+        angle = self.rate * middle
+        here = self.sine * math.cos(angle) - self.cosine * math.sin(angle)
+        return (self.rate * _sinc(0.5 * self.rate * h)) * here
+
+
+class Track(Record):
+    """A spline: d(t) less its value at the end of the frame, which is at the time `now`."""
+
+    times: Array  # (knots,)
+    cubics: Array  # (4, 3, pieces)
+    end: Vec
+    now: float
+
+    def at(self, t):
+        """Its value and first two derivatives."""
+        now = self.now + t
+        low, high = 0, self.times.size - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            if self.times[middle] <= now:
+                low = middle
+            else:
+                high = middle
+        s, cubics = now - self.times[low], self.cubics
+        a, b, c, d = (Vec(cubics[k, 0, low], cubics[k, 1, low], cubics[k, 2, low]) for k in range(4))
+        return (
+            (a - self.end) + s * (b + s * (c + s * d)),
+            b + s * (2.0 * c + (3.0 * s) * d),
+            2.0 * c + (6.0 * s) * d,
+        )
+
+    def mean_velocity(self, middle, h):
+        """By Simpson's rule, exact within a piece."""
+        first, second, third = self.at(middle - 0.5 * h)[1], self.at(middle)[1], self.at(middle + 0.5 * h)[1]
+        return (first + 4.0 * second + third) * (1.0 / 6.0)
+
+
+class Turn(Record):
+    """The rotation about an axis through the centre: the rows of A at the end of the frame, and the rate [rad/s]."""
+
+    x: Vec
+    y: Vec
+    z: Vec
+    axis: Vec
+    rate: float
+
+    def at(self, t):
+        """The rows of A."""
+        # A(t) = A R, with the rotation R about the same axis: the rows of A, turned back.
+        s, versine = sine_and_versine(self.rate * t)
+        k = self.axis
+        # row cos a + (1 - cos a) k (k.row) - sin a k x row
+        return RotationRows(
+            *(row + versine * (dot(k, row) * k - row) - s * cross(k, row) for row in (self.x, self.y, self.z))
+        )
+
+    def mean_velocity(self, middle, h, arm):
+        """(A1 - A0) rho/h of an arm rho in the frame of the wall: w sinc(w h/2) k x A(m) rho."""
+        return (self.rate * _sinc(0.5 * self.rate * h)) * cross(self.axis, self.at(middle).out(arm))
+
+
+def _sinc(x):
+    return select(abs(x) > 0.0, math.sin(x) / select(abs(x) > 0.0, x, 1.0), 1.0)
+
+
+class Drive(Record):
+    """The motion of a wall, as kernels take it in one frame."""
+
+    shift: Vec  # d at the end of the frame
+    velocity: Vec
+    swings: tuple[Any, ...]  # each a `Swing`
+    track: Any  # None or `Track`
+    turn: Any  # None or `Turn`; None also where the rotation leaves the surface as it is
+    spin: Any  # the angular velocity, or None
+    center: Vec
+    fastest: float  # bound of |d'| [m/s]
+    hardest: float  # bound of |d''| [m/s^2]
+    jerk: float  # bound of |d'''| [m/s^3]
+    time_scale: float  # a time in which it changes little [s]
+    late: float  # its fastest speed times the time [m], which the round-off of its place is relative to
+    jerks: Vec  # bounds of the components of d''' [m/s^3]
+
+    def pose(self, remaining):
+        """The `PoseDerivatives` when so much of the frame is left [s]."""
+        t = -remaining
+        d, v, a = ZERO, ZERO, ZERO
+        for swing in self.swings:
+            d, v, a = swing.added(t, d, v, a)
+        e, w, b = (ZERO, ZERO, ZERO) if self.track is None else self.track.at(t)
+        turn = None if self.turn is None else self.turn.at(t)
+        return PoseDerivatives(self.shift + t * self.velocity + d + e, self.velocity + v + w, a + b, turn)
+
+    def mean_velocity(self, middle, h):
+        """The mean of d' over a time h around the middle."""
+        # Not the difference of two places over the time: of a short step that has no digits left, and a particle that
+        # friction stops takes ever shorter ones.
+        swings = ZERO
+        for swing in self.swings:
+            swings = swings + swing.mean_velocity(middle, h)
+        return self.velocity + swings + (ZERO if self.track is None else self.track.mean_velocity(middle, h))
+
+    def angular_speed(self):
+        """The angular speed of the surface [rad/s]."""
+        return 0.0 if self.turn is None else abs(self.turn.rate)
+
+
+# --- From a description ----------------------------------------------------------------------------------
+
+
+def drive_of(surface: Surface, moment: float) -> Drive:
+    """The motion of a surface in the frame that ends at a moment [s]."""
+    # A guide says how impacts move a wall, which is at rest before.
+    parts = [one for one in motions.parts_of(surface.motion) if not isinstance(one, motions.Guide)]
+    velocity, track, turn, spin, center = np.zeros(3), None, None, None, ZERO
+    swings: tuple[Swing, ...] = ()
+    fastest = hardest = jerk = 0.0
+    time_scale, jerks = math.inf, np.zeros(3)
+    for one in parts:
+        if isinstance(one, motions.Translation):
+            velocity = velocity + np.array(one.velocity)
+        elif isinstance(one, motions.Oscillation):
+            led = one.harmonic((0.0, 0.0, 0.0))
+            c, s = math.cos(led.rate * moment), math.sin(led.rate * moment)
+            # C cos(a + b) + S sin(a + b), with the angle a at the end of the frame
+            swing = Swing(_vector(c * led.cosine + s * led.sine), _vector(c * led.sine - s * led.cosine), led.rate)
+            swings = (*swings, swing)
+            amplitude, time_scale = math.hypot(*one.amplitude), min(time_scale, _SLOW / led.rate)
+            fastest += amplitude * led.rate
+            hardest += amplitude * led.rate**2
+            jerk += amplitude * led.rate**3
+            jerks += np.abs(one.amplitude) * led.rate**3
+        elif isinstance(one, motions.Path):
+            cubics = one.cubics
+            track = Track(np.array(one.times), cubics, _vector(one.displacement(moment)), moment)
+            # Within a piece the velocity is largest at an end or where the second derivative is 0.
+            h = np.diff(one.times)
+            time_scale = min(time_scale, _SLOW * float(h.min()))
+            ends = cubics[1], cubics[1] + h * (2.0 * cubics[2] + 3.0 * h * cubics[3])
+            bends = 2.0 * cubics[2], 2.0 * cubics[2] + 6.0 * h * cubics[3]
+            jerk += float(6.0 * np.sqrt((cubics[3] ** 2).sum(axis=0)).max())
+            jerks += 6.0 * np.abs(cubics[3]).max(axis=1)
+            hardest += float(max(np.sqrt((bend**2).sum(axis=0)).max() for bend in bends))
+            fastest += float(max(np.sqrt((end**2).sum(axis=0)).max() for end in ends)) + float(h.max()) * hardest
+        else:
+            axis = motions.unit_axis(one)
+            time_scale = min(time_scale, _SLOW / abs(one.rate)) if one.rate else time_scale
+            center, spin = _vector(one.center), _vector(one.rate * axis)
+            if not surface.is_unturned_by(tuple(axis.tolist()), one.center):
+                rows = motions.pose(one, moment).turn
+                x, y, z = map(vec, rows.tolist())
+                turn = Turn(x, y, z, _vector(axis), one.rate)
+    shift = motions.pose(surface.motion, moment).shift
+    fastest += math.hypot(*velocity)
+    bounds = fastest, hardest, jerk, time_scale, fastest * moment, _vector(jerks)
+    return Drive(_vector(shift), _vector(velocity), swings, track, turn, spin, center, *bounds)
+
+
+def _vector(values: Any) -> Vec:
+    return vec(np.asarray(values, np.float64).tolist())

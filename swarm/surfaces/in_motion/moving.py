@@ -1,0 +1,137 @@
+"""The walls of a scene, some of which move.
+
+`at` and `during` make of them those at one instant, or over one step, which are surfaces like any other.
+"""
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+from ...kernel.record import Record
+from ...motion import Guide
+from ..presence.doors import walls_then
+from ..surface import Surface
+from ..walls import Field, Following, Walls
+from .drive import Drive, drive_of
+from .posed import Drifting, Posed
+
+
+class Moving(Record):
+    """A wall, or a field of them, and its motion."""
+
+    body: Any
+    drive: Drive
+
+    posed, accelerates = Posed, True
+
+    def grown(self, radius):
+        """What the centre of a ball meets."""
+        return self._replace(body=self.body.grown(radius))
+
+    def count(self):
+        """The number of walls of a field."""
+        return self.body.count()
+
+    def during(self, remaining, after):
+        """The wall over a step, at whose start and end so much of the frame is left [s]."""
+        start = self.drive.pose(remaining)
+        end = start if after is remaining else self.drive.pose(after)
+        return self.posed(self.body, start, end, self.drive, remaining, after)
+
+    def seen(self, flight, t):
+        """A particle as safe steps to the wall see it after a time of its flight: None where none are needed."""
+        remaining = flight.remaining - t
+        return flight.seen(t, self.during(remaining, remaining), flight.pull)
+
+
+class Translated(Moving):
+    """A wall in uniform translation, with or without a spin that leaves the surface as it is."""
+
+    posed, accelerates = Drifting, False
+
+    def seen(self, flight, t):
+        return None
+
+
+class Carried(Walls):
+    """The walls of a scene, some of which move, all of them uniformly."""
+
+    def at(self, remaining):
+        return self.during(remaining, remaining)
+
+    def during(self, remaining, after):
+        made: tuple[Any, ...] = ()
+        last: Any = None
+        for wall in self.each:
+            last = _during(wall.members if isinstance(wall, Field) else wall, last, remaining, after)
+            made = (*made, Field(last) if isinstance(wall, Field) else last)
+        return Walls(made, self.unions, self.slack, self.inset)
+
+    def in_steps(self):
+        return False
+
+
+class Marched(Carried):
+    """The same where others move in any other way, by safe steps to these, or where some are bodies of a field."""
+
+    accelerate = True
+
+
+class Strided(Marched):
+    """The same where all of these steps are taken in lanes: see strides.py."""
+
+
+def _during(wall, last, remaining, after):
+    """A wall over a step; `last` is the one before it then."""
+    if isinstance(wall, Following):
+        return last._replace(body=wall.body)
+    return wall.during(remaining, after) if isinstance(wall, Moving) else wall
+
+
+# --- From a description ----------------------------------------------------------------------------------
+
+
+def carried(
+    fields: Sequence[Surface], surfaces: Sequence[Surface], moment: float, largest: float | None = None
+) -> Walls:
+    """The walls of a scene in the frame that ends at a moment [s]; those of fields are before all others.
+
+    Of points, or of balls whose radii are this one at most [m].
+    """
+    of_surfaces = [walls_of(surface, moment, largest) for surface in surfaces]
+    all_walls = (*(Field(walls_of(field, moment, largest)[0]) for field in fields), *itertools.chain(*of_surfaces))
+    if all(surface.motion is None for surface in (*fields, *surfaces)):
+        return Walls(all_walls)
+    if fields:
+        return Marched(all_walls)
+    marched = [walls for walls in of_surfaces if type(walls[0]) is Moving]
+    if not marched:
+        return Carried(all_walls)
+    return (Strided if all(map(_may_stride, marched)) else Marched)(all_walls)
+
+
+def _may_stride(walls: list[Any]) -> bool:
+    """Whether lanes can take the safe steps of the walls of a surface; of a spline each would look for its piece."""
+    return walls[0].drive.track is None and all(wall.body.has_levels for wall in walls)
+
+
+def walls_of(surface: Surface, moment: float, largest: float | None = None) -> list[Any]:
+    """The walls of a surface in the frame that ends at a moment [s], as `carried` takes them."""
+    first, *others = walls_then(surface, moment, largest)
+    if surface.motion is None:
+        return [first, *others]
+    drive = drive_of(surface, moment)
+    return [(Translated if _is_uniform(drive) else Moving)(first, drive), *map(Following, others)]
+
+
+def _is_uniform(drive: Drive) -> bool:
+    return not drive.swings and drive.track is None and drive.turn is None
+
+
+def lacks_bend(surface: Surface) -> bool:
+    """Whether a surface moves so that its hits need safe steps, and does not bound its bend."""
+    if surface.mass is not None and surface.inertia is None:
+        steps = isinstance(surface.motion, Guide) and surface.motion.stiffness > 0.0
+    else:
+        steps = surface.motion is not None and not _is_uniform(drive_of(surface, 0.0))
+    return steps and any(wall.lacks_bend for wall in surface.walls())

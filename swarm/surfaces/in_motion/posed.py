@@ -1,0 +1,234 @@
+"""A wall that moves, at one instant or over one step: what is asked of a surface is asked in the frame of the wall.
+
+A flight to a wall in uniform translation ends as at a wall at rest; to any other it goes by safe steps, safe.py.
+
+In the frame of a wall that is displaced by d(t) and does not turn a step goes from rho0 = r0 - d0 by
+rho1 - rho0 = r1 - r0 - (d1 - d0): it is that at a wall at rest, with the free displacement p - (d1 - d0).
+"""
+
+import math
+from typing import Any
+
+from ...kernel.angle import sine_and_versine
+from ...kernel.gravity import accelerated
+from ...kernel.jit import select
+from ...kernel.vector import ZERO, Vec, absolute, cross, dot, norm, times, total
+from ..frames import Framed
+from ..time_of_impact import safe
+from ..time_of_impact.rising import flight_of
+from ..walls import Field, Walls
+from .drive import Drive, PoseDerivatives
+
+
+class Posed(Framed):
+    """A wall at one instant, or over one step, or a field of them."""
+
+    body: Any
+    pose: PoseDerivatives
+    end: PoseDerivatives  # at the end of the step
+    drive: Drive
+    remaining: float  # of the frame [s]
+    after: float  # of the frame, at the end of the step [s]
+
+    def wall(self, number):
+        """Of a field one of its walls."""
+        return self._replace(body=self.body.wall(number))
+
+    def later(self, t):
+        """The wall, or field, after a time [s]."""
+        remaining = self.remaining - t
+        pose = self.drive.pose(remaining)
+        return self._replace(pose=pose, end=pose, remaining=remaining, after=remaining)
+
+    # --- The frame of the wall ---
+
+    def own_place(self, r):
+        """A point in the frame of the wall."""
+        return self.pose.place_back(self.drive.center, r)
+
+    def own_end(self, r):
+        """A point in the frame of the wall, at the end of the step."""
+        return self.end.place_back(self.drive.center, r)
+
+    def own_velocity(self, r, v):
+        """The velocity of a particle in the frame of the wall."""
+        return self.pose.back(v - self._velocity(r))
+
+    def own_pull(self, r, v, pull):
+        """The acceleration of a free particle in the frame of the wall."""
+        felt = pull - self.pose.acceleration
+        if self.pose.turn is None:
+            return felt
+        spin, w = self.drive.spin, v - self._velocity(r)
+        # The accelerations of a rotating frame, -2 w x v - w x (w x a)
+        return self.pose.back(felt + -1.0 * (2.0 * cross(spin, w) + cross(spin, cross(spin, self.arm(r)))))
+
+    def _velocity(self, r):
+        """The velocity of the frame at a point."""
+        moved = self.pose.velocity
+        return moved if self.pose.turn is None else moved + cross(self.drive.spin, self.arm(r))
+
+    def arm(self, r):
+        """From the centre of the rotation to a point."""
+        return r - self.drive.center - self.pose.shift
+
+    def arm_length(self, r):
+        """The distance of a point from the centre of the rotation; 0 where the frame does not turn."""
+        return 0.0 if self.pose.turn is None else norm(self.arm(r))
+
+    def middle(self):
+        """The middle of the step, from the end of the frame on."""
+        return -0.5 * (self.remaining + self.after)
+
+    place_in, end_in = own_place, own_end
+
+    def place_out(self, r):
+        return self.pose.place_out(self.drive.center, r)
+
+    def end_out(self, r):
+        """A point of the frame of the wall at the end of the step, in the scene."""
+        return self.end.place_out(self.drive.center, r)
+
+    def vector_out(self, a):
+        return self.pose.out(a)
+
+    def way_in(self, p):
+        """The free displacement of a step in the frame of a wall that does not turn."""
+        return p - self.displacement()
+
+    def normal_out(self, n):
+        """A normal of the frame of the wall, of a step, in the scene."""
+        if self.pose.turn is None:
+            return n
+        # rho1 - rho0 = M^-1 (r1 - r0 - way) with M = (A0 + A1)/2, so n becomes M^-T n = M S^-2 n, where S is cos(a/2)
+        # across the axis and 1 along it, with the angle a of the step.
+        k = self.drive.turn.axis
+        half = math.sin(0.5 * self.drive.turn.rate * (self.remaining - self.after))
+        along = dot(k, n) * k
+        n = along + (n - along) * (1.0 / (1.0 - half * half))
+        return 0.5 * (self.pose.out(n) + self.end.out(n))
+
+    # --- At this instant ---
+
+    # A rotation that leaves the surface as it is turns what it is made of.
+
+    def velocity(self, r):
+        moved, spin = self.pose.velocity, self.drive.spin
+        return moved if spin is None else moved + cross(spin, self.arm(r))
+
+    def acceleration(self, r):
+        moved, spin = self.pose.acceleration, self.drive.spin
+        return moved if spin is None else moved + cross(spin, cross(spin, self.arm(r)))
+
+    def outward_acceleration(self, r, v, pull):
+        own_v, own_pull = self.own_velocity(r, v), self.own_pull(r, v, pull)
+        return self.body.outward_acceleration(self.own_place(r), own_v, own_pull)
+
+    def time_scale(self):
+        return self.drive.time_scale
+
+    # --- Flight ---
+
+    accelerates = True
+
+    def seen(self, flight, t):
+        remaining = flight.remaining - t
+        pose = self.drive.pose(remaining)
+        return flight.seen(t, Posed(self.body, pose, pose, self.drive, remaining, remaining), flight.pull)
+
+    def sees(self, gravity, r, v):
+        """A particle in the frame of the wall now, as `Seen`."""
+        return self.seen(flight_of(r, v, accelerated(gravity, ZERO, 1.0), self.remaining), 0.0)
+
+    def first_hit(self, r, v):
+        return self.falling_hit(r, v, ZERO)
+
+    def falling_hit(self, r, v, pull):
+        found = safe.march_alone(Walls((self,)), r, v, pull, self.remaining)
+        return found.time, found.wall >= 0.0
+
+    def field_hit(self, gravity, r, v):
+        """The first `Hit` with the bodies of a field, or how far the flight is surely free."""
+        return safe.march_alone(Walls((Field(self),)), r, v, accelerated(gravity, ZERO, 1.0), self.remaining)
+
+    def until_next_cell(self, r, v):
+        """When a straight flight may meet another body of a field."""
+        return safe.until_next_cell(self.body.grid, self.sees(None, r, v), self.remaining)
+
+    is_quartic, may_be_far, has_levels, in_steps, leaves_once = False, True, False, False, False
+
+    def safe_time(self, r, v, pull):
+        return 0.0
+
+    def steps(self, gravity, r, v):
+        return None
+
+    def straight_hit(self, end, r0, r1):
+        own = self.own_place(r0)
+        return self.body.first_hit(own, end.own_place(r1) - own)
+
+    # --- Over the step ---
+
+    def displacement(self):
+        return self.end.shift - self.pose.shift
+
+    def carry(self, r):
+        spin = self.drive.spin
+        if spin is None:
+            return self.end.shift - self.pose.shift + r
+        rate = norm(spin)
+        k = spin / select(rate > 0.0, rate, 1.0)
+        sine, versine = sine_and_versine(rate * (self.remaining - self.after))
+        before = self.arm(r)
+        after = before + versine * (dot(k, before) * k - before) + sine * cross(k, before)
+        return self.drive.center + self.end.shift + after
+
+    def mean_velocity(self, r0, r1, h):
+        drive, middle = self.drive, self.middle()
+        moved = drive.mean_velocity(middle, h)
+        if drive.turn is None:
+            return moved
+        mean = 0.5 * (self.own_place(r0) + self.own_end(r1)) - drive.center
+        return moved + drive.turn.mean_velocity(middle, h, mean)
+
+    def gap_scale(self, r):
+        # A place in the frame has the round-off of the displacement and of the time too.
+        own = self.own_place(r)
+        gradient, late = self.body.gradient(own), self.drive.late
+        moved = total(absolute(times(gradient, self.pose.shift))) + late * total(absolute(gradient))
+        return self.body.gap_scale(own) + moved
+
+    def place_scale(self, s):
+        late = self.drive.late
+        return s + absolute(self.pose.shift) + Vec(late, late, late)
+
+    def framed(self, r, p):
+        return self.body, self.own_place(r), self.way_in(p)
+
+    def step_normal(self, r0, r1):
+        n = self.normal_out(self.body.step_normal(self.own_place(r0), self.own_end(r1)))
+        return n if self.pose.turn is None else n / norm(n)
+
+
+class Drifting(Posed):
+    """The same of a wall in uniform translation: a flight ends as at a wall at rest."""
+
+    def velocity_in(self, v):
+        """A velocity in the frame of the wall."""
+        return v - self.pose.velocity
+
+    def vector_in(self, a):
+        """An acceleration there."""
+        return a
+
+    gravity_in = vector_in
+    accelerates = False
+    is_quartic = property(lambda self: self.body.is_quartic)
+    may_be_far = property(lambda self: self.body.may_be_far)
+
+    def steps(self, gravity, r, v):
+        # As at a wall at rest where the level is known as a whole: else lanes ask for the hit.
+        return Framed.steps(self, gravity, r, v) if gravity is not None and self.is_quartic else None
+
+    first_hit, falling_hit, safe_time = Framed.first_hit, Framed.falling_hit, Framed.safe_time
+    field_hit, until_next_cell = Framed.field_hit, Framed.until_next_cell  # type: ignore[attr-defined]

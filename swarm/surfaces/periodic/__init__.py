@@ -1,0 +1,1 @@
+"""A cell that repeats, and the images of its walls."""

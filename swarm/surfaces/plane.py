@@ -1,0 +1,250 @@
+"""Scenes of two dimensions: the plane through the origin that their particles stay in, and what would leave it.
+
+Seen from the tip of the axis across it, a plane has its first direction to the right and its second one upwards: x and
+y across z, y and z across x, z and x across y.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common import checks
+from ..errors import SceneError
+from ..kernel.vector import vec
+from ..motion import Guide, Oscillation, Path, Rotation, Translation, parts_of
+from .facets.mesh import Mesh
+from .fields.bodies import Spheres
+from .fields.many import Many
+from .outlines.outlined import Outlined
+from .shapes.slab import AXES
+from .surface import Surface
+from .union import surfaces_of
+from .upright import upright
+from .wall_law import leave_of, tries_of
+
+Floats = NDArray[np.float64]
+
+PLANES = {"x": 0, "y": 1, "z": 2}
+# Points from which places of a wall in the plane are looked for, the steps to them, and what is near to a wall, as a
+# part of the extent of the scene.
+_STARTS, _STEPS, _NEAR = 2048, 40, 1e-9
+# A component of a unit normal across the plane up to this size counts as 0, as in the kernels.
+_ROUND_OFF = 1e-13
+
+
+def across_of(plane: str | None) -> int | None:
+    """The number of the axis across a plane; None without a plane."""
+    return None if plane is None else PLANES[plane]
+
+
+def checked(plane: Any) -> str | None:
+    """The argument `plane`."""
+    return None if plane is None else checks.one_of("plane", plane, PLANES)
+
+
+def repeats_along_all(plane: str | None, lengths: Sequence[float | None] | None) -> bool:
+    """Whether a scene repeats in every direction in which particles may move."""
+    return lengths is not None and all(length is not None for k, length in enumerate(lengths) if k != across_of(plane))
+
+
+def along(across: int) -> tuple[int, int]:
+    """The axes of a plane, to the right and upwards as it is seen from the tip of the axis across it."""
+    return (across + 1) % 3, (across + 2) % 3
+
+
+def shown_as(across: int, points: Any) -> Any:
+    """Points (..., 3) as they are seen: (..., 2)."""
+    return np.asarray(points)[..., list(along(across))]
+
+
+# --- What would leave it ---------------------------------------------------------------------------------
+
+
+def require_all(
+    plane: str, surfaces: Sequence[Surface], gravity: Sequence[float] | None, lengths: Sequence[float | None] | None
+) -> None:
+    """Raise a `SceneError` where gravity, a wall or a motion would send particles out of the plane."""
+    if gravity is not None:
+        _require_pull(plane, gravity)
+    repeated = [one for one in lengths or () if one is not None]
+    farthest = max((*(surface.extent() for surface in surfaces), *repeated), default=0.0)
+    _require_walls(plane, surfaces, 2.0 * farthest or 1.0)
+
+
+def _require_pull(plane: str, gravity: Sequence[float]) -> None:
+    """Raise a `SceneError` where gravity pulls out of the plane."""
+    across = PLANES[plane]
+    if gravity[across] != 0.0:
+        raise SceneError(
+            f'gravity[{across}] must be 0 where plane = "{plane}", got {gravity[across]:g} m/s^2: it would pull '
+            "particles out of the plane; give gravity along the plane"
+        )
+
+
+def require_start(scene: Any, particles: Any) -> None:
+    """Raise a `SceneError` where a particle starts out of the plane of a scene, or with a velocity out of it."""
+    across = across_of(scene.plane)
+    if across is None:
+        return
+    for what, rows, unit in (("start", particles.position, "m"), ("velocity", particles.velocity, "m/s")):
+        off = np.flatnonzero(rows[across])
+        if off.size:
+            k = int(off[np.argmax(np.abs(rows[across, off]))])
+            told = "out of it" if what == "start" else "with a velocity out of it"
+            raise SceneError(
+                f'particles must be in the plane {scene.plane} = 0 of a scene with plane = "{scene.plane}", got '
+                f"{off.size} of {rows.shape[1]} {told}; the farthest is particle {k}, by {rows[across, k]:g} {unit}; "
+                f"set particles.{'position' if what == 'start' else 'velocity'}[{across}] to 0, or use swarm.fill"
+            )
+
+
+def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> None:
+    """Raise a `SceneError` where a wall, or its motion, would send particles out of the plane.
+
+    `reach` is how far from the origin walls are looked at [m].
+    """
+    across = PLANES[plane]
+    for i, surface in enumerate(surfaces):
+        for piece in surfaces_of(surface):
+            _require_motion(plane, f"surfaces[{i}].motion", piece)
+            _require_laws(plane, f"surfaces[{i}].laws", piece)
+        if isinstance(surface, Mesh):
+            raise SceneError(
+                f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got a Mesh, of '
+                "whose triangles none is known to; use swarm.Polygon, with the corners of its section"
+            )
+        if isinstance(surface, Outlined):
+            _require_upright(plane, i, surface)
+            continue
+        places, part = _walls_in(surface, across, reach)
+        leaning = np.flatnonzero(part)
+        if leaning.size:
+            k = int(leaning[np.argmax(np.abs(part[leaning]))])
+            name = type(surface).__name__
+            raise SceneError(
+                f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got {name}, whose '
+                f"normal at {_told(places[:, k])} is {_size(part[k])} out of the plane and would send particles out "
+                f"of it; {_mended(surface, across)}"
+            )
+
+
+def _require_upright(plane: str, i: int, surface: Outlined) -> None:
+    """The same of an outline, which is along the plane or not."""
+    if surface.across != PLANES[plane]:
+        raise SceneError(
+            f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got '
+            f"{type(surface).__name__} with its axis along {_told(surface.frame[:, 2])[:-2]}; give it axis = "
+            f"{tuple(float(name == plane) for name in PLANES)}, and turn it about that"
+        )
+
+
+def _size(part: float) -> str:
+    return f"{math.degrees(math.asin(min(1.0, abs(part)))):.3g} degrees"
+
+
+def _told(point: Any) -> str:
+    return f"({', '.join(f'{x:.4g}' for x in point)}) m"
+
+
+def _mended(surface: Surface, across: int) -> str:
+    center = getattr(surface, "center", None)
+    name = "xyz"[across]
+    if center is not None and center[across] != 0.0:
+        return f"give it a center with {name} = 0, got {center[across]:g} m"
+    if isinstance(surface, Many):
+        return f"give all its bodies centers with {name} = 0, and axes along the plane or across it"
+    return f"give it a normal or axes along the plane or along {name}, without round-off"
+
+
+def _walls_in(surface: Surface, across: int, reach: float) -> tuple[Floats, Floats]:
+    """Places (3, N) of a wall in the plane, and the part of its unit normal there that is out of the plane (N,)."""
+    points = _starts(surface, across, reach)
+    with np.errstate(all="ignore"):
+        for _step in range(_STEPS):
+            phi, slope = _level(surface, across, points)
+            slope[across] = 0.0
+            way = phi / np.maximum((slope**2).sum(axis=0), np.finfo(np.float64).tiny) * slope
+            length = np.sqrt((way**2).sum(axis=0))
+            way = way * np.minimum(1.0, reach / np.maximum(length, np.finfo(np.float64).tiny))
+            points = points - np.where(np.isfinite(way), way, 0.0)
+        phi, slope = _level(surface, across, points)
+        steep = np.sqrt((slope**2).sum(axis=0))
+        part = slope[across] / steep
+        if isinstance(surface, Many) and not isinstance(surface, Spheres):
+            # As kernels take their axes.
+            part = np.where(np.abs(part) <= _ROUND_OFF, 0.0, part)
+        here = np.isfinite(part) & (np.abs(phi) <= _NEAR * reach * steep)
+    return points[:, here], part[here]
+
+
+def _level(surface: Surface, across: int, points: Floats) -> tuple[Floats, Floats]:
+    """phi at points (3, N) of the plane, and its gradient, as kernels take it."""
+    if isinstance(surface, Many) or surface.motion is not None:
+        return surface.phi(points), surface.gradient(points)
+    walls, rows = [upright(wall, across) for wall in surface.walls()], vec(points)
+    levels = np.array([np.broadcast_to(wall.phi(rows), points.shape[1:]) for wall in walls])
+    slopes = [np.array(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3]) for wall in walls]
+    return levels.max(axis=0), np.choose(np.argmax(levels, axis=0), slopes)
+
+
+def _starts(surface: Surface, across: int, reach: float) -> Floats:
+    """Points of the plane from which walls are looked for; of many bodies also the middles, and beside them."""
+    random = np.random.default_rng(0)
+    points = [reach * (2.0 * random.random((3, _STARTS)) - 1.0)]
+    # Also near to what is small or far away
+    size = surface.size()
+    center = np.array(getattr(surface, "center", (0.0, 0.0, 0.0)))[:, None]
+    if math.isfinite(size):
+        points.append(center + 2.0 * size * (2.0 * random.random((3, _STARTS)) - 1.0))
+    if isinstance(surface, Many):
+        low, high = (np.where(np.isfinite(corner), corner, 0.0) for corner in surface.corners())
+        points += [low + (high - low) * random.random((3, 1)) for _k in range(4)]
+    found = np.concatenate(points, axis=1)
+    found[across] = 0.0
+    return found
+
+
+def _require_motion(plane: str, where: str, surface: Surface) -> None:
+    across = PLANES[plane]
+    for part in parts_of(surface.motion):
+        for said in _leaving(part, across):
+            raise SceneError(
+                f'{where} must stay in the plane where plane = "{plane}", got {said}; leave that out, or move the wall '
+                f"along the plane and turn it about {plane}"
+            )
+
+
+def _require_laws(plane: str, where: str, surface: Surface) -> None:
+    """Raise a `SceneError` if a user-defined law sends a particle out of the plane in a trial."""
+    across = PLANES[plane]
+    for k, law in enumerate(surface.laws):
+        if isinstance(law, str):
+            continue  # a name, which a run refuses
+        for v, n, given in tries_of(law, across, AXES[across](1.0)):
+            after, stays, _wait = leave_of(given)
+            if stays and after[across] != 0.0:
+                raise SceneError(
+                    f'{where}[{k}] must send particles along the plane where plane = "{plane}": {plane} = 0 of the '
+                    f"velocity that leave returns; {law} returned {checks.shown(after)} for v = {_told(v)[:-2]} "
+                    f"and n = {_told(n)[:-2]}"
+                )
+
+
+def _leaving(part: Any, across: int) -> Iterable[str]:
+    """The parts of a motion that leave the plane."""
+    name = type(part).__name__
+    if isinstance(part, Translation) and part.velocity[across] != 0.0:
+        yield f"{name} with velocity[{across}] = {part.velocity[across]:g} m/s"
+    if isinstance(part, Oscillation) and part.amplitude[across] != 0.0:
+        yield f"{name} with amplitude[{across}] = {part.amplitude[across]:g} m"
+    if isinstance(part, Rotation) and any(part.axis[k] != 0.0 for k in along(across)):
+        yield f"{name} about the axis {part.axis}"
+    if isinstance(part, Path):
+        for k, place in enumerate(part.positions):
+            if place[across] != part.positions[0][across]:
+                yield f"{name} with positions[{k}][{across}] = {place[across]:g} m"
+    if isinstance(part, Guide) and part.axis[across] != 0.0:
+        yield f"{name} along {part.axis}"

@@ -1,0 +1,1 @@
+"""Where and when a wall is there: openings, doors, rooms and patches."""

@@ -1,0 +1,86 @@
+"""The walls of a scene with unions, from a description."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...kernel.vector import Vec, norm
+from ..in_motion.moving import Marched, Strided
+from ..surface import Surface
+from ..walls import Walls
+
+# Of the extent of a union, the slack of its rooms.
+_SLACK = 1e-13
+# Of it, how far inside what meets a wall is put where rooms touch.
+_INSET = 3.0
+# A place is on a wall up to this distance from it, relative to the extent. Two walls touch if so many of the places on
+# one are on the other.
+_TOUCHES, _SOME = 1e-12, 3
+# Places at which it is asked how steep a level is, and moves of each onto its wall.
+_PLACES, _MOVES = 64, 4
+
+
+def with_rooms(walls: Walls, unions: Sequence[Sequence[Sequence[Surface]]]) -> Walls:
+    """The walls of a scene of which the last are those of unions: of each its rooms, and of these the surfaces."""
+    if not unions:
+        return walls
+    gentle = tuple(tuple(tuple(g for one in room for g in _gentle(one)) for room in rooms) for rooms in unions)
+    extent = max(surface.extent() for rooms in unions for room in rooms for surface in room)
+    if isinstance(walls, Strided):
+        # Lanes take the safe steps of walls that hold every particle.
+        walls = Marched(*walls)
+    slack = _SLACK * (extent or 1.0)
+    inset = _INSET * slack if any(map(_touch, unions)) else None
+    return walls._replace(unions=gentle, slack=slack, inset=inset)
+
+
+def _touch(rooms: Sequence[Sequence[Surface]]) -> bool:
+    """Whether two rooms have a wall in common, seen from both sides."""
+    return any(_wall_between(one, other) for one, other in itertools.combinations(rooms, 2))
+
+
+def _wall_between(one: Sequence[Surface], other: Sequence[Surface]) -> bool:
+    extent = max(surface.extent() for surface in (*one, *other)) or 1.0
+    for surface in one:
+        for wall in surface.walls():
+            places = np.array(_places_on(wall, surface.extent()))
+            there = Vec(*places)
+            with np.errstate(all="ignore"):
+                n = wall.side * _slopes(wall, there)
+                for mate in (mate for neighbour in other for mate in neighbour.walls()):
+                    m = mate.side * _slopes(mate, there)
+                    size = np.sqrt((m**2).sum(axis=0))
+                    on_it = np.abs(mate.phi(there)) <= _TOUCHES * extent * size
+                    opposite = (n * m).sum(axis=0) < -0.999999 * size * np.sqrt((n**2).sum(axis=0))
+                    if (on_it & opposite).sum() >= _SOME:
+                        return True
+    return False
+
+
+def _places_on(wall: Any, extent: float) -> Any:
+    """Places on a wall (3, N)."""
+    places = (extent or 1.0) * np.random.default_rng(0).uniform(-1.0, 1.0, (3, _PLACES))
+    with np.errstate(all="ignore"):
+        for _move in range(_MOVES):
+            slope = _slopes(wall, Vec(*places))
+            places = places - wall.phi(Vec(*places)) / (slope**2).sum(axis=0) * slope
+    return places
+
+
+def _slopes(wall: Any, places: Vec) -> Any:
+    return np.array(np.broadcast_arrays(*wall.gradient(places), places.x)[:3])
+
+
+def _gentle(surface: Surface) -> list[float]:
+    """1/the steepness of the level of each wall of a surface, at its steepest place."""
+    found = []
+    with np.errstate(all="ignore"):
+        for wall in surface.walls():
+            places = _places_on(wall, surface.extent())
+            slopes = [float(norm(wall.inner_gradient(Vec(*place)))) for place in places.T if np.isfinite(place).all()]
+            steepest = max((slope for slope in slopes if slope < math.inf), default=1.0)
+            found.append(1.0 / steepest if steepest > 0.0 else 1.0)
+    return found

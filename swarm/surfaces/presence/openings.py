@@ -1,0 +1,280 @@
+"""Openings: volumes inside which a wall is not there. A particle that reaches the wall there has passed.
+
+A volume is where a particle would be admissible among the walls of the surface that gives it; of many bodies (`Spheres`
+and the like) it is the inside of each.
+"""
+
+import itertools
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...kernel.jit import select
+from ...kernel.record import Record
+from .. import required
+from ..fields.grouped import by_kind
+from ..fields.many import Many, members_of
+from ..fields.members import Members, can_be_member, kind_of
+from ..instant import has_room, side_of
+from ..outlines.outlined import Outlined
+from ..periodic.images import Lengths, images_of
+from ..surface import Surface
+from ..union import Joined
+from ..walls import Field, Walls, all_walls
+from .doors import Spans, Timed, is_there, was_there
+
+# Most walls that all openings of a scene may be compiled for.
+_MOST = 24
+# A volume without end is searched as far as this many times the wall and what gives the volume extend.
+_REACH = 2.0
+
+
+class Opened(Record):
+    """The volumes in which some walls are open."""
+
+    volumes: tuple[Any, ...]  # each `Walls`, a `Field`, or one of these that is `Timed`
+    first: float  # the number of the first of these walls
+    last: float  # that of the first after them
+
+    def is_of(self, wall):
+        """Whether a wall is one of these."""
+        return (wall >= self.first) & (wall < self.last)
+
+
+class Doorway(Opened):
+    """The volumes in which they are open where another room of their union is on the other side."""
+
+
+# --- From a description ----------------------------------------------------------------------------------
+
+
+def openings_in(
+    spans: Sequence[tuple[int, int]], given: Sequence[Sequence[Sequence[Surface]]], moment: float
+) -> tuple[Opened, ...]:
+    """The openings of the walls of a scene as kernels take them.
+
+    `spans` are (piece, walls in a row that are of it), `given` the volumes in which each piece is open, and those in
+    which it is open where another room is behind it; they are those of the frame, or the piece of one, that ends at a
+    moment [s].
+    """
+    made = _runs_of(spans, given, moment, False)
+    return made if compiled(made) <= _MOST else _runs_of(spans, given, moment, True)
+
+
+def compiled(openings: Sequence[Opened]) -> int:
+    """The number of walls of volumes that kernels are compiled for: one for a field, and once for walls in a row."""
+    volumes = (one.volume if isinstance(one, Timed) else one for opened in openings for one in opened.volumes)
+    return sum(1 if isinstance(one, Field) else len(one.each) for one in volumes)
+
+
+def _runs_of(
+    spans: Sequence[tuple[int, int]], given: Sequence[Sequence[Sequence[Surface]]], moment: float, together: bool
+) -> tuple[Opened, ...]:
+    exits, doorways = given
+    return (
+        *_opened(spans, exits, moment, Opened, together),
+        *_opened(spans, doorways, moment, Doorway, together),
+    )
+
+
+def _opened(
+    spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]], moment: float, kind: type[Opened],
+    together: bool,
+) -> tuple[Opened, ...]:  # fmt: skip
+    """The openings of one kind; volumes of one kind are one field if they are taken `together`."""
+    runs, number = [], 0
+    for given, some in itertools.groupby(spans, lambda span: volumes[span[0]]):
+        first, number = number, number + sum(walls for _piece, walls in some)
+        runs += [kind(_taken(given, moment, together), float(first), float(number))] if given else []
+    return tuple(reversed(by_kind(runs, lambda run: run.volumes)))
+
+
+def _taken(volumes: Sequence[Surface], moment: float, together: bool = False) -> tuple[Any, ...]:
+    fields, rest = _fields_of(volumes) if together else ([], volumes)
+    ordered = reversed(by_kind(rest, lambda volume: (volume.walls(), volume.present is None)))
+    alone = tuple(_timed(Field(one.members) if isinstance(one, Many) else all_walls([one]), one.present, moment)
+                  for one in ordered)  # fmt: skip
+    return (*(_timed(Field(members), present, moment) for members, present in fields), *alone)
+
+
+def _timed(volume: Any, present: Spans, moment: float) -> Any:
+    return volume if present is None else Timed(volume, float(was_there(present, moment)))
+
+
+def _fields_of(volumes: Sequence[Surface]) -> tuple[list[tuple[Members, Spans]], list[Surface]]:
+    """Several volumes of one kind, which are open at the same times, as the insides of the solids of a field each.
+
+    And the others.
+    """
+    found: dict[Any, list[Surface]] = defaultdict(list)
+    rest = []
+    for one in volumes:
+        solid = replace(one, side="outside") if getattr(one, "side", None) == "inside" else None  # type: ignore[call-arg]
+        walls = () if solid is None or isinstance(one, (Many, Joined)) else solid.walls()
+        if solid is not None and len(walls) == 1 and can_be_member(walls[0]):
+            found[kind_of(walls[0]), one.present].append(solid)
+        else:
+            rest.append(one)
+    return [(members_of(solids, None), present) for (_kind, present), solids in found.items()], rest
+
+
+def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
+    """The open parts of a surface: those its openings say and, where the scene repeats, the images of that.
+
+    Raises:
+        SceneError: an opening has no phi, or no point of the wall in it, or it does not go with the period.
+    """
+    found: list[Surface] = []
+    for k, opening in enumerate(surface.open_volumes()):
+        where = f"{name}.openings[{k}]"
+        if isinstance(opening, Outlined):
+            raise SceneError(
+                f"{where} must be a volume of surfaces such as swarm.Box, got {type(opening).__name__}; give boxes or "
+                "cylinders"
+            )
+        required.require_description([opening], where)
+        if not reaches(surface, opening):
+            raise SceneError(
+                f"{where} must reach the wall that it opens, got {opening}, in which no point of {name} "
+                f"({type(surface).__name__}) is; move it, or make it larger"
+            )
+        found += [opening] if period is None else _images(opening, period, where)
+    return tuple(found)
+
+
+def volumes_of_counter(volume: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
+    """The volume in which a counter counts and, where the scene repeats, the images of that.
+
+    Raises:
+        SceneError: it has no phi that is known everywhere, or it does not go with the period.
+    """
+    if isinstance(volume, Outlined):
+        raise SceneError(
+            f"{name} must be a volume of surfaces such as swarm.Box, got {type(volume).__name__}; give a box or a "
+            "cylinder"
+        )
+    required.require_description([volume], name)
+    return (volume,) if period is None else tuple(_images(volume, period, name))
+
+
+def volumes_in(volumes: Sequence[Surface]) -> tuple[Any, ...]:
+    """Volumes as kernels take them."""
+    return _taken(volumes, 0.0)
+
+
+def _images(opening: Surface, period: Lengths, name: str) -> list[Surface]:
+    """The volume in every cell, as far as it reaches into this one."""
+    side = getattr(opening, "side", None)
+    if isinstance(opening, Many) or side is None:
+        return images_of(opening, period, name)
+    if side == "outside":
+        raise SceneError(
+            f'{name}.side must be "inside" where the scene has a period, got "outside": the images of what is open '
+            "would cover one another's walls"
+        )
+    # The images of a solid are those of what it fills.
+    solid = replace(opening, side="outside")  # type: ignore[call-arg]
+    return [replace(image, side="inside") for image in images_of(solid, period, name)]  # type: ignore[call-arg]
+
+
+def require_few(openings: Sequence[Opened]) -> None:
+    """Raise a `SceneError` where there are more openings than kernels can be compiled for."""
+    walls = compiled(openings)
+    if walls > _MOST:
+        volumes = sum(len(opened.volumes) for opened in openings)
+        raise SceneError(
+            f"openings must have at most {_MOST} walls in all, got {walls}, of {volumes} volumes of {len(openings)} "
+            "rows of walls: each is compiled into the kernels, once for every row of walls that has it; use volumes of "
+            "fewer kinds, such as spheres alone, or give the same openings to all parts"
+        )
+
+
+def reaches(surface: Surface, opening: Surface) -> bool:
+    """Whether a volume has points on both sides of a wall."""
+    both = _gap(opening, sign_of(opening)), _gap(surface, side_of(surface))
+    reach = _REACH * max(surface.extent(), opening.extent())
+    low, high = (np.array(corner)[:, None] for corner in _box_of(opening))
+    # Also where the box of a flat volume has no width
+    room = 1e-9 * reach
+    low, high = np.maximum(low - room, -reach), np.minimum(high + room, reach)
+    return all(
+        has_room(
+            low,
+            high,
+            lambda points, sign=sign: np.array([both[0][0](points), sign * both[1][0](points)]),  # type: ignore[misc]
+            lambda i, points, sign=sign: (sign if i else 1.0) * both[i][1](points),  # type: ignore[misc]
+        )
+        for sign in (1.0, -1.0)
+    )
+
+
+def _gap(surface: Surface, sign: float) -> Any:
+    """The gap of a surface, and its gradient, at points."""
+    return lambda points: sign * surface.phi(points), lambda points: sign * surface.gradient(points)
+
+
+def sign_of(opening: Surface) -> float:
+    """The distance that phi gives where the volume is not."""
+    return 1.0 if isinstance(opening, Many) else side_of(opening)
+
+
+def _box_of(opening: Surface) -> Any:
+    if isinstance(opening, Many):
+        low, high = opening.corners()
+        return low.min(axis=1), high.max(axis=1)
+    return opening.bounds()
+
+
+def are_open(volumes: Sequence[Surface], points: NDArray[np.float64], time: float) -> NDArray[np.bool_]:
+    """Which of the points (3, N) are in any of the volumes that are open at a time [s]."""
+    found = np.zeros(points.shape[1], np.bool_)
+    for volume in volumes:
+        if is_there(volume.present, time):
+            found |= sign_of(volume) * volume.phi(points) <= 0.0
+    return found
+
+
+# --- In kernels ------------------------------------------------------------------------------------------
+
+
+def outside(volume, r):
+    """Signed distance outside of a volume, to first order: above 0 there, and NaN where that has no value.
+
+    What is neither `Walls` nor a `Field` is the inside of one body of a field, whose admissible side is outside of it.
+    """
+    if isinstance(volume, Timed):
+        return volume.if_open(outside(volume.volume, r), math.inf)
+    if isinstance(volume, Field):
+        return -volume.members.deepest_in_cell(r)
+    if not isinstance(volume, Walls):
+        return -volume.distance(r)
+    farthest = -math.inf
+    for wall in reversed(volume.each):
+        here = wall.distance(r)
+        farthest = select(here <= farthest, farthest, here)
+    return farthest
+
+
+def is_in_any(volumes, r):
+    """Whether a place is in any of some volumes."""
+    found = False
+    for volume in reversed(volumes):
+        found = (outside(volume, r) <= 0.0) | found
+    return found
+
+
+def is_open(openings, wall, r, near):
+    """Whether a place on this wall is open, or nearer to what is than that; False for no wall, which is -1."""
+    is_open_in_any = False
+    for opening in reversed(openings or ()):
+        found = False
+        for volume in reversed(opening.volumes):
+            found = (outside(volume, r) <= near) | found
+        is_open_in_any = (opening.is_of(wall) & found) | is_open_in_any
+    return is_open_in_any

@@ -1,0 +1,36 @@
+"""Boundaries of patches: fields of walls each of which is there on a part of itself only, as the facets of a mesh.
+
+A field of `Patched` members is flown to as any field: `field_hit` gives the first hit that is on a patch. What slides
+on a wall of it goes on, where its patch ends, on the wall that `wall_after` says, or flies. What has no edges but the
+re-entrant ones between parts is a union, rooms.py.
+"""
+
+from ...kernel.record import Record
+
+
+class Patched(Record):
+    """What a field gives of its walls where each is there on its patch only. See also `fields.members.Members`.
+
+    `list_in_cell` and its like name the walls whose patch may be near a point. What slides on another wall meets one by
+    `crossing.arrival`, which asks whether it `is_there`.
+    """
+
+    def is_there(self, number, r, near):
+        """Whether the patch of a wall reaches to a place on it, or nearer to it than `near`."""
+        raise NotImplementedError
+
+    def whole(self, number):
+        """A wall without its edges."""
+        return self.wall(number)  # type: ignore[attr-defined]
+
+    def is_near(self, number, r, near):
+        """Whether the patch of a wall may be nearer to a point than `near`."""
+        return True
+
+    def wall_after(self, number, r, near):
+        """The wall on which what slides on this one goes on beyond the end of its patch at r; -1: it flies."""
+        return -1.0
+
+    def goes_on(self, number, other):
+        """Whether another wall joins this one smoothly where it ends: what slides on this one does not meet it."""
+        return False

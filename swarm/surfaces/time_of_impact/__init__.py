@@ -1,0 +1,1 @@
+"""The time of impact of a free flight with walls at rest and in motion."""

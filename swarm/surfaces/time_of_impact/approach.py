@@ -1,0 +1,105 @@
+"""Safe steps to a wall whose level is known near each place of a flight, and what follows from them.
+
+Where the level along a whole flight is no quartic, or one of which round-off leaves nothing, it is asked for anew at
+the end of each step: a polynomial of the time from there that is nowhere below it. A step ends where a parabola above
+that rises through 0, so no root is skipped; near the root it is Newton's step of second order.
+"""
+
+import math
+from typing import Any
+
+from ...kernel.gravity import accelerated, displacement
+from ...kernel.jit import select
+from ...kernel.record import Record
+from ...kernel.vector import Vec
+from .course import Majorant, positive, rise_by, under_way
+
+
+class LevelBound(Majorant):
+    """The level from one place of a flight on, nowhere above c + 2 b t + a2 t^2 + a3 t^3 + ...
+
+    The window is a time for which that says something. A step that leaves no more than `nearly` of the level is the
+    last, unless to rise through 0 is not yet to meet the wall.
+    """
+
+    c: Any
+    b: Any
+    a2: Any
+    higher: Any  # a3, a4, ...
+    window: Any
+    nearly: Any
+    meets: Any
+    border: Any = None  # None or `Border`
+
+    def bounds(self, reach):
+        """(the level with the a2 of a step as far as its reach, s, m).
+
+        Up to there the terms from t^3 on are at most s t^3, beyond a border with a2, and of a magnitude of at most
+        m t^3.
+        """
+        # The reach is infinite only where the level is a parabola.
+        t = select(reach < math.inf, reach, 0.0)
+        rise, size = positive(self.higher[-1]), abs(self.higher[-1])
+        for a in reversed(self.higher[:-1]):
+            rise, size = positive(a) + t * rise, abs(a) + t * size
+        if self.border is None:
+            return self, rise, size
+        beyond = self.border.beyond(t)
+        above = self._replace(a2=self.a2 + select(self.border.rises, beyond, 0.0))
+        return above, rise, size + beyond / select(t > 0.0, t, math.inf)
+
+    def step(self, time, reach, size):
+        """(the step, its length or 0 if it is the last)."""
+        step = select(time < reach, time, reach)
+        # A step that only ends at its reach is no hit, however short.
+        last = self.meets & (time <= reach) & (rise_by(size, reach) * step * step <= self.nearly)
+        return step, select(last, 0.0, step)
+
+    def first_step(self):
+        """The first step of a flight: (t, its length, 0 if it is the last)."""
+        above, rise, size = self.bounds(self.window)
+        return self.step(above.rises_after_leaving(rise, self.window), self.window, size)
+
+
+class Border(Record):
+    """A border, beyond which a level may differ by (speed t + bent t^2 - margin)^2; `rises`: be higher by that."""
+
+    speed: Any
+    bent: Any
+    margin: Any
+    rises: Any
+
+    def beyond(self, t):
+        """s with (speed t + bent t^2 - margin)^2 <= s t^2 from 0 to t, 0 before the border."""
+        over = positive(self.speed + t * self.bent - self.margin / select(t > 0.0, t, math.inf))
+        return select(t > 0.0, over * over, 0.0)
+
+
+class Approach(Record):
+    """The steps of a flight to a wall that is asked for its level, `near`, at each."""
+
+    surface: Any
+    gravity: Any
+    r: Vec
+    v: Vec
+
+    # What is not found by then goes on in the next pass.
+    most = 100
+
+    def first_step(self):
+        return self.surface.near(self.gravity, self.r, self.v).first_step()
+
+    def next_step(self, t, last):
+        # The parabola holds for twice the last step, or without end where the level is one itself.
+        level = self.surface.near(self.gravity, *place(self.gravity, self.r, self.v, t, last))
+        reach = select(level.window < math.inf, 2.0 * last, math.inf)
+        above, rise, size = level.bounds(reach)
+        step, length = level.step(above.rises(rise, reach), reach, size)
+        goes_on = under_way(t, last)
+        return select(goes_on, t + step, t), select(goes_on, length, last)
+
+
+def place(gravity, r, v, t, last):
+    """The place after the steps of a flight, and the velocity there; its start where there are no more of them."""
+    s = select(under_way(t, last), t, 0.0)
+    return r + displacement(gravity, v, s), accelerated(gravity, v, s)

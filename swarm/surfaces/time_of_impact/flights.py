@@ -1,0 +1,186 @@
+"""When a free flight meets the walls of a scene."""
+
+import math
+from typing import Any, NamedTuple
+
+from ...kernel.gravity import as_vector
+from ...kernel.jit import select
+from ..presence.rooms import leaving
+from ..walls import Field
+from .course import Fall, Quartic
+
+
+class Hit(NamedTuple):
+    """Time of a hit and the wall's number.
+
+    The number is -1 where the flight is surely free until then, and what comes after is not known yet.
+    """
+
+    time: float
+    wall: float
+
+
+# No hit, ever.
+NEVER = Hit(math.inf, 0.0)
+
+
+def of_flights(falls):
+    """The methods of a wall that free flights ask for, with gravity or without."""
+    return ("falling_hit" if falls else "first_hit",)
+
+
+def of_steps(falls):
+    """The same for whole steps, some of which are jumped over."""
+    # The loops of a fall are compiled for every method.
+    free = ("safe_time", "falling_hit") if falls else ("first_hit",)
+    return *free, "inner", "level_of"
+
+
+def hit(gravity, surface, r, v):
+    """When the free flight leaves the admissible side of one wall: (time, whether it does then)."""
+    if gravity is None:
+        return surface.first_hit(r, v)
+    return surface.falling_hit(r, v, as_vector(gravity))
+
+
+def first_hit(walls, gravity, r, v):
+    """The first `Hit` of a free flight."""
+    first = NEVER
+    for rooms in reversed(walls.joined()):
+        hits = tuple(tuple(hit(gravity, wall, r, v) for _number, wall, _gentle in room) for room in rooms)
+        left = union_hit(walls, rooms, hits, gravity, (r, v))
+        first = soonest(left, 0.0, first)
+    for number, wall in reversed(walls.shared()):
+        if isinstance(wall, Field):
+            first = soonest(wall.members.field_hit(gravity, r, v), number, first)
+        else:
+            time, found = hit(gravity, wall, r, v)
+            first = sooner(time, found, number, first)
+    return first
+
+
+def union_hit(walls, rooms, hits, gravity, flight, stops=False):
+    """The first `Hit` of a flight (r, v) with a union, from those with the walls of its rooms; `stops` as of `end`."""
+    leaves: Any = ()
+    for room, some in zip(rooms, hits, strict=True):
+        first = NEVER
+        for (number, _wall, _gentle), (time, found) in zip(reversed(room), reversed(some), strict=True):
+            first = sooner(time, found, number, first)
+        leaves = (*leaves, first)
+    return Hit(*leaving(walls, rooms, leaves, gravity, flight, stops))
+
+
+def soonest(hit, number, later):
+    """The sooner one of a hit with a field that has so many walls before it and that with a later wall."""
+    first = hit.time <= later.time
+    wall = select(hit.wall < 0.0, -1.0, hit.wall + number)
+    return Hit(select(first, hit.time, later.time), select(first, wall, later.wall))
+
+
+def sooner(time, found, number, later):
+    """The sooner one of the hit with the wall of this number and that with a later wall."""
+    sooner = later.time < time
+    return Hit(select(sooner, later.time, time), select(sooner, later.wall, select(found, number, -1.0)))
+
+
+# --- In lanes, by steps ----------------------------------------------------------------------------------
+
+# A flight in lanes: what the safe steps of each wall know, in this many rows a wall.
+COURSE = 9
+_WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
+
+
+def begin(walls, gravity, course, row, lane, r, v):
+    """The start of a flight for every wall into course[row:, lane]."""
+    for k, wall in enumerate(walls.each):
+        at, steps = row + k * COURSE, wall.steps(gravity, r, v)
+        if steps is None:
+            time, found = hit(gravity, wall, r, v)
+            course[at + _TIME, lane], course[at + _LAST, lane] = time, select(found, 0.0, math.inf)
+            continue
+        if isinstance(steps, Fall):
+            for i, number in enumerate(steps.level):
+                course[at + i, lane] = number
+            course[at + _CLOSE, lane] = steps.nearly
+        course[at + _TIME, lane], course[at + _LAST, lane] = steps.first_step()
+
+
+def step(walls, gravity, course, row, lane, r, v):
+    """One safe step of every wall that needs steps, of the flight that starts at r."""
+    for k, wall in enumerate(walls.each):
+        at = row + k * COURSE
+        if gravity is not None and wall.is_quartic:
+            level = Quartic(*(course[at + i, lane] for i in range(_WINDOW + 1)))
+            steps = Fall(level, course[at + _CLOSE, lane], wall.may_be_far)
+        else:
+            steps = wall.steps(gravity, r, v)
+        if steps is not None:
+            t, last = steps.next_step(course[at + _TIME, lane], course[at + _LAST, lane])
+            course[at + _TIME, lane], course[at + _LAST, lane] = t, last
+
+
+def end(walls, gravity, course, row, lane, flight, stops=False):
+    """`first_hit` from the course of a flight (r, v); if it `stops` with none that goes on in another room."""
+    first, k = NEVER, len(walls.shared())
+    for rooms in walls.joined():
+        hits: Any = ()
+        for room in rooms:
+            hits = (*hits, tuple(_known(course, row, k + i, lane) for i in range(len(room))))
+            k += len(room)
+        first = soonest(union_hit(walls, rooms, hits, gravity, flight, stops), 0.0, first)
+    for k, _wall in reversed(tuple(enumerate(walls.shared()))):
+        time, found = _known(course, row, k, lane)
+        first = sooner(time, found, float(k), first)
+    return first
+
+
+def _known(course, row, k, lane):
+    """What the course knows of the hit with wall k: (time, whether it is one)."""
+    at = row + k * COURSE
+    return course[at + _TIME, lane], course[at + _LAST, lane] == 0.0
+
+
+# --- Of one wall, and of all but one ---------------------------------------------------------------------
+
+
+def hit_of(walls, gravity, wall, r, v):
+    """`hit` of the wall with this number."""
+    first, found = math.inf, True
+    for number, one in reversed(walls.numbered()):
+        if isinstance(one, Field):
+            surface, here = one.members.wall(wall - number), wall < number + one.count()
+        else:
+            surface, here = one, wall == number
+        time, hits = hit(gravity, surface, r, v)
+        first, found = select(here, time, first), (here & hits) | ((not here) & found)
+    return first, found
+
+
+def other_hit(walls, wall, r, v):
+    """The first hit of a straight flight with any wall but this one, which is one of these."""
+    first = NEVER
+    # The only wall has no other: else the compiler would compute its hit and throw it away at run time.
+    for k, other in reversed(tuple(enumerate(walls.each if len(walls.each) > 1 else ()))):
+        time, _found = other.first_hit(r, v)
+        use = (first.time < time) | (wall == k)
+        first = Hit(select(use, first.time, time), select(use, first.wall, float(k)))
+    return first
+
+
+# --- Free time, with and without gravity -----------------------------------------------------------------
+
+
+def free_time(gravity, walls, r, v):
+    """A time during which the flight surely stays admissible; 0 for a particle that is in contact now."""
+    if gravity is None:
+        return select(walls.outside(-1.0, r), 0.0, first_hit(walls, gravity, r, v).time)
+    return safe_time(walls, r, v, as_vector(gravity))
+
+
+def safe_time(walls, r, v, pull):
+    """The smallest safe time of all walls."""
+    shortest = math.inf
+    for wall in reversed(walls.each):
+        time = wall.safe_time(r, v, pull)
+        shortest = select(shortest < time, shortest, time)
+    return shortest

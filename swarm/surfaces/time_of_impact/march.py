@@ -1,0 +1,186 @@
+"""The first hit of a flight by looks at it: each says for how long it surely meets nothing, so no root is skipped.
+
+Here a look at a wall follows from `hessian_bounds`, by the root of a parabola above its level. A sampled surface, one
+by functions and walls in motion say in other ways for how long.
+"""
+
+import math
+from typing import Any
+
+from ...kernel.jit import outlined, select
+from ...kernel.record import Record
+from ...kernel.vector import Vec, absolute, dot, norm, square, total
+from .course import rise_time
+
+_EPSILON = 2.220446049250313e-16
+# Looks of one flight; near the wall each one doubles the digits. What is not found by then goes on in the next pass. A
+# fall may end before it meets the wall, which nothing here knows: from `hessian_bounds` it looks less far ahead.
+LOOKS, FALLING_LOOKS = 200, 16
+# Bisections of an interval down to neighbouring numbers.
+_BISECTIONS = 1100
+
+
+# --- Any flight ------------------------------------------------------------------------------------------
+
+
+class SafeStep(Record):
+    """One look at a flight: a time from which on it surely meets nothing for so long, infinite if it never does."""
+
+    since: Any
+    time: Any
+    wall: Any = 0.0  # the wall that it is at after that time, or -1
+    past: Any = -1.0  # a wall that it is past at this time by more than round-off, or -1
+
+
+class Search(Record):
+    """A flight that is looked at; those to one wall have the fields `surface`, r, v and `pull`."""
+
+    start, longest, looks = 0.0, math.inf, LOOKS
+
+    def look(self, t, is_first):
+        """The `SafeStep` at a time; at the first, the sign of the approach decides whether it meets a wall at once."""
+        raise NotImplementedError
+
+    def past(self: Any, t):
+        """A wall that it is past at a time, or -1."""
+        surface = self.surface
+        level = surface.level_of(surface.inner(self.r + t * (self.v + (0.5 * t) * self.pull)))
+        return select(level > 0.0, 0.0, -1.0)
+
+
+class ToWall(Search):
+    """A flight to one wall that is asked for its `look`."""
+
+    surface: Any
+    r: Vec
+    v: Vec
+    pull: Vec
+    looks: int
+
+    def look(self, t, is_first):
+        return self.surface.look(self.r, self.v, self.pull, t, is_first)
+
+
+def first_met(flight):
+    """(when a flight meets a wall, which); the wall is -1 where it is only known to meet none until then."""
+    t, before = flight.start, flight.start
+    for i in range(flight.looks):
+        look = flight.look(t, i == 0)
+        if look.past >= 0.0:
+            return bisected(flight, before, look.since, look.past)
+        goes_on = look.time < flight.longest - look.since
+        before, t = look.since, look.since + look.time
+        if look.wall >= 0.0:
+            return t, look.wall
+        if not goes_on:
+            # Never to meet a wall is known as well as a hit.
+            return flight.longest, select(flight.longest < math.inf, -1.0, 0.0)
+    return t, -1.0
+
+
+def bisected(flight, low, high, wall):
+    """(the last time between two at which a flight is past no wall, that which it is past then)."""
+    for _i in range(_BISECTIONS):
+        t = 0.5 * (low + high)
+        if not low < t < high:
+            break
+        past = flight.past(t)
+        if past >= 0.0:
+            high, wall = t, past
+        else:
+            low = t
+    return low, wall
+
+
+# --- To a wall with `hessian_bounds` ---------------------------------------------------------------------
+
+
+@outlined
+def march(surface, r, v, pull):
+    """`first_hit` of a wall alone."""
+    straight = pull.x == 0.0 and pull.y == 0.0 and pull.z == 0.0
+    time, wall = first_met(ToWall(surface, r, v, pull, LOOKS if straight else surface.falling_looks))
+    return time, wall >= 0.0
+
+
+def safe_time_by_steps(surface, r, v, pull):
+    """A time during which the flight surely stays admissible."""
+    level, _half, step, _way, _steepness = _safe_step(surface, r, v, pull, 0.0)
+    return select(level > 0.0, 0.0, step)
+
+
+def look(surface, r, v, pull, t, is_first):
+    """The `SafeStep` at a wall."""
+    p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
+    level, half, step, way, steepness = _safe_step(surface, p, w, pull, 0.0)
+    # By round-off, or because the surface bends more than its file says.
+    is_past = level > 0.0 and half > 0.0 and not is_first
+    room = 2.0 * _EPSILON * total(absolute(p))
+    slack = room * steepness
+    if not is_past and lets_go(level, half, step, slack):
+        _level, _half, step, _way, _steepness = _safe_step(surface, p, w, pull, slack)
+        return SafeStep(t, step, -1.0, -1.0)
+    straight = pull.x == 0.0 and pull.y == 0.0 and pull.z == 0.0
+    if not is_past and straight and surface.passed(p, w):
+        return SafeStep(t, math.inf, -1.0, -1.0)
+    arrives = (not is_first or step == 0.0) and way <= room
+    return SafeStep(t, step, select(arrives, 0.0, -1.0), select(is_past, 0.0, -1.0))
+
+
+def lets_go(level, half, step, slack):
+    """Whether a flight leaves a wall so slowly that its safe step is a matter of round-off; `slack` is that of a level.
+
+    A particle that slides lets go where the wall bends neither to it nor away, and flies on along it. A bound of the
+    bend is above 0 there: the step ends where the particle may be back, after 1e-16 of what the bend takes, and the
+    next one too, without end; the time does not change, or the places that these steps are rounded to drift through the
+    wall. Round-off does not distinguish such a place from one on the wall: the step may end that deep outside.
+    """
+    return (half < 0.0) & (level >= -slack) & (-half * step <= slack)
+
+
+@outlined
+def _safe_step(surface, r, v, pull, slack):
+    """(level, half its derivative, a time during which the flight stays admissible, how far it goes at most, |grad q|).
+
+    With a slack the level counts as so much below 0.
+    """
+    n = surface.inner_gradient(r)
+    side, level = surface.side, surface.level_of(surface.inner(r))
+    level = select(slack > 0.0, min(level, -slack), level)
+    half = 0.5 * side * dot(n, v)
+    most, magnitude, reach = surface.hessian_bounds(r)
+    speed2 = square(v)
+    speed, g = math.sqrt(speed2), norm(pull)
+    # level'' = 2 side (w.H w) + side grad q.G <= 2 M, where |w|^2 <= |v|^2 + 2 |G| s and grad q turns by 2 H s at most
+    # on the way s: M = m0 + m1 s
+    if g == 0.0:
+        m0, m1 = most * speed2, 0.0
+    else:
+        most = max(most, 0.0)
+        m0 = most * speed2 + 0.5 * side * dot(n, pull)
+        m1 = (2.0 * most + magnitude) * g
+    step = _step_within(level, half, m0 + select(m1 > 0.0, m1 * reach, 0.0), _time_to_travel(speed, g, reach))
+    if m1 > 0.0 and (step > 0.0 or m0 < 0.0):
+        # Again with the M of a shorter way: of twice that step, or as far as a fall off the wall surely bends away.
+        shorter = min(reach, max(2.0 * _travelled(speed, g, step), -0.5 * m0 / m1))
+        within = _step_within(level, half, m0 + select(m1 > 0.0, m1 * shorter, 0.0), _time_to_travel(speed, g, shorter))
+        step = max(step, within)
+    clear = surface.clearance(r)
+    if clear > 0.0:
+        step = max(step, _time_to_travel(speed, g, clear))
+    return level, half, step, _travelled(speed, g, step), norm(n)
+
+
+def _step_within(level, half, bound, longest):
+    """The root of the parabola above the level, within the time in which its bound holds."""
+    return min(rise_time(level, half, bound), longest)
+
+
+def _time_to_travel(speed, g, way):
+    """The time t with speed t + g t^2/2 = way."""
+    twice = speed + (speed if g == 0.0 else math.sqrt(speed * speed + 2.0 * g * way))
+    return 2.0 * way / twice if twice > 0.0 else math.inf
+
+
+def _travelled(speed, g, t):
+    return (speed + 0.5 * g * t) * t

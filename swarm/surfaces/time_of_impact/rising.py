@@ -1,0 +1,264 @@
+"""Until when the level of a wall that moves surely stays below 0: safe steps of one wall.
+
+In the frame of a wall the flight is a curve whose velocity w, acceleration a and jerk j have bounds W, A and J for any
+time ahead. Along it the level f of a wall with the inner function q, whose H = grad grad q/2 has eigenvalues of at most
+the magnitude m, has
+    f' = grad q.w,   f''/2 = w.H w + grad q.a/2,   |f'''| <= 6 m W A + |grad q| J,
+the last where H is constant. A step ends where the parabola above f rises through 0; near the hit each one triples the
+digits, or doubles them where only f'' has a bound.
+"""
+
+import math
+from typing import Any
+
+from ...kernel.jit import select
+from ...kernel.record import Record
+from ...kernel.vector import Vec, absolute, dot, norm, times, total
+from .course import Majorant, rise_time
+
+# The bounds of a step hold for at most so many times its length, after so many trials.
+_CLOSE, _TRIALS = 2.0, 8
+
+
+# --- The flight in the frame of a wall -------------------------------------------------------------------
+
+
+class Flight(Record):
+    """A free flight, and how much of the frame is left at its start [s]."""
+
+    r: Vec
+    v: Vec
+    pull: Vec
+    remaining: float
+    speed: float  # |v|
+    weight: float  # |G|
+
+    def place(self, t):
+        """The place of the particle after a time."""
+        return self.r + t * (self.v + (0.5 * t) * self.pull)
+
+    def velocity(self, t):
+        """Its velocity then."""
+        return self.v + t * self.pull
+
+    def seen(self, t, wall, pull):
+        """The particle after a time as `InWallFrame` in the frame of a wall `Posed` then, where this pulls it."""
+        p, v = self.place(t), self.velocity(t)
+        return InWallFrame(
+            wall.drive, wall.own_place(p), wall.own_velocity(p, v), wall.own_pull(p, v, pull),
+            self.speed + t * self.weight, wall.arm_length(p), self.weight,
+            total(absolute(p)) + total(absolute(wall.pose.shift)),
+        )  # fmt: skip
+
+
+class Bounds(Record):
+    """Of the speed, the acceleration and the jerk in the frame of a wall for some time."""
+
+    speed: float
+    acceleration: float
+    jerk: float
+
+
+class InWallFrame(Record):
+    """A particle in the frame of a wall at one time of its flight, and what bounds its way from there."""
+
+    drive: Any  # a `Drive`
+    r: Vec
+    v: Vec
+    a: Vec
+    speed: float  # a bound of |v| in the scene
+    arm: float  # its distance from the centre of the rotation; 0 without a rotation
+    weight: float  # |G|
+    coordinates: float  # what the round-off of its place is relative to [m]
+
+    def bounds(self, within):
+        """`Bounds` that hold for so long [s]."""
+        drive, spin = self.drive, self.drive.angular_speed()
+        # Derivatives of A^T (r - c - d), where each of A^T turns by the rate once more
+        speed = self.speed + self.weight * within + drive.fastest
+        arm, hard = self.arm + speed * within, self.weight + drive.hardest
+        return Bounds(
+            speed + spin * arm,
+            hard + spin * (2.0 * speed + spin * arm),
+            drive.jerk + spin * (3.0 * hard + spin * (3.0 * speed + spin * arm)),
+        )
+
+
+def flight_of(r, v, pull, remaining):
+    """The flight of a particle."""
+    return Flight(r, v, pull, remaining, norm(v), norm(pull))
+
+
+# --- Levels whose second derivative is known: below c + 2 b t + a t^2 + k t^3, with a bound k of f'''/6 -------
+
+
+class Level(Majorant):
+    """A level whose third derivative has a bound: f, f'/2, f''/2, |grad q| and m."""
+
+    c: float
+    b: float
+    a2: float
+    steepness: float
+    magnitude: float
+
+    def third(self, bounds, within):
+        """The bound of f''' within that time."""
+        moved = self.steepness + 2.0 * self.magnitude * bounds.speed * within
+        return 6.0 * self.magnitude * bounds.speed * bounds.acceleration + moved * bounds.jerk
+
+    def own_rise(self):
+        """When its own parabola rises."""
+        return rise_time(self.c, self.b, self.a2)
+
+    def soonest(self, sixth, within, is_first):
+        """When it rises at the soonest, if a sixth of f''' is bounded within that time.
+
+        How deep a particle is that leaves no wall, the parabola alone knows.
+        """
+        return self.rises_after_leaving(sixth, within) if is_first else self.rises(sixth, within)
+
+
+class Between(Record):
+    """The levels of the two planes of a slab: the place between them in the direction of motion, f'/2 > 0 and f''/2."""
+
+    place: float
+    half: float
+    bend: float
+    radius: float
+
+    steepness = 1.0
+
+    def third(self, bounds, within):
+        """The bound of f''' within that time."""
+        return bounds.jerk
+
+    def own_rise(self):
+        """When the parabola of one of them rises."""
+        # The plane ahead, unless the particle turns short of it: then the one behind
+        c, b, a = self.place - self.radius, self.half, self.bend
+        discriminant = b * b - a * c
+        reaches = (discriminant >= 0.0) | (a > 0.0)
+        discriminant = select(reaches, discriminant, b * b - a * (self.place + self.radius))
+        root = _root(discriminant)
+        over, under = select(reaches, -c, b + root), select(reaches, b + root, -a)
+        return select(under > 0.0, select(over > 0.0, over, 0.0) / under, math.inf)
+
+    def soonest(self, sixth, within, is_first):
+        """When one of them rises at the soonest, as of a `Level`."""
+        b, k = self.half, sixth * within
+        c, a = self.place - self.radius, self.bend + k
+        discriminant = b * b - a * c
+        root = _root(discriminant)
+        reaches = ((discriminant >= 0.0) | (a > 0.0)) & (b + root > 0.0)
+        ahead = select(reaches, select(c < 0.0, -c, 0.0) / (b + root), math.inf)
+        # The one behind: the particle moves away from it.
+        c, a = -self.place - self.radius, k - self.bend
+        behind = select(a > 0.0, (b + _root(b * b - a * c)) / a, math.inf)
+        if is_first:
+            leaving = rise_time(-2.0 * b, -0.5 * self.bend, sixth)
+            behind = select(leaving > behind, leaving, behind)
+        return select(behind < ahead, behind, ahead)
+
+
+def _root(discriminant):
+    return math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
+
+
+# --- Steps -----------------------------------------------------------------------------------------------
+
+
+class LevelStep(Record):
+    """The level, half its derivative, and a time during which the flight stays admissible."""
+
+    level: float
+    half: float
+    time: float
+
+
+class Ahead(Record):
+    """A level along a flight, and what bounds it for some time ahead."""
+
+    def rise(self, within):
+        """When it rises through 0, with bounds that hold for so long."""
+        raise NotImplementedError
+
+    def longest(self, longest):
+        """The longest time, of at most this one, in which the level surely does not rise."""
+        time, within, too_long = 0.0, longest, longest
+        for _k in range(_TRIALS):
+            time = max(time, min(self.rise(within), within))
+            # The bounds grow with the time that they hold for: those of a long time say little of a short step.
+            too_long = select(time < within, within, too_long)
+            if not _CLOSE * time < too_long:
+                break
+            within = math.sqrt(time * too_long)
+        return time
+
+
+class SecondDerivativeBound(Ahead):
+    """Of a level whose second derivative has a bound."""
+
+    seen: InWallFrame
+    level: float
+    half: float
+    steepness: float
+    most: float
+    magnitude: float
+    reach: float
+    clear: float
+
+    def rise(self, within):
+        bounds = self.seen.bounds(within)
+        speed = bounds.speed
+        # f''/2 <= w.H w + |grad q| A/2, where grad q turns by 2 m W t at most
+        bend = max(self.most, 0.0) * speed * speed
+        bend += 0.5 * bounds.acceleration * (self.steepness + 2.0 * self.magnitude * speed * within)
+        some = select(speed > 0.0, speed, 1.0)
+        step = min(rise_time(self.level, self.half, bend), select(speed > 0.0, self.reach / some, math.inf))
+        return max(step, self.clear / some)
+
+
+class ThirdDerivativeBound(Ahead):
+    """Of a level whose third derivative has one."""
+
+    body: Any
+    seen: InWallFrame
+    level: Any  # `Level` or `Between`
+
+    def third(self, within):
+        """The bound of f''' within that time."""
+        return self.level.third(self.body.bounds_along(self.seen, within), within)
+
+    def rise(self, within):
+        here = self.level
+        return rise_time(here.c, here.b, here.a2 + self.third(within) * within * (1.0 / 6.0))
+
+
+def level_step(body, seen, level, longest):
+    """The `LevelStep` of a level whose third derivative has a bound, whose time is at most the longest."""
+    return LevelStep(level.c, level.b, ThirdDerivativeBound(body, seen, level).longest(min(level.own_rise(), longest)))
+
+
+def bent_step(body, seen, longest):
+    """The `LevelStep` of a wall that bounds its bend."""
+    n, level = body.inner_gradient(seen.r), body.level_of(body.inner(seen.r))
+    half = 0.5 * body.side * dot(n, seen.v)
+    most, magnitude, reach = body.hessian_bounds(seen.r)
+    bent = SecondDerivativeBound(seen, level, half, norm(n), most, magnitude, reach, body.clearance(seen.r))
+    return LevelStep(level, half, bent.longest(longest))
+
+
+def bounds_along(n, seen, within):
+    """`Bounds` of a flight that a flat wall with this normal sees: only the jerk along that counts.
+
+    Where a motion has none of it, a particle that leaves the wall at no speed stays at it without end.
+    """
+    bounds, drive = seen.bounds(within), seen.drive
+    if drive.turn is None:
+        jerk = total(absolute(times(n, drive.jerks)))
+    else:
+        # Along its axis a rotation leaves a place as it is.
+        axis = drive.turn.axis
+        along = dot(n, axis)
+        jerk = abs(along) * total(absolute(times(axis, drive.jerks))) + norm(n - along * axis) * bounds.jerk
+    return bounds._replace(jerk=select(jerk < bounds.jerk, jerk, bounds.jerk))

@@ -1,0 +1,214 @@
+"""When a flight meets walls in any motion: safe steps of all walls, so that no hit is skipped."""
+
+import math
+from typing import Any
+
+from ...kernel.arrays import index
+from ...kernel.gravity import accelerated
+from ...kernel.jit import outlined, select
+from ...kernel.record import Record
+from ...kernel.vector import ZERO
+from ..fields.grid import cell_of, until_next
+from ..fields.members import member
+from ..presence.rooms import leaving
+from ..walls import Field, Following, Walls
+from . import flights
+from .flights import NEVER, Hit, hit, sooner, soonest
+from .march import SafeStep, Search, first_met
+from .rising import Flight, flight_of
+
+_EPSILON = 2.220446049250313e-16
+# A flight that is past a wall by so many times the round-off of its place is at it.
+_ROUND_OFF = 8.0
+# The bounds of a flight in the cell of a field hold for at most so many times its length, after so many trials.
+_CLOSE, _TRIALS = 2.0, 8
+
+
+class ShortestStep(Record):
+    """The shortest safe step of all walls, its wall and how far it goes; a wall that is passed, or -1, and how far."""
+
+    time: float
+    wall: float
+    way: float
+    room: float  # what way counts as none
+    past: float
+    depth: float
+
+
+_NOBODY = ShortestStep(math.inf, -1.0, math.inf, 0.0, -1.0, 0.0)
+
+
+# --- Of all walls ----------------------------------------------------------------------------------------
+
+
+def seen_by_walls(walls, flight, t):
+    """(wall, its number, `Seen`) of each wall in no field that is met by safe steps, last to first."""
+    found: Any = ()
+    seen = None
+    for number, wall in walls.numbered():
+        if not isinstance(wall, (Field, Following)):
+            seen = wall.seen(flight, t)
+        if seen is not None and not isinstance(wall, Field):
+            found = ((wall, number, seen), *found)
+    return found
+
+
+def _nearest(walls, flight, t, longest):
+    """The `ShortestStep` of all walls that are met by safe steps."""
+    found = _NOBODY
+    for wall, number, seen in seen_by_walls(walls, flight, t):
+        found = _nearer(seen, wall.body, number, found, longest)
+    for number, field in reversed(walls.fields()):
+        if field.members.accelerates:
+            found = _nearest_in_cell(field.members, number, found, flight, t, longest)
+    return found
+
+
+@outlined
+def _nearest_in_cell(field, number, found, flight, t, longest):
+    """The nearest of what is found and the bodies of the cell in which a particle is then.
+
+    To leave the cell ends a step, but is no hit.
+    """
+    grid, seen = field.body.grid, field.seen(flight, t)
+    until = until_next_cell(grid, seen, min(found.time, longest))
+    if until < found.time:
+        found = ShortestStep(until, -1.0, math.inf, 0.0, found.past, found.depth)
+    cell = index(cell_of(grid, seen.r).number)
+    for k in range(grid.first[cell], grid.first[cell + 1]):
+        m = grid.entries[k]
+        found = _nearer(seen, member(field.body, index(m)), number + m, found, min(found.time, longest))
+    return found
+
+
+@outlined
+def until_next_cell(grid, seen, longest):
+    """A time up to the longest during which a particle, seen in the frame of a field, is surely near its cell."""
+    cell, time, within = cell_of(grid, seen.r), 0.0, longest
+    # The bound of the acceleration grows with the time that it holds for.
+    for _k in range(_TRIALS):
+        until = until_next(seen.bounds(within), grid, cell, seen.r, seen.v)
+        time = max(time, min(until, within))
+        if not _CLOSE * time < within:
+            break
+        within = math.sqrt(time * within)
+    return time
+
+
+def _nearer(seen, body, number, rest, longest):
+    """The `ShortestStep` of one wall and the rest."""
+    step = body.moving_step(seen, longest)
+    is_past = (step.level > 0.0) & (step.half > 0.0)
+    speed, room = seen.bounds(0.0).speed, 2.0 * _EPSILON * seen.coordinates
+    depth, way = speed * (0.5 * step.level / select(is_past, step.half, 1.0)), speed * step.time
+    sooner_one = step.time < rest.time
+    return ShortestStep(
+        *select(sooner_one, (step.time, number, way, room), rest[:4]),
+        *select(is_past, (number, depth), rest[4:]),
+    )
+
+
+class ToWalls(Search):
+    """A flight to all walls that are met by safe steps, up to the longest time."""
+
+    walls: Any
+    flight: Flight
+    longest: float
+
+    def look(self, t, is_first):
+        longest = self.longest - t
+        near = _nearest(self.walls, self.flight, t, longest)
+        is_past = near.past >= 0.0 and not is_first
+        # By round-off: a wall that bends as is said is not passed by more.
+        is_at = is_past and near.depth <= _ROUND_OFF * near.room
+        if is_at:
+            return SafeStep(t, 0.0, near.past, -1.0)
+        # A step that only ends with the longest time is no hit, however short.
+        arrives = near.time < longest and (not is_first or near.time == 0.0) and near.way <= near.room
+        return SafeStep(t, near.time, select(arrives, near.wall, -1.0), select(is_past, near.past, -1.0))
+
+    def past(self, t):
+        return _nearest(self.walls, self.flight, t, 0.0).past
+
+
+@outlined
+def march_moving(walls, flight, longest):
+    """The first `Hit` with the walls that are met by safe steps, if there is one before the longest time."""
+    return Hit(*first_met(ToWalls(walls, flight, longest)))
+
+
+@outlined
+def march_alone(walls, r, v, pull, remaining):
+    """The same of a flight that has so much of the frame left [s]."""
+    return march_moving(walls, flight_of(r, v, pull, remaining), remaining)
+
+
+# --- Free time -------------------------------------------------------------------------------------------
+
+
+def free_time_moving(walls, gravity, r, v, remaining):
+    """A time during which a flight surely stays admissible, with so much of the frame left [s].
+
+    0 for a particle that is in contact now.
+    """
+    now, time = walls.at(remaining), math.inf
+    if not walls.accelerate:
+        return flights.free_time(gravity, now, r, v)
+    for wall in reversed(now.each):
+        here = _free_of(wall, gravity, r, v)
+        time = select(time < here, time, here)
+    return time
+
+
+def _free_of(wall, gravity, r, v):
+    """The free time of one wall."""
+    if not wall.accelerates:
+        return flights.free_time(gravity, Walls((wall,)), r, v)
+    # One safe step: of a flight of many steps the next one begins nearer to the wall.
+    step = wall.body.moving_step(wall.sees(gravity, r, v), wall.remaining)
+    return select(step.level > 0.0, 0.0, step.time)
+
+
+# --- First hits ------------------------------------------------------------------------------------------
+
+
+@outlined
+def first_hit_moving(walls, gravity, r, v, remaining):
+    """The first `Hit` of a free flight with walls in any motion, with so much of the frame left [s]."""
+    if walls.unions:
+        return _first_hit_in_rooms(walls, gravity, r, v, remaining)
+    found = closed_hit(walls.at(remaining), gravity, r, v)
+    longest = select(found.time < remaining, found.time, remaining)
+    met = march_moving(walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining), longest)
+    if met.wall >= 0.0 or met.time < longest:
+        return met
+    return found
+
+
+def _first_hit_in_rooms(walls, gravity, r, v, remaining):
+    """`first_hit_moving` where some of the walls are those of unions."""
+    found: Any = NEVER
+    shared = tuple(wall for _number, wall in walls.shared())
+    if shared:
+        found = first_hit_moving(walls.alone(shared), gravity, r, v, remaining)
+    for rooms, now in zip(walls.joined(), walls.at(remaining).joined(), strict=True):
+        leaves: Any = ()
+        for room in rooms:
+            some = walls.alone(tuple(wall for _number, wall, _gentle in room))
+            leaves = (*leaves, soonest(first_hit_moving(some, gravity, r, v, remaining), room[0][0], NEVER))
+        left = Hit(*leaving(walls, now, leaves, gravity, (r, v), False))
+        found = soonest(left, 0.0, found)
+    return found
+
+
+def closed_hit(walls, gravity, r, v):
+    """The first hit with the walls that have a closed form."""
+    found = NEVER
+    for number, wall in reversed(walls.numbered()):
+        if isinstance(wall, Field):
+            found_in = NEVER if wall.members.accelerates else wall.members.field_hit(gravity, r, v)
+            found = soonest(found_in, number, found)
+        else:
+            time, meets = (math.inf, True) if wall.accelerates else hit(gravity, wall, r, v)
+            found = sooner(time, meets, number, found)
+    return found

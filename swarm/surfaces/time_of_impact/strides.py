@@ -1,0 +1,89 @@
+"""Safe steps in lanes, to walls in any motion whose levels have a bound of their third derivative.
+
+A stride is one safe step of all walls together. Its bounds hold until the parabola of a level itself rises: near the
+hit what is not known of f''' is the only error, and a stride leaves the cube of its length. What a few strides do not
+find goes on in the next pass, from where it is.
+"""
+
+import math
+
+from ...kernel.gravity import accelerated
+from ...kernel.jit import select
+from ...kernel.vector import ZERO
+from ..in_motion.moving import Moving
+from .flights import Hit
+from .rising import ThirdDerivativeBound, flight_of
+from .safe import closed_hit, seen_by_walls
+
+_EPSILON = 2.220446049250313e-16
+# What a lane knows of its way: the time of the flight so far, the wall that it has met or -1, and the first hit with
+# the walls that have a closed form.
+_TIME, _MET, _CLOSED, _OTHER = 0, 1, 2, 3
+# The bounds of a stride hold for at most so many times the pace of a wall: beyond, a power series says little.
+_AHEAD = 32.0
+
+
+def start(walls, gravity, course, lane, r, v, remaining):
+    """The way of a flight with so much of the frame left [s] into a lane of the course."""
+    found = closed_hit(walls.at(remaining), gravity, r, v)
+    course[_TIME, lane], course[_MET, lane] = 0.0, -1.0
+    course[_CLOSED, lane], course[_OTHER, lane] = found.time, found.wall
+
+
+def stride(walls, gravity, course, lane, r, v, remaining, is_first):
+    """One stride of a lane that has not met a wall."""
+    t, met, closed = course[_TIME, lane], course[_MET, lane], course[_CLOSED, lane]
+    longest = select(closed < remaining, closed, remaining) - t
+    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining)
+    known = tuple(
+        (number, ThirdDerivativeBound(wall.body, seen, wall.body.level_along(seen)))
+        for wall, number, seen in seen_by_walls(walls, flight, t)
+    )
+    within, ahead = _first_rise(known), _AHEAD * _pace(walls)
+    ahead = select(ahead < longest, ahead, longest)
+    within = select(within < ahead, within, ahead)
+    time, wall, meets = _first_stride(known, within, is_first)
+    step = select(time < within, time, within)
+    under_way = (met < 0.0) & (longest > 0.0)
+    course[_TIME, lane] = select(under_way, t + step, t)
+    course[_MET, lane] = select(under_way & meets & (time <= within), wall, met)
+
+
+def met(course, lane):
+    """The first `Hit` of a lane, if its strides have found it."""
+    t, met, closed = course[_TIME, lane], course[_MET, lane], course[_CLOSED, lane]
+    # No wall in any motion before the closed hit
+    arrives = (met < 0.0) & (t >= closed)
+    return Hit(select(arrives, closed, t), select(arrives, course[_OTHER, lane], met))
+
+
+def _pace(walls):
+    """The shortest pace of all walls that move."""
+    shortest = math.inf
+    for wall in reversed(walls.each):
+        mine = wall.drive.time_scale if isinstance(wall, Moving) else math.inf
+        shortest = select(mine < shortest, mine, shortest)
+    return shortest
+
+
+def _first_rise(known):
+    """When the first of the levels' own parabolas rises."""
+    first = math.inf
+    for _number, one in known:
+        mine = one.level.own_rise()
+        first = select(mine < first, mine, first)
+    return first
+
+
+def _first_stride(known, within, is_first):
+    """(when the first level may rise, its wall, whether it surely does but for round-off), with bounds for so long."""
+    first, wall, meets_first = math.inf, -1.0, False
+    for number, one in known:
+        sixth, level = one.third(within) * (1.0 / 6.0), one.level
+        time = level.soonest(sixth, within, is_first)
+        # The parabola is above f by no more than this.
+        meets = 2.0 * sixth * within * time * time <= _EPSILON * one.seen.coordinates * level.steepness
+        mine = time < first
+        first, wall = select(mine, time, first), select(mine, number, wall)
+        meets_first = (mine & meets) | ((not mine) & meets_first)
+    return first, wall, meets_first

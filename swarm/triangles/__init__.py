@@ -1,0 +1,1 @@
+"""The walls of a scene as triangles, for pictures, recordings and files."""

@@ -1,0 +1,163 @@
+"""The parts of the surfaces of a scene, each a wall where no other one takes that away: of unions and the like."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..scene import Scene
+from ..state import Floats
+from ..surfaces.fields.many import Many
+from ..surfaces.instant import box_of, side_of
+from ..surfaces.part import handed_down
+from ..surfaces.presence.openings import sign_of
+from ..surfaces.surface import Surface
+from ..surfaces.union import Joined, Place, Union
+
+# Parts of the size of the drawing: a distance that counts as 0, and the distance from a wall at which a level is
+# evaluated to choose between two walls in one place.
+_NOTHING, _BESIDE = 1e-8, 2e-8
+# No distance is more than this many times that size.
+_FAR = 1e3
+
+
+@dataclass(frozen=True)
+class Cover:
+    """A surface that says where a wall is: in its admissible side (`sign` +1), or outside of that (-1).
+
+    Attributes:
+        time: [s].
+        is_room: whether it is a part beside the wall's in a union.
+        first: whether it has what lies in both, so that two walls in one place are drawn once.
+        opens: whether it has a face in common with the wall's part, which is no wall.
+        turn: +1 or -1, whether a way out of the wall is one of what the surface is to cover.
+        side: +1 or -1, the sign of phi that is its gap.
+    """
+
+    surface: Surface
+    sign: float
+    side: float
+    time: float
+    first: bool = False
+    is_room: bool = False
+    opens: bool = False
+    turn: float = 1.0
+
+    def level(self, points: Floats, outwards: Floats, size: float) -> Floats:
+        """The level at points (N, 3) of a wall with unit normals (N, 3).
+
+        It is above 0 where this surface takes the wall away, and a distance to first order.
+        """
+        if not self.surface.is_there(self.time):
+            # All points are on its admissible side.
+            return np.full(len(points), -self.sign * size)
+        way = self.turn * _BESIDE * size * outwards
+        # Of several walls in one place one is drawn. A wall between two rooms without a common volume is not drawn.
+        if self.sign < 0.0:
+            here = self._level(points - way if self.first else points, size)
+            return np.maximum(here, self._level(points + way, size)) if self.opens else here
+        before = self._level(points - way, size)
+        return np.maximum(before, self._level(points + way, size)) if self.first else before
+
+    def level_behind(self, points: Floats, outwards: Floats, size: float) -> Floats:
+        """The same a little behind a wall."""
+        return self._level(points + self.turn * _BESIDE * size * outwards, size)
+
+    def _level(self, points: Floats, size: float) -> Floats:
+        rows = np.ascontiguousarray(points.T)
+        with np.errstate(all="ignore"):
+            steep = np.sqrt((self.surface.gradient(rows, self.time) ** 2).sum(axis=0))
+            gap = self.side * self.surface.phi(rows, self.time) / np.maximum(steep, np.finfo(np.float64).tiny)
+        gap = np.clip(np.where(np.isnan(gap), np.inf, gap), -_FAR * size, _FAR * size)
+        return np.asarray(self.sign * gap - _NOTHING * size)
+
+    def may_cover(self, low: Floats, high: Floats) -> bool:
+        """Whether it may take away something of a wall in a box."""
+        if self.sign > 0.0 or self.side < 0.0 or not self.surface.is_there(self.time):
+            return True
+        first, last = (np.array(corner) for corner in box_of(self.surface, self.time))
+        return bool(((first <= high) & (low <= last)).all())
+
+
+@dataclass(frozen=True)
+class Part:
+    """A surface that is a part of one of the scene, or one of these itself.
+
+    Attributes:
+        owner: the number of the surface in the scene.
+        place: its place in that surface: the number of the part, and of the part of the part; empty for the whole.
+        surface: with what is given to the whole.
+        solid: whether particles are kept out of it.
+        covers: what leaves of it a wall.
+        doorways: volumes that take the wall away where another part is behind it.
+    """
+
+    owner: int
+    place: Place
+    surface: Surface
+    solid: bool
+    covers: tuple[Cover, ...]
+    doorways: tuple[Cover, ...] = ()
+
+    def level(self, points: Floats, outwards: Floats, size: float, near: list[Cover]) -> Floats:
+        """The level with respect to all covers. Covers that are not `near` take nothing away."""
+        found = np.full(len(points), -size)
+        for cover in near:
+            found = np.maximum(found, cover.level(points, outwards, size))
+        if self.doorways:
+            opened = np.max([one.level(points, outwards, size) for one in self.doorways], axis=0)
+            behind = [one.level_behind(points, outwards, size) for one in self.covers if one.is_room]
+            found = np.maximum(found, np.where(np.max(behind, axis=0, initial=-size) > 0.0, opened, -size))
+        return found
+
+
+def parts_of(scene: Scene, time: float) -> list[Part]:
+    """The parts of all surfaces at a time [s], in their order."""
+    found = _Found(time, scene.doorways_of_parts(), scene.common_faces(), [])
+    for i, surface in enumerate(scene.surfaces):
+        found.add(Part(i, (), surface, False, found.beside(scene.surfaces, i, 1.0)))
+    return found.parts
+
+
+class _Found(NamedTuple):
+    """The parts that are found, the volumes of doorways of each, and which two have a face in common."""
+
+    time: float
+    doorways: dict[tuple[int, Place], list[Surface]]
+    common: list[tuple[int, Place, Place]]
+    parts: list[Part]
+
+    def _have_a_face(self, owner: int, one: Place, other: Place) -> bool:
+        """Whether a part of a surface, and another one, have a face in common that is no wall."""
+        return any(
+            i == owner and {pair[0][: len(one)], pair[1][: len(other)]} == {one, other} for i, *pair in self.common
+        )
+
+    def beside(self, surfaces: Sequence[Surface], k: int, sign: float, opened: Sequence[int] = ()) -> tuple[Cover, ...]:
+        """The covers of one of several surfaces, by the others, of which some have a face in common with it."""
+        return tuple(
+            Cover(one, sign, side_of(one), self.time, first=j < k and not isinstance(one, Many), is_room=sign < 0.0,
+                  opens=sign < 0.0 and j in opened)
+            for j, one in enumerate(surfaces) if j != k and (sign < 0.0 or one.is_there(self.time))
+        )  # fmt: skip
+
+    def open(self, volumes: Iterable[Surface]) -> tuple[Cover, ...]:
+        """The covers by volumes in which a wall is open."""
+        return tuple(Cover(one, -1.0, sign_of(one), self.time) for one in volumes if one.is_there(self.time))
+
+    def add(self, part: Part) -> None:
+        """Add a part, or what it consists of."""
+        whole, solid = part.surface, part.solid ^ part.surface.is_solid()
+        if not isinstance(whole, Joined):
+            doorways = self.open(self.doorways.get((part.owner, part.place), ()))
+            covers = (*part.covers, *self.open(whole.open_volumes()))
+            self.parts.append(replace(part, solid=solid, covers=covers, doorways=doorways))
+            return
+        parts = [handed_down(whole, one) for one in whole.parts]
+        turned = tuple(replace(one, turn=one.turn * side_of(whole)) for one in part.covers)
+        for k, one in enumerate(parts):
+            place = (*part.place, k)
+            opened = [j for j in range(len(parts)) if self._have_a_face(part.owner, place, (*part.place, j))]
+            covers = (*turned, *self.beside(parts, k, -1.0 if isinstance(whole, Union) else 1.0, opened))
+            self.add(Part(part.owner, place, one, solid, covers))

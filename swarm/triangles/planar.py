@@ -1,0 +1,192 @@
+"""The walls of a scene of two dimensions as shapes to draw: curves in its plane, and a low ribbon along each."""
+
+import contourpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion import Pose, pose
+from ..scene import Scene
+from ..state import Floats
+from ..surfaces import Spheres
+from ..surfaces.fields.many import Many
+from ..surfaces.instant import box_of
+from ..surfaces.outlines.outlined import Outlined
+from ..surfaces.plane import along
+from ..surfaces.presence.openings import are_open
+from ..surfaces.surface import Surface
+from .curves import runs
+from .cut import Level, SmoothSurface
+from .parts import Part
+from .sharp import filled, smooth_walls
+
+# Points along each side of the grid on which curves are found, and of a small body on a grid of its own; of a circle.
+_POINTS, _BODY, _CIRCLE = 500, 60, 97
+# Bisections of a piece of a curve at the end of a wall.
+_BISECTIONS = 20
+# Cells of the grid beyond the walls, so that these are closed.
+_MARGIN = 2.0
+# An open area is drawn to this many times the distance of the surfaces and particles.
+_BEYOND = 1.2
+# The height of a ribbon, as a part of the width of the scene.
+_HEIGHT = 0.02
+
+Corners = tuple[Floats, Floats]
+Strip = tuple[Floats, NDArray[np.int64], Floats]
+
+
+class PlaneWalls:
+    """The walls of a scene at one time [s], in its plane, around them and particles (3, N)."""
+
+    def __init__(self, scene: Scene, positions: Floats, time: float) -> None:
+        across = scene.across()
+        assert across is not None
+        self._scene, self._time, self._across, self._axes = scene, time, across, along(across)
+        low, high = (np.array(corner)[list(self._axes)] for corner in scene.bounds(time))
+        reach = _BEYOND * max(scene.extent(), float(np.abs(positions).max()))
+        low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+        margin = _MARGIN * (high - low) / (_POINTS - 1.0)
+        self._box: Corners = low - margin, high + margin
+        self.height = _HEIGHT * float((high - low).max())
+        self._coarse = self._curves(self._box)
+
+    def curves(self, i: int, pose: Pose, bodies: int) -> list[Floats]:
+        """The curves (k, 3) [m] of surface i."""
+        surface = self._scene.surfaces[i]
+        if isinstance(surface, Outlined):
+            return self._of(i, surface.curves())
+        if isinstance(surface, Spheres):
+            angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE)
+            circle = self._placed(np.stack([np.cos(angle), np.sin(angle)], axis=1))
+            found = [c + r * circle for c, r in zip(surface.centers, surface.radii, strict=True)]
+            if surface.is_foam():
+                nothing = 1e-9 * float((self._box[1] - self._box[0]).max())
+                found = [run for curve in found for run in runs(curve, surface.phi(curve.T) >= -nothing)]
+            return [pose.placed(curve.T).T for curve in found]
+        if bodies:
+            solids = surface.solids() if isinstance(surface, Many) else [surface]
+            return [pose.placed(curve.T).T for solid in solids for curve in self._around(solid)]
+        found = self._of(i, self._coarse)
+        if not found:
+            return []
+        # Again, on a grid around this surface only.
+        points = np.concatenate(found)[:, list(self._axes)]
+        low, high = points.min(axis=0), points.max(axis=0)
+        margin = 2.0 * _MARGIN * np.maximum(high - low, 0.1 * (high - low).max()) / (_POINTS - 1.0)
+        return self._of(
+            i, self._curves((np.maximum(low - margin, self._box[0]), np.minimum(high + margin, self._box[1])))
+        )
+
+    def of_part(self, part: Part) -> list[Floats]:
+        """The curves of a part of a surface where it is a wall, each end where it meets another one."""
+        surface, at = part.surface, pose(part.surface.motion, self._time)
+        walls = smooth_walls(surface)
+        if isinstance(surface, Outlined):
+            return self._cut(part, walls[0], [], [at.placed(curve.T).T for curve in surface.curves()], at)
+        low, high = (np.array(corner)[list(self._axes)] for corner in box_of(filled(surface), self._time))
+        low, high = np.maximum(low, self._box[0]), np.minimum(high, self._box[1])
+        margin = _MARGIN * (high - low) / (_POINTS - 1.0)
+        sides = [np.linspace(a, b, _POINTS) for a, b in zip(low - margin, high + margin, strict=True)]
+        grid, found = at.given(self._placed(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)).T).T, list[Floats]()
+        for wall in walls if (low < high).all() else ():
+            with np.errstate(all="ignore"):
+                level = np.nan_to_num(wall.phi(grid), nan=1.0).reshape(_POINTS, _POINTS)
+            lines = contourpy.contour_generator(sides[0], sides[1], level).lines(0.0)
+            curves = [self._placed(np.asarray(line)) for line in lines]
+            found += self._cut(part, wall, [other for other in walls if other is not wall], curves, at)
+        return found
+
+    def _cut(
+        self, part: Part, wall: SmoothSurface, others: list[SmoothSurface], curves: list[Floats], at: Pose
+    ) -> list[Floats]:
+        """The parts of curves on a smooth wall that are a wall of the scene."""
+        size = float((self._box[1] - self._box[0]).max())
+        side = -1.0 if part.surface.is_solid() else 1.0
+
+        def level(points: Floats) -> Floats:
+            given = at.given(points.T).T
+            outwards = side * at.turned(wall.normals(given).T).T
+            found = part.level(points, outwards, size, list(part.covers))
+            return np.asarray(np.max([found, *(other.distance(given) for other in others)], axis=0))
+
+        found = []
+        for curve in curves:
+            there = level(curve) <= 0.0
+            for a, b in np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8))).reshape(
+                -1, 2
+            ):
+                first = [_end(level, curve[a], curve[a - 1])] if a else []
+                last = [_end(level, curve[b - 1], curve[b])] if b < len(curve) else []
+                if len(first) + len(last) + b - a > 1:
+                    found.append(np.array([*first, *curve[a:b], *last]))
+        return found
+
+    def strip(self, curves: list[Floats]) -> Strip:
+        """The ribbon on curves: vertices, triangles and normals."""
+        vertices, triangles, normals, first = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [np.empty((0, 3))], 0
+        up = np.zeros(3)
+        up[self._across] = 0.5 * self.height
+        for curve in curves:
+            n = len(curve)
+            vertices += [curve - up, curve + up]
+            k = first + np.arange(n - 1)
+            triangles += [np.stack([k, k + 1, k + n], axis=1), np.stack([k + 1, k + n + 1, k + n], axis=1)]
+            ahead = np.gradient(curve, axis=0)
+            beside = np.cross(ahead, up)
+            normals += [beside / np.maximum(np.sqrt((beside**2).sum(axis=1, keepdims=True)), 1e-300)] * 2
+            first += 2 * n
+        return np.concatenate(vertices), np.concatenate(triangles), np.concatenate(normals)
+
+    # --- On a grid ---
+
+    def _curves(self, box: Corners) -> list[Floats]:
+        """All walls in a box."""
+        sides = [np.linspace(low, high, _POINTS) for low, high in zip(*box, strict=True)]
+        grid = self._placed(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2))
+        with np.errstate(all="ignore"):
+            gap = self._scene.gaps(grid.T, self._time).max(axis=0)
+        gap = np.where(np.isfinite(gap), gap, np.max(gap, where=np.isfinite(gap), initial=1.0))
+        lines = contourpy.contour_generator(sides[0], sides[1], gap.reshape(_POINTS, _POINTS)).lines(0.0)
+        return [self._placed(np.asarray(line)) for line in lines]
+
+    def _of(self, i: int, curves: list[Floats]) -> list[Floats]:
+        """The parts of curves that are of surface i, without its openings."""
+        found = []
+        for curve in curves:
+            with np.errstate(all="ignore"):
+                gaps = self._scene.gaps(curve.T, self._time)
+            owner = np.asarray(np.nan_to_num(gaps, nan=-np.inf).argmax(axis=0))
+            for k, volumes in enumerate(self._scene.volumes):
+                owner[(owner == k) & are_open(volumes, curve.T, self._time)] = -1
+            ends = np.flatnonzero(np.diff(np.concatenate([[False], owner == i, [False]]).astype(np.int8)))
+            found += [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]
+        return found
+
+    def _around(self, solid: Surface) -> list[Floats]:
+        """The curves of one of many bodies."""
+        reach, center = 2.0 * solid.size(), np.array(getattr(solid, "center", (0.0, 0.0, 0.0)))[list(self._axes)]
+        low, high = self._box
+        if np.isfinite(reach):
+            far = _BEYOND * (solid.extent() - float(np.abs(center).max()))
+            reach = max(reach, far)
+            low, high = center - reach, center + reach
+        sides = [np.linspace(a, b, _BODY) for a, b in zip(low, high, strict=True)]
+        grid = self._placed(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2))
+        lines = contourpy.contour_generator(sides[0], sides[1], solid.phi(grid.T).reshape(_BODY, _BODY)).lines(0.0)
+        return [self._placed(np.asarray(line)) for line in lines]
+
+    def _placed(self, points: Floats) -> Floats:
+        """Points of the plane (N, 2) in space (N, 3)."""
+        found = np.zeros((len(points), 3))
+        found[:, list(self._axes)] = points
+        return found
+
+
+def _end(level: Level, within: Floats, beyond: Floats) -> Floats:
+    """The point between two on a curve up to which a level is not above 0."""
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (within + beyond)
+        if level(middle[None])[0] <= 0.0:
+            within = middle
+        else:
+            beyond = middle
+    return within

@@ -1,0 +1,51 @@
+"""The views of a run: the module of each, which is imported when the view is used."""
+
+import importlib
+from types import ModuleType
+from typing import NamedTuple
+
+from .common.extras import needed_by
+
+
+class View(NamedTuple):
+    """A module that shows a run, and what it needs.
+
+    Attributes:
+        module: its name, relative to this package.
+        what: it shows a run as, for errors.
+        extra: the packages that it needs, see `extras.PACKAGES`; None: none.
+    """
+
+    module: str
+    what: str = ""
+    extra: str | None = None
+
+
+VIEWS = {
+    "content": View(".words.content"),
+    "facts": View(".words.facts"),
+    "export": View(".exports.export"),
+    "plot": View(".pictures.plots", "a plot", "plot"),
+    "animation": View(".pictures.film", "a film", "animation"),
+    "film": View(".pictures.shown_film", "a film", "animation"),
+    "report": View(".report.of_run", "a report", "report"),
+    "xarray": View(".exports.labelled", "a Dataset", "xarray"),
+    "viewer": View(".recording.recorded", "a viewer", "record"),
+    "notebook": View(".recording.widget", "a viewer", "notebook"),
+}
+
+
+def view(name: str) -> ModuleType:
+    """The module of a view.
+
+    Raises:
+        SceneError: a package that it needs is not installed.
+
+    >>> view("plot").__name__
+    'swarm.pictures.plots'
+    """
+    found = VIEWS[name]
+    if found.extra is None:
+        return importlib.import_module(found.module, __package__)
+    with needed_by(found.what, found.extra):
+        return importlib.import_module(found.module, __package__)

@@ -1,0 +1,75 @@
+"""The part of a run that plots, titles and verdicts are made of."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from numpy.typing import NDArray
+
+from ..bodies.body import Body
+from ..errors import SceneError
+from ..methods import Method
+from ..particles import Particles
+from ..scene import Scene
+from .gone import Gone, gone_at, gone_of, without
+
+
+@dataclass(frozen=True)
+class Content:
+    """The part of a run that a picture shows.
+
+    Attributes:
+        name: of the file, or "".
+        count: number of particles, or of points of bodies, that were run.
+        seen: the observables, one entry a frame.
+        frames: the particles at the "start" and at the "end", as far as they are known.
+        gone: of each frame a mask of the particles that had escaped or been absorbed by then.
+    """
+
+    name: str
+    scene: Scene
+    method: Method
+    body: Body | None
+    count: int
+    seen: dict[str, NDArray[Any]]
+    frames: dict[str, Particles]
+    gone: dict[str, Gone] = field(default_factory=dict)
+
+    def inside(self, name: str) -> Particles:
+        """The particles of a frame; those that left the scene have positions of NaN."""
+        return without(self.frames[name], self.gone.get(name))
+
+
+def content_of(trajectory: Any) -> Content:
+    """The part of a `Trajectory` that a picture shows."""
+    trajectory.require_frames()
+    last = len(trajectory) - 1
+    numbers = {"start": 0, "end": last} if last else {"start": 0}
+    numbers = numbers if trajectory.has_particles() else {}
+    left = {name: gone_at(trajectory, k) for name, k in numbers.items()}
+    return Content(
+        trajectory.path.name,
+        trajectory.scene,
+        trajectory.method,
+        trajectory.body,
+        trajectory.count,
+        trajectory.observed(),
+        {name: trajectory.frame(k) for name, k in numbers.items()},
+        {name: one for name, one in left.items() if one is not None},
+    )
+
+
+def content_of_result(result: Any, what: str) -> Content:
+    """The part of a `Result` that a picture shows; `what` needs it, for the sentence of an error."""
+    if result.scene is None or result.method is None:
+        raise SceneError(f"{what} needs a Result that knows its scene and its method, got one without them")
+    body = None if result.bodies is None else result.bodies.body
+    name, frames = "", {}
+    if result.trajectory is not None and result.trajectory.is_file():
+        from ..files.trajectory import load
+
+        name = result.trajectory.name
+        with load(result.trajectory) as written:
+            frames = {"start": written.frame(0)} if written.has_particles() else {}
+    frames["end"] = result.particles
+    left = {"end": gone_of((result.escape_time, result.absorbed_time))} if body is None else {}
+    return Content(name, result.scene, result.method, body, len(result.particles), result.observables, frames, left)

@@ -1,0 +1,220 @@
+"""Surfaces in words: what each is, how large, its laws, and how it moves."""
+
+import math
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from .. import motion as motions
+from ..scene import Scene
+from ..surfaces.fields.many import Many
+from ..surfaces.presence.doors import Opening
+from ..surfaces.surface import Surface
+from ..surfaces.union import Place, part_at
+from .amounts import amount, amounts, counted_in_words, direction, listed, many, one, place, plain, plural_of
+
+# Kind -> what a cavity of it is called, what a solid of it is called, and what either is called in a plane.
+_NOUNS = {
+    "Sphere": ("sphere", "ball", "circle", "disc"),
+    "Ellipsoid": ("ellipsoid", "egg", "ellipse", "oval"),
+    "Torus": ("torus", "ring", "torus", "ring"),
+    "Capsule": ("capsule", "rod", "stadium", "rod"),
+    "Plane": ("plane", "plane", "line", "line"),
+    "Slab": ("pair of planes", "slab", "strip", "bar"),
+    "Box": ("box", "block", "rectangle", "block"),
+    "Cylinder": ("cylinder", "cylinder", "circle", "disc"),
+    "Cone": ("cone", "cone", "wedge", "wedge"),
+    "Paraboloid": ("bowl", "paraboloid", "parabola", "parabola"),
+    "Quadric": ("quadric", "quadric", "conic", "conic"),
+    "Formula": ("cavity of a formula", "solid of a formula", "curve of a formula", "solid of a formula"),
+    "OwnSurface": ("cavity of its own kind", "solid of its own kind") * 2,
+    "Sampled": ("sampled cavity", "sampled solid") * 2,
+    "Mesh": ("mesh", "solid mesh") * 2,
+    "Spheres": ("bubble", "ball", "bubble", "disc"),
+    "Cylinders": ("cylinder", "peg", "cylinder", "peg"),
+    "Capsules": ("capsule", "rod", "capsule", "rod"),
+    "Boxes": ("box", "block", "rectangle", "block"),
+    "Ellipsoids": ("ellipsoid", "egg", "ellipse", "oval"),
+    "Polygon": ("polygon", "polygonal column", "polygon", "polygon"),
+    "Stadium": ("stadium", "stadium column", "stadium", "stadium"),
+    "Prism": ("prism", "prism", "prism", "prism"),
+    "Union": ("vessel", "compound solid") * 2,
+    "Intersection": ("intersection", "intersection") * 2,
+}
+# Within this angle of straight down or up a plane is a floor or a lid [cosine].
+_LEVEL = 1.0 - 1e-6
+# What of a description is a length or lengths, and how it is said.
+_SIZES = {
+    "radius": "radius", "radii": "radii", "semi_axes": "semi-axes", "half_widths": "half widths", "length": "length",
+    "lengths": "lengths", "major_radius": "major radius", "minor_radius": "minor radius", "half_width": "half width",
+    "height": "height", "focal_length": "focal length", "offset": "offset", "spacing": "spacing",
+}  # fmt: skip
+
+
+def noun_of(surface: Surface, scene: Scene | None = None) -> str:
+    """What a surface is called: a solid sphere is a ball, and a plane at the bottom a floor."""
+    kind, solid = type(surface).__name__, surface.is_solid()
+    flat = scene is not None and scene.plane is not None
+    if kind == "Plane" and scene is not None and scene.gravity is not None:
+        normal, pull = np.array(surface.normal), np.array(scene.gravity)  # type: ignore[attr-defined]
+        down = float(normal @ pull / (np.linalg.norm(normal) * np.linalg.norm(pull)))
+        return "floor" if down > _LEVEL else "lid" if down < -_LEVEL else "slope" if down > 1e-9 else "wall"
+    if solid is False and isinstance(surface, Many) and not hasattr(surface, "side"):
+        solid = True
+    if kind in _NOUNS:
+        return _NOUNS[kind][2 * flat + solid]
+    # A kind of a plugin.
+    return "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in kind).strip()
+
+
+def is_outlined(surface: Surface) -> bool:
+    """Whether a surface of many sides is one thing all the same."""
+    return hasattr(surface, "given")
+
+
+def number_of(surface: Surface) -> int:
+    """The number of bodies in a surface, as its noun counts them."""
+    return len(surface) if isinstance(surface, Many) and not is_outlined(surface) else 1
+
+
+def labels(scene: Scene) -> dict[tuple[int, Place], str]:
+    """What each surface, and each part of a union, is called in legends: alone by its noun, else with a number.
+
+    >>> import swarm
+    >>> labels(swarm.Scene([swarm.Sphere(1.0), swarm.Plane((1, 0, 0)), swarm.Plane((-1, 0, 0), 0.5)]))
+    {(0, ()): 'sphere', (1, ()): 'plane 1', (2, ()): 'plane 2'}
+    """
+    places: list[tuple[int, Place]] = [(i, ()) for i in range(len(scene.surfaces))]
+    places += [(i, where) for i, where in scene.parts]
+    nouns: dict[tuple[int, Place], str] = {}
+    for i, where in places:
+        surface = part_at(scene.surfaces[i], where)
+        number, noun = number_of(surface), noun_of(surface, scene)
+        nouns[i, where] = noun if number == 1 else f"{many(number)} {plural_of(noun)}"
+    often, seen, told = Counter(nouns.values()), Counter[str](), {}
+    for key, noun in nouns.items():
+        seen[noun] += 1
+        told[key] = noun if often[noun] == 1 else f"{noun} {seen[noun]}"
+    return told
+
+
+def moves_how(surface: Surface) -> str:
+    """What moves a surface, as the end of "a drum that ..."; "" for a surface at rest."""
+    if surface.reacts():
+        return "impacts swing" if surface.mass is None or surface.inertia is not None else "impacts push"
+    kinds = {type(part).__name__ for part in getattr(surface.motion, "parts", (surface.motion,))}
+    for kind, told in (("Rotation", "turns"), ("Oscillation", "shakes"), ("Translation", "moves"), ("Path", "moves")):
+        if kind in kinds:
+            return told
+    return "" if surface.motion is None else "is moved"
+
+
+def size_of(surface: Surface) -> str:
+    """The size of a surface, such as "of radius 0.5 m"; "" if it has no length."""
+    told = []
+    for name, noun in _SIZES.items():
+        value = getattr(surface, name, None)
+        if value is None or (name == "length" and type(surface).__name__ in ("Formula", "OwnSurface")):
+            continue
+        numbers = np.unique(np.asarray(value, np.float64).ravel()) if isinstance(surface, Many) else np.ravel(value)
+        if len(numbers) > 3 or (isinstance(surface, Many) and not is_outlined(surface) and len(numbers) > 1):
+            told.append(f"{noun} from {amounts([numbers.min(), numbers.max()], 'm').replace(' and ', ' to ')}")
+        elif name != "offset" or numbers[0]:
+            told.append(f"{noun} {amounts(numbers.tolist(), 'm')}")
+    if hasattr(surface, "half_angle"):
+        told.append(f"half angle {math.degrees(surface.half_angle):.4g}°")
+    if hasattr(surface, "triangles"):
+        told.append(f"{many(len(surface.triangles))} triangles")
+    if is_outlined(surface):
+        told.append(f"{many(len(surface))} sides")  # type: ignore[arg-type]
+    if hasattr(surface, "formula"):
+        told.append(f"{surface.formula} = 0".replace("**", "^"))
+    if hasattr(surface, "parts"):
+        told.append(f"of {listed([in_full(part) for part in surface.parts])}")
+    return ", ".join(told)
+
+
+def in_full(surface: Surface, scene: Scene | None = None) -> str:
+    """A surface in full: what it is, its size, where it is, its laws, its openings and its motion."""
+    number, noun = number_of(surface), noun_of(surface, scene)
+    told = [counted_in_words(number, noun) if number > 1 else one(noun)]
+    if size := size_of(surface):
+        told[0] += f" {size}" if size.startswith("of ") else f" of {size}"
+    if hasattr(surface, "normal"):
+        told.append(f"normal along {direction(surface.normal)}")
+    axis = getattr(surface, "axis", None)
+    if axis is not None and scene is not None and scene.plane is None:
+        told.append(f"axis along {direction(axis)}")
+    center = getattr(surface, "center", None)
+    if center is not None and any(center):
+        told.append(f"centre at {place(center)}")
+    if surface.rotation is not None:
+        told.append(f"turned by {math.degrees(2.0 * math.acos(min(1.0, abs(surface.rotation[0])))):.4g}°")
+    return ", ".join(told + laws_of(surface) + changes_of(surface))
+
+
+def laws_of(surface: Surface) -> list[str]:
+    """The laws of the wall of a surface; empty for a wall that keeps the energy."""
+    told = []
+    if surface.restitution < 1.0:
+        told.append(f"restitution {plain(surface.restitution)}")
+    if surface.friction:
+        told.append(f"friction {plain(surface.friction)}")
+    if surface.temperature is not None:
+        part = "" if surface.accommodation == 1.0 else f" for {plain(100.0 * surface.accommodation)} % of the impacts"
+        told.append(f"warm, k_B T = {amount(surface.temperature, 'J')}{part}")
+    return told + [law_of(law) for law in surface.laws]
+
+
+def law_of(law: Any) -> str:
+    """A law of a wall in words."""
+    kind, numbers = type(law).__name__, law._asdict() if hasattr(law, "_asdict") else {}
+    if kind == "Absorb":
+        if numbers.get("barrier") is not None:
+            return f"absorbs above {amount(float(law.barrier), 'J')}"
+        chance = float(law.probability)
+        return "absorbs" if chance == 1.0 else f"absorbs {plain(100.0 * chance)} %"
+    named = {"CercignaniLampis": "Cercignani and Lampis' law", "Lambert": "diffuse by Lambert's law"}
+    told = named.get(kind, {"Sticky": "holds particles for a time"}.get(kind, f"the law {kind}"))
+    if kind == "CercignaniLampis":
+        told += f" at k_B T = {amount(float(law.temperature), 'J')}"
+    return told
+
+
+def changes_of(surface: Surface) -> list[str]:
+    """The changes of a surface with time: openings, doors, motion, and the effects of impacts."""
+    told = []
+    doors = [one for one in surface.openings if isinstance(one, Opening) and one.times is not None]
+    if doors:
+        told.append(counted_in_words(len(doors), "door"))
+    if holes := len(surface.openings) - len(doors):
+        told.append(counted_in_words(holes, "opening"))
+    if faces := getattr(surface, "open", ()):
+        told.append(f"open at {listed(list(map(str, faces)))}")
+    if surface.present is not None:
+        spans = [
+            f"from {amount(begin, 's')}" + ("" if math.isinf(end) else f" to {amount(end, 's')}")
+            for begin, end in surface.present
+        ]
+        told.append(f"there {listed(spans)}")
+    told += [motion_of(part) for part in getattr(surface.motion, "parts", (surface.motion,)) if part is not None]
+    if surface.mass is not None:
+        told.append(f"mass {amount(surface.mass, 'kg')}, moved by impacts")
+    if surface.inertia is not None:
+        told.append(f"inertia {plain(surface.inertia)} kg m², turned by impacts")
+    return told
+
+
+def motion_of(motion: Any) -> str:
+    """A motion in words."""
+    if isinstance(motion, motions.Rotation):
+        return f"turns about {direction(motion.axis)} with {plain(motion.rate)} rad/s"
+    if isinstance(motion, motions.Oscillation):
+        return f"shakes by {place(motion.amplitude)} at {amount(motion.frequency, 'Hz')}"
+    if isinstance(motion, motions.Translation):
+        return f"moves with {amount(math.dist(motion.velocity, (0, 0, 0)), 'm/s')} along {direction(motion.velocity)}"
+    if isinstance(motion, motions.Guide):
+        spring = f", on a spring of {amount(motion.stiffness, 'N/m')}" if motion.stiffness else ""
+        return f"guided along {direction(motion.axis)}{spring}"
+    return {"Path": "moves along a path", "Placed": "held where it is"}.get(type(motion).__name__, "moves")

@@ -1,0 +1,279 @@
+"""Whether a run went well: a sentence with its figure for each thing that should hold.
+
+Limits are what the arithmetic of a method allows. A number is rounded to 1.1e-16 of itself once or a few times in an
+impact or a step, so errors of round-off grow at most in proportion to their number; measured ones grow far less, and up
+to 1e5 impacts of a particle the project's own tests ask for 1e-12.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..common.catalog import OBSERVABLES
+from ..pairs import MOST_PRESSED
+from ..state import Floats
+from .amounts import amount, counted_in_words, listed, many, plain
+
+# Of whatever should be kept: the bound of the project's tests, and how much of a number one operation may round away.
+ROUND_OFF, _OPERATION = 1e-12, 8.0 * float(np.finfo(np.float64).eps)
+# Methods that keep the energy to round-off or to their tolerance: the others are said to drift.
+_CONSERVING = ("Impact", "Penalty", "AugmentedLagrangian")
+
+
+class Verdict(NamedTuple):
+    """What should hold, as "energy", whether it does (None: nothing to judge), and how well, in words."""
+
+    about: str
+    holds: bool | None
+    text: str
+
+
+def judged(content: Any) -> list[Verdict]:
+    """The verdicts on a run, of what plots show of it (`Content`)."""
+    found = _numbers(content)
+    if any(verdict.holds is False for verdict in found):
+        return found  # with values that are not finite other verdicts mean nothing
+    for judge in (_energy, _balance, _penetration, _overlap, _momentum, _multipliers, _links, _books):
+        found[-1:-1] = judge(content)
+    return found
+
+
+def marked(content: Any) -> list[str]:
+    """The verdicts as lines of a picture, such as "✓ energy: kept to round-off: ...".
+
+    The verdict on numbers has a line only if some values are not finite.
+    """
+    marks = {True: "✓", False: "✗", None: "·"}
+    found = [one for one in judged(content) if one.about != "numbers" or not one.holds]
+    return [f"{marks[one.holds]} {one.about}: {one.text}" for one in found]
+
+
+def energy_limit(content: Any) -> float:
+    """The largest relative error of the energy of one particle that round-off, or a tolerance, explains."""
+    seen, method = content.seen, content.method
+    steps = float(seen["time"][-1] - seen["time"][0]) / step if (step := getattr(method, "dt", None)) else 0.0
+    each = float(seen["impacts"][-1] + seen.get("collisions", [0.0])[-1]) / max(1, content.count)
+    limit = max(ROUND_OFF, _OPERATION * (each + steps))
+    return float(limit + _tolerated(content, each)) if method.has_multipliers() else float(limit)
+
+
+def _tolerated(content: Any, each: float) -> float:
+    """The relative energy that `each` contacts of a particle may change within the tolerance of the loop.
+
+    A contact ends with a gap of at most g, V = penalty g^2/2 = tolerance; its force, the impulse over the step, has
+    done at most force times g of work, which is missing in the balance of energy. A particle may have four times the
+    mean impulse.
+    """
+    seen, method = content.seen, content.method
+    most = float((seen["kinetic_energy"] + np.abs(seen["contact_energy"])).max()) / max(1, int(content.count))
+    impulse = float(np.abs(seen["impulse"][-1]).sum()) / max(1.0, float(seen["impacts"][-1]))
+    gap = float(np.sqrt(2.0 * method.tolerance / method.penalty))
+    return (1.0 + each) * 4.0 * impulse / method.dt * gap / most if most else 0.0
+
+
+def _numbers(content: Any) -> list[Verdict]:
+    """Whether all observables of every run are numbers."""
+    bad = []
+    for name, values in content.seen.items():
+        if name in OBSERVABLES and not OBSERVABLES[name].may_be_nan and np.asarray(values).dtype.kind == "f":
+            wrong = ~np.isfinite(np.asarray(values).reshape(len(values), -1)).all(axis=1)
+            bad += [f"{name} from {amount(content.seen['time'][wrong.argmax()], 's')} on"] if wrong.any() else []
+    if bad:
+        return [Verdict("numbers", False, f"not finite: {listed(bad)}")]
+    return [Verdict("numbers", True, "every observable is finite in every frame")]
+
+
+def _energy(content: Any) -> list[Verdict]:
+    """The worst particle, its books of losses and heat included."""
+    worst, limit = float(content.seen["energy_error"].max()), energy_limit(content)
+    one, name = "particle" if content.body is None else "body", type(content.method).__name__
+    figure = f"the worst {one}'s error is {plain(worst, 2)} of its energy"
+    if worst == 0.0:
+        return [Verdict("energy", True, f"every {one}'s is as it should be, to the last bit")]
+    if worst <= max(ROUND_OFF, limit if not content.method.has_multipliers() else 0.0):
+        return [Verdict("energy", True, f"kept to round-off: {figure}")]
+    if worst <= limit:
+        return [Verdict("energy", True, f"kept to the tolerance of the loop: {figure}")]
+    why = "the tolerance of the loop" if content.method.has_multipliers() else "round-off"
+    if name not in _CONSERVING:
+        return [Verdict("energy", False, f"not kept, {name} does not conserve it: {figure}")]
+    return [Verdict("energy", False, f"not kept: {figure}, and {why} explains {plain(limit, 1)}")]
+
+
+def books(seen: dict[str, Any]) -> dict[str, Floats]:
+    """What has changed the energy of all since the first frame [J], each with the sign with which it does."""
+    zero = np.zeros(len(seen["time"]))
+    moved = np.sum(seen.get("wall_work", zero[:, None]), axis=1)
+    changes = {
+        "dissipated": -np.asarray(seen.get("dissipated_energy", zero)),
+        "heat of the walls": np.sum(seen.get("wall_heat", zero[:, None]), axis=1),
+        "work of the walls": moved,
+        "work of anchors": np.asarray(seen.get("work", zero)),
+        "brought by sources": np.asarray(seen.get("source_energy", zero)),
+    }
+    return {name: values - values[0] for name, values in changes.items() if np.any(values - values[0])}
+
+
+def unexplained(seen: dict[str, Any]) -> tuple[float, float]:
+    """The largest change of the energy of all that is in no book, and the energy that moved or was there at most [J].
+
+    The zero of the potential energy is arbitrary, so of that only what changes counts.
+    """
+    total, changes = np.asarray(seen["total_energy"]), books(seen)
+    rest = total - total[0] - np.sum(list(changes.values()), axis=0) if changes else total - total[0]
+    scale = (
+        np.abs(seen["kinetic_energy"]).max() + np.ptp(seen["potential_energy"]) + np.abs(seen["contact_energy"]).max()
+    )
+    return float(np.abs(rest).max()), float(scale + sum(np.abs(values).max() for values in changes.values()))
+
+
+def _balance(content: Any) -> list[Verdict]:
+    """The energy of all against what walls, sources and anchors have taken and given."""
+    changes, (rest, scale) = books(content.seen), unexplained(content.seen)
+    part = rest / scale if scale else rest
+    limit = energy_limit(content)
+    holds = part <= limit
+    if not changes:
+        known = type(content.method).__name__ in _CONSERVING
+        why = "" if holds or known else f", {type(content.method).__name__} does not conserve it"
+        if rest == 0.0:
+            return [Verdict("total energy", True, "constant to the last bit")]
+        kept = "constant" if holds else "not constant"
+        return [Verdict("total energy", holds, f"{kept}: it changes by {plain(part, 2)} of itself at most{why}")]
+    told = [
+        f"{name} {amount(float(values[-1]) * (-1 if name == 'dissipated' else 1), 'J', 3)}"
+        for name, values in changes.items()
+    ]
+    closes = "closes" if holds else "does not close: it is off by"
+    to = f"to {plain(part, 2)}" if holds else plain(part, 2)
+    return [Verdict("balance of energy", holds, f"{closes} {to} of what moved ({listed(told)})")]
+
+
+def _penetration(content: Any) -> list[Verdict]:
+    """How far outside a wall a particle was."""
+    if not content.scene.surfaces:
+        return []
+    deepest, one = float(content.seen["max_penetration"].max()), "particle" if content.body is None else "point"
+    if deepest == 0.0:
+        kind = "a rigid wall" if content.method.law() is None else "a wall"
+        return [Verdict("walls", True, f"no {one} was outside {kind}")]
+    size = reach_of(content.scene)
+    if content.method.law() is not None and not content.method.has_multipliers():
+        part = f", {plain(100.0 * deepest / size, 2)} % of the vessel" if size else ""
+        return [Verdict("walls", None, f"springs gave way by at most {amount(deepest, 'm', 2)}{part}")]
+    limit = penetration_limit(content)
+    outside = f"at most {amount(deepest, 'm', 2)} outside a rigid wall"
+    if deepest <= limit:
+        return [Verdict("walls", True, f"{outside}, round-off of {amount(size, 'm', 2)}")]
+    why = "the tolerance of the loop" if content.method.has_multipliers() else "round-off"
+    return [Verdict("walls", False, f"{outside}, where {why} explains {amount(limit, 'm', 1)}")]
+
+
+def _overlap(content: Any) -> list[Verdict]:
+    """How deep soft balls pressed on one another and on walls, at any step."""
+    radius = next((frame.radius for frame in content.frames.values() if frame.radius is not None), None)
+    if "largest_overlap" not in content.seen or radius is None:
+        return []
+    deepest, least, most = (
+        float(f(x)) for f, x in ((np.max, content.seen["largest_overlap"]), (np.min, radius), (np.max, radius))
+    )
+    if deepest == 0.0:
+        return [Verdict("contacts", True, "no ball pressed on another one or on a wall")]
+    found = f"balls overlapped by at most {amount(deepest, 'm', 2)}, {plain(100.0 * deepest / least, 2)} % of "
+    found += "their radius" if least == most else "the smallest radius"
+    if deepest <= MOST_PRESSED * least:
+        return [Verdict("contacts", True, found)]
+    wanted = f"{found}; up to {100.0 * MOST_PRESSED:g} % of a radius they are small: use a larger penalty"
+    return [Verdict("contacts", False if deepest > MOST_PRESSED * most else None, wanted)]
+
+
+def penetration_limit(content: Any) -> float:
+    """The largest distance outside a rigid wall that round-off, or a tolerance, explains [m]."""
+    method, limit = content.method, ROUND_OFF * reach_of(content.scene)
+    if method.has_multipliers():
+        limit += float(np.sqrt(2.0 * method.tolerance / method.penalty))
+    return limit
+
+
+def reach_of(scene: Any) -> float:
+    """The distance from the origin within which walls are [m]: numbers of that size are rounded."""
+    sizes = [scene.finite_size(), *(surface.extent() for surface in scene.surfaces)]
+    return float(max(size for size in sizes if np.isfinite(size)))
+
+
+def _momentum(content: Any) -> list[Verdict]:
+    """Momentum, which nothing changes in a cell that repeats, without walls and gravity."""
+    scene, seen = content.scene, content.seen
+    if scene.surfaces or scene.gravity is not None or content.body is not None or "born" in seen:
+        return []
+    frame = content.frames.get("start", content.frames.get("end"))
+    mass = float(np.nansum(frame.mass)) if frame is not None else float(content.count)
+    change = float(np.abs(seen["momentum"] - seen["momentum"][0]).max())
+    scale = float(np.sqrt(2.0 * mass * seen["kinetic_energy"].max()))
+    part = change / scale if scale else change
+    holds = part <= energy_limit(content)
+    return [Verdict("momentum", holds, f"{'kept' if holds else 'not kept'}: it changes by {plain(part, 2)} of all")]
+
+
+def _multipliers(content: Any) -> list[Verdict]:
+    """Whether loops of multipliers ended by themselves."""
+    if not content.method.has_multipliers():
+        return []
+    failed = int(content.seen["unconverged"][-1])
+    if failed:
+        return [Verdict("loops", False, f"{counted_in_words(failed, 'contact')} did not converge")]
+    sweeps = float(content.seen.get("sweeps", [0])[-1])
+    each = sweeps / max(1.0, float(content.seen["impacts"][-1]))
+    return [Verdict("loops", True, f"every contact converged, in {plain(each, 2)} sweeps an impact")]
+
+
+def _links(content: Any) -> list[Verdict]:
+    """Whether links keep their lengths."""
+    if content.body is None or not len(content.body.links):
+        return []
+    worst, limit = float(np.max(content.seen["link_error"])), energy_limit(content)
+    holds = worst <= limit
+    kept = "keep their lengths" if holds else "do not keep their lengths"
+    return [Verdict("links", holds, f"they {kept}: the worst is off by {plain(worst, 2)} of it")]
+
+
+def _books(content: Any) -> list[Verdict]:
+    """Whether the numbers of particles balance: all are inside, or were absorbed, or escaped.
+
+    Empty for a run without sources that no particle left.
+    """
+    seen, body = content.seen, content.body
+    ends = {"escaped": int(seen["escaped"][-1]), "absorbed": int(np.sum(seen.get("absorbed", [0])[-1]))}
+    if not any(ends.values()) and "born" not in seen:
+        return []
+    if body is not None:
+        whole = content.scene.is_open()
+        return [Verdict("number", whole or None, f"{many(ends['escaped'])} of {many(content.count // len(body))} left")]
+    born = int(np.sum(seen["born"][-1])) if "born" in seen else 0
+    there = content.count if "born" not in seen else at_start(content) + born
+    inside = there - sum(ends.values())
+    parts = [f"{many(inside)} inside"] + [f"{many(number)} {what}" for what, number in ends.items() if number]
+    frame = content.frames.get("end")
+    seen_there = there if frame is None else int((~np.isnan(frame.position[0])).sum())
+    kept = content.count == (there if frame is None else len(frame.mass))
+    came = f", of whom {many(born)} came from sources" if born else ""
+    if inside < 0 or (kept and frame is not None and seen_there != there):
+        return [Verdict("number", False, f"{listed(parts)} are not the {many(there)} that there are{came}")]
+    if ends["escaped"] and not content.scene.is_open() and not _has_openings(content.scene):
+        return [Verdict("number", False, f"{many(ends['escaped'])} of {many(there)} passed through a closed wall")]
+    return [Verdict("number", True, f"{many(there)} = {' + '.join(parts)}{came}")]
+
+
+def at_start(content: Any) -> int:
+    """How many particles were there before any came from a source."""
+    frame, born = content.frames.get("start"), content.seen.get("born")
+    if born is None:
+        return int(content.count)
+    if frame is not None and len(frame.mass) == content.count:
+        return int((~np.isnan(frame.position[0])).sum() - np.sum(born[0]))
+    # The run has reached its end: all particles of its sources are born.
+    return int(content.count - np.sum(born[-1]))
+
+
+def _has_openings(scene: Any) -> bool:
+    return any(piece.openings or piece.present is not None for piece in scene.pieces)
