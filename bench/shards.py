@@ -11,9 +11,8 @@ from unittest import mock
 import numpy as np
 
 import swarm
-from swarm import observables
-from swarm.run import cluster
-from swarm.run.cluster import joined, shards, worker
+from swarm import cluster, observables
+from swarm.cluster import joined, shards, worker
 from swarm.run.machine import RunEnd
 from swarm.run.measures import Measures
 from swarm.run.options import Task
@@ -27,7 +26,7 @@ _OF_PARTICLES = ("position", "velocity", "mass", "radius", "spin", "image")
 
 
 def carry_out(task: Task, session: cluster.Sharded) -> RunEnd:
-    """Carry out a run that is checked, as `swarm.run.cluster.carry_out`.
+    """Carry out a run that is checked, as `swarm.cluster.carry_out`.
 
     Raises:
         RunError: a shard failed.

@@ -1,7 +1,7 @@
 """Particles: arrays with one row per component."""
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -225,3 +225,40 @@ def _rows(name: str, value: ArrayLike) -> Floats:
             f"{first} ({int((~good).sum())} such particles){late}"
         )
     return rows
+
+
+class TiedParticles:
+    """Particles that are points of bodies: all that the engine of independent particles asks of `Bodies`.
+
+    Attributes:
+        body: the template of all copies.
+        position: (3, P, n) of every point of every copy [m].
+        velocity: the same shape [m/s].
+    """
+
+    body: Any
+    position: Floats
+    velocity: Floats
+
+    def __len__(self) -> int:
+        return int(self.position.shape[2])
+
+    def copy(self) -> Self:
+        """The same bodies as a start, checked again, with arrays of their own."""
+        raise NotImplementedError
+
+    def contact_points(self) -> Floats:
+        """(3, K, n) the points that can touch walls."""
+        raise NotImplementedError
+
+    def bonds(self) -> NDArray[np.int64]:
+        """(B n, 2) the pairs of points that are tied, as numbers of `particles`."""
+        raise NotImplementedError
+
+    def moved(self, particles: Particles) -> Self:
+        """These bodies where their points, as `particles` gives them, are now."""
+        raise NotImplementedError
+
+    def particles(self) -> Particles:
+        """All points as particles: point p of copy i is number p n + i."""
+        raise NotImplementedError

@@ -22,12 +22,14 @@ class View(NamedTuple):
 
 
 VIEWS = {
+    "bodies": View(".bodies.table"),
     "content": View(".words.content"),
     "facts": View(".words.facts"),
     "export": View(".exports.export"),
     "plot": View(".pictures.plots", "a plot", "plot"),
     "animation": View(".pictures.film", "a film", "animation"),
     "film": View(".pictures.shown_film", "a film", "animation"),
+    "recording": View(".recording.writer", "a recording", "record"),
     "report": View(".report.of_run", "a report", "report"),
     "xarray": View(".exports.labelled", "a Dataset", "xarray"),
     "viewer": View(".recording.recorded", "a viewer", "record"),

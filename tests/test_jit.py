@@ -1,8 +1,6 @@
-"""Compilation: the same definitions in Python and in kernels, a cache that notices edits, and the layers of imports."""
+"""Compilation: the same definitions in Python and in kernels, and a cache that notices edits."""
 
-import ast
 import functools
-import graphlib
 import math
 import os
 import subprocess
@@ -15,7 +13,7 @@ import numba
 import numpy as np
 import pytest
 from children import python
-from conftest import LAWS, call, compiled, every_surface, numbers_of, rarely, row, scene_of
+from conftest import LAWS, call, compiled, every_surface, numbers_of, rarely, scene_of
 from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import TypingError
 
@@ -478,82 +476,3 @@ assert (product(a) == a @ a).all()
 assert "scipy.linalg" in sys.modules
 """
     subprocess.run([sys.executable, "-c", code], check=True)
-
-
-# --- Layers ----------------------------------------------------------------------------------------------
-
-# The architecture, from the top down; a module imports only from layers below its own, or from its own package.
-# `check` and `numbers` of a method take the Scene and the Particles, so these are below.
-LAYERS = [
-    ["__init__"],
-    ["__main__"],
-    ["cli"],
-    ["commands"],
-    ["ensemble"],
-    ["scene_file", "summary"],
-    ["history", "packing"],
-    ["run"],
-    ["output"],
-    ["bodies"],
-    ["run_tables"],
-    ["tables", "filling", "sources"],
-    ["law_tables"],
-    ["plugins"],
-    ["observables", "placing"],
-    ["colliding", "grains"],
-    ["lanes", "reacting"],
-    ["ball_numbers", "methods"],
-    ["scene"],
-    ["pairs", "pieces"],
-    ["particles"],
-    ["plane"],
-    ["contact"],
-    ["surfaces"],
-    ["frames", "kernel", "motion", "rows"],
-    ["snapshot"],
-    ["columns"],
-    ["checks", "notebook"],
-    ["extras"],
-    ["links"],
-    ["catalog", "state", "status", "errors", "version", "interrupt", "signature"],
-]
-LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
-
-
-@functools.cache
-def modules():
-    """Every module of the package as its path of names."""
-    return {path.relative_to(PACKAGE).with_suffix("").parts: path for path in PACKAGE.rglob("*.py")}
-
-
-@functools.cache
-def imported_names(parts):
-    """The modules of the package that a module imports, at its top or inside a function, and what from each."""
-    known, found = modules(), []
-    for node in ast.walk(ast.parse(known[parts].read_text())):
-        if isinstance(node, ast.Import):
-            assert not any(alias.name.split(".")[0] == "swarm" for alias in node.names), "relative imports only"
-        if isinstance(node, ast.ImportFrom) and node.level:
-            home = (*parts[: len(parts) - node.level], *(node.module.split(".") if node.module else ()))
-            for alias in node.names:
-                targets = [(*home, alias.name), (*home, alias.name, "__init__"), home, (*home, "__init__")]
-                target = next(target for target in targets if target in known)
-                found.append((target, [] if target in targets[:2] else [alias.name]))
-    return found
-
-
-def imported(parts):
-    """The modules of the package that a module imports."""
-    return [target for target, _names in imported_names(parts)]
-
-
-def test_a_module_imports_only_from_below():
-    for parts in modules():
-        with row(".".join(parts)):
-            above = [one for one in imported(parts) if LAYER[one[0]] <= LAYER[parts[0]]]
-            assert [".".join(one) for one in above if len(one) == 1 or one[0] != parts[0]] == []
-
-
-def test_no_imports_go_in_circles():
-    graph = {parts: set(imported(parts)) for parts in modules()}
-    assert len(list(graphlib.TopologicalSorter(graph).static_order())) >= len(modules())

@@ -12,7 +12,7 @@ import pytest
 
 from bench import cells, outcomes
 from bench.cells import Cell
-from swarm.run.cluster import Sharded, shards
+from swarm.cluster import Sharded, shards
 from swarm.run.preflight import knows
 
 FOLDER = Path(__file__).parent / "reference"

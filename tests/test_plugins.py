@@ -15,7 +15,7 @@ from examples.own_surface import Superellipsoid
 from swarm import scene_file
 from swarm.commands import summary
 from swarm.run.simulation import carry_out
-from swarm.serialization import tables
+from swarm.serialization import plugins, run_tables, tables
 
 LAW, SURFACE, METHOD = "examples.own_law", "examples.own_surface", "examples.own_method"
 FILE = """

@@ -7,10 +7,9 @@ from conftest import edited
 
 import swarm
 from swarm.commands import summary
-from swarm.pictures import graphs, plots
+from swarm.pictures import graphs, plots, series
 from swarm.recording import playback, recorded, sheet
 from swarm.recording import writer as recording
-from swarm.words import series
 
 HOT = swarm.Scene([swarm.Sphere(0.5, temperature=300.0), swarm.Sphere(0.2, side="outside")])
 FRAMES = 3

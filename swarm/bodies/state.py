@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from ..common import checks
 from ..errors import SceneError
-from ..particles import Particles
+from ..particles import Particles, TiedParticles
 from ..state import Floats
 from . import checked, holding, velocities
 from .body import Body
@@ -15,7 +15,7 @@ from .checked import Pairs
 _LINK = 1e-9
 
 
-class Bodies:
+class Bodies(TiedParticles):
     """n copies of a body.
 
     Args:
@@ -75,9 +75,6 @@ class Bodies:
         made = Bodies.of_run(self.body, self.position, self.velocity)
         made.velocity = velocities.led_along(made.body, made.position, made.velocity)
         return made
-
-    def __len__(self) -> int:
-        return int(self.position.shape[2])
 
     def __repr__(self) -> str:
         return f"Bodies({len(self)} of {len(self.body)} points)"

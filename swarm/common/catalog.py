@@ -7,6 +7,9 @@ LENGTHS = {"sense": 2, "axis": 3, "quaternion": 4}
 # The names of the entries of the last axis of a vector, and of an orientation.
 _COMPONENTS = {"axis": ("x", "y", "z"), "quaternion": ("w", "x", "y", "z")}
 
+# What particles of pictures and recordings are coloured by.
+COLOURINGS = ("speed", "energy-error")
+
 Axis = Literal["surface", "part", "member", "cavity", "source", "counter", "sense", "axis", "quaternion"]
 
 

@@ -186,6 +186,9 @@ def _power_slope(b, g0, g1):
 class Power(Law):
     """Any a >= 1. `pow` is a call, so the lane loop is not vectorised: about ten times the cost of `Linear`."""
 
+    # The last bit of `pow` may differ between plain Python and compiled kernels.
+    calls_library = True
+
     alpha: float
     a: float
 

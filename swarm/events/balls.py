@@ -17,13 +17,12 @@ from ..scene import Scene
 _ROUND_OFF = 64.0 * np.finfo(np.float64).eps
 
 
-def require_balls(scene: Scene, particles: Particles | None, method: Method) -> None:
+def require_balls(scene: Scene, particles: Particles, method: Method) -> None:
     """Raise a `SceneError` where balls do not fit the scene, the cell or the steps.
 
     Where contacts turn balls that have no spin, they get one of 0.
     """
-    if particles is None or particles.radius is None:
-        return
+    assert particles.radius is not None
     require_shapes(scene, particles.radius)
     require_size(scene, particles.radius)
     _require_cell(scene, particles, method)

@@ -8,10 +8,10 @@ import numpy as np
 from ..kernel.vector import ZERO
 from ..run import failures
 from ..run.base import Arrays
-from ..run.observed import with_walls
+from ..run.observed import Observed, with_walls
 from .balls_run import CollidingRun, balance
 from .colliding.heavy import COUNTS, Heavy
-from .reacting.described import Observed, freedoms_of, observed, scenery_of, walls_now
+from .reacting.described import freedoms_of, observed, scenery_of, walls_now
 from .reacting.freedoms import Freedoms
 
 # The first leases have this part of the balls' speed as their width.

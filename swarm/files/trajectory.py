@@ -228,10 +228,10 @@ class Trajectory(Stored):
                 f"{self.path} keeps bodies in float32, in which their links lose their lengths; use frame({k}) for the "
                 'points, or run again with precision = "float64"'
             )
-        from ..bodies.state import Bodies
-
         with self._reading(f"frame {k}"):
-            return Bodies.of_run(body, points.position.reshape(shape), points.velocity.reshape(shape))
+            position, velocity = points.position.reshape(shape), points.velocity.reshape(shape)
+            bodies: Bodies = view("bodies").bodies_of_run(body, position, velocity)
+        return bodies
 
     def impacts(self, k: int) -> NDArray[np.int64]:
         """Number of impacts of each of the particles of frame k since the start, (N,)."""
@@ -389,10 +389,8 @@ class Trajectory(Stored):
         """The body whose copies were run; None for particles."""
         if not self._has("parameters/body"):
             return None
-        from ..bodies.table import body_of
-
         with self._reading("its body"):
-            body = body_of(parsed(self._text("body")))
+            body: Body = view("bodies").body_of(parsed(self._text("body")))
             if len(body) * self.copies != self.count:
                 raise ValueError(f"{self.copies} of {len(body)} points are not {self.count}")
         return body

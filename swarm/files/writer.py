@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
@@ -10,10 +10,11 @@ import tomli_w
 from numpy.typing import DTypeLike, NDArray
 
 from ..methods import Method
-from ..particles import Particles
+from ..particles import Particles, TiedParticles
 from ..scene import Scene
 from ..serialization import tables
 from ..state import State
+from ..views import view
 from . import checksums, paths
 from .appended import AppendedFile, put
 from .layout import (
@@ -33,10 +34,6 @@ from .layout import (
 )
 from .provenance import Course, makers
 from .storage import Storage
-
-if TYPE_CHECKING:
-    from ..bodies.body import Body
-    from ..bodies.state import Bodies
 
 # Frames x particles of a chunk: a particle's path and a frame are both read with few chunks.
 _CHUNK = (10, 1000)
@@ -74,7 +71,7 @@ class TrajectoryWriter(AppendedFile):
         storage: Storage,
         scene: Scene,
         method: Method,
-        particles: "Particles | Bodies",
+        particles: Particles | TiedParticles,
         scene_text: str | None,
         identity: dict[str, Any],
         following: bool = False,
@@ -161,7 +158,8 @@ class TrajectoryWriter(AppendedFile):
         if self._text is not None:
             parameters["scene_file"] = self._text
         if self._bodies is not None:
-            parameters["body"], parameters["copies"] = body_text(self._bodies.body), len(self._bodies)
+            parameters["body"] = tomli_w.dumps(view("bodies").table_of(self._bodies.body))
+            parameters["copies"] = self._bodies.position.shape[2]
         if self._radius is not None and self._volume is not None:
             parameters["volume"] = self._volume
 
@@ -297,10 +295,3 @@ def descriptions(
         "method": tomli_w.dumps(tables.table_of(method)),
         "storage": tomli_w.dumps(vars(storage)),
     }
-
-
-def body_text(body: "Body") -> str:
-    """The text that a trajectory keeps of a body."""
-    from ..bodies.table import table_of
-
-    return tomli_w.dumps(table_of(body))

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.damping import damping_of
 from ..methods.base import Method
 from ..methods.fixed_step import longest_step
 from ..pairs import Pairs
@@ -17,8 +18,6 @@ from .overlaps import Limits
 
 # The least restitution whose damper steps can follow.
 MOST_DAMPED = 0.01
-# Halvings in which a damping is found.
-_HALVINGS = 200
 
 
 def matter_of(scene: Scene, method: Method, radius: NDArray[np.float64]) -> Matter:
@@ -64,38 +63,3 @@ def contact_time(scene: Scene, particles: Particles, method: Method) -> float:
         return math.inf
     deepest = math.pow(0.5 * mass * speed * speed * (a + 1.0) / alpha, p)
     return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + p) / math.gamma(0.5 + p) * deepest / speed
-
-
-def damping_of(alpha: float, restitution: float) -> float | None:
-    """What times the root of the mass that moves is the damping C of a contact with this restitution, None for 1.
-
-    With y = Phi(g) and the time of Phi'(g) dt the equation of a contact, m g'' = -V'(g) - C dPhi/dt, is
-        y'' + 2 z w y' + w^2 y = 0,   C = 2 z sqrt(alpha m),
-    for any exponent of the law [Antypov and Elliott 2011], so that e depends on z alone. The contact ends when the sum
-    of spring and damper is 0, not y [Schwager and Poeschel 2007]: with z = sin t
-        ln e = -(pi - 2 t) tan t,   and for z = cosh t   ln e = -2 t/tanh t.
-    """
-    if restitution == 1.0:
-        return None
-    wanted = -math.log(restitution)
-    low, high = 0.0, 1.0
-    while _loss(high) < wanted:
-        high *= 2.0
-    for _k in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if _loss(middle) < wanted:
-            low = middle
-        else:
-            high = middle
-    return 2.0 * high * math.sqrt(alpha)
-
-
-def _loss(z: float) -> float:
-    """-ln e of the part z of critical damping."""
-    if z == 1.0:
-        return 2.0
-    if z < 1.0:
-        t = math.asin(z)
-        return (math.pi - 2.0 * t) * math.tan(t)
-    t = math.acosh(z)
-    return 2.0 * t / math.tanh(t)

@@ -12,7 +12,6 @@ from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..errors import RunError
-from ..events.faces import Fields
 from ..methods import Penalty
 from ..methods.base import Method
 from ..particles import Particles
@@ -28,6 +27,7 @@ from .arrays import DONE, LOST, SINCE, SKIN, TAKEN, X
 from .booking import ContactTotals
 from .described import matter_of
 from .drags import kept_drags, set_drags
+from .faces import Fields
 from .overlaps import COLUMNS
 from .step import MarchRule, World, march
 

@@ -17,7 +17,6 @@ from ..state import Floats
 Colours = NDArray[np.uint32]
 Values = Callable[[Floats, Floats], Floats]
 
-BY = ("speed", "energy-error")
 BACKGROUND = (255, 255, 255)
 
 # Plasma (https://bids.github.io/colormap) from 6 % to 80 %: all of it is seen on a light background and on a dark one.

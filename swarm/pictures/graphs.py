@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter, MaxNLocator, ScalarFormatter
 
 from ..state import Floats
-from ..words import series
 from ..words.amounts import many, plain, prefixed
 from ..words.verdicts import ROUND_OFF
+from . import series
 from .colours import BLUE, ENERGIES, curve_colour
 from .style import GREY, ink
 

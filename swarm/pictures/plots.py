@@ -14,12 +14,12 @@ from ..files import marks
 from ..files.replaced import named_when_whole
 from ..triangles.shape import Shape
 from ..triangles.shapes import cell_of, shapes_of
-from ..words import series, verdicts
 from ..words import titles as words
+from ..words import verdicts
 from ..words.amounts import amount, many
 from ..words.content import Content, content_of
 from ..words.gone import how_many_left
-from . import colours, drawing, graphs, sentences, speeds, style
+from . import colours, drawing, graphs, sentences, series, speeds, style
 from .drawn import Drawn
 from .framed import most_of
 

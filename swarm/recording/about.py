@@ -4,11 +4,12 @@ from typing import Any
 
 import rerun as rr
 
+from ..pictures import series
 from ..pictures.colours import Scale
 from ..pictures.drawn import Drawn
 from ..state import Floats
-from ..words import series, verdicts
 from ..words import titles as words
+from ..words import verdicts
 from ..words.amounts import many
 from ..words.content import Content
 

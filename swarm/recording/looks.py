@@ -5,12 +5,11 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from ..pictures import colours
+from ..pictures import colours, series
 from ..pictures.colours import BACKGROUND, curve_colour, rgb
 from ..pictures.drawn import Drawn
 from ..state import Floats
 from ..triangles.shape import Shape
-from ..words import series
 from .playback import LINES, MESH, PARTICLES
 
 # The colours of matplotlib's pictures.

@@ -10,9 +10,8 @@ from matplotlib.image import imread
 from ..errors import RunError, SceneError
 from ..files import marks
 from ..files.replaced import named_when_whole
-from ..pictures import drawing, graphs, sentences, style
+from ..pictures import drawing, graphs, sentences, series, style
 from ..surfaces.plane import across_of
-from ..words import series
 from ..words.amounts import many
 from . import viewer
 from .playback import Playback

@@ -30,6 +30,7 @@ import rerun as rr
 
 from ..bodies.body import Body
 from ..common import checks
+from ..common.catalog import COLOURINGS
 from ..errors import FileError, SceneError
 from ..files import marks
 from ..files.origin import origin_of
@@ -37,12 +38,11 @@ from ..files.replaced import no_room
 from ..files.writer import WriteFrames, Written, rows
 from ..methods import Method
 from ..particles import Particles
-from ..pictures import colours
+from ..pictures import colours, series
 from ..pictures.drawn import Drawn
 from ..scene import Scene
 from ..triangles import solids
 from ..triangles.shapes import shapes_of, since_start
-from ..words import series
 from ..words.content import Content
 from . import about, instanced, looks, sight, viewer
 from .playback import LINES, MESH, PARTICLES, is_whole
@@ -79,7 +79,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         checks.count("record_particles", self.particles)
-        checks.one_of("record_color", self.color, colours.BY)
+        checks.one_of("record_color", self.color, COLOURINGS)
         checks.positive("record_megabytes", self.megabytes)
 
 

@@ -7,13 +7,13 @@ import numpy as np
 
 from ..common.status import Status
 from ..errors import RunError
-from ..grains import sinking
 from ..kernel.random import Stream
 from ..kernel.vector import ZERO, column
 from ..methods.base import Method
 from ..scene import Scene
 from ..state import State
 from ..surfaces.wall_law import leave_of, mirrored, said_of, why_wrong
+from .preflight import softness
 from .state import Seeding
 
 _UNSEEDED = Seeding()
@@ -32,7 +32,7 @@ def of_frame(
     if status == Status.TOO_FAST:
         sentence += f", {method.too_fast(scene)}"
     if status == Status.TOO_DEEP:
-        sentence = f"{_failed(moment)} {first + particle}{sinking.of_passing(scene, method, state, particle, moment)}"
+        sentence = f"{_failed(moment)} {first + particle}{softness.of_passing(scene, method, state, particle, moment)}"
     if status == Status.SENT_WRONG:
         sentence += _of_law(scene, state, particle, moment, seeding)
     multipliers = state.multipliers

@@ -11,22 +11,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bodies.body_run import BodyRun
 from ..common import interrupt
 from ..common.catalog import CHUNK_SUMS
 from ..common.frames import Frame
 from ..common.snapshot import NOTHING, Read, Snapshot
-from ..events.balls_run import CollidingRun
-from ..events.heavy_run import HeavyRun
-from ..events.walls_run import ReactingRun
-from ..grains.grains_run import GrainsRun
 from ..kernel.cache import kernels_compiled
 from ..kernel.compiling import Compilations
 from ..particles import Particles
 from ..state import Absorbed, Multipliers
 from .base import BaseRun
-from .doors import DoorRun
-from .engine import Run
+from .engines import run_of
 from .impacts import log_of
 from .measures import Measures
 from .options import Task
@@ -34,7 +28,6 @@ from .outputs import recorder_of, writer_of
 from .preflight import hints
 from .progress import Display, display
 from .session import Session
-from .state import Seeding
 from .tally import Watched, tally_of
 
 if TYPE_CHECKING:
@@ -44,7 +37,6 @@ _LOG = logging.getLogger("swarm")
 _OF_PARTICLES = "position", "velocity", "mass", "image", "radius", "spin"
 # So many frames are packed into arrays: as Python objects they take 3 kB each.
 _PACKED = 1024
-_UNWATCHED = Watched()
 
 
 class RunEnd(NamedTuple):
@@ -193,23 +185,6 @@ def _snapshot_of(task: Task, read: Read, moment: float, copies: bool = False) ->
     scene, births = task.scene, task.particles.births
     there = None if births is None else births.there(moment)
     return Snapshot(read, scene.gravity, scene.period, there, copies)
-
-
-def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
-    """The state of a run at its start, and the threads that advance it."""
-    options = task.options
-    how = options.thread_count(), options.block_size, options.compile
-    if task.bodies is not None:
-        bodies = BodyRun(task.scene, task.bodies, task.particles, task.method, *how, task.first)
-        bodies.tally = watched.tally
-        return bodies
-    if task.particles.radius is not None:
-        kind = (HeavyRun if task.scene.reacts() else CollidingRun) if task.method.is_rigid() else GrainsRun
-        return kind(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
-    if task.scene.reacts():
-        return ReactingRun(task.scene, task.particles, task.method, *how, watched.tally)
-    alone = DoorRun if task.scene.has_doors() else Run
-    return alone(task.scene, task.particles, task.method, *how, Seeding(options.seed, task.first), watched)
 
 
 def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> RunEnd:

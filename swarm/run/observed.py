@@ -1,13 +1,23 @@
 """The observables of a frame that are no sums over its particles: how many are gone, and where walls are."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..events.reacting.described import Observed
 from ..scene import Scene
-from ..state import State
+from ..state import Floats, State
+
+
+class Observed(NamedTuple):
+    """The surfaces of a scene as observed: those that react where they are, and how they move."""
+
+    position: Floats  # (surfaces, 3) where what is given at the origin is [m]
+    orientation: Floats  # (surfaces, 4) quaternions (w, x, y, z)
+    velocity: Floats  # (surfaces, 3) [m/s]
+    spin: Floats  # (surfaces, 3) [rad/s]
+    kinetic: Floats  # (surfaces,) [J]
+    potential: Floats  # (surfaces,) of gravity and springs, 0 at the start [J]
 
 
 def gone_of(state: State, far: int, owners: NDArray[np.int64], surfaces: int) -> dict[str, Any]:

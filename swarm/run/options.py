@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ..bodies.state import Bodies
 from ..common import checks
+from ..common.catalog import COLOURINGS
 from ..common.frames import FrameTimes
 from ..errors import SceneError
 from ..files import paths
 from ..files.storage import Storage
 from ..methods.base import Method
-from ..particles import Particles
-from ..pictures.colours import BY as COLOURS
+from ..particles import Particles, TiedParticles
 from ..scene import Scene
 from ..sources.source import checked_sources
 from ..surfaces.counter import checked_counters
@@ -102,7 +101,7 @@ class RunOptions:
     def _check_recording(self) -> None:
         """Raise a SceneError if an option of a recording or a display is wrong, even if the run has neither of them."""
         checks.count("record_particles", self.record_particles)
-        checks.one_of("record_color", self.record_color, COLOURS)
+        checks.one_of("record_color", self.record_color, COLOURINGS)
         object.__setattr__(self, "record_megabytes", checks.positive("record_megabytes", self.record_megabytes))
         if not isinstance(self.live, str):
             checks.flag("live", self.live)
@@ -150,6 +149,10 @@ class RunOptions:
         """Number of threads that compute."""
         return cores() if self.threads is None else self.threads
 
+    def keeps_float32(self) -> bool:
+        """Whether files of the run keep places in float32."""
+        return self.precision == "float32" and (self.trajectory is not None or self.impacts is not None)
+
     def checkpoint_file(self) -> Path | None:
         """The checkpoint; None without a trajectory."""
         if self.trajectory is None and (self.checkpoint is not None or self.resume):
@@ -169,7 +172,7 @@ class Task:
     particles: Particles
     method: Method
     options: RunOptions
-    bodies: Bodies | None = None
+    bodies: TiedParticles | None = None
     first: int = 0
     start: str = ""
     scales: tuple[float, float] | None = None

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from ..errors import SceneError
+from ..views import view
 from .impacts import Impacts
 from .options import Task
 from .session import Session
@@ -21,17 +22,16 @@ def recorder_of(task: Task) -> "Writer | None":
             "recording and live cannot continue a run that was stopped; leave them out, and make the recording from "
             "the trajectory: swarm record RUN.h5 -o OUT.rrd"
         )
-    from ..common.extras import needed_by
-
-    with needed_by("a recording", "record"):
-        from ..recording.writer import RecordingWriter, Settings  # rerun takes half a second
-
-    settings = Settings(options.record_particles, options.record_color, options.record_megabytes, options.live)
+    recording = view("recording")  # rerun takes half a second
+    settings = recording.Settings(
+        options.record_particles, options.record_color, options.record_megabytes, options.live
+    )
     body = None if task.bodies is None else task.bodies.body
-    return RecordingWriter(
+    made: Writer = recording.RecordingWriter(
         options.recording, options.overwrite, task.scene, task.method, task.particles, options.times.count, settings,
         body,
     )  # fmt: skip
+    return made
 
 
 def writer_of(task: Task, session: Session, recorder: "Writer | None", log: Impacts | None) -> "Background | None":

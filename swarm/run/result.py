@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bodies.state import Bodies
 from ..common import notebook
 from ..common.columns import frame_of
 from ..errors import SceneError
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from ..bodies.state import Bodies
     from ..pictures.shown_film import Film
     from ..report.html import Page
     from ..words.content import Content
@@ -79,7 +79,7 @@ class Result:
     impacts_per_particle: NDArray[np.int64]
     escape_time: NDArray[np.float64]
     absorbed_time: NDArray[np.float64]
-    bodies: Bodies | None = None
+    bodies: "Bodies | None" = None
     scene: Scene | None = None
     method: Method | None = None
     birth_time: NDArray[np.float64] | None = None

@@ -17,6 +17,7 @@ from ..files.lock import only_writer
 from ..kernel.cache import Spent
 from ..serialization import run_tables
 from ..version import VERSION
+from ..views import view
 from .base import BaseRun
 from .impacts import Impacts
 from .options import RunOptions, Task
@@ -95,11 +96,13 @@ class Session:
 
     def _hold(self, task: Task, log: Impacts | None) -> None:
         """Lock the files of the run, and describe it."""
-        from ..files.writer import body_text, descriptions
+        import tomli_w
+
+        from ..files.writer import descriptions
 
         overwrite, impacts = task.options.overwrite, task.options.impacts
         self._owners = task.scene.members()
-        body = "" if task.bodies is None else body_text(task.bodies.body)
+        body = "" if task.bodies is None else tomli_w.dumps(view("bodies").table_of(task.bodies.body))
         self.identity = {"start": task.start or checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
         self.identity |= {"first": task.first} if task.is_shard else {}
         self.identity |= {"observables": ", ".join(task.options.observables)} if task.options.observables else {}

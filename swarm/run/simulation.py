@@ -2,11 +2,10 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..bodies.state import Bodies
 from ..common.frames import Frame
 from ..methods.base import Method
 from ..particles import Particles
@@ -14,16 +13,19 @@ from ..scene import Scene
 from ..sources.source import Source
 from ..surfaces.counter import Counter
 from ..surfaces.surface import Surface
-from . import machine
+from . import engines, machine
 from .options import RunOptions, Task
 from .preflight.admission import task_of
 from .result import Result
 from .session import Session
 
+if TYPE_CHECKING:
+    from ..bodies.state import Bodies
+
 
 def simulate(  # noqa: PLR0913  the keywords are the public interface
     scene: Scene,
-    particles: Particles | Bodies | None,
+    particles: "Particles | Bodies | None",
     method: Method,
     *,
     until: float,
@@ -141,7 +143,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
 
 def carry_out(
     scene: Scene,
-    particles: Particles | Bodies | None,
+    particles: "Particles | Bodies | None",
     method: Method,
     options: RunOptions,
     counted_from: float | None = None,
@@ -152,12 +154,11 @@ def carry_out(
     if options.cluster is None:
         session = Session(options, counted_from)
     else:
-        from . import cluster  # `distributed` takes half a second to import
-
+        cluster = engines.wing("cluster")  # `distributed` takes half a second to import
         session, carried = cluster.Sharded(options, counted_from), cluster.carry_out
     task = task_of(scene, particles, method, options)
     end = carried(task, session)
-    bodies = None if task.bodies is None else task.bodies.moved(end.particles)
+    bodies: Any = None if task.bodies is None else task.bodies.moved(end.particles)
     absorbed_time = np.full(len(end.particles), np.nan) if end.absorbed is None else end.absorbed.time
     return Result(
         end.particles, end.observables, end.wall_time, options.trajectory, end.multipliers, end.impacts,

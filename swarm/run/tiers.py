@@ -13,9 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.regularisation import Power
 from ..kernel import cache
-from ..surfaces.formulas.numbers import OwnNumbers
 
 CHOICES = ("auto", "always", "never")
 # Seconds of plain Python, of all runs of a process with the same missing kernels, after which these are compiled.
@@ -83,6 +81,6 @@ def _same_bits(numbers: Any) -> bool:
     if not isinstance(numbers, tuple):
         return True
     kind = type(numbers)
-    if isinstance(numbers, (Power, OwnNumbers)) or kind.__module__.partition(".")[0] not in ("builtins", "swarm"):
+    if getattr(kind, "calls_library", False) or kind.__module__.partition(".")[0] not in ("builtins", "swarm"):
         return getattr(kind, "same_in_python", False)
     return all(map(_same_bits, numbers))

@@ -183,6 +183,9 @@ class Surface:
         """Whether particles are kept out of it rather than in it."""
         return getattr(self, "side", "inside") == "outside"
 
+    def require_compiled(self) -> None:
+        """Raise a `SceneError` where Numba cannot compile a function of its user: sooner than in a kernel."""
+
     # Whether the inner side is convex: then nothing of it is on the other side of its wall.
     is_convex = False
 

@@ -16,9 +16,9 @@ from test_cli import command
 
 import swarm
 from swarm import scene_file
+from swarm.cluster import client as of_client
+from swarm.cluster import connection, local, shards, worker
 from swarm.run import machine
-from swarm.run.cluster import client as of_client
-from swarm.run.cluster import connection, local, shards, worker
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
 from swarm.run.progress import lines

@@ -11,9 +11,9 @@ import swarm
 from bench.shards import carry_out
 from bench.shards import same as the_same
 from swarm import scene_file
+from swarm.cluster import Sharded
 from swarm.files import paths
 from swarm.run import machine
-from swarm.run.cluster import Sharded
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
 from swarm.run.session import Session
@@ -273,8 +273,8 @@ def test_a_flipped_bit_of_a_shard_is_told(case, on_a_cluster, tmp_path):
 KILLED = """
 import os, signal, sys
 import numpy as np, swarm
-from swarm.run.cluster import joined, shards, worker
-from swarm.run.cluster.sharded import Sharded
+from swarm.cluster import joined, shards, worker
+from swarm.cluster.sharded import Sharded
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
 

@@ -10,8 +10,8 @@ import swarm
 from swarm import RunError, SceneError
 from swarm.commands.summary import numbers, of_trajectory
 from swarm.grains import sinking
+from swarm.pictures.series import lines_of
 from swarm.words.content import Content
-from swarm.words.series import lines_of
 from swarm.words.verdicts import judged
 
 ROOM = swarm.Box((50.0, 50.0, 50.0))

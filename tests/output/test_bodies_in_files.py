@@ -6,6 +6,7 @@ import itertools
 import h5py
 import numpy as np
 import pytest
+import tomli_w
 from children import python
 from conftest import edited
 from matplotlib.collections import LineCollection
@@ -13,15 +14,15 @@ from matplotlib.collections import LineCollection
 import swarm
 from swarm import observables, scene_file
 from swarm.bodies.elastic import block
+from swarm.bodies.table import table_of
 from swarm.commands import summary
 from swarm.files import checkpoint, writer
 from swarm.files.storage import Storage
-from swarm.pictures import colours, drawing, graphs, plots
+from swarm.pictures import colours, drawing, graphs, plots, series
 from swarm.pictures.drawn import Drawn
 from swarm.recording import playback, recorded, sheet
 from swarm.recording import writer as recording
 from swarm.state import State
-from swarm.words import series
 
 BOX = swarm.Scene([swarm.Box((0.5, 0.5, 0.5))], gravity=(0.0, 0.0, -1.0))
 METHOD = swarm.Impact()
@@ -209,7 +210,7 @@ def test_the_digest_of_a_start_is_also_of_its_body():
         for stiffness in (1.0, 2.0)
     )
     points = swarm.Bodies(one, one.points.T, np.zeros((3, 2))).particles()
-    digests = {checkpoint.digest_of(points, writer.body_text(body)) for body in (one, other)}
+    digests = {checkpoint.digest_of(points, tomli_w.dumps(table_of(body))) for body in (one, other)}
     assert len(digests | {checkpoint.digest_of(points)}) == 3
 
 

@@ -6,9 +6,9 @@ from matplotlib.colors import to_hex
 from matplotlib.text import Text
 
 import swarm
-from swarm.pictures import colours, graphs, plots, speeds, style
+from swarm.pictures import colours, graphs, plots, series, speeds, style
 from swarm.recording import looks
-from swarm.words import series, verdicts
+from swarm.words import verdicts
 
 TIMES = np.linspace(0.0, 1.0, 11)
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])

@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 import swarm
+from swarm.cluster import shards
 from swarm.commands.cli import app
 from swarm.files import marks, paths
-from swarm.run.cluster import shards
 from swarm.serialization import plugins
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.pictures import graphs, plots
+from swarm.pictures import graphs, plots, series
 from swarm.pictures.eye import Eye
 from swarm.recording import about, looks, playback, sheet, sight
 from swarm.triangles.shapes import shapes_of
-from swarm.words import series, verdicts
 from swarm.words import titles as words
+from swarm.words import verdicts
 
 SCENE = swarm.Scene([swarm.Ellipsoid((0.3, 0.3, 0.6)), swarm.Sphere(0.1, side="outside")], (0.0, 0.0, -9.81))
 

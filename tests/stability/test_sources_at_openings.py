@@ -11,7 +11,7 @@ import pytest
 import tomli_w
 
 import swarm
-from swarm.serialization import tables
+from swarm.serialization import run_tables, tables
 from swarm.sources.births import with_births
 
 N = 200

@@ -8,7 +8,7 @@ import tomli_w
 
 import swarm
 from swarm.events import packing
-from swarm.serialization import tables
+from swarm.serialization import run_tables, tables
 from swarm.surfaces.instant import side_of
 
 TUBE = swarm.Cylinder(0.2, (1.0, 0.0, 0.0), 1.0, (0.8, 0.0, 0.0))

@@ -1,7 +1,7 @@
 """A scene with walls that react as kernels take it, from its description."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ...contact.laws import NONE
 from ...kernel.vector import Vec, vec
 from ...motion import Guide, Rotation, Translation, pose, unit_axis
+from ...run.observed import Observed
 from ...scene import Scene
 from ...surfaces.surface import Surface
 from ...surfaces.walls import Walls
@@ -104,17 +105,6 @@ def freedoms_of(scene: Scene, width: float) -> Freedoms:
         if isinstance(wall.freedom, Pendulum):
             wall.freedom.expand(made)
     return made
-
-
-class Observed(NamedTuple):
-    """The surfaces of a scene as observed: those that react where they are, and how they move."""
-
-    position: Floats  # (surfaces, 3) where what is given at the origin is [m]
-    orientation: Floats  # (surfaces, 4) quaternions (w, x, y, z)
-    velocity: Floats  # (surfaces, 3) [m/s]
-    spin: Floats  # (surfaces, 3) [rad/s]
-    kinetic: Floats  # (surfaces,) [J]
-    potential: Floats  # (surfaces,) of gravity and springs, 0 at the start [J]
 
 
 def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:

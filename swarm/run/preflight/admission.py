@@ -2,24 +2,20 @@
 
 import numpy as np
 
-from ...bodies import passing
-from ...bodies.state import Bodies
-from ...bodies.steps import require_steps_of_bodies
 from ...errors import SceneError
-from ...events.balls import require_apart, require_balls
 from ...files.origin import require_near
 from ...methods import Impact
 from ...methods.base import Method, check_surfaces
 from ...motion import Path, parts_of
 from ...motion.given import require_angles
-from ...particles import Particles
+from ...particles import Particles, TiedParticles
 from ...scene import Scene
 from ...sources.births import with_births
-from ...surfaces.formulas.own import require_compiled
 from ...surfaces.instant import gaps_of, gradient_of
 from ...surfaces.plane import require_start
 from ...surfaces.shapes.cone import Cone
 from ...surfaces.shapes.quadric import Quadric
+from .. import engines
 from ..options import RunOptions, Task
 from . import workload
 from .counting import require_counters
@@ -35,36 +31,43 @@ _LONG_AGO = 1e12
 _MOST_CELLS = 2.0**53
 
 
-def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, options: RunOptions) -> Task:
+def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: Method, options: RunOptions) -> Task:
     """The run, checked, with its own copy of the particles, and behind them those that come.
 
     Raises:
         SceneError: an argument is wrong, or the arguments do not go together.
     """
-    kinds = ("scene", scene, (Scene,)), ("particles", particles, (Particles, Bodies)), ("method", method, (Method,))
+    kinds = (
+        ("scene", scene, (Scene,)),
+        ("particles", particles, (Particles, TiedParticles)),
+        ("method", method, (Method,)),
+    )
     for name, value, allowed in kinds:
         if not isinstance(value, allowed) and not (name == "particles" and value is None and options.sources):
             raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
     require_known(Asked(scene, particles, method, options))
-    if isinstance(particles, Bodies):
-        known = scene if isinstance(method, Impact) else scene.ungrouped("bodies and soft walls")
-        return _task_of_bodies(known, particles.copy(), method, options)
+    if isinstance(particles, TiedParticles):
+        task: Task = engines.wing("bodies.admission").task_of(scene, particles, method, options)
+        return task
     if not isinstance(method, Impact) or method.contact_step > 0.0:
         scene = scene.ungrouped(type(method).__name__ if not isinstance(method, Impact) else "a contact_step")
     # The arrays of Particles may have been changed since it checked them.
     start = None if particles is None else _in_the_cell(scene, particles.copy(), options.times.until)
     check_surfaces(method, scene)
-    require_balls(scene, start, method)
+    if start is not None and start.radius is not None:
+        engines.wing("events.balls").require_balls(scene, start, method)
     scene = scene.of_balls(None if start is None else start.radius)
     if options.compile != "never":
         counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
         walls = [*scene.surfaces, *scene.open_volumes()]
-        require_compiled([*walls, *counters])
+        for surface in [*walls, *counters]:
+            surface.require_compiled()
     times = options.times
     _require_motions(scene, times.until)
     particles = with_births(scene, start, options.sources, options.seed, times.until)
     _require_logged(particles, options)
-    _require_precision(scene, particles, options)
+    if options.keeps_float32():
+        require_near(scene, particles)
     method.check(scene, particles)
     require_counters(scene, particles, options)
     assert times.every is not None
@@ -81,28 +84,10 @@ def task_of(scene: Scene, particles: Particles | Bodies | None, method: Method, 
 def _require_place(scene: Scene, start: Particles, method: Method) -> None:
     """Raise a `SceneError` where a particle cannot be where it is at the start, or fly from there."""
     if start.radius is not None:
-        require_apart(scene, start, method)
+        engines.wing("events.balls").require_apart(scene, start, method)
         return
     require_inside(scene, start)
     _require_normals(scene, start)
-
-
-def _task_of_bodies(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
-    require_steps_of_bodies(scene, bodies, method, options)
-    for point, motion in bodies.body.anchors.items():
-        require_angles(f"anchors[{point}]", motion, options.times.until)
-    assert method.dt is not None  # type: ignore[attr-defined]
-    passing.warn(scene, bodies.body)
-    workload.check_turns(bodies, method.dt)  # type: ignore[attr-defined]
-    check_surfaces(method, scene)
-    if options.compile != "never":
-        require_compiled(scene.surfaces)
-    if len(bodies.body.contacts):
-        touching = bodies.contact_points().reshape(3, -1)
-        require_inside(scene, Particles(touching, touching))
-    points = bodies.particles()
-    _require_precision(scene, points, options)
-    return Task(scene, points, method, options, bodies)
 
 
 def _require_motions(scene: Scene, until: float) -> None:
@@ -152,12 +137,6 @@ def _require_countable(scene: Scene, particles: Particles, until: float) -> None
                 f"particles that may be {reach / length + before:.3g} cells away at {until:g} s; give a longer period, "
                 "or a shorter run"
             )
-
-
-def _require_precision(scene: Scene, start: Particles, options: RunOptions) -> None:
-    """Raise a `SceneError` where files that are asked for in float32 would not tell particles apart."""
-    if options.precision == "float32" and (options.trajectory is not None or options.impacts is not None):
-        require_near(scene, start)
 
 
 def _require_logged(particles: Particles, options: RunOptions) -> None:

@@ -5,13 +5,12 @@ import math
 
 import numpy as np
 
-from ...grains import sinking
 from ...methods import Impact
 from ...methods.verlet import Verlet
 from ...scene import Scene
 from ...surfaces.union import Joined
 from ..options import Task
-from . import workload
+from . import softness, workload
 from .overlaps import warn_of_overlap
 
 _LOG = logging.getLogger("swarm")
@@ -31,7 +30,7 @@ def give(task: Task) -> None:
     warn_of_overlap(task.scene)
     _warn_of_faces(task.scene)
     _warn_of_fall(task.scene)
-    sinking.warn_of_depths(task)
+    softness.warn_of_depths(task)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
         # About the fastest: of some.
         some = task.particles.velocity[:, _some(len(task.particles))]

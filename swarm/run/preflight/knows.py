@@ -8,12 +8,11 @@ every other pair is. `require_known` raises the first one that applies, before a
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
-from ...bodies.state import Bodies
 from ...errors import SceneError
 from ...methods import AugmentedLagrangian, Impact, Penalty
 from ...methods.base import Method
 from ...methods.fixed_step import SoftWalls
-from ...particles import Particles
+from ...particles import Particles, TiedParticles
 from ...scene import BESIDE_MASS, INSTEAD_OF_MASS, MOST_WALLS, Scene
 from ...surfaces.facets.mesh import Mesh
 from ...surfaces.fields.many import Many
@@ -47,7 +46,7 @@ class Asked(NamedTuple):
     """A run as it is asked for, whose arguments are of the right types; no particles where all come from sources."""
 
     scene: Scene
-    particles: Particles | Bodies | None
+    particles: Particles | TiedParticles | None
     method: Method
     options: RunOptions
 
@@ -55,7 +54,7 @@ class Asked(NamedTuple):
 def engine_of(asked: Asked) -> str:
     """The engine of a run: one of `ENGINES`, or that of a method which this kind of particles does not support."""
     scene, particles, method, _options = asked
-    if isinstance(particles, Bodies):
+    if isinstance(particles, TiedParticles):
         return _by_method(method, (BODIES, SOFT_BODIES, PAPER_BODIES), OTHER_BODIES)
     if particles is not None and particles.radius is not None:
         return _by_method(method, (HEAVY if scene.reacts() else BALLS, GRAINS, OTHER_BALLS), OTHER_BALLS)
@@ -192,7 +191,7 @@ def _groups(asked: Asked) -> Found:
 
 
 def _period(asked: Asked) -> Found:
-    is_known = not isinstance(asked.particles, Bodies) and asked.method.knows_period()
+    is_known = not isinstance(asked.particles, TiedParticles) and asked.method.knows_period()
     if asked.scene.period is not None and not is_known:
         yield {"got": asked.scene.period}
 
@@ -252,7 +251,7 @@ def _members_in_fixed_steps(asked: Asked) -> Found:
 
 
 def _cavities(asked: Asked) -> Found:
-    body = asked.particles.body if isinstance(asked.particles, Bodies) else None
+    body = asked.particles.body if isinstance(asked.particles, TiedParticles) else None
     for k, (surface, _carrier, _point) in enumerate(() if body is None else body.cavities):
         yield {"k": k, "got": surface}
 

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bodies.state import Bodies
 from ...errors import SceneError
 from ...kernel.gravity import Gravity
 from ...kernel.vector import vec
@@ -20,8 +19,6 @@ from ...surfaces.time_of_impact import flights
 _LOG = logging.getLogger("swarm")
 # At some 10 ns an impact: minutes a frame, without a sign of progress; and days of a processor.
 _MOST_A_FRAME, _MANY = 1e10, 1e13
-# A body that turns farther in a step [rad], and how far it may.
-_FAR_TURN, _GOOD_TURN = 1.0, 0.3
 # Particles whose flights are computed, and most parts of a fall until its hit is known.
 _PARTICLES, _PARTS = 8, 8
 # Chords of a walk through the volume, and how many of the last of them count.
@@ -67,23 +64,6 @@ def time_between(scene: Scene, particles: Particles) -> float:
     """The typical time of a flight from impact to impact at the start [s]."""
     with np.errstate(all="ignore"):
         return _of_particles(scene, particles, 0.0).between
-
-
-def check_turns(bodies: Bodies, dt: float) -> None:
-    """Warn where a tie of a body turns so far in a step that the step is cut, or says little."""
-    ends, r, v = bodies.body.links, bodies.position, bodies.velocity
-    if not len(ends):
-        return
-    length2 = ((r[:, ends[:, 0]] - r[:, ends[:, 1]]) ** 2).sum(axis=0)
-    speed2 = ((v[:, ends[:, 0]] - v[:, ends[:, 1]]) ** 2).sum(axis=0)
-    turns = dt * np.sqrt(speed2 / length2)  # (L, n)
-    link, copy = np.unravel_index(int(np.argmax(turns)), turns.shape)
-    if turns[link, copy] > _FAR_TURN:
-        _LOG.warning(
-            "body %d turns by %.2g rad in a step of %g s (links[%d]): its steps will be cut, which is slow, or say "
-            "little of its motion; use dt = %.1g s or less",
-            copy, turns[link, copy], dt, link, _GOOD_TURN * dt / turns[link, copy],
-        )  # fmt: skip
 
 
 def _is_much(found: Flights, particles: Particles, until: float, every: float) -> bool:

@@ -63,6 +63,9 @@ def _between(low, high, x, v):
 class OwnNumbers(contract.Smooth):
     """The numbers of a surface by functions. The box is relative to the center."""
 
+    # Functions of users may: their last bit may differ between plain Python and compiled kernels.
+    calls_library = True
+
     center: Vec
     side: float
     step: float  # of the differences that replace second derivatives

@@ -1,7 +1,7 @@
 """A surface by your own phi and its gradient: Python functions that become part of the kernels."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -92,6 +92,17 @@ class OwnSurface(FormSurface):
             form.check()
         return replace(form, bend=form.sampled_bend() if self.curvature is None else Bend.of_magnitude(self.curvature))
 
+    def require_compiled(self) -> None:
+        if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+            return
+        kinds = (numba.typeof(self.numbers()), numba.typeof(ZERO))
+        functions = (self.phi_function, _compiled_phi), (self.gradient_function, _compiled_gradient)
+        for function, compiled in functions:
+            try:
+                compiled.compile(kinds)  # type: ignore[attr-defined]
+            except (NumbaError, UnsupportedBytecodeError) as error:
+                raise _not_compiled(function.__name__, str(error)) from None
+
     def table(self) -> dict[str, Any]:
         """Its table in a file: enough to recognise it, not to make it again."""
         given = {"code": self._form.kind.__name__, "parameters": self.parameters._asdict(), "size": self.length}
@@ -117,23 +128,6 @@ def _compiled_phi(surface, r):
 @kernel
 def _compiled_gradient(surface, r):
     return total(surface.gradient(r))
-
-
-def require_compiled(surfaces: Sequence[Surface]) -> None:
-    """Raise a `SceneError` where Numba cannot compile a function: sooner than in a kernel."""
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
-        return
-    for surface in surfaces:
-        if isinstance(surface, OwnSurface):
-            kinds = (numba.typeof(surface.numbers()), numba.typeof(ZERO))
-            for function, compiled in (
-                (surface.phi_function, _compiled_phi),
-                (surface.gradient_function, _compiled_gradient),
-            ):
-                try:
-                    compiled.compile(kinds)  # type: ignore[attr-defined]
-                except (NumbaError, UnsupportedBytecodeError) as error:
-                    raise _not_compiled(function.__name__, str(error)) from None
 
 
 def _not_compiled(name: str, message: str) -> SceneError:

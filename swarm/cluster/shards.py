@@ -18,19 +18,19 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bodies.body import Body
-from ...bodies.state import Bodies
-from ...errors import SceneError
-from ...files import marks, paths
-from ...methods.base import Method
-from ...observables import CHUNK
-from ...particles import Births, Particles
-from ...scene import Scene
-from ...serialization import plugins
-from ...state import Absorbed, Multipliers
-from ..machine import RunEnd, birth_times
-from ..options import RunOptions, Task
-from ..tally import scales_of
+from ..bodies.body import Body
+from ..bodies.state import Bodies
+from ..errors import SceneError
+from ..files import marks, paths
+from ..methods.base import Method
+from ..observables import CHUNK
+from ..particles import Births, Particles
+from ..run.machine import RunEnd, birth_times
+from ..run.options import RunOptions, Task
+from ..run.tally import scales_of
+from ..scene import Scene
+from ..serialization import plugins
+from ..state import Absorbed, Multipliers
 
 _ARRAYS = ("position", "velocity", "mass", "image")
 _BIRTHS = ("birth_time", "birth_source")

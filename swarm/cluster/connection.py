@@ -9,8 +9,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from ...common.extras import needed_by
-from ...errors import SceneError
+from ..common.extras import needed_by
+from ..errors import SceneError
 from . import worker
 
 # Seconds until a scheduler must answer, and until it must have a worker.

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import SceneError
-from ...files import checkpoint, paths
-from ..options import Task
-from ..session import Session
+from ..errors import SceneError
+from ..files import checkpoint, paths
+from ..run.options import Task
+from ..run.session import Session
 from . import shards
 
 

@@ -12,20 +12,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import observables
-from ...bodies import energies
-from ...common.catalog import CHUNK_SUMS, OBSERVABLES
-from ...common.snapshot import Snapshot
-from ...files.layout import UNIT, UNITS
-from ...files.trajectory import Trajectory, load
-from ...files.writer import TrajectoryWriter
-from ...lanes.arrays import booked
-from ..machine import Columns
-from ..measures import NONE, Measures
-from ..options import Task
-from ..present import total_of
-from ..sequence import values_of
-from ..tally import OBSERVED, units_of, value_of
+from .. import observables
+from ..bodies import energies
+from ..common.catalog import CHUNK_SUMS, OBSERVABLES
+from ..common.snapshot import Snapshot
+from ..files.layout import UNIT, UNITS
+from ..files.trajectory import Trajectory, load
+from ..files.writer import TrajectoryWriter
+from ..lanes.arrays import booked
+from ..run.machine import Columns
+from ..run.measures import NONE, Measures
+from ..run.options import Task
+from ..run.present import total_of
+from ..run.sequence import values_of
+from ..run.tally import OBSERVED, units_of, value_of
 from . import shards
 
 # Frames that are read at a time.

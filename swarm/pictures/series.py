@@ -14,8 +14,8 @@ from ..state import Floats
 from ..surfaces.surface import Surface
 from ..surfaces.union import part_at
 from ..triangles.shape import Shape
-from .named import name_of
-from .nouns import labels
+from ..words.named import name_of
+from ..words.nouns import labels
 
 # Stands for the logarithm of zero.
 NOTHING = -18.0

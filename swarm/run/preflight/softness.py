@@ -5,15 +5,15 @@ import math
 
 import numpy as np
 
-from ..methods.base import Method
-from ..pairs import MOST_PRESSED, Pairs
-from ..particles import Particles
-from ..run.options import Task
-from ..scene import Scene
-from ..state import Floats, State
-from ..surfaces.in_motion.drive import drive_of
-from ..surfaces.surface import Surface, side_sign
-from .described import damping_of
+from ...contact.damping import damping_of
+from ...methods.base import Method
+from ...pairs import MOST_PRESSED, Pairs
+from ...particles import Particles
+from ...scene import Scene
+from ...state import Floats, State
+from ...surfaces.in_motion.drive import drive_of
+from ...surfaces.surface import Surface, side_sign
+from ..options import Task
 
 _LOG = logging.getLogger("swarm")
 
@@ -38,7 +38,7 @@ def depths_of(method: Method, mass: Floats, speed: Floats, restitution: float = 
     """The largest overlaps [m] of contacts that begin at these speeds [m/s], of masses that move alone [kg].
 
     Without losses that of the energy, alpha d^(a + 1)/(a + 1) = m v^2/2. Phi(d) then is the amplitude of an oscillator
-    (`damping_of` of grains/described.py), which with the part z of critical damping is smaller by
+    (`damping_of`), which with the part z of critical damping is smaller by
         exp(-z acos(z)/sqrt(1 - z^2)).
     """
     a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]

@@ -21,14 +21,14 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ...common import interrupt
-from ...common.frames import Frame
-from ...errors import RunError, WallTimeError
-from ..machine import RunEnd, start_of, warn_open
-from ..measures import Measures
-from ..options import Task
-from ..preflight import hints
-from ..progress import Display, display
+from ..common import interrupt
+from ..common.frames import Frame
+from ..errors import RunError, WallTimeError
+from ..run.machine import RunEnd, start_of, warn_open
+from ..run.measures import Measures
+from ..run.options import Task
+from ..run.preflight import hints
+from ..run.progress import Display, display
 from . import connection, joined, shards, worker
 from .sharded import Sharded
 

@@ -9,12 +9,12 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from ...errors import SwarmError
-from ...files import paths
-from ...files.lock import only_writer
-from .. import machine
-from ..progress import Display
-from ..session import Session
+from ..errors import SwarmError
+from ..files import paths
+from ..files.lock import only_writer
+from ..run import machine
+from ..run.progress import Display
+from ..run.session import Session
 from . import shards
 
 # Reports of all shards in a second, so that the scheduler has little to do.

@@ -1,0 +1,132 @@
+"""The architecture: layers of imports, a core that imports no wing, and folders that can be looked through."""
+
+import ast
+import functools
+import graphlib
+import importlib
+import warnings
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from conftest import row
+
+import swarm
+from swarm import moved
+
+PACKAGE = Path(swarm.__file__).parent
+# From the top down; a module imports only from layers below its own, or from its own package. `check` and `numbers` of
+# a method take the Scene and the Particles, so these are below.
+# Engines of bodies, balls and grains, commands, and what shows runs: the core imports none of them.
+WINGS = [
+    ["__main__"],
+    ["commands"],
+    ["ensemble"],
+    ["scene_file"],
+    ["exports", "recording", "report"],
+    ["pictures"],
+    ["triangles"],
+    ["words", "cluster"],
+    ["events", "history"],
+    ["grains"],
+    ["bodies"],
+]
+CORE = [
+    ["run"],
+    ["files"],
+    ["lanes", "placing", "serialization"],
+    ["ball_numbers", "methods", "observables", "sources"],
+    ["scene"],
+    ["pieces"],
+    ["contact"],
+    ["surfaces"],
+    ["motion", "pairs", "particles", "views"],
+    ["__init__", "common", "kernel"],
+    ["errors", "moved", "state", "version"],
+]
+LAYERS = WINGS + CORE
+LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
+# What the core reaches of wings it reaches by these modules alone, which load by name: the choice of an engine, and the
+# table of views. The kinds of surfaces are a table too, which has those of data and formulas.
+LOADERS = {("run", "engines"), ("views",)}
+# Modules of Numba and of users, and modules by their earlier names.
+LOADERS_OF_OTHERS = {("kernel", "jit"), ("serialization", "plugins"), ("moved",)}
+KINDS = ("surfaces", "__init__")
+WINGS_OF_SURFACES = ("data", "formulas")
+
+
+@functools.cache
+def modules():
+    """Every module of the package as its path of names."""
+    return {path.relative_to(PACKAGE).with_suffix("").parts: path for path in PACKAGE.rglob("*.py")}
+
+
+@functools.cache
+def imported(parts):
+    """The modules of the package that a module imports, at its top or inside a function, but for types alone."""
+    known, found = modules(), []
+    tree = ast.parse(known[parts].read_text())
+    branches = [node for node in ast.walk(tree) if isinstance(node, ast.If)]
+    of_types = {id(node) for one in branches if "TYPE_CHECKING" in ast.unparse(one.test) for node in ast.walk(one)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            assert not any(alias.name.split(".")[0] == "swarm" for alias in node.names), "relative imports only"
+        if isinstance(node, ast.ImportFrom) and node.level and id(node) not in of_types:
+            home = (*parts[: len(parts) - node.level], *(node.module.split(".") if node.module else ()))
+            for alias in node.names:
+                targets = [(*home, alias.name), (*home, alias.name, "__init__"), home, (*home, "__init__")]
+                found.append(next(target for target in targets if target in known))
+    return found
+
+
+def test_a_module_imports_only_from_below():
+    for parts in modules():
+        with row(".".join(parts)):
+            above = [one for one in imported(parts) if LAYER[one[0]] <= LAYER[parts[0]]]
+            assert [".".join(one) for one in above if len(one) == 1 or one[0] != parts[0]] == []
+
+
+def test_no_imports_go_in_circles():
+    graph = {parts: set(imported(parts)) for parts in modules()}
+    assert len(list(graphlib.TopologicalSorter(graph).static_order())) >= len(modules())
+
+
+def test_the_core_imports_no_wing():
+    """By layers it could not import them at its top; modules that are loaded by name are named in two places only."""
+    wings = {name for names in WINGS for name in names}
+    for parts, path in modules().items():
+        with row(".".join(parts)):
+            if parts[0] not in wings and parts != ("__init__",):
+                assert [one for one in imported(parts) if one[0] in wings] == []
+                if parts not in LOADERS:
+                    assert "importlib.import_module" not in path.read_text() or parts[0] in (
+                        "kernel",
+                        "serialization",
+                        "moved",
+                    )
+            if parts[0] == "surfaces" and parts[1] not in WINGS_OF_SURFACES and parts != KINDS:
+                assert [one for one in imported(parts) if one[0] == "surfaces" and one[1] in WINGS_OF_SURFACES] == []
+
+
+def test_folders_can_be_looked_through():
+    """Modules at the root: at most 15; in any one folder: at most 25."""
+    folders = Counter(parts[:-1] for parts in modules())
+    assert folders[()] <= 15
+    assert {folder: count for folder, count in folders.items() if count > 25} == {}
+
+
+@pytest.mark.parametrize("name", ["swarm.output.style", "swarm.packing", "swarm.colliding.cells", "swarm.run.cluster"])
+def test_a_module_is_found_by_its_earlier_name(name):
+    with warnings.catch_warnings(record=True, action="always") as said:
+        found = importlib.import_module(name)
+    assert f"the module {name} is now {moved.present_name(name)}" in [str(one.message) for one in said]
+    assert found is importlib.import_module(moved.present_name(name))
+    assert found.__spec__.name == found.__name__ == moved.present_name(name)
+
+
+def test_every_earlier_name_has_a_module():
+    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
+        for name, present in moved.MOVED.items():
+            with row(name):
+                assert importlib.util.find_spec(present) is not None
+                assert importlib.util.find_spec(name) is not None
