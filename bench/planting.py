@@ -25,23 +25,24 @@ _DISPLAY = re.compile(
 _RAISING = re.compile(r"(Error|Warning|warn|Refused|getLogger|debug|info)$")
 # Folders of swarm/, and for some of them the only modules that hold mathematics or the logic of files.
 GROUPS: dict[str, str] = {
-    "": r"ball_numbers|columns|filling|history|observables|packing|particles|scene|state",
+    "": r"ball_numbers|history|observables|particles|scene|state",
     "bodies": "",
-    "colliding": "",
     "contact": "",
+    "events": "",
+    "exports": "obj|ply|vtkhdf|xyz",
+    "files": "appended|checkpoint|checksums|impact_log|impacts|replaced|storage|stored|superblock|trajectory|writer",
     "grains": "",
     "kernel": "angle|arrays|fours|gravity|heap|random|vector",
     "lanes": "",
     "methods": "",
     "motion": "",
-    "output": "appended|checkpoint|checksums|cut|impact_log|impacts|obj|parts|ply|recorded|replaced|sequence"
-    "|series|speeds|storage|stored|superblock|trajectory|vtkhdf|writer|xyz",
+    "pictures": "series|speeds",
     "placing": "",
-    "reacting": "",
-    "run": "balls|base|bodies|colliding|counting|doors|energies|engine|faces|grains|growing|heavy|impacts|knows"
-    "|measures|observed|overlaps|passing|present|reacting|resting|result|sinking|soft|state|tally|turns|windows",
+    "run": "base|counting|doors|engine|impacts|knows|measures|observed|overlaps|present|result|sequence|softness|state"
+    "|tally|turns",
     "sources": "",
     "surfaces": "",
+    "triangles": "cut|parts",
 }
 MODULES = 20
 FAULTS = 5
