@@ -4,6 +4,7 @@ import ast
 import functools
 import graphlib
 import importlib
+import re
 import warnings
 from collections import Counter
 from pathlib import Path
@@ -113,6 +114,17 @@ def test_folders_can_be_looked_through():
     folders = Counter(parts[:-1] for parts in modules())
     assert folders[()] <= 15
     assert {folder: count for folder, count in folders.items() if count > 25} == {}
+
+
+def test_the_page_has_the_folders_the_files_and_the_engines_that_there_are():
+    page = (PACKAGE.parent / "docs" / "architecture.md").read_text()
+    for path in re.findall(r"`((?:[a-z_]+/)*[a-z_]+(?:/|\.py))", page):
+        with row(path):
+            assert any(PACKAGE.rglob(path)) or (PACKAGE.parent / path).exists()
+    named = set(re.findall(r"`([a-z_]+)/", page))
+    assert {parts[0] for parts in modules() if len(parts) > 1} - named == set()
+    chosen = set(re.findall(r"\b([A-Z]\w*Run|Run)\b", (PACKAGE / "run" / "engines.py").read_text()))
+    assert chosen - {"BaseRun"} == set(re.findall(r"\b([A-Z]\w*Run|Run)`", page)) - {"BaseRun"}
 
 
 @pytest.mark.parametrize("name", ["swarm.output.style", "swarm.packing", "swarm.colliding.cells", "swarm.run.cluster"])
