@@ -91,7 +91,7 @@ def ways(name: str, scene: swarm.Scene) -> dict[str, Iterator[tuple[str, Contend
         found[PLAIN] = plain()
     if name == reference.SOFT:
         return found
-    if scene.gravity is None:  # cutting a step at the impact knows no gravity yet
+    if scene.gravity is None:  # cutting a step at the impact does not support gravity yet
         uzawa = {"adaptive": True, "acceleration": "reflection", "on_unconverged": "count"}
         found["AugmentedLagrangian"] = soft(swarm.AugmentedLagrangian, _stiff, **uzawa)
         found["AugmentedLagrangian, centred"] = soft(

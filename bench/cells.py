@@ -63,7 +63,7 @@ CEILING = {"middle": 0.25, "ring": 0.14}
 
 
 class Numbers(NamedTuple):
-    """Of a surface of one's own: its centre and the square of its radius."""
+    """Of a user-defined surface: its centre and the square of its radius."""
 
     x: float
     y: float

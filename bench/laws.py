@@ -51,7 +51,7 @@ LAWS: dict[str, tuple[dict[str, Any], float | None]] = {
     "Absorb above a barrier": ({"laws": [swarm.Absorb(barrier=10.0, loss=1e-12)]}, 25.0),
     "CercignaniLampis": ({"laws": [swarm.CercignaniLampis(0.3, 0.8, 0.5)]}, 60.0),
     "Absorb, then Lambert": ({"laws": [swarm.Absorb(1e-12), swarm.Lambert()]}, None),
-    "one's own Lambert": ({"laws": [Diffuse(1.0)]}, 25.0),
+    "user-defined Lambert": ({"laws": [Diffuse(1.0)]}, 25.0),
 }
 # Surfaces that count, beside what they cost as walls.
 COUNTED: dict[str, swarm.Sphere | swarm.Plane | swarm.Box] = {
@@ -59,7 +59,7 @@ COUNTED: dict[str, swarm.Sphere | swarm.Plane | swarm.Box] = {
     "ball": swarm.Sphere(0.1, side="outside"),
     "box": swarm.Box((0.1, 0.1, 0.1), side="outside"),
 }
-_FIRST_CALLS = "none", "Lambert", "CercignaniLampis", "one's own Lambert"
+_FIRST_CALLS = "none", "Lambert", "CercignaniLampis", "user-defined Lambert"
 
 
 def _impact(walls: list[Any], count: int, impacts: float, **keywords: Any) -> Callable[[], float]:

@@ -51,7 +51,7 @@ class Ran(NamedTuple):
 
 @contextlib.contextmanager
 def quiet() -> Iterator[str]:
-    """A folder for the files of a run, of whose warnings nothing is told."""
+    """A folder for the files of a run, without the warnings of the run."""
     level = logging.getLogger("swarm").level
     logging.getLogger("swarm").setLevel(logging.CRITICAL)
     try:

@@ -37,7 +37,7 @@ _PARTICLES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 # Files of more than a million particles measure the disk, and ten million in every scene the patience.
 _MOST_WRITTEN = 1_000_000
 _LARGEST_IN = "sphere"
-# Steps that are cut at the impact know no gravity yet.
+# Steps that are cut at the impact do not support gravity yet.
 _REFUSED = {("AugmentedLagrangian, dt=0.025", "sphere, gravity")}
 # What a measurement takes [s], and its repeats.
 _SECONDS, _REPEATS = 0.15, 3

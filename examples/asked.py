@@ -5,7 +5,7 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-# What examples write goes here unless they are told otherwise: Git ignores it.
+# What examples write goes here by default: Git ignores it.
 OUT = Path("out")
 # What the extras of pyproject.toml hold of what examples import.
 _MODULES = {"plot": ("matplotlib",), "mesh": ("trimesh", "igl"), "table": ("pandas",)}

@@ -141,7 +141,7 @@ def main() -> None:
     ask.add_argument("--particles", type=int, default=20_000)
     asked = ask.parse_args()
     shut, opened = shutter(asked.particles), door(asked.particles)
-    title = "A gas behind a shutter fills the vessel once that has gone; later a valve lets it out"
+    title = "A gas behind a shutter fills the vessel once it is open; later a valve lets it out"
     captions = "in the vessel", "1 s, as the shutter goes", "0.15 s later: fast ones are there"
     file = asked.output.with_name("shutter.png")
     draw(shut, file, (title, *captions), draw_vessel, (20.0, 140.0, "valve is open"))

@@ -68,7 +68,7 @@ def run(count: int, hot: bool, until: float = 2.0, frames: int = 20) -> Gas:
     result = swarm.simulate(scene, start, swarm.Impact(), until=until * scale, every=until * scale / frames, seed=2)
     seen, times = result.observables, result.escape_time
     law, energy_law = laws(seen["time"], hot)
-    # Who has escaped keeps the energy it left with.
+    # Particles that escaped keep the energy they left with.
     energies = 0.5 * (result.particles.velocity**2).sum(axis=0)
     gone = np.array([energies[times <= time].sum() for time in seen["time"]])
     inside = count - seen["escaped"]

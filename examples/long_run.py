@@ -1,7 +1,7 @@
 """A long run that is stopped and resumed twice on its way: what it conserves, and what it takes.
 
 `python -m examples.long_run` gives 5 000 particles in an ellipsoid 10^6 impacts each, 5 10^9 in all, in three
-processes: the first two are told to stop (SIGTERM) at frames 50 and 300, and the next goes on from the checkpoint.
+processes: the first two get SIGTERM at frames 50 and 300, and the next goes on from the checkpoint.
 `--particles` and `--impacts` make it shorter.
 """
 
@@ -93,7 +93,7 @@ if __name__ == "__main__":
     arguments.add_argument("--particles", type=int, default=5_000)
     arguments.add_argument("--impacts", type=float, default=1e6, help="of each particle")
     arguments.add_argument("--session", type=Path, metavar="FOLDER", help="one of the processes: go on there")
-    arguments.add_argument("--stop", type=int, metavar="FRAME", help="where it is told to stop")
+    arguments.add_argument("--stop", type=int, metavar="FRAME", help="the frame at which it stops")
     options = arguments.parse_args()
     if options.session:
         print(json.dumps(session(options.session, options.particles, options.impacts, options.stop)))

@@ -84,7 +84,7 @@ def measure(gap: float, count: int, windows: int = 64) -> Measured:
 
 def going_back(gap: float, count: int, hops: int = 100) -> float:
     """The part of hops that lead back through the gap through which the particle came: 1/3 without memory."""
-    # Nobody crosses a triangle from gap to gap, or comes back into one, within half a unit of time.
+    # No particle crosses a triangle from gap to gap, or comes back into one, within half a unit of time.
     places, _result = run(gap, count, hops * hop_time(gap), 0.5)
     v = places[:, 1] / (np.sqrt(0.75) * (2.0 + gap))
     u = places[:, 0] / (2.0 + gap) - 0.5 * v

@@ -28,7 +28,7 @@ def run(count: int | None = None, until: float | None = None) -> tuple[swarm.Sce
 
 
 def draw(scene: swarm.Scene, result: swarm.Result, file: Path) -> None:
-    """The maze with those who are left in it, and how many are left over time."""
+    """The maze with the particles left in it, and how many are left over time."""
     from swarm.pictures.style import BLUE, RED
 
     title = "A maze: most particles find the exit, some need very long"
@@ -43,7 +43,7 @@ def draw(scene: swarm.Scene, result: swarm.Result, file: Path) -> None:
         axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, markerscale=3.0)
         times = np.sort(np.nan_to_num(result.escape_time, nan=np.inf))
         axes[1].loglog(times, 1.0 - np.arange(1, len(times) + 1) / len(times), color=BLUE)
-        axes[1].set(title="who is still in it", xlabel="time [s]", ylabel="part of the particles", xlim=(1.0, None))
+        axes[1].set(title="particles still in it", xlabel="time [s]", ylabel="part of the particles", xlim=(1.0, None))
         axes[1].set_yticks([0.3, 0.4, 0.5, 0.7, 1.0], ["0.3", "0.4", "0.5", "0.7", "1"], minor=False)
         axes[1].set_yticks([], minor=True)
 

@@ -2,10 +2,10 @@
 
     python -m examples.mushroom
 
-In the cap, a half disc, a path keeps its distance b from the middle at every bounce, as it does in a circle. Who keeps
-farther than half the width w of the stem never enters it; all others do, sooner or later, and are chaotic. Of a start
+In the cap, a half disc, a path keeps its distance b from the middle at every bounce, as it does in a circle. A path
+with b above half the width w of the stem never enters it; all others do, sooner or later, and are chaotic. Of a start
 that is uniform in the cap, in all directions, the part that stays is 1 - (asin s + s sqrt(1 - s^2)) 2/pi with s = w/2R:
-78.31 % for this stem. The foot of the stem is open here, so that who enters it is seen to leave.
+78.31 % for this stem. The foot of the stem is open here, so that a particle that enters it is seen to leave.
 """
 
 import math
@@ -32,10 +32,10 @@ class Run(NamedTuple):
 
     start: swarm.Particles
     distance: np.ndarray  # of each path from the middle at the start, in half widths of the stem
-    escape_time: np.ndarray  # NaN of who stays
+    escape_time: np.ndarray  # NaN of particles that stay
 
     def stays(self) -> np.ndarray:
-        """Who has stayed."""
+        """Which particles stayed."""
         return np.isnan(self.escape_time)
 
 
@@ -60,7 +60,7 @@ def draw(found: Run, file: Path) -> None:
     """Where each path starts and whether it stays, a path of each kind, and how many are left over time."""
     from swarm.pictures.style import BLUE, RED
 
-    title = "Bunimovich's mushroom: who circles in the cap stays for ever, all others find the stem and leave"
+    title = "Bunimovich's mushroom: particles that circle in the cap stay for ever, all others find the stem and leave"
     with page(file, title, 1, 3, (11.0, 3.9)) as axes:
         scene = mushroom()
         for one in axes[:2]:
@@ -84,7 +84,7 @@ def draw(found: Run, file: Path) -> None:
         left = 1.0 - np.arange(1, len(times) + 1) / len(times)
         law(axes[2], None, STAYS, f"law: {100.0 * STAYS:.2f} % stay")
         axes[2].semilogx(times, left, color=BLUE, label="run")
-        axes[2].set(title="who is still inside", xlabel="time [s]", ylabel="part of the particles", ylim=(0.7, 1.0))
+        axes[2].set(title="particles still inside", xlabel="time [s]", ylabel="part of the particles", ylim=(0.7, 1.0))
         axes[2].legend()
 
 

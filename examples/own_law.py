@@ -22,7 +22,7 @@ class Viscoelastic(swarm.WallLaw):
 
 
 class Glue(swarm.WallLaw):
-    """Who hits slower than `slow` [m/s] stays stuck, with a probability."""
+    """A particle that hits slower than `slow` [m/s] stays stuck, with a probability."""
 
     slow: float
     probability: float

@@ -1,4 +1,4 @@
-"""A method of one's own, complete: `Mirror` flies to the next wall and reflects the velocity there, and nothing more.
+"""A complete user-defined method: `Mirror` flies to the next wall and reflects the velocity there, and nothing more.
 
     python examples/own_method.py
 

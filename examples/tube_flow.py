@@ -97,7 +97,7 @@ def draw(flows: dict[float, Flow], file: Path) -> None:
         axes[1].set(xlim=(0.0, 1.0), ylim=(0.0, None))
         law(axes[2], None, 0.0, "Clausing's factor")
         axes[2].set(xscale="log", xlabel="length over radius", ylabel="% of the particles", ylim=(-0.3, 0.5))
-        axes[2].set(title="who comes through, less the law")
+        axes[2].set(title="transmission less the law")
         axes[2].set_xticks(list(flows), [f"{ratio:g}" for ratio in flows], minor=False)
         axes[2].set_xticks([], minor=True)
         for one, place in zip(axes, ("center right", "lower left", "upper left"), strict=True):

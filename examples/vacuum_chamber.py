@@ -7,8 +7,8 @@ The wall at the end of the tube captures the part c of what reaches it: a pump. 
 both the part of those that enter the tube that is captured, c W/(c + W - c W), so the pumping speed of a mouth of area
 A is S = (<v> A/4) times that, and the number in the chamber of volume V settles at Q V/S, as 1 - exp(-S t/V).
 
-Counters are the gauges: small balls and discs that stop nobody. The momentum that crosses a disc is a pressure, and on
-a ball the sum of 1/|v_n| is the mean density over its surface.
+Counters are the gauges: small balls and discs that stop no particle. The momentum that crosses a disc is a pressure,
+and on a ball the sum of 1/|v_n| is the mean density over its surface.
 """
 
 import math

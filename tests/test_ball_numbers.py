@@ -39,7 +39,7 @@ def test_a_rate_and_a_pressure_are_of_the_frame_before():
     # (2 3 J + 5/0.5)/(3 2)
     assert numbers.seen(state) == {"collisions": 3, "collision_rate": 6.0, "pressure": 16.0 / 6.0}
     numbers.frame(state, 1.0, 1.0)
-    # Nobody met; by the trapezoidal rule K is 2.
+    # No balls met; by the trapezoidal rule K is 2.
     assert numbers.seen(state) == {"collisions": 3, "collision_rate": 0.0, "pressure": 4.0 / 6.0}
     numbers.frame(state, 2.0, 1.0, action=10.0)
     assert numbers.seen(state)["pressure"] == pytest.approx(2.0 * (10.0 - 2.5) / 6.0, rel=1e-15)

@@ -1,4 +1,4 @@
-"""Particles that start at a time of their own: `State.starts`, and who is there at a frame."""
+"""Particles that start at a time of their own: `State.starts`, and which particles are there at a frame."""
 
 import numpy as np
 import pytest
@@ -85,7 +85,7 @@ def test_pieces_of_frames_that_doors_cut_hold_starts():
     scene = swarm.Scene([swarm.Sphere(0.5), wall])
     times = np.linspace(0.0, 0.95, 20)
     particles = started(SPHERE, times)
-    # This wall touches the sphere in one point: nobody meets it.
+    # This wall touches the sphere in one point: no particle meets it.
     (cut, _), (whole, _) = (run(one, particles, [0.5, 1.0]) for one in (scene, SPHERE))
     np.testing.assert_allclose(cut.position, whole.position, atol=1e-12)
     np.testing.assert_array_equal(cut.impacts, whole.impacts)

@@ -1,4 +1,4 @@
-"""What is said while kernels compile, in words for who does not know their names."""
+"""What is said while kernels compile, in words, for their names are of the code."""
 
 from types import SimpleNamespace
 

@@ -260,7 +260,7 @@ def test_a_tangent_is_crossed_in_pairs(off):
 
 
 def test_frames_that_end_on_it_count_once():
-    """A frame ends on the plane, to the last digit: whoever crosses it counts in the next one."""
+    """A frame ends on the plane, to the last digit: a particle that crosses it counts in the next one."""
     start = one([-0.25, 0.0, 0.0], [0.5, 0.0, 0.0])
     _start, result = run(SPHERE, [swarm.Plane((1.0, 0.0, 0.0))], start=start, until=1.0, every=0.25)
     assert result.observables["crossings"][:, 0, 0].tolist() == [0, 0, 0, 1, 1]

@@ -84,7 +84,7 @@ def test_the_storage_curve_falls_by_a_quarter_of_area_speed_over_volume_while_th
     # The cap within the chord: its area is pi radius^2 exactly.
     rate = math.pi * radius**2 * speed / (4.0 * (4.0 / 3.0 * math.pi * 0.5**3))
     time = found.observables["time"]
-    # Where a flight ends nobody knows where it began: impacts are those of a renewal process, whose chords have a mean
+    # The end of a flight does not say where it began: impacts are those of a renewal process, whose chords have a mean
     # of 4 R/3 and a variance of 2 R^2/9. Of p = area/surface that leaves 0.44 p of the rate.
     part = math.pi * radius**2 / math.pi
     kept = np.exp(-rate * (1.0 + 0.4375 * part) * (np.clip(time, begin, end) - begin))
@@ -177,11 +177,11 @@ def test_a_wall_must_come_where_nobody_is():
     scene = swarm.Scene([swarm.Box((1.0, 1.0, 1.0)), swarm.Plane((0.0, 0.0, 1.0), 0.5, present=[(0.5, 0.8)])])
     start = thrown([(0, 0, 0), (0, 0, 0.9)], [(0, 0, 0.5), (0.0, 0.0, -0.2)])
     sentence = (
-        r"surfaces\[1\] \(Plane\) must come where nobody is: at 0.5 s particle 1 is 0.3 m inside, at \(0, 0, 0.8\)"
+        r"surfaces\[1\] \(Plane\) must come where no particle is: at 0.5 s particle 1 is 0.3 m inside, at \(0, 0, 0.8\)"
     )
     with pytest.raises(swarm.RunError, match=sentence):
         run(scene, start, until=1.0, frames=1)
-    # As the run ends nobody sees it come; and who has escaped is not in the way.
+    # No frame sees it come as the run ends; and particles that escaped are not in the way.
     assert run(scene, start, until=0.5, frames=1).observables["time"][-1] == 0.5
     leak = swarm.Box((1, 1, 1), openings=[swarm.Box((2.0, 2.0, 0.1), center=(0, 0, 1))])
     away = swarm.Scene([leak, scene.surfaces[1]])
@@ -236,14 +236,14 @@ def test_until_a_wall_goes_all_is_as_with_it_and_then_as_without(name, gravity):
     pushed = found.observables["impulse"][-1, 1]
     assert before.observables["impulse"][-1, 1] == pytest.approx(pushed, rel=1e-9)
     assert pushed > 0.0
-    # What has gone is nothing that particles are outside of.
+    # No particle is outside of a wall that left.
     assert found.observables["max_penetration"].max() < 1e-15
 
 
 @pytest.mark.parametrize("gravity", [None, DOWN])
 @pytest.mark.parametrize("law", [{}, {"restitution": 0.5, "friction": 0.3}])
 def test_a_foam_that_goes_lets_all_fly(gravity, law):
-    """It is alone in its scene, so they fly freely; and it comes back where nobody is only."""
+    """It is alone in its scene, so they fly freely; and it comes back only where no particle is."""
     foam = swarm.Spheres([(0.0, 0.0, 0.0), (0.7, 0.0, 0.0)], [0.5, 0.4], side="inside", **law)
     start = swarm.fill(swarm.Scene([foam], gravity), 20, speed=0.5, seed=1)
 
@@ -255,7 +255,7 @@ def test_a_foam_that_goes_lets_all_fly(gravity, law):
     assert found.particles.position == pytest.approx(before.position + before.velocity + 0.5 * fall, abs=1e-13)
     assert found.observables["impacts"][2:].tolist() == [found.observables["impacts"][2]] * 3
     assert found.observables["max_penetration"].max() < 1e-15
-    with pytest.raises(swarm.RunError, match=r"surfaces\[0\] \(Spheres\) must come where nobody is: at 1\.9 s"):
+    with pytest.raises(swarm.RunError, match=r"surfaces\[0\] \(Spheres\) must come where no particle is: at 1\.9 s"):
         gone((0.0, 0.5), (1.9, 3.0))
 
 

@@ -35,7 +35,7 @@ DIGESTS = "import golden; print([golden.digest(name) for name in {names}])"
 @pytest.mark.physics
 @pytest.mark.parametrize("processor", ["Haswell", "Sandybridge"])
 def test_another_processors_blas_changes_no_bit(processor):
-    """NumPy's matrix product rounds as the processor likes; OpenBLAS can be told of which one it runs on."""
+    """NumPy's matrix product rounds as the processor likes; OpenBLAS can be set to one."""
     folder = Path(golden.__file__).parent
     done = subprocess.run(
         [sys.executable, "-c", DIGESTS.format(names=ROTATED)],

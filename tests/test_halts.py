@@ -169,7 +169,7 @@ def assert_all_end(script):
 
 @pytest.mark.parametrize(("tier", "every"), [("never", 1.0), ("never", 1e-3), ("always", 1e-3)])
 def test_turns_without_end_are_ended(tier, every):
-    """In long frames, and in short ones, which the caller's thread computes: nobody watches it."""
+    """In long frames, and in short ones, which the caller's thread computes, without a watcher."""
     assert_all_end(IN_TURN.format(tier=tier, every=every))
 
 

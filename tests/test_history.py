@@ -195,7 +195,7 @@ def test_impact_is_one_sweep_at_the_wall(surface):
 
 
 def test_impact_is_one_step_of_simulate():
-    """From the wall on, so that the flight before it is none."""
+    """From the wall on, so that no flight comes before it."""
     method = swarm.Impact(contact_step=0.025)
     history = swarm.contact_history(SPHERE, *STATE_ONE, 2.0, method)
     _is_one_step_of_simulate(history, SPHERE, *STATE_ONE, 2.0, method, 0.025)

@@ -1,4 +1,4 @@
-"""What each engine supports is declared once: engines are told apart, and each sentence is complete."""
+"""What each engine supports is declared once: engines are distinct, and each sentence is complete."""
 
 import re
 import string
@@ -55,7 +55,7 @@ def test_each_sentence_names_only_fields_that_runs_have():
 
 
 def test_each_sentence_says_what_is_not_supported_what_came_and_what_to_use_instead():
-    """What came is told before the reason; the remedy is an instruction, and the sentence is one line."""
+    """What came stands before the reason; the remedy is an instruction, and the sentence is one line."""
     verbs = ("use", "give", "leave", "make", "move", "run", "heat")
     for _capability, _engines, one in REFUSALS:
         assert re.fullmatch(r"[^;]+ (must|need) [^;]+, got [^;]+", one.said), one.said

@@ -1,4 +1,4 @@
-"""Observables of one's own, and the particles of frames that users are given."""
+"""User-defined observables, and the particles of frames that users are given."""
 
 import numpy as np
 import pytest
@@ -97,7 +97,7 @@ def test_a_run_that_is_resumed_has_all_frames_of_them(tmp_path):
     def ended(**keywords):
         return swarm.simulate(SPHERE, start, swarm.Impact(), until=2.0, every=0.5, **more | keywords)
 
-    with pytest.raises(swarm.SceneError, match="its observables of one's own are kinetic, spectrum, energy, got kin"):
+    with pytest.raises(swarm.SceneError, match="its user-defined observables are kinetic, spectrum, energy, got kin"):
         ended(trajectory=path, resume=True, observables={"kinetic": kinetic})
     other = OWN | {"spectrum": lambda frame: frame.position[0]}
     with pytest.raises(
@@ -188,7 +188,7 @@ def test_what_they_take_is_counted_before_the_run():
 
 
 def test_who_has_come_and_who_is_absorbed():
-    """A frame has those who are there: who has not come yet has no place in it, who is absorbed has a time."""
+    """A frame has the particles that are there: those not yet born have no place in it, absorbed ones have a time."""
     scene = swarm.Scene([swarm.Sphere(0.5, laws=[swarm.Absorb(0.5)])])
     own = {
         "there": lambda frame: frame.position.shape[1],

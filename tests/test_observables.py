@@ -99,7 +99,7 @@ def test_rigid_walls_store_nothing_and_particles_inside_do_not_penetrate():
 
 
 def test_what_lasts_of_contacts_and_the_heat_of_walls(seen):
-    """Who is on a wall now, how long all were, and the heat of each surface, whose walls may be several."""
+    """Particles on a wall now, how long all were there, and the heat of each surface, whose walls may be several."""
     scene, law, state, found = seen
     assert (found["sliding"], found["sliding_time"], found["wall_heat"].tolist()) == (0, 0.0, [0.0, 0.0])
     random = np.random.default_rng(7)

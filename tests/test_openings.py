@@ -323,7 +323,7 @@ def test_every_body_of_a_field_is_open():
     found = run(scene, swarm.Particles(r, v), until=0.9, frames=2)
     above = 0.9 - math.sqrt(0.04 - 0.0025)
     assert np.allclose(found.escape_time, np.where(r[2] > 0.0, above, np.nan), rtol=1e-14, equal_nan=True)
-    # As single balls, of which more than a few are one field too, and as few that are none.
+    # As single balls, more than a few of which are one field, and as few that are no field.
     for some in (9, 3):
         single = [
             swarm.Sphere(0.2, center=tuple(c), side="outside", openings=balls.openings) for c in balls.centers[:some]

@@ -1,4 +1,4 @@
-"""Openings of walls between the rooms of a union: who comes to one goes on in the other room."""
+"""Openings of walls between the rooms of a union: a particle that comes to one goes on in the other room."""
 
 import math
 

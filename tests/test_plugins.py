@@ -1,4 +1,4 @@
-"""Laws, sources, counters and numbers of one's own in scene files; code is named by files and allowed by callers."""
+"""User-defined laws, sources, counters and numbers in scene files; code is named by files and allowed by callers."""
 
 import tomllib
 from dataclasses import replace
@@ -216,7 +216,7 @@ def test_a_module_that_fails_is_named(tmp_path, monkeypatch):
 
 
 def test_a_trajectory_of_a_law_of_ones_own_is_shown_without_its_code(folder, tmp_path):
-    """It holds the names; who runs it again needs the code."""
+    """It holds the names; to run it again needs the code."""
     path = written(tmp_path, f'laws = [{{ law = "{folder}:Damped" }}, {{ kind = "lambert" }}]')
     run_of(path, [folder], trajectory=tmp_path / "run.h5")
     with swarm.load(tmp_path / "run.h5") as trajectory:
@@ -297,7 +297,7 @@ WRONG = {
     "no speed": ("[[source]]\nwhere = 0\nrate = 1.0", r"source\[0\].*one of temperature, speed and beam, got none"),
     "an opening": (
         "[[source]]\nwhere = { surface = 0, opening = 2 }\nrate = 1.0\nspeed = 1.0",
-        r"source\[0\].where.opening: expected none, as there are none, got 2",
+        r"source\[0\].where.opening: expected no value, for there is nothing to choose from, got 2",
     ),
     "a surface": (
         "[[source]]\nwhere = { surface = 7, opening = 0 }\nrate = 1.0\nspeed = 1.0",

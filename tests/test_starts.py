@@ -87,7 +87,7 @@ def test_balls_are_told_too():
 
 
 def test_the_row_of_a_file_is_named(tmp_path):
-    """An empty row is none of a particle."""
+    """An empty row belongs to no particle."""
     (tmp_path / "start.csv").write_text("x,y,z,vx,vy,vz\n0,0,0,1,0,0\n\n0.1,0,0,1,0,0\n0.7,0,0,1,0,0\n")
     text = '[particles]\nfrom = "start.csv"\n[[surface]]\nkind = "sphere"\nradius = 0.5\n[method]\nkind = "impact"\n'
     (tmp_path / "scene.toml").write_text(text + "[run]\nuntil = 1.0\n")

@@ -116,7 +116,7 @@ def test_a_file_of_an_older_version_is_read(path):
 
 
 def test_a_log_of_impacts_is_told(tmp_path):
-    """Not as a trajectory that is none."""
+    """Not as a broken trajectory."""
     start = swarm.fill(HOT, 6, speed=0.5, seed=1)
     for some, kept in (("all", 6), (4, 2), ([5, 3, 5], 2)):
         swarm.simulate(

@@ -197,7 +197,7 @@ def test_the_time_on_each_wall_is_that_of_what_lies_on_it():
 
 
 def test_the_time_on_a_sticky_wall_is_that_in_which_nobody_flies():
-    """Between two plates at speed 1: of those who fly at the end the way from the last plate is known."""
+    """Between two plates at speed 1: of particles in flight at the end the way from the last plate is known."""
     plates = [swarm.Plane((1.0, 0.0, 0.0), 0.5, laws=[swarm.Sticky(0.3)]), swarm.Plane((-1.0, 0.0, 0.0), 0.5)]
     start = swarm.Particles(np.zeros((3, 40)), np.array([[1.0], [0.0], [0.0]]) * np.ones(40))
     for count in range(40):

@@ -63,7 +63,7 @@ def test_both_tiers_have_the_same_bits_in_every_surface(monkeypatch, name):
 @pytest.mark.level3
 @compiled_only
 def test_what_is_not_done_in_time_goes_on_compiled(monkeypatch):
-    """Here there is next to no time, and the kernels are told to be nowhere."""
+    """Here there is next to no time, and no kernel is found."""
     start = swarm.fill(SPHERE, 20, speed=1.0, seed=1)
     whole = swarm.simulate(SPHERE, start, swarm.Impact(), until=10.0, every=5.0, compile="always")
     monkeypatch.setattr(cache, "is_compiled", lambda *call: False)

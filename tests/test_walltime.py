@@ -37,7 +37,7 @@ every = 1.0
 
 
 class Clock:
-    """A clock that goes on when it is told to."""
+    """A clock that goes on only when it is set."""
 
     def __init__(self, monkeypatch):
         self.now = 100.0

@@ -138,7 +138,7 @@ class Pool:
         else:
             status = hand.carry_out(order, lambda message: self._tell(variant, message))
         if status["state"] == "stopped" and not self._stops:
-            error = "its process was told to end (SIGTERM); a resumed sweep goes on with it"
+            error = "its process got SIGTERM; a resumed sweep goes on with it"
             status |= {"state": "failed", "error": error}
         has_ended = status["state"] == "done" or (status["state"] == "failed" and not self._stops)
         if has_ended:

@@ -96,7 +96,7 @@ _NAMES = {
     "seed": "seed of thermal walls is",
     "kept": "log of impacts keeps",
     "member_impacts": "member_impacts is",
-    "observables": "observables of one's own are",
+    "observables": "user-defined observables are",
     "counters": "counters are",
     "version": "version of swarm is",
 }

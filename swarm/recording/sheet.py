@@ -25,7 +25,7 @@ _PLOT = 0.5
 _NONE = {
     "energy_error": "no error of the energy in any frame",
     "link_error": "no error of a link's length in any frame",
-    "penetration": "nobody was outside a wall in any frame",
+    "penetration": "no particle was outside a wall in any frame",
     "overlap": "no ball pressed on another one or on a wall",
 }
 

@@ -114,7 +114,7 @@ def _hindrance(trajectory: Any) -> str:
     if trajectory.body is not None and _is_rounded(trajectory):
         return f"{told}it was run in Python, and the file keeps its bodies in float32; keep the script that made it."
     if any(table.get("kind") == "own" for table in _tables_of(tomllib.loads(trajectory.descriptions["scene"]))):
-        return f"{told}it has a surface of one's own, which no file holds; keep the script that made it."
+        return f"{told}it has a user-defined surface, which no file holds; keep the script that made it."
     return ""
 
 

@@ -72,7 +72,7 @@ def sentence_of_coming(
     wall, particle = found
     place = ", ".join(f"{x:.6g}" for x in state.position[:, particle])
     return (
-        f"{_named(scene, wall)} must come where nobody is: at {instant:g} s particle {first + particle} is "
+        f"{_named(scene, wall)} must come where no particle is: at {instant:g} s particle {first + particle} is "
         f"{depth:.3g} m inside, at ({place}) m; let it come later or elsewhere, or start that particle elsewhere"
     )
 

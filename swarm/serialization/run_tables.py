@@ -104,7 +104,7 @@ def _place_of(given: Any, where: str, scene: Scene) -> Any:
 
 def _numbered(where: str, number: Any, known: Any) -> Any:
     if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < len(known):
-        there = f"a number from 0 to {len(known) - 1}" if known else "none, as there are none"
+        there = f"a number from 0 to {len(known) - 1}" if known else "no value, for there is nothing to choose from"
         raise SceneError(f"{where}: expected {there}, got {number!r:.200}")
     return known[number]
 

@@ -46,7 +46,7 @@ def with_births(
     times = np.concatenate([time for time, _r, _v in drawn])
     if not len(times) + given:
         raise SceneError(
-            f"sources must give at least one particle where there are none at the start, got none until {until:g} s; "
+            f"sources must give at least one particle where the start has no particles, got none until {until:g} s; "
             "give a higher rate, or a later until"
         )
     order = np.argsort(times, kind="stable")

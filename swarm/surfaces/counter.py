@@ -36,7 +36,7 @@ class Counter:
     inside: Any = None
 
     def __post_init__(self) -> None:
-        require_bare("surface", self.surface, "a counter stops nobody")
+        require_bare("surface", self.surface, "a counter stops no particle")
         if self.inside is not None:
             require_bare("inside", self.inside, "it is no wall")
 
@@ -59,6 +59,6 @@ def checked_counters(value: Any) -> tuple[Counter, ...]:
     found = []
     for k, one in enumerate(given):
         if not isinstance(one, Counter):
-            require_bare(f"counters[{k}]", one, "a counter stops nobody")
+            require_bare(f"counters[{k}]", one, "a counter stops no particle")
         found.append(one if isinstance(one, Counter) else Counter(one))
     return tuple(found)

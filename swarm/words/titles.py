@@ -204,7 +204,7 @@ def details(content: Any) -> list[tuple[str, str]]:
         born = [counted_in_words(int(count), "particle") for count in np.atleast_1d(seen["born"][-1])]
         rows.append(("sources", f"{listed(born)} came" if len(born) < 7 else f"{len(born)} of them"))
     if "crossings" in seen and seen["crossings"].shape[1]:
-        rows.append(("counters", counted_in_words(seen["crossings"].shape[1], "surface") + " that stop nobody"))
+        rows.append(("counters", counted_in_words(seen["crossings"].shape[1], "surface") + " that stop no particle"))
     rows.append(("method", ", ".join([of_method(content.method), *_numbers(content.method)])))
     frames = counted_in_words(len(seen["time"]), "frame")
     return [*rows, ("time", f"{end}, {frames}")]

@@ -256,7 +256,7 @@ def _books(content: Any) -> list[Verdict]:
     frame = content.frames.get("end")
     seen_there = there if frame is None else int((~np.isnan(frame.position[0])).sum())
     kept = content.count == (there if frame is None else len(frame.mass))
-    came = f", of whom {many(born)} came from sources" if born else ""
+    came = f", {many(born)} of them from sources" if born else ""
     if inside < 0 or (kept and frame is not None and seen_there != there):
         return [Verdict("number", False, f"{listed(parts)} are not the {many(there)} that there are{came}")]
     if ends["escaped"] and not content.scene.is_open() and not _has_openings(content.scene):

@@ -20,7 +20,7 @@ NODES, ELEMENTS = block((1.0, 1.0, 1.0), (1, 1, 1))
 
 
 class Odd:
-    """An object that is none of what is asked for, whose parts cannot be read either."""
+    """An object of another kind than asked for, whose parts cannot be read either."""
 
     def __len__(self):
         return -1

@@ -166,7 +166,7 @@ def test_mdanalysis_reads_the_joined_file_and_so_does_swarm_where_it_is_moved(cl
 
 @pytest.fixture
 def held(client):
-    """The shards of the workers tell of their first frame, and stay there until they are told to stop."""
+    """The shards of the workers report their first frame, and stay there until they get a signal to stop."""
 
     def hold():
         import threading
@@ -211,7 +211,7 @@ def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, held, tmp_pat
         reached.set()
 
     client.subscribe_topic("held", reach)
-    # A shell that starts the tests in the background has told them to ignore this signal, and they who they start.
+    # A shell that starts the tests in the background makes them, and the processes that they start, ignore this signal.
     process = subprocess.Popen(
         [sys.executable, "-m", "swarm", *words, "--shards", "3"], stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),

@@ -132,5 +132,7 @@ def test_a_door_that_comes_and_goes():
 def test_a_wall_that_comes_where_a_ball_is_is_told():
     wall = swarm.Slab((1.0, 0.0, 0.0), 0.1, side="outside", present=[(1.0, math.inf)])
     start = swarm.Particles((-0.25, 0.0, 0.0), (0.1, 0.0, 0.0), radius=0.1)
-    with pytest.raises(swarm.RunError, match=r"surfaces\[1\] \(Slab\) must come where nobody is: at 1 s particle 0"):
+    with pytest.raises(
+        swarm.RunError, match=r"surfaces\[1\] \(Slab\) must come where no particle is: at 1 s particle 0"
+    ):
         swarm.simulate(swarm.Scene([swarm.Box((1.0,) * 3), wall]), start, swarm.Impact(), until=2.0, compile="never")

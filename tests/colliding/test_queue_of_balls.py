@@ -124,7 +124,7 @@ def test_each_event_is_the_first_that_there_is(options):
                     time = np.where((closing < 0.0) & (root > 0.0), gap / (np.sqrt(root) - closing), math.inf)
                 soonest = min(soonest, time.min())
             meets = run._flock.event[0::FLOATS].min() - run._since(0.02 * (k + 1))
-            # One that is known may not come to pass: then there is none sooner.
+            # A known collision may not come to pass: then no collision is sooner.
             assert meets <= soonest + 1e-12
             assert meets > -1e-12
 

@@ -22,7 +22,7 @@ FALL = math.sqrt(2.0 * RADIUS / 9.81)
 
 
 class Damped(swarm.WallLaw):
-    """Restitution, as a law of one's own."""
+    """Restitution, as a user-defined law."""
 
     e: float
     book = "dissipated"

@@ -1,4 +1,4 @@
-"""The runs of a sweep file, and what is said of files that are none."""
+"""The runs of a sweep file, and the errors about files that are no sweeps."""
 
 import tomllib
 

@@ -18,7 +18,7 @@ def results_of(tmp_path, sweep, run=""):
 
 
 class Hands:
-    """Workers that take no time: what they are told."""
+    """Workers that take no time: what they are sent."""
 
     def __init__(self, monkeypatch, seconds):
         self.told = told = []

@@ -1,4 +1,4 @@
-"""1e9 impacts in outlines with arcs, needles and re-entrant corners, and 1e6 flights at corners: nobody gets out.
+"""1e9 impacts in outlines with arcs, needles and re-entrant corners, and 1e6 flights at corners: no particle gets out.
 
 `pytest -m long -s` prints the figures. SWARM_IMPACTS says of how many impacts, a billion else.
 """

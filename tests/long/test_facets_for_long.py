@@ -1,4 +1,4 @@
-"""1e9 impacts on triangles, and 1e6 flights aimed exactly at edges and corners: nobody is out, no energy is lost."""
+"""1e9 impacts on triangles, and 1e6 flights aimed exactly at edges and corners: none is out, no energy is lost."""
 
 import os
 import sys

@@ -52,7 +52,7 @@ def test_ten_million_impacts(name, gravity):
     scene = swarm.Scene([SURFACES[name]()], gravity)
     start, impacts, session = grazing(scene, N), 0, 0
     while impacts < IMPACTS // (2 * len(SURFACES)):
-        # Whoever is outside by more than round-off ends the run; a hang would be stalled, or take for ever.
+        # A particle outside by more than round-off ends the run; a hang would be stalled, or take for ever.
         result = swarm.simulate(scene, start, swarm.Impact(), until=10.0, every=EVERY, compile="always", threads=1)
         seen, session = result.observables, session + 1
         impacts += int(seen["impacts"][-1])

@@ -1,4 +1,4 @@
-"""1e9 impacts in a T of three capped cylinders, straight and falling, and in a foam of 1000 balls: nobody gets out.
+"""1e9 impacts in a T of three capped cylinders, straight and falling, and in a foam of 1000 balls: none gets out.
 
 `pytest -m long -s` prints the figures. SWARM_IMPACTS says of how many impacts, a billion else.
 """

@@ -16,7 +16,7 @@ TIMES = (0.2, 0.45, 0.7, 0.8)
 
 @pytest.fixture(scope="module", params=["none", "some"])
 def path(request, tmp_path_factory):
-    """A run in which nobody, or two, are there at the start."""
+    """A run with no particle at the start, or two."""
     target = tmp_path_factory.mktemp("run") / "run.h5"
     start = None if request.param == "none" else swarm.fill(BOX, 2, speed=1.0, seed=1)
     source = swarm.Source(0, times=TIMES, temperature=1.0)
@@ -176,7 +176,7 @@ def test_recordings(path, tmp_path):
         played = Playback(file)
         positions, _colours = played.frame(2)
         assert np.isnan(positions[:, 0]).tolist() == [False] * (n + 2) + [True] * 2
-    # Where all come during the run the scale is that of those who have come.
+    # Where all particles are born during the run the scale is of those born so far.
     with swarm.load(path) as trajectory:
         speeds = np.linalg.norm(trajectory.frame(-1).velocity, axis=0)
         assert 1.3 < Playback(held[0]).about["high"] / np.sqrt((speeds**2).mean()) < 1.7 or n

@@ -376,7 +376,7 @@ def test_the_summary_says_what_they_are(run, tmp_path):
 
 
 def test_work_of_anchors_is_no_drift(tmp_path):
-    """Work that led anchors do is energy that bodies have; both are told."""
+    """Work of led anchors is energy of the bodies; the verdict has both."""
     motion = swarm.Oscillation(amplitude=(0.0, 0.0, 0.01), frequency=1.0)
     led = swarm.Body([(0.0, 0.0, 0.0), (0.0, 0.0, -0.1)], 1.0, springs=[(0, 1, 50.0, 0.1)], anchors={0: motion})
     start = swarm.Bodies(led, led.points.T, np.zeros((3, 2)))

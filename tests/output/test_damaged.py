@@ -158,7 +158,7 @@ STRANGE = {
     "scene is no TOML": (replaced("parameters/scene", "surface = ["), "its scene"),
     "scene is no table": (replaced("parameters/scene", "surface = 1"), "its scene"),
     "scene is too deep": (replaced("parameters/scene", f"surface = {'[' * 5000}"), "its scene"),
-    # A file, a pipe or a device of the machine of who reads the trajectory would be opened.
+    # A file, a pipe or a device of the reader's machine would be opened.
     "scene names a file": (
         replaced(
             "parameters/scene", '[[surface]]\nkind = "sampled"\nvalues = "a.h5"\nspacing = 1.0\norigin = [0, 0, 0]'
@@ -461,7 +461,7 @@ ARRAYS = {
     "float32": lambda a: a.update(position=a["position"].astype(np.float32)),
     "one particle": lambda a: a.update(mass=a["mass"][:1]),
     "transposed": lambda a: a.update(velocity=a["velocity"].T),
-    "a halt of nobody's": lambda a: a.update({"halted.rows": np.zeros((3, 1))}),
+    "a halt of no particle": lambda a: a.update({"halted.rows": np.zeros((3, 1))}),
     "a halt of particle 99": lambda a: a.update(
         {"halted.particle": np.array([99]), "halted.rows": np.zeros((len(a["halted.rows"]), 1))}
     ),

@@ -265,7 +265,7 @@ def test_a_vessel_of_several_surfaces_is_closed_and_outward(tmp_path):
         trajectory.export(tmp_path / "walls.obj")
     found = objects(tmp_path / "walls.obj")
     cap = np.pi * 0.6**2 * (1.5 - 0.6) / 3.0
-    # Of a part alone, which is not closed, trimesh knows no volume.
+    # A part alone is not closed: trimesh has no volume of it.
     corners = np.concatenate([mesh.triangles for name, mesh in found.items() if "box" not in name])
     volume = np.linalg.det(corners).sum() / 6.0
     assert volume == pytest.approx(cap, rel=0.03)

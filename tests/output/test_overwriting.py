@@ -328,7 +328,7 @@ def virtual(file, name="other.h5", where="observables/total_energy"):
 
 LINKS = {
     "a link": external_link,
-    "a link that nobody asks for": external_group,
+    "a link that no reader asks for": external_group,
     "storage": external_storage,
     "a virtual observable": lambda file, _folder: virtual(file),
     "virtual particles": lambda file, _folder: virtual(file, where="particles/all/position"),

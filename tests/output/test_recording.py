@@ -63,7 +63,7 @@ def test_an_energy_has_one_colour_in_every_picture(tmp_path, monkeypatch):
     drawn.clear()
     with swarm.load(tmp_path / "run.h5") as trajectory:
         plots.draw_plot(trajectory, tmp_path / "plot.png")
-    # What nobody was outside of is a sentence there, and no plot.
+    # A penetration of 0 in all frames is a sentence there, and no plot.
     assert drawn == {name: curves for name, curves in in_sheet.items() if name in drawn}
     assert set(in_sheet) - set(drawn) <= {"largest penetration [m]", "worst relative energy error"}
     assert drawn["energy [J]"] == ["total", "kinetic", "potential", "dissipated"]

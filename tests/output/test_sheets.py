@@ -60,7 +60,7 @@ def test_a_recording_has_the_words_of_plots(tmp_path, monkeypatch):
     title, below, drawn = texts(held, monkeypatch, tmp_path)
     assert title == held.about["title"]
     assert below == held.verdicts
-    # Nobody was outside: a sentence, no graph.
+    # No particle was outside: a sentence, no graph.
     assert "largest penetration [m]" not in drawn
 
 
@@ -84,7 +84,7 @@ def test_a_recording_of_an_older_version_still_draws(tmp_path, monkeypatch):
     assert held.verdicts is None
     title, below, drawn = texts(held, monkeypatch, tmp_path)
     assert title == "run.rrd: 60 particles, 5 frames"
-    assert below == ["nobody was outside a wall in any frame"]
+    assert below == ["no particle was outside a wall in any frame"]
     assert "largest penetration [m]" not in drawn
 
 

@@ -87,7 +87,7 @@ def test_vtk_reads_solids_as_points(tmp_path, kind):
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_solids_that_are_not_there_are_in_no_step(tmp_path, moving):
-    """One field leaves when another one comes, and at last there is none."""
+    """One field leaves when another one comes, and at last no field is left."""
     places = np.random.default_rng(3).uniform(-0.3, 0.3, (2, N + 7, 3))
     first = swarm.Spheres(places[0, :N], 1e-3, present=[(0.0, 0.15)])
     second = swarm.Boxes(places[1], (1e-3, 1e-3, 1e-3), present=[(0.15, 0.35)])

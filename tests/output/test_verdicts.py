@@ -54,7 +54,7 @@ def test_penalty_keeps_the_energy_and_gives_way():
 
 
 def test_a_loop_keeps_the_energy_up_to_its_tolerance():
-    """And who does not converge is told."""
+    """And particles that do not converge are counted."""
     method = swarm.AugmentedLagrangian(1e-2, 1e4, tolerance=1e-8, adaptive=True)
     content = run(SPHERE, method, n=5)
     found = told(content)
@@ -82,7 +82,7 @@ def test_the_balance_closes_with_losses_heat_and_work():
 
 
 def test_numbers_add_up(tmp_path):
-    """Inside, absorbed and escaped are all who are there, with those who came."""
+    """Inside, absorbed and escaped are all particles, those born during the run included."""
     walls = [swarm.Sphere(0.5, laws=[swarm.Absorb(0.05)], openings=[swarm.Sphere(0.2, (0.0, 0.0, 0.5))])]
     source = swarm.Source(0, rate=5.0, speed=1.0)
     scene = swarm.Scene(walls)
@@ -107,8 +107,7 @@ def test_numbers_add_up(tmp_path):
     assert n == 30 + born
     assert min(born, escaped, absorbed) > 0
     assert number.text == (
-        f"{n} = {n - escaped - absorbed} inside + {escaped} escaped + {absorbed} absorbed, "
-        f"of whom {born} came from sources"
+        f"{n} = {n - escaped - absorbed} inside + {escaped} escaped + {absorbed} absorbed, {born} of them from sources"
     )
     content.seen["born"][-1] += 1
     assert told(content)["number"].holds is False

@@ -19,7 +19,7 @@ STEP = 4e-3
 SHORTEST = 1e-5
 # A gap that comes so near to 0 and grows again [m]: whether it is an impact is round-off.
 GRAZES = 1e-9
-# A gap that is smaller is none [m].
+# A smaller gap counts as contact [m].
 ROUND_OFF = 1e-12
 # An impact in which so little of the velocity is along the normal is known to as few digits less.
 SLOW = 1e-3
@@ -294,7 +294,7 @@ class _Loop:
 
     def _strike(self, i, hit):
         """The impact of a ball; False where round-off decides of it, or is large in it."""
-        # Who is back at a wall, or met another ball, within the contact duration is in a contact that may last.
+        # A ball that is back at a wall, or met another ball, within the contact duration is in a contact that may last.
         if not hit[2] or hit[0] - self.met[i] < self.duration:
             return False
         time, wall, _clear = hit
@@ -315,7 +315,7 @@ class _Loop:
         return True
 
     def _restitution(self, e, *balls):
-        """That of an impact of balls; who met anything less than the contact duration before keeps its energy."""
+        """Of an impact of balls; a ball that met anything within the contact duration before keeps its energy."""
         recent = max(self.met[k] for k in balls)
         return self.number(1) if self.now - recent < self.duration else e
 

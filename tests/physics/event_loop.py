@@ -45,7 +45,7 @@ class Wall(NamedTuple):
         rest = dataclasses.replace(surface, motion=None, present=None, openings=())
         e, mu, laws = surface.restitution, surface.friction, surface.laws
         if laws and laws[0]._fields == ("e", "mu"):
-            # A law of one's own is a pair of both.
+            # A user-defined law is a pair of both.
             (e, mu), laws = laws[0], ()
         return Wall(rest, parts_of(surface.motion), sign, e, mu, surface.present or ALWAYS, surface.openings, laws)
 
@@ -197,7 +197,7 @@ def by_laws(laws, w, n, streams):
 
 
 def first_impact(walls, place, start, until):
-    """(time, wall, whether it is clear) of the first rise of a gap through 0; later than `until` if there is none."""
+    """(time, wall, whether it is clear) of the first rise of a gap through 0; later than `until` if it never rises."""
     # The wall that was left is still within round-off: it counts once it has been left.
     begin, left = start, start + 0.1 * SHORTEST
     while begin < until:
@@ -211,7 +211,7 @@ def first_impact(walls, place, start, until):
 
 
 def first_rise(wall, place, t, left):
-    """(time, whether it is clear) of the first rise of the gap of one wall among samples; infinite if there is none."""
+    """(time, whether it is clear) of the first rise of a wall's gap among samples; infinite if it never rises."""
     g = wall.gap(place(t), t)
 
     def gap(s):

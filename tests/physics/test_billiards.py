@@ -71,7 +71,7 @@ def test_who_stays_in_the_mushroom_is_known_one_by_one():
     stays = found.stays()
     assert pytest.approx(0.7831, abs=5e-5) == mushroom.STAYS
     assert not ((found.distance > 1.0) & ~stays).any()
-    # Those who all but touch the rim of the stem take long.
+    # Particles that all but touch the rim of the stem take long.
     assert np.count_nonzero((found.distance < 1.0) & stays) <= 10
     error = math.sqrt(mushroom.STAYS * (1.0 - mushroom.STAYS) / len(stays))
     assert abs(stays.mean() - mushroom.STAYS) < 3.0 * error

@@ -165,7 +165,7 @@ def test_a_start_on_the_wall_is_reflected_exactly(make):
 
 @pytest.mark.parametrize("make", chart.METHODS.values(), ids=chart.METHODS)
 def test_a_frame_cuts_the_step(make):
-    """A frame before the impact, at it or after it: the step is as much shorter, and nobody is outside."""
+    """A frame before the impact, at it or after it: the step is as much shorter, and no particle is outside."""
     met = 1.0 - one_pass(swarm.Impact(), PAPER, np.array(START.position[:, 0]), START.velocity[:, 0], 1.0).remaining
     exact = simulate(PAPER, START, swarm.Impact(), 1.0).particles.position
     whole = np.linalg.norm(simulate(PAPER, START, make(0.2, "centred"), 1.0).particles.position - exact)

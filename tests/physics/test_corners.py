@@ -63,7 +63,7 @@ def test_planes_hit_almost_at_once_reverse_the_velocity(apart):
 
 @pytest.mark.parametrize("angle", [1.0, 0.3, 0.1, 0.03, 0.01])
 def test_a_wedge_turns_a_particle_as_its_mirror_images_say(angle):
-    """pi/angle impacts, when none of them is too short to be told apart."""
+    """pi/angle impacts, when none of them is too short to be seen by itself."""
     scene, random = wedge(angle), np.random.default_rng(1)
     for _ in range(10):
         part, aim = random.uniform(0.2, 0.8), random.uniform(0.05, 0.3)

@@ -41,7 +41,7 @@ def test_an_open_billiard_is_survived_by_an_exponential():
     assert len(gone) == found.observables["escaped"][-1]
     # Kolmogorov and Smirnov: exceeded by chance once in 10^4
     assert np.abs(np.arange(1, len(gone) + 1) / count - expected).max() < 2.2 / np.sqrt(count)
-    # Nobody else has left, and who has is in the hole.
+    # No other particle left, and those that left are in the hole.
     out = np.isfinite(found.escape_time)
     hole = scene.surfaces[0].openings[0]
     assert (hole.phi(found.particles.position[:, out]) <= 0.0).all()

@@ -118,7 +118,7 @@ def test_between_nested_spheres():
 
 
 def test_mass_does_not_steer():
-    """The exact reflection knows no mass: the same bits for any masses, and impulses in proportion to them."""
+    """The exact reflection does not depend on the mass: the same bits, and impulses in proportion to it."""
     scene = scene_of("ball in ellipsoid")
     light = swarm.fill(scene, 50, speed=0.5, seed=6)
     mixed = swarm.Particles(light.position, light.velocity, np.random.default_rng(6).uniform(0.1, 10.0, 50))

@@ -22,14 +22,14 @@ def test_a_cradle_keeps_energy_and_order(name):
     assert found.balance < 1e-14
     assert (np.diff(found.place, axis=1) >= 2.0 * newton_cradle.RADIUS - 1e-15).all()
     if "masses" not in how and "restitution" not in how:
-        # At 0.7 s as many leave as came, and nobody else moves.
+        # At 0.7 s as many leave as came, and no other ball moves.
         k = int(np.searchsorted(found.time, 0.7))
         leaves = np.arange(newton_cradle.COUNT) >= newton_cradle.COUNT - how["moving"]
         assert found.velocity[k] == pytest.approx(leaves.astype(float), abs=1e-14)
 
 
 def test_a_break_shot():
-    """Nobody is in another ball or leaves but through a pocket, and the game is another one with other gaps."""
+    """No ball is in another one or leaves but through a pocket, and the game is another one with other gaps."""
     games = [break_shot.run(seed, until=2.0) for seed in (1, 2)]
     for game in games:
         assert game.collisions > 20

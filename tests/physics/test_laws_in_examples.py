@@ -58,7 +58,7 @@ def test_a_pump_takes_what_a_source_gives():
     gas = vacuum_chamber.run(15_000)
     for part, law in ((gas.part, vacuum_chamber.CAPTURED), (gas.at_pump, vacuum_chamber.CAPTURE)):
         assert abs(part[0] - law) < 3.0 * part[1]
-    # Who is in the tube at the two moments is between both counts.
+    # Particles in the tube at the two moments are between both counts.
     assert abs(gas.entered - gas.captured) < 0.01 * gas.captured
     late = gas.time >= 5.0
     assert gas.inside[late].mean() == pytest.approx(1.0, abs=0.05)

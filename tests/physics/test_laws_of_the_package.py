@@ -17,7 +17,7 @@ from swarm.observables import drift
 pytestmark = pytest.mark.physics
 G = (0.0, 0.0, -9.81)
 EPSILON = np.finfo(float).eps
-# A wall whose frame is none of the axes, and its velocity.
+# A wall turned away from the axes, and its velocity.
 NORMAL = np.array([0.6, -0.48, 0.64])
 FIRST = np.cross(NORMAL, (0.0, 0.0, 1.0)) / np.linalg.norm(np.cross(NORMAL, (0.0, 0.0, 1.0)))
 SECOND = np.cross(NORMAL, FIRST)
@@ -415,7 +415,7 @@ def test_the_books_balance_and_bits_are_the_same(name):
 
 
 def require_books(result, scene):
-    """The energy is that of the particles and the books, and who is absorbed is counted once."""
+    """The energy is that of the particles and the books, and an absorbed particle is counted once."""
     seen = result.observables
     assert drift(seen) < (1e-12 if scene.moves() or scene.gravity else 1e-13)
     assert seen["absorbed"][-1].sum() == np.count_nonzero(~np.isnan(result.absorbed_time)) > 0
@@ -450,7 +450,7 @@ def test_the_books_of_1e8_impacts():
     seen = swarm.simulate(scene, start, swarm.Impact(), until=1.4e4, every=1e3).observables
     assert seen["impacts"][-1] > 1e8
     booked = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum(axis=1)
-    # Of all energy that has gone through the books.
+    # Of all energy that went through the books.
     assert np.abs(booked / booked[0] - 1.0).max() < 1e-13 * seen["dissipated_energy"][-1] / booked[0]
 
 
@@ -498,7 +498,7 @@ def test_nobody_waits_where_walls_move():
 
 
 class Waiting(swarm.WallLaw):
-    """Who comes faster than in any trial waits, or for a time that is none."""
+    """A particle that comes faster than in any trial waits, or waits for no valid time."""
 
     time: float
 

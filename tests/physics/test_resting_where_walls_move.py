@@ -115,7 +115,7 @@ def test_a_ceiling_that_closes_on_what_rests_is_told(tmp_path):
     place = r"it is at \(0\.5, 0, (\S+)\) m, .* at ([\d.]+) s: walls that move"
     told = re.search(place, str(caught.value))
     assert told is not None, str(caught.value)
-    # It is told after the short step in which it happens: there the lid has pressed it down by its way since.
+    # It is seen after the short step in which it happens: there the lid has pressed it down by its way since.
     height, instant = (float(number) for number in told.groups())
     assert instant == pytest.approx(0.5, abs=1e-4)
     assert 0.25 - 0.5 * instant <= height <= 0.0

@@ -1,4 +1,4 @@
-"""Laws of walls of one's own, against the laws that swarm has, closed forms and distributions."""
+"""User-defined laws of walls, against the laws that swarm has, closed forms and distributions."""
 
 import inspect
 import math

@@ -126,7 +126,7 @@ def test_a_motion_that_moves_nothing_is_rest(name, gravity, motion):
 
 
 def first_hit_by_scan(scene, rest, r, v, pull, start, times, poses):
-    """The first time at which a gap rises through 0, from many samples; infinite if there is none.
+    """The first time at which a gap rises through 0, from many samples; infinite if it never rises.
 
     Args:
         rest: the scene whose walls do not move.

@@ -52,7 +52,7 @@ def test_who_enters_overlaps_nobody():
     enter_free(cells, points, numbers, done)
     assert 5 < done.sum() < 40
     assert overlaps_of(cells.position[:, done], radius[done]) is None
-    # Nobody enters twice, and who is there is in the way of who comes.
+    # No ball enters twice, and balls in place are in the way of those that come.
     enter_free(cells, random.random((3, 280)), numbers, done)
     assert overlaps_of(cells.position[:, done], radius[done]) is None
     assert not find_free(cells, cells.position[:, done], radius[done]).any()

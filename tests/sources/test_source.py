@@ -1,4 +1,4 @@
-"""Bad input of sources: one sentence each, before anything runs; and who is refused."""
+"""Bad input of sources: one sentence each, before anything runs; and what is refused."""
 
 import math
 
@@ -251,5 +251,5 @@ def test_a_wall_may_come_where_somebody_is_born_when_it_has_gone():
     later = swarm.Source(swarm.Sphere(0.1), volume=True, times=[0.5, 0.7], speed=1.0)
     assert run(scene, later, every=0.25).observables["born"][:, 0].tolist() == [0, 0, 1, 2, 2]
     before = swarm.Source(swarm.Sphere(0.1), volume=True, times=[0.25], speed=0.0)
-    with pytest.raises(swarm.RunError, match=r"must come where nobody is: at 0\.3 s particle 0"):
+    with pytest.raises(swarm.RunError, match=r"must come where no particle is: at 0\.3 s particle 0"):
         run(scene, before)

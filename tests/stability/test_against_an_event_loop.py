@@ -221,7 +221,7 @@ def holds(seed, folder, vessels=VESSELS, sourced=False):
         raise
     except swarm.RunError as failed:
         # A solid has come back where a particle was.
-        if "must come where nobody is" in str(failed) and len(scene.surfaces[-1].present or ()) > 1:
+        if "must come where no particle is" in str(failed) and len(scene.surfaces[-1].present or ()) > 1:
             return 0
         raise
     seen = result.observables

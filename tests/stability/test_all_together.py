@@ -40,7 +40,7 @@ SEEDS = range(12)
 REFUSED = (
     "must be free when particles come",
     "must be in the vessel",
-    "must come where nobody is",
+    "must come where no particle is",
     "wait where walls move",
 )
 # A cone has a tip, into which particles slide: there a run may end with this sentence.
@@ -61,7 +61,7 @@ class Damped(swarm.WallLaw):
 
 
 def some_laws(random, moves, certain):
-    """What a surface has of laws: built in, one's own, several, or restitution, friction and a temperature.
+    """What a surface has of laws: built in, user-defined, several, or restitution, friction and a temperature.
 
     `certain`: what the event loop knows.
     """
@@ -184,7 +184,7 @@ def require_balance(made, result, frames, born):
     kept = seen["total_energy"] + booked - seen["source_energy"]
     scale = max(np.abs(seen[name]).max() for name in ("kinetic_energy", "potential_energy", "source_energy"))
     assert np.abs(kept - kept[0]).max() <= UNBOOKED * scale
-    # Whoever has ended is where it ended.
+    # A particle that ended stays where it ended.
     ended = np.isfinite(taken) | np.isfinite(gone)
     if ended.any():
         gaps = scene.gaps(result.particles.position[:, ended])

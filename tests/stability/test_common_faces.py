@@ -139,9 +139,9 @@ def check(seed, gravity=None, n=N, until=4.0, **options):
     assert found.observables["max_penetration"].max() < 1e-12 * (1.0 + union.extent()), name
     assert union.phi(found.particles.position).max() < 1e-12 * (1.0 + union.extent()), name
     off = np.abs(found.particles.position - expected.particles.position).max(axis=0)
-    # Who comes to an edge goes another way, and round walls spread what is near.
+    # Particles that come to an edge go another way, and round walls spread what is near.
     assert (off < 1e-6).mean() >= 0.9, f"{name}: {np.sort(off)[::-1][:5]}"
-    # Who is where: in every part are as many.
+    # Every part has as many particles.
     for part in parts:
         inside = [(swarm.Union([part]).phi(one.particles.position) < 0.0).sum() for one in (found, expected)]
         assert abs(int(inside[0]) - int(inside[1])) <= 0.1 * n, name
@@ -197,7 +197,7 @@ def test_only_faces_seen_from_both_sides_are_common():
     # What only touches, at a point or along a line.
     assert seams(box, swarm.Sphere(1.0, (2.0, 0.0, 0.0))) == 0
     assert seams(box, swarm.Cylinder(1.0, (0.0, 0.0, 1.0), 1.0, (2.0, 0.0, 0.0))) == 0
-    # Open faces are none, and a plane ends where its room does.
+    # Open faces are no walls, and a plane ends where its room does.
     half = swarm.Intersection([swarm.Sphere(1.0, (3.0, 0.0, 0.0)), swarm.Plane((1.0, 0.0, 0.0), 3.0)])
     assert seams(half, swarm.Box((1.0, 1.0, 1.0), (4.0, 0.0, 0.0))) == 1
     assert seams(half, swarm.Box((1.0, 1.0, 1.0), (4.0, 1.5, 0.0))) == 1

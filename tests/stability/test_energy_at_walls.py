@@ -37,7 +37,7 @@ class Reversing(swarm.WallLaw):
 
 
 class Damped(swarm.WallLaw):
-    """Restitution, as a law of one's own."""
+    """Restitution, as a user-defined law."""
 
     e: float
     book = "dissipated"

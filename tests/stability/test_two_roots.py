@@ -87,7 +87,7 @@ def test_what_the_others_would_do():
 def test_it_is_the_smallest_of_random_ones():
     """Long and flat ellipsoids, steps of 0.1 to 10 times their length, soft to stiff: 1 in 100 has several roots.
 
-    Two within a factor of 2 of each other, where the residual all but touches 0, are not told apart.
+    Two within a factor of 2 of each other, where the residual all but touches 0, are not separated.
     """
     random = np.random.default_rng(1)
     several = 0

@@ -1,4 +1,4 @@
-"""Triangles as walls: the same impacts as a box, nobody out at edges, corners, needles and thin walls, laws, slides."""
+"""Triangles as walls: the same impacts as a box, none out at edges, corners, needles and thin walls, laws, slides."""
 
 import numpy as np
 import pytest

@@ -288,7 +288,7 @@ def test_grains_come_to_rest_in_front_of_a_thin_wall():
     result = swarm.simulate(scene, start, swarm.Impact(), until=8.0)
     assert scene.gaps(result.particles.position).max() < 1e-14
     height, falls = result.particles.position[1], result.particles.velocity[1] < -0.1
-    # But for who has just slid off the shelf
+    # But for particles that have just slid off the shelf
     assert ((height < 1e-9) | (height > 0.999) | falls).all()
     assert np.count_nonzero(falls) <= 1
 

@@ -1,4 +1,4 @@
-"""A phi of one's own: the same flights as the built-in surface, and never the code of another phi from the cache."""
+"""A user-defined phi: the same flights as the built-in surface, and never the code of another phi from the cache."""
 
 import collections
 import math
@@ -157,7 +157,7 @@ def test_a_trajectory_is_written(tmp_path):
         assert trajectory.frame(-1).position.shape == (3, 3)
 
 
-# --- Functions that know no arrays -----------------------------------------------------------------------
+# --- Functions of single numbers -------------------------------------------------------------------------
 
 
 def scalar_phi(parameters, x, y, z):

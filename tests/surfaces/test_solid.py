@@ -41,7 +41,7 @@ every_body = pytest.mark.parametrize("name", BODIES)
 
 
 def check(parts, position, velocity, pull, size):
-    """The time of the hit, or infinity if there is none up to a horizon."""
+    """The time of the hit, or infinity if it hits nothing up to a horizon."""
     horizon = 10.0 * (size + np.linalg.norm(position)) / np.linalg.norm(velocity)
     if any(pull):
         horizon = min(horizon, math.sqrt(20.0 * size / np.linalg.norm(pull)))

@@ -258,8 +258,14 @@ def test_a_scene_file_names_the_opening_of_a_part():
     assert run_tables.source_table(made, room)["where"] == place
     for wrong, said in (
         ({**place, "part": 2}, r"source\[0\].where.part: expected a number from 0 to 1, got 2"),
-        ({**place, "part": [1, 0, 0, 0]}, r"source\[0\].where.part: expected none, as there are none, got 0"),
-        ({**place, "part": 1}, r"source\[0\].where.opening: expected none, as there are none, got 0"),
+        (
+            {**place, "part": [1, 0, 0, 0]},
+            r"source\[0\].where.part: expected no value, for there is nothing to choose from, got 0",
+        ),
+        (
+            {**place, "part": 1},
+            r"source\[0\].where.opening: expected no value, for there is nothing to choose from, got 0",
+        ),
         ({**place, "prat": 1}, r"source\[0\].where.prat: unknown key"),
         ({"opening": 0}, r"source\[0\].where.surface: expected the number of a surface"),
     ):

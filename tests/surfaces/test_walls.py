@@ -39,7 +39,7 @@ def is_out(numbers, point):
 
 
 def first_least(hits):
-    """Least time and the first index that has it, -1 where that is not found; infinity and 0 where there is none."""
+    """Least time and the first index that has it, -1 where that is not found; infinity and 0 without walls."""
     times = [time for time, _found in hits]
     if not times or min(times) == math.inf:
         return math.inf, 0.0
