@@ -4,7 +4,7 @@ What is compared. Every flight is asked as the lanes ask it: `first_hit` of all 
 the answer only said that it is free until then. The level along each leg is a polynomial of time, built from the same
 doubles with 32 digits (see `roots`); its roots and turning points tell when the flight leaves. An answer is EXACT where
 the time is that of the first exit to 1e-12 of itself or of the crossing time; TOUCHED where there is no exit (a double
-root, a start on the wall) but the level is 0 to 1e-14 of the size of its terms, there and everywhere before. It is MISSED
+root, a start on the wall) but the level is 0 to 1e-14 of the size of its terms, there and everywhere before; MISSED
 where the flight was outside by more before, and EARLY where it is still inside: of both there must be none.
 Of each surface 2000 flights more are judged with fractions, that is without any rounding.
 
