@@ -115,7 +115,7 @@ _LEAST = 1e-17
 
 
 def accuracy(name: str, found: list[Any], front: list[Any], advice: str, where: str, file: str) -> None:
-    """Errors over wall time, one curve a method, as PNG; `where` is the machine, `file` the name of the file."""
+    """Errors over processor time, one curve a method, as PNG; `where` is the machine, `file` the name of the file."""
     from swarm.pictures.style import GREY
 
     picture, panels = subplots(3, 11.0, 5.4, sharex=True)
@@ -143,7 +143,7 @@ def accuracy(name: str, found: list[Any], front: list[Any], advice: str, where: 
     panels[1].set(title="distance from the exact place\nafter 64 impacts (faint: 20 and 5)", ylabel="median [m]")
     panels[2].set(title="largest penetration", ylabel="part of the scene's size")
     for axes in panels:
-        axes.set(xscale="log", yscale="log", xlabel="wall time [s]")
+        axes.set(xscale="log", yscale="log", xlabel="processor time [s]")
         axes.set_ylim(0.5 * _LEAST, 10.0)
         ticks = [10.0**k for k in range(-15, 2, 3)]
         axes.set_yticks([_LEAST, *ticks], ["0", *(f"$10^{{{k}}}$" for k in range(-15, 2, 3))])

@@ -9,13 +9,19 @@ from typing import Any
 from . import accuracy, figure, pairs, report, throughput
 from .stability import MAPS
 
+# Names of makers and families that are written in capitals.
+_CAPITALS = ("amd", "epyc", "cpu")
+
 
 def machine_of(name: str) -> str:
     """The machine in words, by its part of a file's name."""
     parts = re.fullmatch(r"(.+)-(avx-512|avx2|sse)-(\d+)-cores", name)
     if parts is None:
         return name
-    return f"{parts[1].replace('-', ' ').upper()}, {parts[2].upper()}, {parts[3]} cores"
+    # A file's name has the letter of "(R)" as a word.
+    words = [word for word in parts[1].split("-") if word != "r"]
+    model = " ".join(word.upper() if word in _CAPITALS else word.capitalize() for word in words)
+    return f"{model}, {parts[2].upper()}, {parts[3]} cores"
 
 
 def rows(path: Path) -> list[dict[str, str]]:
@@ -34,9 +40,14 @@ def number(text: str) -> Any:
     return text
 
 
+def scene_of(path: Path) -> str:
+    """The scene of a table of `python -m bench accuracy`."""
+    return max((s for s in accuracy.scenes() if path.stem.startswith(f"accuracy-{s.replace(' ', '-')}-")), key=len)
+
+
 def redraw_accuracy(path: Path) -> None:
     """One scene of `python -m bench accuracy`."""
-    name = max((s for s in accuracy.scenes() if path.stem.startswith(f"accuracy-{s.replace(' ', '-')}-")), key=len)
+    name = scene_of(path)
     where = machine_of(path.stem.removeprefix(f"accuracy-{name.replace(' ', '-')}-"))
     found = []
     for row in rows(path):

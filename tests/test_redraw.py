@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from children import python
 
-from bench import cells, pairs, redraw
+from bench import accuracy, cells, pairs, redraw
 
 pytest.importorskip("matplotlib")
 ROOT = Path(__file__).parents[1]
@@ -17,7 +17,7 @@ RESULTS = ROOT / "bench" / "results"
 def test_pictures_are_made_of_tables_alone(tmp_path):
     """One of each kind."""
     tables = [
-        "accuracy-soft-sphere-amd-epyc-avx2-2-cores.csv",
+        "accuracy-soft-sphere-intel-r-xeon-r-processor-avx-512-2-cores.csv",
         "throughput-amd-epyc-avx2-2-cores.csv",
         "stability-tunnelling.csv",
         "pairs.csv",
@@ -41,6 +41,35 @@ def test_a_case_of_the_table_is_what_it_was(monkeypatch):
     assert sorted([*limits, *map(str, found)]) == sorted(table)
     assert all("thr" not in name for name in limits)
     assert where == "AMD EPYC, AVX2, 2 cores"
+
+
+@pytest.mark.parametrize("name", accuracy.scenes())
+def test_the_accuracy_tables_have_every_curve(name):
+    """A picture is as old as its table, which is measured again when a method comes or goes."""
+    (path,) = [one for one in RESULTS.glob("accuracy-*.csv") if redraw.scene_of(one) == name]
+    assert list(dict.fromkeys(row["method"] for row in redraw.rows(path))) == list(
+        accuracy.ways(name, accuracy.scenes()[name])
+    )
+
+
+def test_a_machine_by_the_name_of_a_file():
+    assert redraw.machine_of("intel-r-xeon-r-processor-avx-512-2-cores") == "Intel Xeon Processor, AVX-512, 2 cores"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "errors", "told"),
+    [
+        ([1.0, 4.0, 3.0], [3e-16, 2e-16, 4e-16], "; Uzawa is as near, first at dt=2, in 3.0 times its time"),
+        ([1.0, 4.0, 3.0], [3e-16, 1e-6, 1e-7], "; the nearest of the others, Uzawa at dt=2, is 1e-07 m off in 3.0"),
+    ],
+)
+def test_the_advice_names_the_fastest_that_is_exact_or_the_nearest(seconds, errors, told):
+    names, settings = ("Impact", "Uzawa", "Uzawa"), ("default", "dt=1", "dt=2")
+    found = [
+        accuracy.Point("sphere", name, setting, spent, (error,) * 3, 0.0, 0.0)
+        for name, setting, spent, error in zip(names, settings, seconds, errors, strict=True)
+    ]
+    assert told in accuracy.advice("sphere", found)
 
 
 def test_a_folder_that_is_not_there_is_a_sentence(tmp_path):
