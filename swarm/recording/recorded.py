@@ -37,7 +37,7 @@ def _record(trajectory: Any, path: Path | None, part: Path | None, settings: Set
     seen = trajectory.observed()
     scene, method, body = trajectory.scene, trajectory.method, trajectory.body
     writer = RecordingWriter(path, overwrite, scene, method, start, frames, settings, body)
-    writer.count, writer.file = trajectory.count, part
+    writer.count, writer.numbers, writer.file = trajectory.count, trajectory.ids, part
     if np.isnan(start.position[0]).all():
         # All come during the run.
         writer.colour_by(trajectory.frame(frames - 1))

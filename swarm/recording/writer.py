@@ -1,6 +1,7 @@
 """Recordings for Rerun (https://rerun.io), written during a run or from its trajectory.
 
-/scene/particles              Points3D, a frame's; coloured; of bodies, their points
+/scene/particles              Points3D, a frame's; coloured; of bodies, their points; of particles also their mass and
+                              number, static. A velocity would double the file
 /scene/bodies/lines, .../mesh LineStrips3D and Mesh3D of bodies, a frame's; which points a triangle has is static
 /scene/surfaces/0_KIND/       mesh: Mesh3D, wires (edges) and levels: LineStrips3D; static; /scene/solids/... likewise;
                               of one that moves also Transform3D, a frame's, from where it is at the start; where there
@@ -50,6 +51,8 @@ from .playback import LINES, MESH, PARTICLES, is_whole
 # Bytes of a particle (position and colour), of a line (ends, where it begins, colour), and at most of a number of a
 # time series, which may be a chunk of its own.
 _PARTICLE_BYTES, _LINE_BYTES, _NUMBER_BYTES = 16, 32, 2000
+# Bytes of what a particle has once: its mass and its number.
+_FIXED_BYTES = 16
 _MEGABYTE = 1e6
 # Rows of the time series that are sent together, unless that takes longer than this [s].
 _ROWS, _PATIENCE = 50, 0.5
@@ -108,6 +111,8 @@ class RecordingWriter:
                 raise FileError(f"cannot write the recording {path}: no permission")
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
         self._last, self._body, self._start, self.count = frames - 1, body, start, len(start)
+        # Those of a trajectory may be some of its run.
+        self.numbers = np.arange(len(start))
         self._fed = start.births is not None or bool(np.isnan(start.position).any())
         self._drawn = drawn = Drawn(len(start), body, settings.particles, start.radius)
         some = {"collisions": start.radius is not None, "rotational_energy": start.spin is not None}
@@ -151,7 +156,7 @@ class RecordingWriter:
         lines, triangles = len(self._drawn.lines), len(self._drawn.triangles)
         points = self._at_start.shape[1] * (2 if triangles else 1)
         frame = _PARTICLE_BYTES * points + _LINE_BYTES * lines + _NUMBER_BYTES * (4 + len(self._series))
-        fixed += 12 * triangles
+        fixed += 12 * triangles + _FIXED_BYTES * points
         room = max(self._settings.megabytes * _MEGABYTE - fixed, frame)
         self._stride = math.ceil((self._last + 1) * frame / room)
         is_new = self.file is not None and not self.file.exists()
@@ -183,6 +188,10 @@ class RecordingWriter:
         """Log what does not change."""
         self.stream.set_log_time_enabled(False)
         looks.log_static(self.stream, self._drawn, [] if self._has_doors else self._shapes, self._center)
+        if self._body is None:
+            mass, number = (self._drawn.points(row[None])[0] for row in (self._start.mass, self.numbers))
+            fixed = rr.DynamicArchetype("Particles", components={"mass": mass, "number": number})
+            self.stream.log(PARTICLES, fixed, static=True)
         if not self._has_doors:
             self._log_solids(many, static=True)
         looks.log_series(self.stream, self._series)

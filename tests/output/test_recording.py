@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import rerun as rr
 from children import python
+from rerun.chunk import RrdReader
 
 import swarm
 from swarm.pictures import colours, graphs, plots
@@ -85,6 +86,34 @@ def test_frames_come_back(run):
             scale = colours.Scale(held.about["quantity"], held.about["low"], held.about["high"])
             np.testing.assert_array_equal(packed, scale.colours(speeds))
     assert held.about["low"] <= 0.5 <= held.about["high"]
+
+
+def particles_of(path):
+    """Mass and number of the particles of a recording."""
+    found = {}
+    for chunk in RrdReader(path).stream().to_chunks():
+        if chunk.entity_path == playback.PARTICLES:
+            batch = chunk.to_record_batch()
+            found |= dict(zip(batch.schema.names, batch.columns, strict=True))
+    return [np.array(found[f"Particles:{name}"].drop_null()[0].as_py()) for name in ("mass", "number")]
+
+
+def test_a_recording_has_masses_and_numbers(tmp_path):
+    """Of those that are shown, where the trajectory keeps a part of the particles too."""
+    rng = np.random.default_rng(5)
+    start = swarm.Particles(rng.uniform(-0.2, 0.2, (3, 50)), rng.normal(size=(3, 50)), rng.uniform(1.0, 2.0, 50))
+    swarm.simulate(
+        SCENE, start, METHOD, until=1.0, every=0.5, trajectory=tmp_path / "run.h5", frames=3,
+        recording=tmp_path / "run.rrd", record_particles=25, compile="never",
+    )  # fmt: skip
+    mass, number = particles_of(tmp_path / "run.rrd")
+    np.testing.assert_array_equal(number, np.arange(50)[::2])
+    np.testing.assert_array_equal(mass, start.mass[::2])
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        recorded.record(trajectory, tmp_path / "later.rrd", recording.Settings(particles=9))
+    mass, number = particles_of(tmp_path / "later.rrd")
+    np.testing.assert_array_equal(number, np.arange(50)[::3][::2])
+    np.testing.assert_array_equal(mass, start.mass[::3][::2])
 
 
 def test_series_are_the_observables(run):
