@@ -303,7 +303,8 @@ class Checked:
 
 
 def _is_text(data: Any) -> bool:
-    return data.shape == () and h5py.check_string_dtype(data.dtype) is not None
+    # A damaged file may have a group under the name.
+    return isinstance(data, h5py.Dataset) and data.shape == () and h5py.check_string_dtype(data.dtype) is not None
 
 
 def _value(data: Any) -> Any:
@@ -315,6 +316,8 @@ def _told(sums: dict[str, int]) -> bytes:
 
 
 def _lines(file: Any, name: str, numbers: int) -> Iterator[list[str]]:
+    if not _is_text(file[name]):
+        raise ValueError(f"{name} is not a text")
     return (line.rsplit(" ", numbers) for line in file[name][()].decode().split("\n"))
 
 

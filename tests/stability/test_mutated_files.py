@@ -1,5 +1,6 @@
 """Scene files and trajectories with random changes: no traceback, nothing lost, nothing overwritten unasked."""
 
+import contextlib
 import os
 import random
 import re
@@ -11,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import swarm
+from swarm.commands import summary
 from swarm.commands.cli import app
 
 SCENE = """
@@ -111,7 +113,10 @@ def whole(tmp_path_factory):
     path = tmp_path_factory.mktemp("whole") / "run.h5"
     scene = swarm.Scene([swarm.Sphere(0.5)])
     start = swarm.fill(scene, 3, speed=1.0, seed=1)
-    swarm.simulate(scene, start, swarm.Impact(), until=1.0, every=0.5, trajectory=path, compile="never", threads=1)
+    swarm.simulate(
+        scene, start, swarm.Impact(), until=1.0, every=0.5, trajectory=path, impacts=path.with_name("log.h5"),
+        compile="never", threads=1,
+    )  # fmt: skip
     return path
 
 
@@ -163,3 +168,40 @@ def test_many_changed_trajectories_are_told(whole, tmp_path):
     for seed in range(FEW, MANY):
         require_told(whole, tmp_path, seed)
     assert sorted(os.listdir(tmp_path)) == ["other.h5", "run.h5"]
+
+
+def names_in(path):
+    """What a file holds."""
+    names = []
+    with h5py.File(path) as file:
+        file.visit(names.append)
+    return names
+
+
+def require_known(path, name, value):
+    """A file with something else under a name is read, or is damaged; None is a group."""
+    with h5py.File(path, "r+") as file:
+        del file[name]
+        if value is None:
+            file.create_group(name)
+        else:
+            file[name] = value
+    with contextlib.suppress(swarm.SwarmError):
+        summary.of_file(path)
+
+
+@pytest.mark.parametrize("value", [None, 5, [1.0, 2.0]], ids=["group", "number", "list"])
+@pytest.mark.parametrize("kind", ["run.h5", "log.h5"])
+def test_another_thing_under_a_name_of_a_file_is_told(whole, tmp_path, kind, value):
+    """Of the parameters, among them the checksums; what follows needs no other error than a sentence."""
+    names = [name for name in names_in(whole.with_name(kind)) if name.startswith("parameters/")]
+    for name in names:
+        require_known(shutil.copy(whole.with_name(kind), tmp_path / kind), name, value)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["run.h5", "log.h5"])
+def test_anything_under_any_name_of_a_file_is_told(whole, tmp_path, kind):
+    for name in names_in(whole.with_name(kind)):
+        for value in (None, *HDF5_VALUES):
+            require_known(shutil.copy(whole.with_name(kind), tmp_path / kind), name, value)
