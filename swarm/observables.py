@@ -165,19 +165,29 @@ def _escapes(period, gravity, walls, r, v):
     return (flights.first_hit(walls.at(0.0), gravity, r, v).time == np.inf) & (square(v) > 0.0)
 
 
-def drift(seen: dict[str, Any]) -> float:
-    """Change of the total energy over a run that nothing caused; relative, if there was any at the start.
+def books(seen: dict[str, Any]) -> dict[str, Floats]:
+    """What has changed the energy of all since the first frame [J], each with the sign with which it does."""
+    zero = np.zeros(len(seen["time"]))
+    moved = np.sum(seen.get("wall_work", zero[:, None]), axis=1)
+    changes = {
+        "dissipated": -np.asarray(seen.get("dissipated_energy", zero)),
+        "heat of the walls": np.sum(seen.get("wall_heat", zero[:, None]), axis=1),
+        "work of the walls": moved,
+        "work of anchors": np.asarray(seen.get("work", zero)),
+        "brought by sources": np.asarray(seen.get("source_energy", zero)),
+    }
+    return {name: values - values[0] for name, values in changes.items() if np.any(values - values[0])}
 
-    Walls may take or give energy, particles that come bring theirs, and anchors that are led give their work.
+
+def drift(seen: dict[str, Any]) -> float:
+    """The largest change of the energy of all that is in no book, over the energy that moved or was there at most.
+
+    The zero of the potential energy is arbitrary, so of that only what changes counts. Where nothing moved, it is in J.
     """
-    energy, lost = seen["total_energy"], seen["dissipated_energy"]
-    # Files of older versions have no heat, and those of particles no work.
-    given = np.sum(seen.get("wall_heat", [0.0])[-1]) + seen.get("work", [0.0])[-1]
-    given += np.sum(seen.get("wall_work", [0.0])[-1])
-    # Those that are there at the first frame are in its energy.
-    brought = seen.get("source_energy", [0.0])
-    come = brought[-1] - brought[0]
-    change, scale = abs(energy[-1] + lost[-1] - given - come - energy[0]), abs(energy[0]) + abs(come)
+    changes, total = books(seen), np.asarray(seen["total_energy"])
+    change = np.abs(total - total[0] - np.sum(list(changes.values()), axis=0)).max()
+    scale = np.max(np.abs(seen["kinetic_energy"])) + np.ptp(seen["potential_energy"])
+    scale += np.max(np.abs(seen["contact_energy"])) + sum(np.abs(values).max() for values in changes.values())
     return float(change / scale if scale else change)
 
 

@@ -119,11 +119,19 @@ def test_what_lasts_of_contacts_and_the_heat_of_walls(seen):
 
 
 def test_drift_is_what_neither_loss_nor_heat_explains():
-    table = {"total_energy": [2.0, 2.5], "dissipated_energy": [0.0, 0.25], "wall_heat": [[0.0, 0.0], [1.0, -0.25]]}
+    table = {
+        "time": [0.0, 1.0], "kinetic_energy": [1.0, 1.75], "potential_energy": [1.0, 0.75],
+        "contact_energy": [0.0, 0.0],
+        "total_energy": [2.0, 2.5], "dissipated_energy": [0.0, 0.25], "wall_heat": [[0.0, 0.0], [1.0, -0.25]],
+    }  # fmt: skip
     seen = {name: np.array(values) for name, values in table.items()}
     assert observables.drift(seen) == 0.0
     del seen["wall_heat"]  # of an older version
-    assert observables.drift(seen) == 0.375
+    assert observables.drift(seen) == 0.75 / (1.75 + 0.25 + 0.25)
+    # The zero of the potential energy is arbitrary: that of the total energy changes nothing.
+    for height in (-2.0, 1e3):
+        moved = {name: seen[name] + height for name in ("potential_energy", "total_energy")}
+        assert observables.drift(seen | moved) == observables.drift(seen)
 
 
 def test_at_rest_the_energy_error_has_no_scale():

@@ -10,6 +10,7 @@ from swarm.commands import summary
 from swarm.pictures import graphs, plots, series
 from swarm.recording import playback, recorded, sheet
 from swarm.recording import writer as recording
+from swarm.words.amounts import plain
 
 HOT = swarm.Scene([swarm.Sphere(0.5, temperature=300.0), swarm.Sphere(0.2, side="outside")])
 FRAMES = 3
@@ -65,6 +66,19 @@ def test_what_is_dissipated_is_beside_kinetic_energies(tmp_path):
     assert seen["dissipated_energy"][-1] > 10.0 * seen["total_energy"][0]
     told = f"{seen['dissipated_energy'][-1]:.4g} J; the kinetic energy: 1 J, then {seen['kinetic_energy'][-1]:.4g} J"
     assert summary.of_trajectory(file)["dissipated"] == summary.of_result(result, None)["dissipated"] == told
+
+
+def test_the_drift_of_a_fall_that_begins_near_the_zero_of_its_energy_is_round_off():
+    """Of its total energy at the start it would be 7e-6."""
+    scene = swarm.Scene([swarm.Sphere(0.5)], gravity=(0.0, 0.0, -9.81))
+    start = swarm.Particles([[0.1, -0.1], [0.0, 0.0], [1e-12, 0.0]], np.zeros((3, 2)), 2.0)
+    result = swarm.simulate(scene, start, swarm.Impact(), until=5.0, every=0.1, compile="never")
+    rows = summary.of_result(result, None)
+    part = rows["energy drift"].split(" of the energy that moved, ")[0]
+    assert 0.0 < float(part) < 1e-15
+    # The verdict says the same.
+    (told,) = [line for line in rows["verdicts"].splitlines() if "total energy" in line]
+    assert told == f"✓ total energy: constant: it changes by {plain(float(part), 2)} of the energy that moved"
 
 
 def test_the_work_of_walls_is_told(tmp_path, path):

@@ -109,7 +109,8 @@ def of_run(seen: dict[str, Any], radius: Any = None) -> dict[str, str]:
     rows: dict[str, str] = {name: f"{int(seen[name][-1]):,}".replace(",", " ") for name in counts}
     if slid := seen.get("sliding_time", [0.0])[-1]:
         rows["sliding"] = f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"
-    rows["energy drift"] = f"{drift(seen):.1e} of the total, {seen['energy_error'].max():.1e} of the worst particle"
+    worst = seen["energy_error"].max()
+    rows["energy drift"] = f"{drift(seen):.1e} of the energy that moved, {worst:.1e} of the worst particle"
     rows["largest penetration"] = f"{seen['max_penetration'].max():.1e} m"
     rows |= _overlap(seen, radius)
     if np.any(seen.get("link_error", 0.0)):

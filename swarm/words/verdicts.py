@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..common.catalog import OBSERVABLES
+from ..observables import books, drift
 from ..pairs import MOST_PRESSED
-from ..state import Floats
 from .amounts import amount, counted_in_words, listed, many, plain
 
 # Of whatever should be kept: the bound of the project's tests, and how much of a number one operation may round away.
@@ -100,46 +100,18 @@ def _energy(content: Any) -> list[Verdict]:
     return [Verdict("energy", False, f"not kept: {figure}, and {why} explains {plain(limit, 1)}")]
 
 
-def books(seen: dict[str, Any]) -> dict[str, Floats]:
-    """What has changed the energy of all since the first frame [J], each with the sign with which it does."""
-    zero = np.zeros(len(seen["time"]))
-    moved = np.sum(seen.get("wall_work", zero[:, None]), axis=1)
-    changes = {
-        "dissipated": -np.asarray(seen.get("dissipated_energy", zero)),
-        "heat of the walls": np.sum(seen.get("wall_heat", zero[:, None]), axis=1),
-        "work of the walls": moved,
-        "work of anchors": np.asarray(seen.get("work", zero)),
-        "brought by sources": np.asarray(seen.get("source_energy", zero)),
-    }
-    return {name: values - values[0] for name, values in changes.items() if np.any(values - values[0])}
-
-
-def unexplained(seen: dict[str, Any]) -> tuple[float, float]:
-    """The largest change of the energy of all that is in no book, and the energy that moved or was there at most [J].
-
-    The zero of the potential energy is arbitrary, so of that only what changes counts.
-    """
-    total, changes = np.asarray(seen["total_energy"]), books(seen)
-    rest = total - total[0] - np.sum(list(changes.values()), axis=0) if changes else total - total[0]
-    scale = (
-        np.abs(seen["kinetic_energy"]).max() + np.ptp(seen["potential_energy"]) + np.abs(seen["contact_energy"]).max()
-    )
-    return float(np.abs(rest).max()), float(scale + sum(np.abs(values).max() for values in changes.values()))
-
-
 def _balance(content: Any) -> list[Verdict]:
     """The energy of all against what walls, sources and anchors have taken and given."""
-    changes, (rest, scale) = books(content.seen), unexplained(content.seen)
-    part = rest / scale if scale else rest
+    changes, part = books(content.seen), drift(content.seen)
     limit = energy_limit(content)
     holds = part <= limit
     if not changes:
         known = type(content.method).__name__ in _CONSERVING
         why = "" if holds or known else f", {type(content.method).__name__} does not conserve it"
-        if rest == 0.0:
+        if part == 0.0:
             return [Verdict("total energy", True, "constant to the last bit")]
         kept = "constant" if holds else "not constant"
-        return [Verdict("total energy", holds, f"{kept}: it changes by {plain(part, 2)} of itself at most{why}")]
+        return [Verdict("total energy", holds, f"{kept}: it changes by {plain(part, 2)} of the energy that moved{why}")]
     told = [
         f"{name} {amount(float(values[-1]) * (-1 if name == 'dissipated' else 1), 'J', 3)}"
         for name, values in changes.items()
