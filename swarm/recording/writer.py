@@ -112,7 +112,7 @@ class RecordingWriter:
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
         self._last, self._body, self._start, self.count = frames - 1, body, start, len(start)
         # Those of a trajectory may be some of its run.
-        self.numbers = np.arange(len(start))
+        self.numbers: Any = np.arange(len(start))
         self._fed = start.births is not None or bool(np.isnan(start.position).any())
         self._drawn = drawn = Drawn(len(start), body, settings.particles, start.radius)
         some = {"collisions": start.radius is not None, "rotational_energy": start.spin is not None}
