@@ -9,8 +9,8 @@ from grains_runs import ran
 import swarm
 from swarm import RunError, SceneError
 from swarm.commands.summary import numbers, of_trajectory
-from swarm.grains import sinking
 from swarm.pictures.series import lines_of
+from swarm.run.preflight import softness
 from swarm.words.content import Content
 from swarm.words.verdicts import judged
 
@@ -85,7 +85,7 @@ def test_a_damper_takes_of_the_depth_what_is_said(restitution):
     wall = swarm.Plane((1.0, 0.0, 0.0), restitution=restitution)
     method = swarm.Penalty(1e-5, 1e4)
     seen = ran(swarm.Scene([ROOM, wall]), thrown(1.0, 0.0), method, 0.006).observables
-    wanted = float(sinking.depths_of(method, np.array(MASS), np.array(1.0), restitution))
+    wanted = float(softness.depths_of(method, np.array(MASS), np.array(1.0), restitution))
     assert seen["largest_overlap"][-1] == pytest.approx(wanted, rel=0.01)
 
 
