@@ -30,7 +30,7 @@ VIEWS = {
     "animation": View(".pictures.film", "a film", "animation"),
     "film": View(".pictures.shown_film", "a film", "animation"),
     "recording": View(".recording.writer", "a recording", "record"),
-    "report": View(".report.of_run", "a report", "report"),
+    "report": View(".pages.of_run", "a report", "report"),
     "xarray": View(".exports.labelled", "a Dataset", "xarray"),
     "viewer": View(".recording.recorded", "a viewer", "record"),
     "notebook": View(".recording.widget", "a viewer", "notebook"),

@@ -24,7 +24,7 @@ WINGS = [
     ["commands"],
     ["ensemble"],
     ["scene_file"],
-    ["exports", "recording", "report"],
+    ["exports", "pages", "recording"],
     ["pictures"],
     ["triangles"],
     ["words", "cluster"],
@@ -107,6 +107,11 @@ def test_the_core_imports_no_wing():
                     )
             if parts[0] == "surfaces" and parts[1] not in WINGS_OF_SURFACES and parts != KINDS:
                 assert [one for one in imported(parts) if one[0] == "surfaces" and one[1] in WINGS_OF_SURFACES] == []
+
+
+def test_no_module_has_a_public_name():
+    """Importing it would hide the function or the class: `swarm.report`."""
+    assert {parts[0] for parts in modules()} & set(swarm.__all__) == set()
 
 
 def test_folders_can_be_looked_through():

@@ -81,7 +81,7 @@ def of_module(module):
     """What a module imports when it is imported; of pages and films also the packages of their functions."""
     at_once = set(imported(tree_of(module).body, module, deep=False))
     later = {name for name in imported(tree_of(module).body, module, deep=True) if not name.startswith("swarm")}
-    return at_once | later if module.startswith(("swarm.report", "swarm.pictures.film")) else at_once
+    return at_once | later if module.startswith(("swarm.pages", "swarm.pictures.film")) else at_once
 
 
 def packages(names):
@@ -113,11 +113,11 @@ def guarded():
                     names = set(imported(node.body, module, deep=True))
                     if module == "swarm.exports.export" and "import_module" in ast.unparse(node):
                         forms = [form for kind, form in export._FORMS.items() if (kind == ".gsd") == (extra == "gsd")]
-                        names |= {f"swarm.output.{form}" for form in forms}
+                        names |= {f"swarm.exports.{form}" for form in forms}
                     yield f"{module}:{node.lineno}", (*before, extra), names
                 before = (*before, *extras_of(node))
     for name, one in views.VIEWS.items():
-        yield f"{views.__name__}, {name}", () if one.extra is None else (one.extra,), {f"swarm.output{one.module}"}
+        yield f"{views.__name__}, {name}", () if one.extra is None else (one.extra,), {f"swarm{one.module}"}
 
 
 CORE = {named(one) for one in PROJECT["dependencies"]} | BROUGHT

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import swarm
+from swarm.pages.html import Page
 from swarm.pictures.shown_film import Film
-from swarm.report.html import Page
 
 SCENE = swarm.Scene([swarm.Sphere(0.5)])
 START = swarm.fill(SCENE, 3, speed=1.0, seed=1)

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from ..common.catalog import MAIN, NAMES, OBSERVABLES
+from ..pages.pictures import PagePicture, svg
 from ..pictures import style
-from ..report.pictures import PagePicture, svg
 from ..words.amounts import plain
 from .folder import SweepFolder
 

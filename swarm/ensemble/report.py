@@ -11,7 +11,7 @@ from ..common.checks import flag, path_of
 from ..common.extras import needed_by
 
 if TYPE_CHECKING:
-    from ..report.html import Page
+    from ..pages.html import Page
 
 
 def report(
@@ -59,7 +59,7 @@ def report(
 def checked(source: Path, output: Path | None, overwrite: bool) -> Path:
     """The file of the report of a run or a folder; a SceneError if it cannot be written."""
     with needed_by("a report", "report"):
-        from ..report import html
+        from ..pages import html
     named = source.resolve() if source.is_dir() else source
     target = named.with_name(f"{named.name}.html") if source.is_dir() else source.with_suffix(".html")
     return html.checked_target(target if output is None else output, overwrite, () if source.is_dir() else (source,))
@@ -68,7 +68,7 @@ def checked(source: Path, output: Path | None, overwrite: bool) -> Path:
 def page_of(source: Path, target: Path | None) -> "Page":
     """The report of a run or of a folder; its links are as of the file `target`."""
     with needed_by("a report", "report"):
-        from ..report import of_run as run
+        from ..pages import of_run as run
     if source.is_dir():
         return of_folder(source, source.resolve().parent if target is None else target.resolve().parent)
     from ..files.trajectory import load
@@ -80,7 +80,7 @@ def page_of(source: Path, target: Path | None) -> "Page":
 
 def of_folder(folder: Path, place: Path) -> "Page":
     """The report of the folder of a sweep, whose links are as of a file in the folder `place`."""
-    from ..report.html import Page, filled
+    from ..pages.html import Page, filled
     from . import curves
     from .folder import found
 
@@ -121,7 +121,7 @@ def _told(row: dict[str, Any], sweep: Any) -> str:
 
 def _notes(sweep: Any, states: list[str]) -> list[Any]:
     """Whether the sweep goes on, or was stopped."""
-    from ..report.of_run import Note, is_written
+    from ..pages.of_run import Note, is_written
 
     waiting = states.count("waiting")
     if sweep.table is not None and is_written(sweep.table):
@@ -140,7 +140,7 @@ def _command(sweep: Any) -> str:
     """The command that carries out the sweep again, or "" where its file is not there."""
     if sweep.text is None:
         return ""
-    from ..report.reproduce import plugins_of
+    from ..pages.reproduce import plugins_of
 
     try:
         plugins = plugins_of(tomllib.loads(sweep.text))

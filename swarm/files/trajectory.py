@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from ..bodies.body import Body
     from ..bodies.state import Bodies
     from ..exports.exported import Progress
+    from ..pages.html import Page
     from ..pictures.shown_film import Film
-    from ..report.html import Page
 
 
 class Trajectory(Stored):

@@ -42,7 +42,7 @@ class Picture(Figure):
 @contextlib.contextmanager
 def applied(dark: bool = False) -> Iterator[None]:
     """What is drawn and saved in this context has the look, on a light or a dark background."""
-    names = ["swarm.pictures.look", *["swarm.output.dark"] * dark]
+    names = ["swarm.pictures.look", *["swarm.pictures.dark"] * dark]
     with style.context(["default", *names]):
         yield
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..bodies.state import Bodies
+    from ..pages.html import Page
     from ..pictures.shown_film import Film
-    from ..report.html import Page
     from ..words.content import Content
     from .sequence import Frames
 

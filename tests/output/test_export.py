@@ -286,9 +286,9 @@ def test_bad_input_writes_nothing(stored, tmp_path, change, message):
 def test_missing_libraries_are_named_before_anything_is_written(stored, tmp_path, monkeypatch, name, missing, message):
     for module in {missing, *(found for found in sys.modules if found.split(".")[0] == missing)}:
         monkeypatch.setitem(sys.modules, module, None)
-    for module in ("gsd", "walls", "shapes", "gridded"):
-        monkeypatch.delitem(sys.modules, f"swarm.output.{module}", raising=False)
-        monkeypatch.delattr(f"swarm.output.{module}", raising=False)
+    for module in ("exports.gsd", "exports.walls", "triangles.shapes", "triangles.gridded"):
+        monkeypatch.delitem(sys.modules, f"swarm.{module}", raising=False)
+        monkeypatch.delattr(f"swarm.{module}", raising=False)
     with swarm.load(stored["cavity"]) as trajectory, pytest.raises(swarm.SceneError, match=message):
         trajectory.export(tmp_path / name)
     assert list(tmp_path.iterdir()) == []

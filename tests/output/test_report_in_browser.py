@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.report.html import filled
+from swarm.pages.html import filled
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium here (Debian: apt install chromium)")
