@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 import swarm
 from swarm.motion import led
@@ -39,6 +40,14 @@ def test_rotation_is_right_handed_about_its_axis(length):
         c, s = math.cos(0.8 * t), math.sin(0.8 * t)
         turned = arm * c + np.cross(unit, arm) * s + unit * (unit @ arm) * (1.0 - c)
         assert path.position(t) == pytest.approx(center + turned, abs=1e-14)
+
+
+def test_a_path_is_the_natural_cubic_spline_through_its_positions():
+    times = (0.0, 0.4, 1.0, 1.5, 2.7)
+    positions = np.random.default_rng(1).uniform(-1.0, 1.0, (len(times), 3))
+    path, spline = swarm.Path(times, positions), CubicSpline(times, positions, bc_type="natural")
+    for t in np.linspace(0.0, 2.7, 28):
+        assert path.displacement(t) == pytest.approx(spline(t), abs=1e-14)
 
 
 def test_every_path_begins_at_its_start():
