@@ -50,9 +50,9 @@ settings.register_profile(
 )
 settings.load_profile("swarm")
 
-# What plain Python does sooner than a kernel is compiled is not worth compiling, also where others use the processor: a
-# kind in which contact lasts takes 4 to 7 s of processor time, a particle that slides for ten crossings 2 s.
-tiers._PATIENCE = 10.0
+# What plain Python does sooner than a kernel is compiled is not worth compiling, also where others use the processor.
+# At level 0 a kind takes 1 to 3 s of processor time, a particle that slides for ten crossings in plain Python 2 s.
+tiers._PATIENCE = 4.0
 # The tier of a test does not depend on the tests before it.
 SPENT, tiers.spent = tiers.spent, lambda kinds: 0.0
 EPSILON = float(np.finfo(np.float64).eps)

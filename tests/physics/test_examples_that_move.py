@@ -14,7 +14,7 @@ pytestmark = pytest.mark.physics
 SCENES = Path(__file__).parents[2] / "examples" / "scenes"
 
 
-def test_a_slow_piston_heats_its_gas_by_the_adiabatic_law():
+def test_a_slow_piston_heats_its_gas_by_the_adiabatic_law(compiled_at_once):
     """T V^(2/3) where balls mix the directions, T_z L^2 where nothing does and the others keep their energy."""
     mixed, straight = (piston.run(400, 0.01, frames=4, balls=balls) for balls in (True, False))
     law = mixed.volume ** (-2.0 / 3.0)

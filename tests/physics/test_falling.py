@@ -116,7 +116,7 @@ def test_time_runs_back(name):
 
 
 @pytest.mark.parametrize("name", ["sphere", "ellipsoid"])
-def test_the_vertical_angular_momentum_stays(name):
+def test_the_vertical_angular_momentum_stays(name, compiled_at_once):
     """Of each particle, in what is round about the vertical: the round-off of an impact, adding up at random."""
     scene = SCENES[name]
     start = swarm.fill(scene, 100, speed=1.0, seed=7)

@@ -40,7 +40,7 @@ def test_a_gas_keeps_energy_and_walls(name):
 
 
 @pytest.mark.parametrize("name", [rarely(name) if name == "ellipsoid" else name for name in SHAPES])
-def test_a_tolerance_bounds_gap_and_energy(name):
+def test_a_tolerance_bounds_gap_and_energy(name, compiled_at_once):
     """Phi1 <= sqrt(2 tolerance/alpha) outside, and lambda Phi1 of energy a contact."""
     scene, start = scene_of(name), swarm.fill(scene_of(name), 200, speed=0.5, seed=4)
     for tolerance in (1e-8, 1e-12):

@@ -31,7 +31,7 @@ def test_verlet_is_gone_beyond_two():
 
 
 @pytest.mark.parametrize("cls", [swarm.Midpoint, swarm.Trapezoidal])
-def test_implicit_rules_are_stable_and_do_not_conserve(cls):
+def test_implicit_rules_are_stable_and_do_not_conserve(cls, compiled_at_once):
     """A-stable for a spring that never lets go; each contact that begins and ends changes the energy."""
     assert worst_energy(cls, 0.3) > 1e-6
     assert worst_energy(cls, 3.0) > 1e-2

@@ -222,7 +222,7 @@ def test_around_a_solid_and_in_a_ring():
     assert (end.observables["impulse"][-1] > 0.0).all()
 
 
-def test_a_prism_has_lids():
+def test_a_prism_has_lids(compiled_at_once):
     for axis in ((0, 0, 1), (1, 2, 3)):
         prism = swarm.Prism(CURVED, 2.0, axis=axis, center=(0.1, 0.2, 0.3))
         scene = swarm.Scene([prism])
@@ -239,7 +239,7 @@ def test_a_prism_has_lids():
 # --- Slides ----------------------------------------------------------------------------------------------
 
 
-def test_what_slides_over_a_smooth_joint_keeps_its_energy():
+def test_what_slides_over_a_smooth_joint_keeps_its_energy(compiled_at_once):
     """A bead in a stadium of frictionless walls swings from one arc over the line to the other."""
     scene = swarm.Scene([swarm.Stadium(1.0, 2.0, restitution=0.0)], gravity=(0.0, -1.0, 0.0), plane="z")
     height = 0.4
