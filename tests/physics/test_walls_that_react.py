@@ -118,6 +118,18 @@ def test_galperin_unfolded():
     assert 1.0 + result.observables["wall_position"][-1, 1, 0] == pytest.approx(float(folded.real / root), rel=1e-12)
 
 
+def test_a_wall_in_uniform_motion_beside_one_that_reacts():
+    """Three impacts within a frame: at 0.4 s, at 1 s on the wall with a mass, at 1.75 s."""
+    closing = swarm.Plane((1.0, 0.0, 0.0), 1.0, motion=swarm.Translation((-0.25, 0.0, 0.0)))
+    heavy = swarm.Plane((-1.0, 0.0, 0.0), 0.0, mass=3.0, motion=swarm.Guide((1.0, 0.0, 0.0)))
+    start = swarm.Particles([0.5, 0.0, 0.0], [1.0, 0.0, 0.0])
+    result = run(swarm.Scene([closing, heavy]), start, until=2.0)
+    assert result.observables["impacts"][-1] == 3
+    assert result.particles.position[0, 0] == pytest.approx(0.25, abs=1e-15)
+    assert result.particles.velocity[0, 0] == pytest.approx(-1.25, abs=1e-15)
+    assert result.observables["wall_position"][-1, 1, 0] == pytest.approx(-0.75, abs=1e-15)
+
+
 def test_nothing_strikes():
     """A wall that nothing strikes falls, vibrates or turns by its closed form, frame by frame."""
     far = swarm.Particles([0.0, 0.0, 0.2], [0.0, 0.0, 0.0])
