@@ -92,9 +92,11 @@ def pytest_collection_modifyitems(config, items):
     A test that is named by itself runs, however slow it is.
     """
     is_named = any("::" in argument for argument in config.args)
-    seconds, unmeasured = durations.known() if not is_named else ({}, set())
+    seconds = {} if is_named else durations.known()[0]
+    measured = (item.nodeid for item in items if not any(map(item.get_closest_marker, ("slow", "long"))))
+    slow = set() if is_named else durations.slow_ones(measured)
     for item in items:
-        if item.nodeid in seconds or item.nodeid.partition("::")[0] in unmeasured:
+        if item.nodeid in slow:
             item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: -seconds.get(item.nodeid, 0.0))
     if int(numba.config.OPT) != 3:

@@ -13,7 +13,9 @@ import pytest
 
 FILE = Path(__file__).with_suffix(".json")
 # From here on a test is slow [s].
-SLOW = 0.5
+SLOW = 0.3
+# Of a file of slow tests alone the shortest is in the quick ring as well, if it takes less than this [s].
+AT_LEAST_ONE = 1.0
 _spent = {}
 
 
@@ -22,6 +24,22 @@ def known():
     table = json.loads(FILE.read_text("utf-8")) if FILE.exists() else {}
     seconds = {f"{path}::{name}": time for path, names in table.items() for name, time in (names or {}).items()}
     return seconds, {path for path, names in table.items() if names is None}
+
+
+def slow_ones(names):
+    """Which of the tests of whole files are slow, by their ids."""
+    seconds, unmeasured = known()
+    files = {}
+    for name in names:
+        files.setdefault(name.partition("::")[0], set()).add(name)
+    slow = set()
+    for file, tests in files.items():
+        some = tests if file in unmeasured else tests & seconds.keys()
+        shortest = min(some & seconds.keys(), key=lambda name: (seconds[name], name), default=None)
+        if some == tests and shortest is not None and seconds[shortest] < AT_LEAST_ONE:
+            some = some - {shortest}
+        slow |= some
+    return slow
 
 
 def _processor_time():

@@ -8,6 +8,7 @@ import string
 import sys
 from pathlib import Path
 
+import durations
 import pytest
 
 from bench import cells, outcomes
@@ -33,8 +34,11 @@ def test_no_cell_has_a_third_outcome():
 
 
 def test_every_row_and_column_is_in_the_quick_ring():
+    slow = durations.known()[0]
+    quick = [cell for cell in SOON if f"tests/test_pairs.py::test_a_cell_is_as_the_list_says[{cell}]" not in slow]
+    assert len(quick) < len(SOON)  # the table has these ids
     for names, k in ((cells.ENGINES, 0), (cells.WALLS, 1), (cells.CAPABILITIES, 2)):
-        assert {cell[k] for cell in SOON} == set(names)
+        assert {cell[k] for cell in quick} == set(names)
 
 
 def pattern(sentence):

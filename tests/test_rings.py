@@ -41,3 +41,11 @@ def test_what_is_measured_is_written(tmp_path, monkeypatch):
     durations.FILE.write_text('{"a.py": null, "b.py": {"test_x": 0.9, "test_y": 2.0}, "c.py": null}')
     durations.write({"a.py::test[1]": 0.7, "b.py::test_x": 0.1})
     assert durations.known() == ({"a.py::test[1]": 0.7, "b.py::test_y": 2.0}, {"c.py"})
+
+
+def test_of_a_file_of_slow_tests_the_shortest_is_quick(monkeypatch):
+    """Unless it takes a second or more, or nothing is known of its file."""
+    seconds = {"a.py::one": 2.0, "a.py::other": 0.9, "b.py::one": 1.0, "c.py::one": 0.5, "d.py::one": 0.5}
+    monkeypatch.setattr(durations, "known", lambda: (seconds, {"d.py"}))
+    names = ["a.py::one", "a.py::other", "b.py::one", "c.py::one", "c.py::quick", "d.py::new"]
+    assert durations.slow_ones(names) == {"a.py::one", "b.py::one", "c.py::one", "d.py::new"}
