@@ -12,11 +12,10 @@ from children import python
 
 import swarm
 from swarm.contact.events import CAREFUL, EVENT
-from swarm.events import walls_run as reacting
 from swarm.events.reacting import queue
 from swarm.lanes import block, careful, contact_events, slide
 from swarm.lanes.table import LANES
-from swarm.run import turns
+from swarm.run import base, turns
 from swarm.run.engine import Run
 from swarm.run.machine import run_of
 from swarm.run.options import RunOptions
@@ -334,7 +333,7 @@ def test_a_collapse_on_a_wall_that_reacts_is_bounded():
 
 def test_predictions_that_are_halted_have_the_same_bits(monkeypatch):
     """After any number of particles, also taken over by another run."""
-    monkeypatch.setattr(reacting, "_AT_ONCE_PLAIN", 3)
+    monkeypatch.setattr(base, "_AT_ONCE_PLAIN", 3)
     plate = swarm.Plane((0.0, 0.0, 1.0), 0.5, mass=1.0)
     scene = swarm.Scene([swarm.Box((0.5, 0.5, 1.0)), plate])
     start = swarm.fill(scene, 20, speed=1.0, seed=1)

@@ -98,7 +98,7 @@ def test_bodies_are_compiled_at_once_and_have_lanes_there_alone():
     """With one lane they took four times as long."""
     bodies = swarm.place(SPHERE, swarm.dumbbell(0.2, 1.0), 40, speed=1.0, seed=1)
     task = task_of(SPHERE, bodies, swarm.Impact(dt=0.01), RunOptions(until=1.0))
-    runs = [BodyRun(SPHERE, bodies, task.particles, task.method, 1, None, choice) for choice in ("auto", "never")]
+    runs = [BodyRun(SPHERE, (bodies, task.particles), task.method, 1, None, choice) for choice in ("auto", "never")]
     assert [run._tier.is_plain for run in runs] == [False, True]
     assert runs[0]._rule.lanes > runs[1]._rule.lanes == 1
 

@@ -14,7 +14,8 @@ from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import Particles
 from ..run.base import Arrays, BaseRun
-from ..run.tally import Tally
+from ..run.state import Seeding
+from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..scene import Scene
 from ..state import Floats, State
@@ -35,19 +36,19 @@ _REST, _PAGE = 8 << 20, 1 << 16
 _AT_ONCE = 256
 # Suzuki's composition: five steps of second order are one of fourth.
 _OUTER = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
+_UNSEEDED, _UNWATCHED = Seeding(), Watched()
 STAGES = {2: (1.0,), 4: (_OUTER, _OUTER, 1.0 - 4.0 * _OUTER, _OUTER, _OUTER)}
 
 
 class BodyRun(BaseRun):
-    """The run of bodies; `particles` are all their points, whose arrays become a part of its state."""
-
-    # Where impacts are counted by walls.
-    tally: Tally | None = None
+    """The run of copies of a body; with them come all their points, whose arrays become a part of its state."""
 
     def __init__(
-        self, scene: Scene, bodies: Bodies, particles: Particles, method: Method, threads: int,
-        block_size: int | None = None, compile: str = "always", first: int = 0,
+        self, scene: Scene, copies: tuple[Bodies, Particles], method: Method, threads: int,
+        block_size: int | None = None, compile: str = "always", seeding: Seeding = _UNSEEDED,
+        watched: Watched = _UNWATCHED,
     ) -> None:  # fmt: skip
+        bodies, particles = copies
         law, looped, soft = method.law(), method.has_multipliers(), walls_of(method)
         n, points, own = len(bodies), len(bodies.body), own_surfaces(bodies.body)
         self._body = bodies.body
@@ -67,14 +68,16 @@ class BodyRun(BaseRun):
         contacts = most_contacts_of(self._touching, soft)
         per_lane = 8 * (24 * points + 10 * rows + rows * rows + 20 * contacts)
         lanes = max(1, min(_MOST_LANES, _STACK // per_lane, n))
-        self._size = max(1, block_size or _AT_ONCE)
-        self._threads = min(threads, math.ceil(n / self._size))
+        drawn = max(1, block_size or _AT_ONCE)
+        threads = min(threads, math.ceil(n / drawn))
         # Matrices of ties, and of contacts, of one body.
         pressed = max(contacts, 3 * MOST_CONTACTS)
         at_once = 8 * (rows * rows + pressed * (pressed + 3 * rows))
         # In plain Python a step takes some milliseconds: it never pays.
         tier = Tier("always" if compile == "auto" else compile, self._walls, n * points)
-        super().__init__(scene, method, n, threads_with(self._threads, lanes * per_lane + at_once), tier, first)
+        pool = threads_with(threads, lanes * per_lane + at_once)
+        super().__init__(scene, method, n, threads, tier, seeding, watched, pool)
+        self._size = drawn
         size, gravity = scene.finite_size(), np.array(scene.gravity or (0.0, 0.0, 0.0))
         room = _ROUND_OFF * max(size, scene.extent())
         noise = room / math.sqrt(min([*(self._link_lengths() ** 2), size * size]))
@@ -86,13 +89,13 @@ class BodyRun(BaseRun):
         # Frames of fixed steps are counted in steps.
         self._unit = 1.0 if soft is None or soft.is_cut else dt
         pull = math.hypot(*gravity) * self._ties.mass.sum()
-        self._led_start, self._start, self._scale = np.zeros((3, n))
+        self._led_start, self._energy_start, self._scale = np.zeros((3, n))
         for some, r, v in self._blocks():
             kinetic = self._energies.kinetic(v)
             self._led_start[some] = self._energies.led(r, v)
-            self._start[some] = start = kinetic + self._energies.fall(r) + self._energies.stored(r)
+            self._energy_start[some] = start = kinetic + self._energies.fall(r) + self._energies.stored(r)
             self._scale[some] = np.maximum(np.abs(start), kinetic) + pull * size
-        self._bodies.energy[:] = self._start
+        self._bodies.energy[:] = self._energy_start
         self._seen: dict[str, Any] = {}
         self._sums = np.zeros((0, 0))
 
@@ -102,28 +105,24 @@ class BodyRun(BaseRun):
     def _arguments(self, thread: int, ticket: Any) -> tuple[Any, ...]:
         """Arguments of `advance_bodies`, with the counts of a thread."""
         both, bodies = (self._ties, self._touching), self._bodies
-        if self.tally is not None:
-            bodies = bodies._replace(counts=self.tally.of_thread(thread).impacts)
+        if self._tally is not None:
+            bodies = bodies._replace(counts=self._tally.of_thread(thread).impacts)
         return both, self._walls, self._rule, bodies, ticket, self._size, self._watch.passes
 
-    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+    def _prepare(self, span: float, moment: float) -> None:
         if not self._cut_short:
             self._bodies.remaining.fill(span * self._unit)
         self._rule = self._rule._replace(end=moment)
+
+    def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
         threads, ticket = 1 if self._tier.is_plain else self._threads, np.zeros(1, np.int64)
         calls = [self._arguments(thread, ticket) for thread in range(threads)]
-        status, number = max(self._called(advance_bodies, calls, latest))
-        self._watch.end()
-        self._cut_short = status == Status.INTERRUPTED
-        if status not in (Status.DONE, Status.INTERRUPTED):
-            raise RunError(self._failure(Status(status), number, moment))
-        if not self._cut_short:
-            self.observe()
-        return not self._cut_short
+        status, body = max(self._called(advance_bodies, calls, latest))
+        return status, body
 
-    def _failure(self, status: Status, number: int, moment: float) -> str:
-        time_of = moment - self._bodies.remaining[number]
-        sentence = f"the frame at {moment:g} s failed at body {self._first + number}, at {time_of:.6g} s: "
+    def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
+        time_of = moment - self._bodies.remaining[item]
+        sentence = f"the frame at {moment:g} s failed at body {self._first + item}, at {time_of:.6g} s: "
         if status == Status.UNSOLVED:
             return sentence + (
                 f"its ties have no solution even in a step of 1e-6 of dt = {self._rule.dt:g} s; lengths at its start "
@@ -139,7 +138,7 @@ class BodyRun(BaseRun):
             "a point meets its walls without end, as in a cusp; start it elsewhere, or take a shorter dt"
         )
 
-    def share_done(self, span: float) -> float:
+    def _share_done(self, span: float) -> float:
         return float((1.0 - self._bodies.remaining / (span * self._unit)).mean())
 
     # --- What is observed --------------------------------------------------------------------------------
@@ -173,6 +172,9 @@ class BodyRun(BaseRun):
             yield scene.distances_outside(r[:, point] - r[:, carrier])
 
     def observe(self) -> None:
+        self._observe(0.0)
+
+    def _observe(self, moment: float) -> None:
         bodies, surfaces = self._bodies, len(self._scene.surfaces)
         self.state.impacts[:] = np.tile(bodies.impacts, len(self._body))
         sums, errors, depths = zip(*(self._observed(*block) for block in self._blocks()), strict=True)
@@ -196,7 +198,7 @@ class BodyRun(BaseRun):
         kinetic, fall, elastic = energies.kinetic(v), energies.fall(r), energies.stored(r)
         total, lost = kinetic + fall + elastic, bodies.dissipated[some]
         work = bodies.work[some] + energies.led(r, v) - self._led_start[some]
-        error, scale = np.abs(total + lost - work - self._start[some]), self._scale[some]
+        error, scale = np.abs(total + lost - work - self._energy_start[some]), self._scale[some]
         scaled = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0.0)
         numbers = (kinetic, fall, elastic, total, lost, bodies.sliding[some], work)
         pushed = np.ascontiguousarray(bodies.impulse[:, some]).sum(axis=1)
@@ -226,14 +228,8 @@ class BodyRun(BaseRun):
                 "walls"
             )
 
-    def arrays(self) -> Arrays:
-        held = {name: array for name, array in self._bodies._asdict().items() if array is not None}
-        return held if self.tally is None else {**held, **self.tally.arrays()}
-
-    def restore(self, arrays: Arrays, cut_short: bool) -> None:
-        super().restore(arrays, cut_short)
-        if self.tally is not None:
-            self.tally.restore(arrays)
+    def _arrays(self) -> Arrays:
+        return {name: array for name, array in self._bodies._asdict().items() if array is not None}
 
 
 def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:

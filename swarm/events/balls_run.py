@@ -1,10 +1,7 @@
 """The run of balls that meet one another and walls at instants."""
 
-import itertools
 import math
-import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -12,14 +9,12 @@ import numpy as np
 from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
-from ..errors import RunError
 from ..methods.base import Method
 from ..particles import Particles
 from ..run import failures
 from ..run.base import Arrays, BaseRun
-from ..run.doors import comers
+from ..run.doors import comers, require_free
 from ..run.impacts import ThreadLog
-from ..run.observed import gone_of, poses_of
 from ..run.state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -34,11 +29,6 @@ from .colliding.queue import FIRST
 from .colliding.window import END
 from .resting import warn_of_rest
 from .windows import windows_of
-
-# Fewer balls than this are written sooner than another thread is awake.
-_FEW = 4096
-# So many balls are aimed at a time, compiled and in plain Python: in some 0.1 s, from one look at the halt to the next.
-_AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 64
 
 
 class CollidingRun(BaseRun):
@@ -73,26 +63,20 @@ class CollidingRun(BaseRun):
         state, self._balls, gates = self.state, balls, None
         if openings is not None or laws.may_end:
             gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
-        seed = seeding.seed - 2**64 if seeding.seed >= 2**63 else seeding.seed
-        self._impacts, self._tally, _counters = watched
         self._box = self._with_heavy(box)._replace(
-            log=None if self._impacts is None else self._impacts.example,
+            log=None if watched.log is None else watched.log.example,
             window=None if self._windows is None else self._windows.numbers,
-            gates=gates, source=RandomSource(seed, seeding.first) if laws.send_off else None,
+            gates=gates, source=RandomSource(seeding.signed(), seeding.first) if laws.send_off else None,
         )  # fmt: skip
-        pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, self._box, n)
-        super().__init__(scene, method, n, pool, tier, seeding.first)
+        super().__init__(scene, method, n, threads, Tier(compile, self._box, n), seeding, watched)
         counts = None if self._tally is None else self._tally.counts()
         self._books = CollisionTotals(
             self._impulse_of_books(), state.dissipated, state.impacts, balls.virial, state.image, counts, state.heat
         )
-        self._surfaces_of_walls = scene.members()[0]
-        self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
-        self._threads = threads if n >= _FEW else 1
-        self._numbers = BallNumbers(scene, particles)
+        self._ball_numbers = BallNumbers(scene, particles)
         self._told_of_rest = False
-        self._ends = np.zeros(2)  # of the frame, and of the one before [s]
-        self._start = np.zeros(1)
+        self._frame_before = 0.0  # [s]
+        self._walls = self._walls_seen(0.0)
         self._choose_tier()
 
     def _with_heavy(self, box: Any) -> Any:
@@ -103,19 +87,16 @@ class CollidingRun(BaseRun):
         """Where impulses on walls are booked."""
         return self.state.impulse
 
-    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
-        latest = self._limit(latest)
-        began = time.perf_counter()
-        self._ends[:] = moment, moment - span
-        page, rule = (
-            None if self._impacts is None else ThreadLog(self._impacts, moment),
-            CollisionRule(moment, self._watch.passes),
-        )
+    def _prepare(self, span: float, moment: float) -> None:
+        self._frame_before = moment - span
+
+    def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
+        page = None if self._impacts is None else ThreadLog(self._impacts, moment)
+        rule = CollisionRule(moment, self._watch.passes)
         status = ball = int(Status.LEASE_ENDED)
         while status in (Status.LEASE_ENDED, Status.LOG_FULL):
             kept = self._box if page is None else self._box._replace(log=page.log)
-            taking: Any = kept, self._flock, self._books, self._clock, rule
-            ((status, ball),) = self._called(events.take, [taking], latest)
+            status, ball = self._call(events.take, kept, self._flock, self._books, self._clock, rule, latest=latest)
             if page is not None and status == Status.LOG_FULL:
                 page.turn()
             elif status == Status.LEASE_ENDED and ball >= 0:
@@ -125,16 +106,7 @@ class CollidingRun(BaseRun):
         if page is not None:
             page.close()
         self._told_of_rest = self._told_of_rest or warn_of_rest(self._box, self._clock)
-        self._cut_short = status == Status.INTERRUPTED
-        if not self._cut_short and status == Status.DONE:
-            self._show(moment)
-        self._tier.spend(time.perf_counter() - began)
-        self._watch.end()
-        if status not in (Status.DONE, Status.INTERRUPTED):
-            raise RunError(self._failed(Status(status), int(ball), moment - span))
-        if not self._cut_short:
-            self._observe(moment)
-        return not self._cut_short
+        return status, ball
 
     def _make_room(self) -> None:
         """More room in the cells."""
@@ -142,8 +114,12 @@ class CollidingRun(BaseRun):
         self._box = self._box._replace(grid=grid)
 
     def _show(self, moment: float) -> None:
-        """Write the arrays of a frame."""
-        self._in_parts(events.show, self._box, self._flock, self.state, self._since(moment), count=self.state.mass.size)
+        self._show_at(self._since(moment))
+        self._walls = self._walls_seen(moment)
+
+    def _show_at(self, now: float) -> None:
+        """Write the arrays of the state at a time of the epoch [s]."""
+        self._in_parts(events.show, self._box, self._flock, self.state, now, last=self.state.mass.size)
 
     def _since(self, moment: float) -> float:
         """A moment in the time of the epoch [s]."""
@@ -155,16 +131,21 @@ class CollidingRun(BaseRun):
         assert windows is not None
         instant, now = windows.instant(), float(windows.numbers[END])
         if windows.is_at_epoch():
-            ending: Any = self._flock, self._clock
-            self._called(events.next_epoch, [ending], math.inf)
+            self._call(events.next_epoch, self._flock, self._clock)
             now = 0.0
         windows.begin(now)
         self._set_window()
-        if instant is not None:
-            self._require_free(instant, now)
-        self._for_all(events.begin, self._box, self._flock, now)
-        ordering: Any = (self._flock,)
-        self._called(events.order, [ordering], math.inf)
+        if instant is not None and (came := comers(self._scene, instant)).any():
+            self._show_at(now)
+            require_free(self._scene, self.state, came, self._deepest, instant, self._first)
+        self._look_anew(now)
+
+    def _look_anew(self, now: float) -> None:
+        """Find what is next for every ball from a time of the epoch on [s]; negative: at the start."""
+        n, size = self.state.mass.size, self._at_once()
+        for first in range(0, n, size):
+            self._call(events.begin, self._box, self._flock, now, first, min(first + size, n))
+        self._call(events.order, self._flock)
 
     def _set_window(self) -> None:
         """The walls of the window, and which cells are near them."""
@@ -174,44 +155,11 @@ class CollidingRun(BaseRun):
                 gates = gates._replace(openings=self._windows.openings())
                 self.state = self.state._replace(openings=gates.openings)
             self._box = self._box._replace(walls=self._windows.walls(), gates=gates)
-        self._in_parts(events.mark, self._box, self._radius, count=int(self._box.grid.x.count) + 2)
+        self._in_parts(events.mark, self._box, self._radius, last=int(self._box.grid.x.count) + 2)
 
-    def _require_free(self, instant: float, now: float) -> None:
-        """Raise a RunError where a ball is inside a wall that comes at an instant [s], which is now in the epoch."""
-        came = comers(self._scene, instant)
-        if not came.any():
-            return
-        self._in_parts(events.show, self._box, self._flock, self.state, now, count=self.state.mass.size)
-        distances = self._scene.distances_outside(self.state.position, instant, self._balls.radius)
-        distances[~came] = -math.inf
-        distances[:, self.state.gone()] = -math.inf
-        inside = ~(distances <= self._deepest)
-        if inside.any():
-            ball = int(np.argmax(inside.any(axis=0)))
-            wall = int(np.argmax(inside[:, ball]))
-            depth = float(distances[wall, ball])
-            said = failures.sentence_of_coming(self._scene, self.state, (wall, ball), depth, instant, self._first)
-            raise RunError(said)
-
-    def _for_all(self, kernel: Any, *arguments: Any) -> None:
-        """Call a kernel for all balls, some at a time."""
-        n, size = self.state.mass.size, _AT_ONCE_PLAIN if self._tier.is_plain else _AT_ONCE
-        for first in range(0, n, size):
-            aiming: Any = *arguments, first, min(first + size, n)
-            self._called(kernel, [aiming], math.inf)
-
-    def _in_parts(self, kernel: Any, *arguments: Any, count: int) -> None:
-        """Call a kernel for so many balls, a part of them in each thread."""
-        threads = 1 if self._tier.is_plain else self._threads
-        ends = np.linspace(0, count, threads + 1).astype(int).tolist()
-        self._called(kernel, [(*arguments, *part) for part in itertools.pairwise(ends)], math.inf)
-
-    def _failed(self, status: Status, ball: int, before: float) -> str:
-        r, _v = self._flock.at(self._box.pull, ball, self._flock.time(ball))
-        return (
-            f"the frame after {before:g} s failed at particle {ball}: {status.sentence}; it is at "
-            f"({', '.join(f'{x:.6g}' for x in r)}) m at {self._now():.9g} s"
-        )
+    def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
+        place, _v = self._flock.at(self._box.pull, item, self._flock.time(item))
+        return failures.after(moment - span, item, status, place, self._now())
 
     def collisions(self) -> float:
         """How many there were since the start."""
@@ -232,55 +180,28 @@ class CollidingRun(BaseRun):
             yield events.next_epoch, (flock, self._clock)
         yield observables.observe, self._observing()
 
-    def _observing(self, moment: float = 0.0) -> tuple[Any, ...]:
-        drawn = np.arange(len(self._partial))
-        return None, self._walls_seen(moment), self._box.pull, self.state, drawn, observables.CHUNK, self._partial
-
     def _walls_seen(self, moment: float) -> Any:
+        """The walls at a frame."""
         return self._box.walls if self._windows is None else self._scene.walls(moment)
 
-    def observe(self) -> None:
-        self._begin()
-        self._show(0.0)
-        self._observe(0.0)
-        self._start[0] = balance(self._summary())
-
     def _begin(self) -> None:
-        """Find what is next for every ball."""
-        began = time.perf_counter()
         if self._windows is not None:
             self._windows.begin(0.0)
         self._set_window()
-        self._for_all(events.begin, self._box, self._flock, -1.0)
-        ordering: Any = (self._flock,)
-        self._called(events.order, [ordering], math.inf)
-        self._tier.spend(time.perf_counter() - began)
+        self._look_anew(-1.0)
 
-    def _observe(self, moment: float) -> None:
-        self._tier.kernel(observables.observe)(*self._observing(moment))
-        self._moment = moment
-        self._numbers.frame(self.state, moment, self._summary()["kinetic_energy"])
+    def _summary(self, lasts: bool = False) -> dict[str, Any]:
+        assert self._ball_numbers is not None
+        return self._ball_numbers.added(super()._summary(), self.state)
 
-    def _summary(self) -> dict[str, Any]:
-        return observables.summary(self._partial, self.state, self._owners, lasts=False, parts=self._parts)
+    def _scale_of(self, seen: dict[str, Any]) -> float:
+        return float(seen["kinetic_energy"] + seen["dissipated_energy"] + abs(seen["potential_energy"]))
 
-    def seen(self) -> dict[str, Any]:
-        seen = self._summary()
-        scale = seen["kinetic_energy"] + seen["dissipated_energy"] + abs(seen["potential_energy"])
-        seen["energy_error"] = abs(balance(seen) - self._start[0]) / scale if scale > 0.0 else 0.0
-        far = (np.sqrt((self.state.position**2).sum(axis=0)) > self._far) & ~self.state.gone()
-        seen |= gone_of(self.state, int(far.sum()), self._surfaces_of_walls, len(self._scene.surfaces))
-        if self._scene.moves():
-            seen |= poses_of(self._scene, self._moment)
-        return self._numbers.added(seen, self.state)
+    def _share_done(self, span: float) -> float:
+        return min(1.0, max(0.0, (self._now() - self._frame_before) / span))
 
-    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
-        failures.require_admissible(self._scene, self.state, seen, self._deepest, moment, self._first)
-
-    def share_done(self, span: float) -> float:
-        return min(1.0, max(0.0, (self._now() - float(self._ends[1])) / span))
-
-    def arrays(self) -> Arrays:
+    def _arrays(self) -> Arrays:
+        assert self._ball_numbers is not None
         flock, state = self._flock, self.state
         found = {
             "flight": flock.flight, "event": flock.event, "node": flock.node, "key": flock.key, "item": flock.item,
@@ -288,7 +209,7 @@ class CollidingRun(BaseRun):
             "impulse": state.impulse, "dissipated": state.dissipated, "impacts": state.impacts,
             "collisions": self._balls.collisions, "virial": self._books.virial, "clock": self._clock,
             "start": self._start, "position": state.position, "velocity": state.velocity,
-            **self._numbers.arrays(),
+            **self._ball_numbers.arrays(),
         }  # fmt: skip
         kept = flock.kept
         some = {
@@ -298,7 +219,7 @@ class CollidingRun(BaseRun):
             "window": None if self._windows is None else self._windows.numbers,
         }  # fmt: skip
         found |= {name: array for name, array in some.items() if array is not None}
-        return found if self._tally is None else {**found, **self._tally.arrays()}
+        return found
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
@@ -309,11 +230,4 @@ class CollidingRun(BaseRun):
         if self._windows is not None:
             self._set_window()
         if self._tally is not None:
-            self._tally.restore(arrays)
             self._books = self._books._replace(counts=self._tally.counts())
-
-
-def balance(seen: dict[str, Any]) -> float:
-    """The energy of all, with what was lost."""
-    kept: float = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum()
-    return kept - float(np.sum(seen.get("wall_work", 0.0)))

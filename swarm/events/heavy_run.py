@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 
 from ..kernel.vector import ZERO
-from ..run import failures
 from ..run.base import Arrays
 from ..run.observed import Observed, with_walls
-from .balls_run import CollidingRun, balance
+from .balls_run import CollidingRun
 from .colliding.heavy import COUNTS, Heavy
 from .reacting.described import freedoms_of, observed, scenery_of, walls_now
 from .reacting.freedoms import Freedoms
@@ -22,7 +21,7 @@ class HeavyRun(CollidingRun):
     """A `CollidingRun` in which impacts move walls."""
 
     _freedoms: Freedoms
-    _walls: Observed
+    _observed: Observed
 
     def _with_heavy(self, box: Any) -> Any:
         state, scene = self.state, self._of
@@ -62,31 +61,20 @@ class HeavyRun(CollidingRun):
         for wall in scenery.reacting:
             wall.freedom.push(freedoms, since, ZERO, ZERO)
         freedoms.time.fill(0.0)
-        self._walls = observed(self._of, freedoms, moment)
+        self._observed = observed(self._of, freedoms, moment)
         return walls_now(self._of, scenery, freedoms)
 
-    def _summary(self) -> dict[str, Any]:
-        return with_walls(super()._summary(), self._walls)
+    def _summary(self, lasts: bool = False) -> dict[str, Any]:
+        return with_walls(super()._summary(), self._observed)
 
-    def seen(self) -> dict[str, Any]:
-        seen = super().seen()
-        seen |= {"wall_position": self._walls.position, "wall_orientation": self._walls.orientation}
-        scale = seen["kinetic_energy"] + seen["dissipated_energy"] + abs(seen["potential_energy"])
-        scale += float(self._walls.kinetic.sum())
-        seen["energy_error"] = abs(balance(seen) - self._start[0]) / scale if scale > 0.0 else 0.0
-        return seen
+    def _scale_of(self, seen: dict[str, Any]) -> float:
+        return super()._scale_of(seen) + float(self._observed.kinetic.sum())
 
-    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
-        scene = self._scene
-        if seen["max_penetration"] > self._deepest:
-            scene = scene.placed(seen["wall_position"], seen["wall_orientation"])
-        failures.require_admissible(scene, self.state, seen, self._deepest, moment, self._first)
-
-    def arrays(self) -> Arrays:
+    def _arrays(self) -> Arrays:
         heavy = self._heavy
         freedoms = {f"walls.{name}": array for name, array in self._freedoms._asdict().items()}
         own = {name: getattr(heavy, name) for name in ("counts", "near", "listed", "close")}
         return {
-            **super().arrays(), **freedoms, **{f"heavy.{name}": array for name, array in own.items()},
+            **super()._arrays(), **freedoms, **{f"heavy.{name}": array for name, array in own.items()},
             "heavy.impulse": heavy.impulse, "given_impulse": self._given_impulse,
         }  # fmt: skip

@@ -1,9 +1,7 @@
 """The run of soft balls, which press on one another and on walls in fixed steps."""
 
 import math
-import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -16,7 +14,6 @@ from ..methods import Penalty
 from ..methods.base import Method
 from ..particles import Particles
 from ..run.base import Arrays, BaseRun
-from ..run.observed import poses_of
 from ..run.state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -64,8 +61,7 @@ class GrainsRun(BaseRun):
         self._image = np.zeros((3, 0), np.int64) if particles.image is None else particles.image.copy()
         self._fields = Fields(scene, radius)
         self._walls = self._fields.walls(0.0, 0.0)
-        pool, tier = ThreadPoolExecutor(1, "swarm"), Tier(compile, (self._matter, self._walls), n)
-        super().__init__(scene, method, n, pool, tier)
+        super().__init__(scene, method, n, 1, Tier(compile, (self._matter, self._walls), n), seeding, watched)
         state = self.state
         books = ContactTotals(
             balls.collisions,
@@ -84,10 +80,8 @@ class GrainsRun(BaseRun):
         )  # fmt: skip
         self._clock = np.zeros(arrays.CLOCK)
         self._clock[SKIN] = _SKIN * radius.min()
-        self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
-        self._start = self._scale = self._stored = math.nan
-        self._moment = 0.0
-        self._numbers = BallNumbers(scene, particles)
+        self._scale, self._stored = 0.0, math.nan
+        self._ball_numbers = BallNumbers(scene, particles)
         self._choose_tier()
         self._list()
 
@@ -136,19 +130,6 @@ class GrainsRun(BaseRun):
                 grains.place[:, LOST + axis] += (x - inside) - cells * length
                 self._image[axis, grains.number] += cells.astype(np.int64)
 
-    def _show(self) -> None:
-        """Copy where all are, and how fast, into the state."""
-        self._tier.kernel(energy.show)(self._world.grains, self.state)
-        image, position = self.state.image, self.state.position
-        for axis, length in enumerate(self._scene.period or ()):
-            if length is not None and image is not None:
-                cells = np.floor(position[axis] / length)
-                position[axis] -= cells * length
-                # Below 0 by so little that it is at the other face.
-                at_face = position[axis] >= length
-                position[axis, at_face] = 0.0
-                image[axis] = self._image[axis] + cells.astype(np.int64) + at_face
-
     def _room(self, pairs: int, touching: int, members: int | None) -> tuple[arrays.Neighbours, arrays.Touches]:
         """Arrays for so many pairs, balls at walls, and members of fields near them, None where there are no fields."""
         n, walls, rubs = len(self.state.mass), len(self._owners), self._matter.rubs
@@ -179,31 +160,24 @@ class GrainsRun(BaseRun):
 
     # --- A frame -------------------------------------------------------------------------------------------
 
-    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
-        self._moment = self._method.instant(moment)
+    def _prepare(self, span: float, moment: float) -> None:
         self._walls = self._fields.walls(self._moment, float(self._clock[SKIN]))
         if not self._cut_short:
             self._clock[DONE] = 0.0
             self._world.books.overlap[0] = 0.0
         self._clock[TAKEN] = 0.0
-        latest = self._limit(latest)
+
+    def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
         status, rule = Status.LEASE_ENDED.value, MarchRule(span, self._watch.passes)
-        began = time.perf_counter()
         while status == Status.LEASE_ENDED:
-            (status,) = self._called(march, [(self._matter, self._walls, self._world, self._clock, rule)], latest)
+            status = self._call(march, self._matter, self._walls, self._world, self._clock, rule, latest=latest)
             if status == Status.LEASE_ENDED:
                 self._list_again()
-        self._tier.spend(time.perf_counter() - began)
-        self._watch.end()
-        self._cut_short = status == Status.INTERRUPTED
-        if status not in (Status.DONE, Status.INTERRUPTED):
-            raise RunError(self._refused(status, moment - (span - self._clock[DONE]) * self._matter.h))
-        if not self._cut_short:
-            self._observe(moment)
-        return not self._cut_short
+        return status, 0
 
-    def _refused(self, status: int, moment: float) -> str:
-        """The sentence about the step at a moment [s]."""
+    def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
+        # Of the step.
+        moment -= (span - self._clock[DONE]) * self._matter.h
         if status == Status.UNSOLVED:
             return refused.unsolved(moment, self._matter.h)
         assert isinstance(self._method, Penalty)
@@ -219,50 +193,48 @@ class GrainsRun(BaseRun):
         yield energy.show, (world.grains, self.state)
         yield observables.observe, self._observing()
 
-    def _observing(self) -> tuple[Any, ...]:
-        drawn = np.arange(len(self._partial))
-        return None, self._walls, self._matter.pull, self.state, drawn, observables.CHUNK, self._partial
-
-    def observe(self) -> None:
-        self._observe(0.0)
-        seen = self._summary()
-        self._start, self._scale = _balance(seen), self._scale_of(seen)
+    def _show(self, moment: float) -> None:
+        self._tier.kernel(energy.show)(self._world.grains, self.state)
+        image, position = self.state.image, self.state.position
+        for axis, length in enumerate(self._scene.period or ()):
+            if length is not None and image is not None:
+                cells = np.floor(position[axis] / length)
+                position[axis] -= cells * length
+                # Below 0 by so little that it is at the other face.
+                at_face = position[axis] >= length
+                position[axis, at_face] = 0.0
+                image[axis] = self._image[axis] + cells.astype(np.int64) + at_face
 
     def _observe(self, moment: float) -> None:
-        world, kernel = self._world, self._tier.kernel
-        self._show()
-        stored, overlap = kernel(energy.stored)(self._matter, self._walls, world.grains, world.near)
+        world, walls = self._world, self._walls
+        stored, overlap = self._tier.kernel(energy.stored)(self._matter, walls, world.grains, world.near)
         # At the start, where no step was before.
         self._stored, world.books.overlap[0] = stored, max(overlap, world.books.overlap[0])
-        kernel(observables.observe)(*self._observing())
-        self._numbers.frame(self.state, moment, self._summary()["kinetic_energy"])
+        super()._observe(moment)
 
-    def _summary(self) -> dict[str, Any]:
-        seen = observables.summary(self._partial, self.state, self._owners, lasts=False, parts=self._parts)
-        books = self._world.books
+    def observe(self) -> None:
+        super().observe()
+        self._scale = self._scale_of(self._summary())
+
+    def _summary(self, lasts: bool = False) -> dict[str, Any]:
+        seen, books = super()._summary(), self._world.books
         seen["contact_energy"], seen["unconverged"] = self._stored, int(books.lagging[0])
         seen["largest_overlap"] = float(books.overlap[0])
         seen["total_energy"] += self._stored
-        return self._numbers.added(seen, self.state)
+        assert self._ball_numbers is not None
+        return self._ball_numbers.added(seen, self.state)
 
     def _scale_of(self, seen: dict[str, Any]) -> float:
-        """What the error of the energy is relative to: kinetic and contact energy, and what weight may make of them."""
+        """The larger one of now and of the start: kinetic and contact energy, and what weight may make of them."""
         pull = 0.0 if self._scene.gravity is None else math.hypot(*self._scene.gravity)
         weight = float(self.state.mass.sum()) * pull * self._scene.finite_size()
-        return float(seen["kinetic_energy"] + seen["contact_energy"] + weight)
+        return max(self._scale, float(seen["kinetic_energy"] + seen["contact_energy"] + weight))
 
-    def seen(self) -> dict[str, Any]:
-        seen = self._summary()
-        scale = max(self._scale, self._scale_of(seen))
-        seen["energy_error"] = abs(_balance(seen) - self._start) / scale if scale > 0.0 else 0.0
-        if self._scene.moves():
-            seen |= poses_of(self._scene, self._moment)
-        return {**seen, "escaped": int((np.sqrt((self.state.position**2).sum(axis=0)) > self._far).sum())}
-
-    def share_done(self, span: float) -> float:
+    def _share_done(self, span: float) -> float:
         return float(self._clock[DONE] / span)
 
-    def arrays(self) -> Arrays:
+    def _arrays(self) -> Arrays:
+        assert self._ball_numbers is not None
         world = self._world
         kept = {
             f"{name}.{part}": array
@@ -270,18 +242,11 @@ class GrainsRun(BaseRun):
             for part, array in getattr(world, name)._asdict().items()
             if array is not None
         }
-        return {**kept, **self._numbers.arrays(), "clock": self._clock, "image": self._image}
+        return {**kept, **self._ball_numbers.arrays(), "clock": self._clock, "image": self._image}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
         members = arrays["near.listed"].size if "near.listed" in arrays else 0
         self._make_room(arrays["near.mate"].size, arrays["near.slot"].size, members)
         super().restore(arrays, cut_short)
-        self._show()
-
-
-def _balance(seen: dict[str, Any]) -> float:
-    """The energy of all, with what was lost and without the work of walls that are moved."""
-    work = seen.get("wall_work")
-    kept: float = seen["total_energy"] + seen["dissipated_energy"] - (0.0 if work is None else work.sum())
-    return kept
+        self._show(self._moment)

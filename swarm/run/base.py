@@ -1,18 +1,28 @@
-"""The common part of the three engines of a run: of particles, of bodies, of walls that react."""
+"""The shell of a run, which all engines share."""
 
+import bisect
+import itertools
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import observables
+from ..ball_numbers import BallNumbers
+from ..common.status import Status
+from ..errors import RunError
 from ..methods.base import Method
+from ..observables import CHUNK
 from ..scene import Scene
 from ..state import State
 from . import failures
+from .observed import balance, gone_of, poses_of
+from .state import Seeding
+from .tally import Watched
 from .tiers import Tier
 from .watch import Watch
 
@@ -22,41 +32,69 @@ _FAR = 100.0
 _OUTSIDE = 1e-9
 # The caller's thread looks for an interrupt so often [s].
 _GLANCE = 0.1
+# Kernels take fewer particles than this sooner than another thread is awake.
+_FEW = 4096
+# So many particles are taken at a time, compiled and in plain Python: in some 0.1 s, from one look at the halt to the
+# next.
+_AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 64
+_UNSEEDED, _UNWATCHED = Seeding(), Watched()
 Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
 
 
 class BaseRun:
-    """A run from frame to frame: its state, and the threads that advance and observe it, which end with this context.
+    """A run from frame to frame: it times, halts, balances and observes an engine, whose functions come first below.
+
+    Its threads end with this context.
 
     Args:
         scene, method: what is run.
         n: how many particles, or bodies.
-        pool: the threads.
+        threads: how many.
         tier: of the kernels.
-        first: the number of the first particle, or body, in the whole run.
+        seeding: the number of the first particle, or body, in the whole run.
+        watched: the log of impacts and their tally.
+        pool: the threads, where they are not the usual ones.
 
     Attributes:
         state: what files take of a frame.
     """
 
     state: State
+    # Of one particle, where walls have any.
+    _law: Any = None
+    # The walls as observed.
+    _walls: Any
+    # Where particles have a radius.
+    _ball_numbers: BallNumbers | None = None
+    # The times at which frames are cut into pieces [s].
+    _instants: Sequence[float] = ()
 
     def __init__(
-        self, scene: Scene, method: Method, n: int, pool: ThreadPoolExecutor, tier: Tier, first: int = 0
-    ) -> None:
-        self._scene, self._method, self._first = scene, method, first
-        self._owners, self._parts = scene.owners(), scene.parts_of_rows()
+        self, scene: Scene, method: Method, n: int, threads: int, tier: Tier, seeding: Seeding = _UNSEEDED,
+        watched: Watched = _UNWATCHED, pool: ThreadPoolExecutor | None = None,
+    ) -> None:  # fmt: skip
+        self._scene, self._method, self._first, self._gravity = scene, method, seeding.first, scene.pull()
+        self._owners, self._parts, self._surfaces_of_walls = scene.owners(), scene.parts_of_rows(), scene.members()[0]
         self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
         # In a scene without walls no particle escapes: it has only balls in free space.
         self._far = _FAR * scene.extent() if scene.surfaces and scene.is_open() else math.inf
-        self._pool, self._tier, self._watch = pool, tier, Watch(n)
+        self._pool = ThreadPoolExecutor(threads, "swarm") if pool is None else pool
+        self._threads, self._tier, self._watch = threads, tier, Watch(n)
+        self._impacts, self._tally, _counters = watched
+        self._size, self._partial = CHUNK, np.zeros((math.ceil(n / CHUNK), observables.ROWS))
+        # The energy of the start, and the time of the last frame, of the method's clock.
+        self._start, self._moment = np.zeros(1), 0.0
+        # When the frame began [s], and how many of its pieces are done.
+        self._begun, self._done = np.zeros(1), np.zeros(1, np.int64)
         self._cut_short = False
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
+        if self._impacts is not None:
+            self._impacts.close()
         self.halt()
         self._pool.shutdown(wait=True)
 
@@ -67,7 +105,54 @@ class BaseRun:
         """
         self._watch.halt(passes)
 
-    # --- What each engine does ---------------------------------------------------------------------------
+    # --- What differs between engines --------------------------------------------------------------------
+
+    def calls(self) -> Iterable[tuple[Any, tuple[Any, ...]]]:
+        """Every kernel of a frame, with arguments of the types that it is called with from now on."""
+        raise NotImplementedError
+
+    def _prepare(self, span: float, moment: float) -> None:
+        """Prepare a frame, or what is left of one that was cut short: `span` and `moment` as in `advance`."""
+        raise NotImplementedError
+
+    def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
+        """Call kernels until the frame is done, or halted: their status, and the particle or body that it is about."""
+        raise NotImplementedError
+
+    def _goes_on(self, status: int, item: int, seconds: float) -> bool:
+        """Whether a turn that took so many seconds and ended like this is followed by another one at once."""
+        return False
+
+    def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
+        """The sentence about a frame that failed."""
+        raise NotImplementedError
+
+    def _share_done(self, span: float) -> float:
+        """The share that is done of a frame, or of a piece of it."""
+        raise NotImplementedError
+
+    def _arrays(self) -> Arrays:
+        """The arrays of `arrays`, without the counts of impacts."""
+        raise NotImplementedError
+
+    def _begin(self) -> None:
+        """Prepare the start."""
+
+    def _show(self, moment: float) -> None:
+        """Bring the state, and the walls as observed, to a frame at a moment [s]."""
+
+    def _scale_of(self, seen: dict[str, Any]) -> float | None:
+        """What the error of the energy is relative to [J]; None: each particle has an error of its own."""
+        return None
+
+    def _switch(self, instant: float) -> None:
+        """Change what changes at the instant at which a piece of a frame begins [s]."""
+
+    def chunk_sums(self) -> NDArray[np.float64]:
+        """The sums over each chunk of the last frame, from which those of shards are joined."""
+        raise NotImplementedError
+
+    # --- From frame to frame -----------------------------------------------------------------------------
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
         """Advance all by `span`, in the method's unit, to a moment [s], and observe them: whether the frame is done.
@@ -79,53 +164,142 @@ class BaseRun:
         Raises:
             RunError: a step failed.
         """
-        raise NotImplementedError
+        times = self._times(moment)
+        for k in range(int(self._done[0]), len(times) - 1):
+            before, after = times[k : k + 2]
+            if self._instants:
+                span = after - before
+                if not self._cut_short:
+                    self._switch(before)
+                if self._impacts is not None:
+                    self._impacts.begin = before
+            if not self._advance_piece(span, after, writing, latest):
+                return False
+            self._done[0] = k + 1
+        self._begun[0], self._done[0] = moment, 0
+        return True
 
-    def observe(self) -> None:
-        """Observe the start."""
-        raise NotImplementedError
+    def _times(self, end: float) -> list[float]:
+        """The times between which the pieces of a frame are."""
+        begin = float(self._begun[0])
+        first, last = bisect.bisect_right(self._instants, begin), bisect.bisect_left(self._instants, end)
+        return [begin, *self._instants[first:last], end]
 
-    def calls(self) -> Iterable[tuple[Any, tuple[Any, ...]]]:
-        """Every kernel of a frame, with arguments of the types that it is called with from now on."""
-        raise NotImplementedError
+    def _advance_piece(self, span: float, moment: float, writing: float, latest: float) -> bool:
+        """Advance by a piece of a frame, as `advance` does by all of it."""
+        self._moment = self._method.instant(moment)
+        self._prepare(span, moment)
+        again = True
+        while again:
+            until = self._limit(latest)
+            began = time.perf_counter()
+            status, item = self._turn(span, moment, writing, until)
+            seconds = time.perf_counter() - began
+            self._tier.spend(seconds)
+            self._cut_short = status in (Status.INTERRUPTED, Status.HARD_CONTACT)
+            again = self._goes_on(status, item, seconds)
+        self._watch.end()
+        if status not in (Status.DONE, Status.INTERRUPTED):
+            raise RunError(self._failure(Status(status), item, span, moment))
+        if not self._cut_short:
+            self._show(moment)
+            self._observe(moment)
+        return not self._cut_short
 
     def share_done(self, span: float) -> float:
         """The share of a frame that was cut short that is done, on average over the particles, or bodies."""
-        raise NotImplementedError
-
-    def seen(self) -> dict[str, Any]:
-        """The observables of the last frame."""
-        raise NotImplementedError
-
-    def chunk_sums(self) -> NDArray[np.float64]:
-        """The sums over each chunk of the last frame, from which those of shards are joined."""
-        raise NotImplementedError
+        if not self._instants:
+            return self._share_done(span)
+        k, times = int(self._done[0]), self._times(float(self._begun[0] + span))
+        before, after = times[k : k + 2]
+        return float((before - times[0] + self._share_done(after - before) * (after - before)) / span)
 
     def arrays(self) -> Arrays:
         """The arrays that `restore` needs for the same bits, not copied; to be called between calls of `advance`."""
-        raise NotImplementedError
-
-    # --- What they share ---------------------------------------------------------------------------------
+        found = self._arrays()
+        return found if self._tally is None else {**found, **self._tally.arrays()}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         """Take the state of the run that gave these `arrays`: at a frame, or within one if it was `cut_short`."""
         for name, array in self.arrays().items():
             np.copyto(array, arrays[name], casting="no")
         self._cut_short = cut_short
+        if self._tally is not None:
+            self._tally.restore(arrays)
 
-    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
-        """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""
-        failures.require_admissible(self._scene, self._seen_state(), seen, self._deepest, moment, self._first)
+    # --- What is observed --------------------------------------------------------------------------------
+
+    def observe(self) -> None:
+        """Observe the start."""
+        began = time.perf_counter()
+        self._begin()
+        self._tier.spend(time.perf_counter() - began)
+        self._show(0.0)
+        self._observe(0.0)
+        self._start[0] = balance(self._summary())
+
+    def _observe(self, moment: float) -> None:
+        """Observe a frame."""
+        self._tier.kernel(observables.observe)(*self._observing())
+        if self._ball_numbers is not None:
+            self._ball_numbers.frame(self.state, moment, self._summary()["kinetic_energy"])
+
+    def _observing(self, drawn: NDArray[Any] | None = None) -> tuple[Any, ...]:
+        """Arguments of `observe`: of all chunks, or of the draws of a thread."""
+        drawn = np.arange(len(self._partial)) if drawn is None else drawn
+        return self._law, self._walls, self._gravity, self._seen_state(), drawn, self._size, self._partial
+
+    def _summary(self, lasts: bool = False) -> dict[str, Any]:
+        """The observables that are sums over particles; `lasts`: a contact has lasted."""
+        return observables.summary(self._partial, self._seen_state(), self._owners, lasts, self._parts)
+
+    def seen(self) -> dict[str, Any]:
+        """The observables of the last frame."""
+        seen = self._summary()
+        if (scale := self._scale_of(seen)) is not None:
+            seen["energy_error"] = abs(balance(seen) - float(self._start[0])) / scale if scale > 0.0 else 0.0
+        seen |= gone_of(self.state, self._escaped(), self._surfaces_of_walls, len(self._scene.surfaces))
+        if self._scene.moves() and not self._scene.reacts():
+            seen |= poses_of(self._scene, self._moment)
+        return seen
+
+    def _escaped(self) -> int:
+        """The number of particles that are far away, and left through no opening."""
+        far = np.sqrt((self.state.position**2).sum(axis=0)) > self._far
+        return int((far & ~self.state.gone()).sum())
 
     def _seen_state(self) -> State:
         """The state as observers of the last frame know it."""
         return self.state
+
+    def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
+        """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""
+        scene = self._scene
+        if scene.reacts() and seen["max_penetration"] > self._deepest:
+            scene = scene.placed(seen["wall_position"], seen["wall_orientation"])
+        failures.require_admissible(scene, self._seen_state(), seen, self._deepest, moment, self._first)
+
+    # --- Calls of kernels --------------------------------------------------------------------------------
 
     def _called(self, kernel: Any, calls: Iterable[tuple[Any, ...]], latest: float) -> list[Any]:
         """The results of a kernel of this tier for each of these arguments, in a thread each, halted at `latest`."""
         chosen = self._tier.kernel(kernel)
         shares = [self._pool.submit(chosen, *arguments) for arguments in calls]
         return [result_of(share, latest, self.halt) for share in shares]
+
+    def _call(self, kernel: Any, *arguments: Any, latest: float = math.inf) -> Any:
+        """The result of a kernel in one thread."""
+        return self._called(kernel, [arguments], latest)[0]
+
+    def _in_parts(self, kernel: Any, *arguments: Any, first: int = 0, last: int, latest: float = math.inf) -> None:
+        """Call a kernel for what has numbers from `first` to before `last`, a part of it in each thread."""
+        threads = 1 if self._tier.is_plain or self.state.mass.size < _FEW else self._threads
+        ends = np.linspace(first, last, threads + 1).astype(int).tolist()
+        self._called(kernel, [(*arguments, *part) for part in itertools.pairwise(ends)], latest)
+
+    def _at_once(self) -> int:
+        """How many particles are looked at from one look at the halt to the next."""
+        return _AT_ONCE_PLAIN if self._tier.is_plain else _AT_ONCE
 
     def _choose_tier(self) -> None:
         """Take the tier of the next calls."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..contact.events import ARRIVED, CAREFUL, EDGE, FLYING, HELD
 from ..errors import RunError
 from ..scene import Scene
-from ..state import Contacts
+from ..state import Contacts, State
 from .base import Arrays
 from .engine import Run
 from .failures import sentence_of_coming
@@ -22,28 +22,6 @@ class DoorRun(Run):
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
         self._instants = self._scene.instants
-        # When the frame began [s], and how many of its pieces are done.
-        self._begun, self._done = np.zeros(1), np.zeros(1, np.int64)
-
-    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
-        begin = float(self._begun[0])
-        times = self._times(begin, moment)
-        for k in range(int(self._done[0]), len(times) - 1):
-            before, after = times[k], times[k + 1]
-            if not self._cut_short:
-                self._switch(before)
-            if self._impacts is not None:
-                self._impacts.begin = before
-            if not super().advance(after - before, after, writing, latest):
-                return False
-            self._done[0] = k + 1
-        self._begun[0], self._done[0] = moment, 0
-        return True
-
-    def _times(self, begin: float, end: float) -> list[float]:
-        """The times between which the pieces of a frame are."""
-        first, last = bisect.bisect_right(self._instants, begin), bisect.bisect_left(self._instants, end)
-        return [begin, *self._instants[first:last], end]
 
     def _reach(self, moment: float) -> None:
         super()._reach(moment)
@@ -51,23 +29,20 @@ class DoorRun(Run):
             self._walls, self._faces = self._scene.walls(moment), self._scene.open_faces(moment)
         self.state = self.state._replace(openings=self._scene.openings(moment))
 
-    def share_done(self, span: float) -> float:
-        k, end = int(self._done[0]), self._begun[0] + span
-        times = self._times(float(self._begun[0]), float(end))
-        before, after = times[k : k + 2]
-        return float((before - times[0] + super().share_done(after - before) * (after - before)) / span)
-
-    def arrays(self) -> Arrays:
-        return {**super().arrays(), "piece.begun": self._begun, "piece.done": self._done}
+    def _arrays(self) -> Arrays:
+        return {**super()._arrays(), "piece.begun": self._begun, "piece.done": self._done}
 
     # --- At an instant -----------------------------------------------------------------------------------
 
     def _switch(self, instant: float) -> None:
-        """What comes, goes, opens or shuts at an instant [s], if it is one."""
         k = bisect.bisect_left(self._instants, instant)
         if k == len(self._instants) or self._instants[k] != instant:
             return
-        self._require_free(instant)
+        if (came := comers(self._scene, instant)).any():
+            # Particles from sources are born later, where no wall is at that time.
+            self._present.reach(instant)
+            state = self.state
+            require_free(self._scene, state, came, self._deepest, instant, self._first, self._present.count)
         contacts = self.state.contacts
         if contacts is None or not self._kinds:
             return
@@ -81,25 +56,6 @@ class DoorRun(Run):
     def _before(self, instant: float) -> float:
         """A time before an instant and after the one before it [s]."""
         return _before(self._scene, instant)
-
-    def _require_free(self, instant: float) -> None:
-        """Raise a RunError where a particle is inside a wall that comes at an instant [s]."""
-        came = comers(self._scene, instant)
-        if not came.any():
-            return
-        distances = self._scene.distances_outside(self.state.position, instant)
-        distances[~came] = -math.inf
-        distances[:, self.state.gone()] = -math.inf
-        # Particles from sources are born later, where no wall is at that time.
-        self._present.reach(instant)
-        distances[:, self._present.count :] = -math.inf
-        # A place at which phi is NaN counts as inside.
-        inside = ~(distances <= self._deepest)
-        if inside.any():
-            particle = int(np.argmax(inside.any(axis=0)))
-            wall = int(np.argmax(inside[:, particle]))
-            depth, found = float(distances[wall, particle]), (wall, particle)
-            raise RunError(sentence_of_coming(self._scene, self.state, found, depth, instant, self._first))
 
     def _let_go(self, contacts: Contacts, gone: NDArray[np.bool_]) -> None:
         """Let particles that slide or rest on the walls of the pieces in `gone` fly: these walls left the scene."""
@@ -122,6 +78,24 @@ def comers(scene: Scene, instant: float) -> NDArray[np.bool_]:
     for i, piece in zip(scene.owners_of_pieces, scene.pieces, strict=True):
         came[i] |= piece.is_there(instant) and not piece.is_there(last)
     return came
+
+
+def require_free(
+    scene: Scene, state: State, came: NDArray[np.bool_], deepest: float, instant: float, first: int = 0,
+    count: int | None = None,
+) -> None:  # fmt: skip
+    """Raise a RunError where one of the first `count` particles is inside a surface that comes at an instant [s]."""
+    distances = scene.distances_outside(state.position, instant, state.radius)
+    distances[~came] = -math.inf
+    distances[:, state.gone()] = -math.inf
+    distances[:, state.mass.size if count is None else count :] = -math.inf
+    # A place at which phi is NaN counts as inside.
+    inside = ~(distances <= deepest)
+    if inside.any():
+        particle = int(np.argmax(inside.any(axis=0)))
+        wall = int(np.argmax(inside[:, particle]))
+        depth, found = float(distances[wall, particle]), (wall, particle)
+        raise RunError(sentence_of_coming(scene, state, found, depth, instant, first))
 
 
 def _before(scene: Scene, instant: float) -> float:

@@ -4,7 +4,6 @@ import functools
 import math
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from .. import observables
 from ..common.status import Status
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, HELD, PHASES
 from ..contact.hold import One, Two
-from ..errors import RunError
 from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..lanes import careful, contact_events, slide, sliding, table
@@ -28,7 +26,6 @@ from ..state import Contacts, Crossed, Multipliers, State
 from . import failures
 from .base import Arrays, BaseRun, result_of
 from .impacts import ThreadLog
-from .observed import gone_of, poses_of
 from .preflight.counting import counters_of, crossed_of
 from .present import Presence
 from .state import Seeding, begin, have_lasted, holders_of_resting, state_of
@@ -54,16 +51,18 @@ _DONE: End = (int(Status.DONE), 0, None)
 class Run(BaseRun):
     """The run of particles; their arrays become a part of its state."""
 
+    # Work of the last frame [s], over its span; unknown, so that another thread compiles what is missing.
+    _pace = math.inf
+
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
         compile: str = "always", seeding: Seeding = _UNSEEDED, watched: Watched = _UNWATCHED,
     ) -> None:  # fmt: skip
         n = len(particles)
         self._numbers, self._law = method.numbers(scene), method.law()
-        self._walls, self._gravity = scene.walls(), scene.pull()
-        pool, tier = ThreadPoolExecutor(threads, "swarm"), Tier(compile, (self._numbers, self._law, self._walls), n)
-        super().__init__(scene, method, n, pool, tier, seeding.first)
-        self._impacts, self._tally, counters = watched
+        self._walls = scene.walls()
+        tier, counters = Tier(compile, (self._numbers, self._law, self._walls), n), watched.counters
+        super().__init__(scene, method, n, threads, tier, seeding, watched)
         self._counters = counters_of(scene, counters, self._impacts is not None)
         self._booked = lanes.booked(self._walls)
         self.state = state_of(scene, particles, method, self._booked)
@@ -71,17 +70,14 @@ class Run(BaseRun):
             crossed = crossed_of(self._counters, counters, scene, particles.position)
             self.state = self.state._replace(crossed=crossed)
         observables.start_energies(scene, self._law, self.state)
-        self._moment, self._faces = 0.0, scene.open_faces()
-        self._surfaces_of_walls = scene.members()[0]
+        self._faces = scene.open_faces()
         # Whole chunks, so that a thread observes what it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
         self._present = Presence(particles.births, n, self._size)
         self._present.start(self.state)
         self._ticket = np.zeros(1, np.int64)
-        self._partial = np.zeros((math.ceil(n / observables.CHUNK), observables.ROWS))
         self._phase = np.zeros(n, np.int8)
-        # Kernels have signed numbers, of the same 64 bits.
-        self._seed = seeding.seed - 2**64 if seeding.seed >= 2**63 else seeding.seed
+        self._seed = seeding.signed()
         self._kinds: set[int] = set()  # the phases that are no flight and that this run has met
         self._halted = lanes.none_halted(self._booked)
         self._lanes: list[lanes.Lanes] = []  # of threads that do not advance now
@@ -89,52 +85,48 @@ class Run(BaseRun):
         self._threads = min(threads, len(self._present.order))
         self._choose_tier()
 
-    def __exit__(self, *error: object) -> None:
-        if self._impacts is not None:
-            self._impacts.close()
-        super().__exit__(*error)
-
-    def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
+    def _prepare(self, span: float, moment: float) -> None:
         self._reach(moment)
         if not self._cut_short:
             begin(self.state, self._present.of(self._phase), (span, self._moment), bool(self._kinds))
             if self._tally is not None and self._kinds:
                 self._tally.rest(holders_of_resting(self.state.contacts), span)
-        again = True
-        while again:
-            until = self._limit(latest)
-            self._ticket[0] = 0
-            others, helps = self._hands(span, writing)
-            self._watch.begin(until, helps, self._tier.is_plain)
-            began = time.perf_counter()
-            shares = [self._pool.submit(self._share, span) for _ in range(others)]
-            ends = [self._share(span)] if helps else []
-            ends += [result_of(share, until, self.halt) for share in shares]
-            seconds = time.perf_counter() - began
-            self._tier.spend(seconds)
-            status, particle, _left = max(ends, key=lambda end: end[:2])
-            self._cut_short = status in (Status.INTERRUPTED, Status.HARD_CONTACT)
-            if self._cut_short:
-                left = [halted for *_, halted in ends if halted is not None]
-                self._halted = left_behind(self._halted, self._phase, left)
-            if status == Status.HARD_CONTACT:
-                # Go on with the kernel of this phase, or with hard contacts where none last.
-                if self.state.contacts is not None:
-                    self._kinds.add(particle)
-                else:
-                    self._hard = blocks.Hard(blocks.MOST_HITS)
-                self._choose_tier()
-            elif again := self._cut_short and helps and self._watch.is_freed(seconds):
-                self._pace = math.inf  # it is a long frame
-        self._watch.end()
-        if status not in (Status.DONE, Status.INTERRUPTED):
-            ended = Status(status), particle
-            seeding = Seeding(self._seed, self._first)
-            raise RunError(failures.of_frame(self._scene, self._method, self.state, ended, moment, seeding))
+
+    def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
+        self._ticket[0] = 0
+        others, self._helps = self._hands(span, writing)
+        self._watch.begin(latest, self._helps, self._tier.is_plain)
+        began = time.perf_counter()
+        shares = [self._pool.submit(self._share, span) for _ in range(others)]
+        ends = [self._share(span)] if self._helps else []
+        ends += [result_of(share, latest, self.halt) for share in shares]
+        seconds = time.perf_counter() - began
+        status, particle, _left = max(ends, key=lambda end: end[:2])
+        if status in (Status.INTERRUPTED, Status.HARD_CONTACT):
+            left = [halted for *_, halted in ends if halted is not None]
+            self._halted = left_behind(self._halted, self._phase, left)
         if status == Status.DONE:
             self._halted = lanes.none_halted(self._booked)
-            self._pace = seconds * (others + helps) / span if span > 0.0 else self._pace
-        return not self._cut_short
+            self._pace = seconds * (others + self._helps) / span if span > 0.0 else self._pace
+        return status, particle
+
+    def _goes_on(self, status: int, item: int, seconds: float) -> bool:
+        if status == Status.HARD_CONTACT:
+            # Go on with the kernel of this phase, or with hard contacts where none last.
+            if self.state.contacts is not None:
+                self._kinds.add(item)
+            else:
+                self._hard = blocks.Hard(blocks.MOST_HITS)
+            self._choose_tier()
+            return True
+        freed = status == Status.INTERRUPTED and self._helps and self._watch.is_freed(seconds)
+        if freed:
+            self._pace = math.inf  # it is a long frame
+        return freed
+
+    def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
+        seeding = Seeding(self._seed, self._first)
+        return failures.of_frame(self._scene, self._method, self.state, (status, item), moment, seeding)
 
     def _share(self, span: float) -> End:
         """Advance and observe what one thread draws."""
@@ -192,7 +184,7 @@ class Run(BaseRun):
         return chosen if page is None else functools.partial(page.call, chosen)
 
     def observe(self) -> None:
-        """Observe the start, at which no particle is advanced."""
+        # No particle is advanced.
         self._reach(0.0)
         self._phase.fill(ARRIVED)
         self._ticket[0] = 0
@@ -200,14 +192,16 @@ class Run(BaseRun):
         self._share(0.0)
         self._tier.spend(time.perf_counter() - began)
 
+    def _observe(self, moment: float) -> None:
+        """Each thread has observed what it has advanced."""
+
     def _reach(self, moment: float) -> None:
         """The walls and the particles of the frame that ends at a moment [s]."""
         self._present.reach(moment)
-        self._moment = moment = self._method.instant(moment)
         if self._scene.moves():
-            self._walls, self._faces = self._scene.walls(moment), self._scene.open_faces(moment)
+            self._walls, self._faces = self._scene.walls(self._moment), self._scene.open_faces(self._moment)
 
-    def share_done(self, span: float) -> float:
+    def _share_done(self, span: float) -> float:
         remaining = self._halted.time_left()
         if self.state.contacts is not None:
             remaining = np.append(remaining, self.state.contacts.remaining[self.state.contacts.remaining > 0.0])
@@ -257,10 +251,6 @@ class Run(BaseRun):
             return contact_events.meet_block if phase == EVENT else careful.careful_block, common
         return slide.slide_block, (_KINDS[phase], *common, sliding.empty_sliding(self.state))
 
-    def _observing(self, drawn: NDArray[Any]) -> tuple[Any, ...]:
-        """Arguments of `observe`."""
-        return self._law, self._walls, self._gravity, self._seen_state(), drawn, self._size, self._partial
-
     def _escaping(self) -> tuple[Any, ...]:
         """Arguments of `count_escaped`."""
         return self._walls, self._gravity, self._far, self._faces, self._seen_state()
@@ -277,34 +267,32 @@ class Run(BaseRun):
 
     def _choose_tier(self) -> None:
         super()._choose_tier()
-        # Work of the last frame [s], over its span; unknown, so that another thread compiles what is missing.
         self._pace = math.inf
 
-    def arrays(self) -> Arrays:
+    def _arrays(self) -> Arrays:
         found: Arrays = {}
         for name, value in {"phase": self._phase, "halted": self._halted, **self.state._asdict()}.items():
             if isinstance(value, (lanes.Halted, Contacts, Crossed, Multipliers)):
                 found |= {f"{name}.{field}": array for field, array in value._asdict().items()}
             elif isinstance(value, np.ndarray):
                 found[name] = value
-        return found if self._tally is None else {**found, **self._tally.arrays()}
+        return found
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self._halted = lanes.Halted(arrays["halted.particle"], arrays["halted.rows"])
         super().restore(arrays, cut_short)
-        if self._tally is not None:
-            self._tally.restore(arrays)
         if have_lasted(self.state.contacts, self._phase):
             self._kinds = set(_KINDS)
             self._choose_tier()
 
+    def _summary(self, lasts: bool = False) -> dict[str, Any]:
+        return super()._summary(bool(self._kinds))
+
     def seen(self) -> dict[str, Any]:
-        seen = observables.summary(self._partial, self._seen_state(), self._owners, bool(self._kinds), self._parts)
-        far = 0 if self._far == math.inf else self._tier.kernel(observables.count_escaped)(*self._escaping())
-        seen |= gone_of(self.state, int(far), self._surfaces_of_walls, len(self._scene.surfaces))
-        if self._scene.moves():
-            seen |= poses_of(self._scene, self._moment)
-        return seen | self._present.observed()
+        return super().seen() | self._present.observed()
+
+    def _escaped(self) -> int:
+        return 0 if self._far == math.inf else int(self._tier.kernel(observables.count_escaped)(*self._escaping()))
 
     def chunk_sums(self) -> NDArray[np.float64]:
         return self._present.sums(observables.chunk_sums(self._partial, self._seen_state(), bool(self._kinds)))

@@ -6,6 +6,7 @@ A run of points that are independent of one another is an engine of the core, `R
 
 import importlib
 from types import ModuleType
+from typing import Any
 
 from .base import BaseRun
 from .doors import DoorRun
@@ -29,22 +30,16 @@ def wing(name: str) -> ModuleType:
 def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
     """The state of a run at its start, and the threads that advance it."""
     scene, particles, method, options = task.scene, task.particles, task.method, task.options
-    how = options.thread_count(), options.block_size, options.compile
-    run: BaseRun
+    what: Any = particles
+    kind: Any = DoorRun if scene.has_doors() else Run
     if task.bodies is not None:
-        bodies = wing("bodies.body_run").BodyRun(scene, task.bodies, particles, method, *how, task.first)
-        bodies.tally = watched.tally
-        run = bodies
+        what, kind = (task.bodies, particles), wing("bodies.body_run").BodyRun
     elif particles.radius is None and scene.reacts():
-        run = wing("events.walls_run").ReactingRun(scene, particles, method, *how, watched.tally)
-    else:
-        if particles.radius is None:
-            kind = DoorRun if scene.has_doors() else Run
-        elif not method.is_rigid():
-            kind = wing("grains.grains_run").GrainsRun
-        elif scene.reacts():
-            kind = wing("events.heavy_run").HeavyRun
-        else:
-            kind = wing("events.balls_run").CollidingRun
-        run = kind(scene, particles, method, *how, Seeding(options.seed, task.first), watched)
+        kind = wing("events.walls_run").ReactingRun
+    elif particles.radius is not None and not method.is_rigid():
+        kind = wing("grains.grains_run").GrainsRun
+    elif particles.radius is not None:
+        kind = wing("events.heavy_run").HeavyRun if scene.reacts() else wing("events.balls_run").CollidingRun
+    how = options.thread_count(), options.block_size, options.compile, Seeding(options.seed, task.first), watched
+    run: BaseRun = kind(scene, what, method, *how)
     return run

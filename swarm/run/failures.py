@@ -43,6 +43,14 @@ def of_frame(
     return sentence
 
 
+def after(before: float, particle: int, status: Status, place: Any, moment: float) -> str:
+    """The sentence about a frame after a time [s] that ended with this particle at its place at a moment [s]."""
+    return (
+        f"the frame after {before:g} s failed at particle {particle}: {status.sentence}; it is at "
+        f"({', '.join(f'{x:.6g}' for x in place)}) m at {moment:.9g} s"
+    )
+
+
 def require_admissible(
     scene: Scene, state: State, seen: dict[str, Any], deepest: float, moment: float, first: int = 0
 ) -> None:

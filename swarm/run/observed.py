@@ -43,6 +43,12 @@ def poses_of(scene: Scene, moment: float) -> dict[str, Any]:
     }
 
 
+def balance(seen: dict[str, Any]) -> float:
+    """The energy of all, with what was lost, and without the heat and the work of walls."""
+    kept = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum()
+    return float(kept - np.sum(seen.get("wall_work", 0.0)))
+
+
 def with_walls(seen: dict[str, Any], walls: Observed) -> dict[str, Any]:
     """The observables with those of walls that react, whose energy is a part of the whole."""
     energy = walls.kinetic + walls.potential

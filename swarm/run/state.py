@@ -22,6 +22,10 @@ class Seeding(NamedTuple):
     seed: int = 0
     first: int = 0
 
+    def signed(self) -> int:
+        """The seed as kernels take it: the signed number of the same 64 bits."""
+        return self.seed - 2**64 if self.seed >= 2**63 else self.seed
+
 
 def state_of(scene: Scene, particles: Particles, method: Method, booked: int) -> State:
     """The state with the arrays of the particles and so many rows of what walls give; energies are still to be set."""
