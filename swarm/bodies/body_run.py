@@ -14,8 +14,8 @@ from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import Particles
 from ..run.base import Arrays, BaseRun
-from ..run.state import Seeding
-from ..run.tally import Watched
+from ..run.state import UNSEEDED, Seeding
+from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
 from ..scene import Scene
 from ..state import Floats, State
@@ -36,7 +36,6 @@ _REST, _PAGE = 8 << 20, 1 << 16
 _AT_ONCE = 256
 # Suzuki's composition: five steps of second order are one of fourth.
 _OUTER = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
-_UNSEEDED, _UNWATCHED = Seeding(), Watched()
 STAGES = {2: (1.0,), 4: (_OUTER, _OUTER, 1.0 - 4.0 * _OUTER, _OUTER, _OUTER)}
 
 
@@ -45,8 +44,8 @@ class BodyRun(BaseRun):
 
     def __init__(
         self, scene: Scene, copies: tuple[Bodies, Particles], method: Method, threads: int,
-        block_size: int | None = None, compile: str = "always", seeding: Seeding = _UNSEEDED,
-        watched: Watched = _UNWATCHED,
+        block_size: int | None = None, compile: str = "always", seeding: Seeding = UNSEEDED,
+        watched: Watched = UNWATCHED,
     ) -> None:  # fmt: skip
         bodies, particles = copies
         law, looped, soft = method.law(), method.has_multipliers(), walls_of(method)
@@ -177,7 +176,7 @@ class BodyRun(BaseRun):
     def _observe(self, moment: float) -> None:
         bodies, surfaces = self._bodies, len(self._scene.surfaces)
         self.state.impacts[:] = np.tile(bodies.impacts, len(self._body))
-        sums, errors, depths = zip(*(self._observed(*block) for block in self._blocks()), strict=True)
+        sums, errors, depths = zip(*(self._sums_of(*block) for block in self._blocks()), strict=True)
         self._sums = np.ascontiguousarray(np.array(sums).T)
         self._seen = {
             **summed(self._sums, self._owners, surfaces, len(self._body.cavities)),
@@ -192,7 +191,7 @@ class BodyRun(BaseRun):
         if self._rule.loop:
             self._seen["sweeps"] = int(bodies.sweeps.sum())
 
-    def _observed(self, some: slice, r: Floats, v: Floats) -> tuple[list[float], float, float]:
+    def _sums_of(self, some: slice, r: Floats, v: Floats) -> tuple[list[float], float, float]:
         """Of one chunk: what is summed, as `summed` takes it, the largest error of the energy, how far it is out."""
         energies, bodies = self._energies, self._bodies
         kinetic, fall, elastic = energies.kinetic(v), energies.fall(r), energies.stored(r)

@@ -190,10 +190,6 @@ class CollidingRun(BaseRun):
         self._set_window()
         self._look_anew(-1.0)
 
-    def _summary(self, lasts: bool = False) -> dict[str, Any]:
-        assert self._ball_numbers is not None
-        return self._ball_numbers.added(super()._summary(), self.state)
-
     def _scale_of(self, seen: dict[str, Any]) -> float:
         return float(seen["kinetic_energy"] + seen["dissipated_energy"] + abs(seen["potential_energy"]))
 
@@ -201,7 +197,6 @@ class CollidingRun(BaseRun):
         return min(1.0, max(0.0, (self._now() - self._frame_before) / span))
 
     def _arrays(self) -> Arrays:
-        assert self._ball_numbers is not None
         flock, state = self._flock, self.state
         found = {
             "flight": flock.flight, "event": flock.event, "node": flock.node, "key": flock.key, "item": flock.item,
@@ -209,7 +204,6 @@ class CollidingRun(BaseRun):
             "impulse": state.impulse, "dissipated": state.dissipated, "impacts": state.impacts,
             "collisions": self._balls.collisions, "virial": self._books.virial, "clock": self._clock,
             "start": self._start, "position": state.position, "velocity": state.velocity,
-            **self._ball_numbers.arrays(),
         }  # fmt: skip
         kept = flock.kept
         some = {
@@ -218,8 +212,7 @@ class CollidingRun(BaseRun):
             "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
             "window": None if self._windows is None else self._windows.numbers,
         }  # fmt: skip
-        found |= {name: array for name, array in some.items() if array is not None}
-        return found
+        return found | {name: array for name, array in some.items() if array is not None}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()

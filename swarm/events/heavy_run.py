@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from ..kernel.vector import ZERO
-from ..run.base import Arrays
-from ..run.observed import Observed, with_walls
+from ..run.base import Arrays, named
+from ..run.observed import Observed
 from .balls_run import CollidingRun
 from .colliding.heavy import COUNTS, Heavy
 from .reacting.described import freedoms_of, observed, scenery_of, walls_now
@@ -64,17 +64,10 @@ class HeavyRun(CollidingRun):
         self._observed = observed(self._of, freedoms, moment)
         return walls_now(self._of, scenery, freedoms)
 
-    def _summary(self, lasts: bool = False) -> dict[str, Any]:
-        return with_walls(super()._summary(), self._observed)
-
     def _scale_of(self, seen: dict[str, Any]) -> float:
         return super()._scale_of(seen) + float(self._observed.kinetic.sum())
 
     def _arrays(self) -> Arrays:
-        heavy = self._heavy
-        freedoms = {f"walls.{name}": array for name, array in self._freedoms._asdict().items()}
-        own = {name: getattr(heavy, name) for name in ("counts", "near", "listed", "close")}
-        return {
-            **super()._arrays(), **freedoms, **{f"heavy.{name}": array for name, array in own.items()},
-            "heavy.impulse": heavy.impulse, "given_impulse": self._given_impulse,
-        }  # fmt: skip
+        heavy = self._heavy._asdict()
+        own = {f"heavy.{name}": heavy[name] for name in ("counts", "near", "listed", "close", "impulse")}
+        return {**super()._arrays(), **named("walls", self._freedoms), **own, "given_impulse": self._given_impulse}

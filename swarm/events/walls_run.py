@@ -14,8 +14,8 @@ from ..kernel.vector import vec
 from ..methods.base import Method
 from ..particles import Particles
 from ..run import failures
-from ..run.base import Arrays, BaseRun
-from ..run.observed import with_walls
+from ..run.base import Arrays, BaseRun, named
+from ..run.observed import Observed
 from ..run.state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -34,6 +34,8 @@ _ALL_AHEAD = -1.0
 
 class ReactingRun(BaseRun):
     """The run of particles and walls that react; the arrays of the particles become a part of its state."""
+
+    _observed: Observed
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
@@ -138,9 +140,6 @@ class ReactingRun(BaseRun):
         self._observed = observed(self._scene, self._freedoms, moment)
         self._walls = walls_now(self._scene, self._scenery, self._freedoms)
 
-    def _summary(self, lasts: bool = False) -> dict[str, Any]:
-        return with_walls(super()._summary(), self._observed)
-
     def _scale_of(self, seen: dict[str, Any]) -> float:
         return float(seen["kinetic_energy"] + self._observed.kinetic.sum() + abs(seen["potential_energy"]))
 
@@ -149,8 +148,7 @@ class ReactingRun(BaseRun):
 
     def _arrays(self) -> Arrays:
         queue = {name: array for name, array in self._queue._asdict().items() if name not in ("heap", "mass", "counts")}
-        freedoms = {f"walls.{name}": array for name, array in self._freedoms._asdict().items()}
-        return {**queue, **freedoms, "key": self._queue.heap.key, "clock": self._clock}
+        return {**queue, **named("walls", self._freedoms), "key": self._queue.heap.key, "clock": self._clock}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()

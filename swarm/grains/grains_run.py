@@ -13,7 +13,7 @@ from ..errors import RunError
 from ..methods import Penalty
 from ..methods.base import Method
 from ..particles import Particles
-from ..run.base import Arrays, BaseRun
+from ..run.base import Arrays, BaseRun, named
 from ..run.state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -216,13 +216,12 @@ class GrainsRun(BaseRun):
         super().observe()
         self._scale = self._scale_of(self._summary())
 
-    def _summary(self, lasts: bool = False) -> dict[str, Any]:
-        seen, books = super()._summary(), self._world.books
-        seen["contact_energy"], seen["unconverged"] = self._stored, int(books.lagging[0])
-        seen["largest_overlap"] = float(books.overlap[0])
-        seen["total_energy"] += self._stored
-        assert self._ball_numbers is not None
-        return self._ball_numbers.added(seen, self.state)
+    def _with_stored(self, seen: dict[str, Any]) -> dict[str, Any]:
+        books = self._world.books
+        return {
+            **seen, "contact_energy": self._stored, "total_energy": seen["total_energy"] + self._stored,
+            "unconverged": int(books.lagging[0]), "largest_overlap": float(books.overlap[0]),
+        }  # fmt: skip
 
     def _scale_of(self, seen: dict[str, Any]) -> float:
         """The larger one of now and of the start: kinetic and contact energy, and what weight may make of them."""
@@ -234,15 +233,10 @@ class GrainsRun(BaseRun):
         return float(self._clock[DONE] / span)
 
     def _arrays(self) -> Arrays:
-        assert self._ball_numbers is not None
-        world = self._world
-        kept = {
-            f"{name}.{part}": array
-            for name in ("grains", "near", "books")
-            for part, array in getattr(world, name)._asdict().items()
-            if array is not None
-        }
-        return {**kept, **self._ball_numbers.arrays(), "clock": self._clock, "image": self._image}
+        kept = {"clock": self._clock, "image": self._image}
+        for name in ("grains", "near", "books"):
+            kept |= named(name, getattr(self._world, name))
+        return kept
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()

@@ -4,7 +4,7 @@ import bisect
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Self, TypeVar
 
@@ -20,7 +20,7 @@ from ..observables import CHUNK
 from ..scene import Scene
 from ..state import State
 from . import failures
-from .observed import balance, gone_of, poses_of
+from .observed import Observed, balance, gone_of, poses_of, with_walls
 from .state import Seeding
 from .tally import Watched
 from .tiers import Tier
@@ -37,7 +37,6 @@ _FEW = 4096
 # So many particles are taken at a time, compiled and in plain Python: in some 0.1 s, from one look at the halt to the
 # next.
 _AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 64
-_UNSEEDED, _UNWATCHED = Seeding(), Watched()
 Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
 
@@ -67,12 +66,16 @@ class BaseRun:
     _walls: Any
     # Where particles have a radius.
     _ball_numbers: BallNumbers | None = None
+    # Where walls react.
+    _observed: Observed | None = None
+    # What is no flight, of contacts that have lasted.
+    _kinds: Set[int] = frozenset()
     # The times at which frames are cut into pieces [s].
     _instants: Sequence[float] = ()
 
     def __init__(
-        self, scene: Scene, method: Method, n: int, threads: int, tier: Tier, seeding: Seeding = _UNSEEDED,
-        watched: Watched = _UNWATCHED, pool: ThreadPoolExecutor | None = None,
+        self, scene: Scene, method: Method, n: int, threads: int, tier: Tier, seeding: Seeding,
+        watched: Watched, pool: ThreadPoolExecutor | None = None,
     ) -> None:  # fmt: skip
         self._scene, self._method, self._first, self._gravity = scene, method, seeding.first, scene.pull()
         self._owners, self._parts, self._surfaces_of_walls = scene.owners(), scene.parts_of_rows(), scene.members()[0]
@@ -132,7 +135,7 @@ class BaseRun:
         raise NotImplementedError
 
     def _arrays(self) -> Arrays:
-        """The arrays of `arrays`, without the counts of impacts."""
+        """The arrays of `arrays` that only this engine has."""
         raise NotImplementedError
 
     def _begin(self) -> None:
@@ -140,6 +143,10 @@ class BaseRun:
 
     def _show(self, moment: float) -> None:
         """Bring the state, and the walls as observed, to a frame at a moment [s]."""
+
+    def _with_stored(self, seen: dict[str, Any]) -> dict[str, Any]:
+        """The observables of points with what contacts store, where sums over particles are without it."""
+        return seen
 
     def _scale_of(self, seen: dict[str, Any]) -> float | None:
         """What the error of the energy is relative to [J]; None: each particle has an error of its own."""
@@ -217,7 +224,9 @@ class BaseRun:
     def arrays(self) -> Arrays:
         """The arrays that `restore` needs for the same bits, not copied; to be called between calls of `advance`."""
         found = self._arrays()
-        return found if self._tally is None else {**found, **self._tally.arrays()}
+        for more in (self._ball_numbers, self._tally):
+            found |= {} if more is None else more.arrays()
+        return found
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         """Take the state of the run that gave these `arrays`: at a frame, or within one if it was `cut_short`."""
@@ -249,9 +258,14 @@ class BaseRun:
         drawn = np.arange(len(self._partial)) if drawn is None else drawn
         return self._law, self._walls, self._gravity, self._seen_state(), drawn, self._size, self._partial
 
-    def _summary(self, lasts: bool = False) -> dict[str, Any]:
-        """The observables that are sums over particles; `lasts`: a contact has lasted."""
-        return observables.summary(self._partial, self._seen_state(), self._owners, lasts, self._parts)
+    def _summary(self) -> dict[str, Any]:
+        """The observables that are sums over particles and walls."""
+        state = self._seen_state()
+        seen = self._with_stored(
+            observables.summary(self._partial, state, self._owners, bool(self._kinds), self._parts)
+        )
+        seen = seen if self._ball_numbers is None else self._ball_numbers.added(seen, state)
+        return seen if self._observed is None else with_walls(seen, self._observed)
 
     def seen(self) -> dict[str, Any]:
         """The observables of the last frame."""
@@ -310,6 +324,16 @@ class BaseRun:
         if self._tier.is_plain and self._tier.remaining <= 0.0:
             self._choose_tier()
         return min(latest, time.monotonic() + self._tier.remaining) if self._tier.is_plain else latest
+
+
+def named(prefix: str, arrays: Any) -> Arrays:
+    """The arrays of a named tuple, for `BaseRun.arrays`.
+
+    >>> from swarm.state import Absorbed
+    >>> list(named("absorbed", Absorbed(np.zeros(1), np.zeros(1, np.int32))))
+    ['absorbed.time', 'absorbed.wall']
+    """
+    return {f"{prefix}.{name}": array for name, array in arrays._asdict().items() if array is not None}
 
 
 def result_of(share: "Future[T]", latest: float, halt: Callable[[], None]) -> T:

@@ -46,16 +46,12 @@ class DoorRun(Run):
         contacts = self.state.contacts
         if contacts is None or not self._kinds:
             return
-        last, pieces = self._before(instant), self._scene.pieces
+        last, pieces = _before(self._scene, instant), self._scene.pieces
         gone = [one.is_there(last) and not one.is_there(instant) for one in pieces]
         if any(gone):
             self._let_go(contacts, np.array(gone))
         if any(one.is_there(instant) and not one.is_there(last) for one in self._scene.open_volumes()):
             _wake(contacts, contacts.phase == ARRIVED)
-
-    def _before(self, instant: float) -> float:
-        """A time before an instant and after the one before it [s]."""
-        return _before(self._scene, instant)
 
     def _let_go(self, contacts: Contacts, gone: NDArray[np.bool_]) -> None:
         """Let particles that slide or rest on the walls of the pieces in `gone` fly: these walls left the scene."""

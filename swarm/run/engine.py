@@ -24,12 +24,12 @@ from ..particles import Particles
 from ..scene import Scene
 from ..state import Contacts, Crossed, Multipliers, State
 from . import failures
-from .base import Arrays, BaseRun, result_of
+from .base import Arrays, BaseRun, named, result_of
 from .impacts import ThreadLog
 from .preflight.counting import counters_of, crossed_of
 from .present import Presence
-from .state import Seeding, begin, have_lasted, holders_of_resting, state_of
-from .tally import Watched
+from .state import UNSEEDED, Seeding, begin, have_lasted, holders_of_resting, state_of
+from .tally import UNWATCHED, Watched
 from .tiers import Tier
 from .turns import End, Turns, left_behind
 
@@ -44,7 +44,6 @@ _MUCH_WRITING = 1.0 / 3.0
 _KINDS = {EVENT: None, CAREFUL: None, HELD: One(0.0), EDGE: Two(0.0, 0.0)}
 # A thread draws so many parts of its share of a frame in which particles slide: each part is done before the next.
 _PARTS = 4
-_UNWATCHED, _UNSEEDED = Watched(), Seeding()
 _DONE: End = (int(Status.DONE), 0, None)
 
 
@@ -56,7 +55,7 @@ class Run(BaseRun):
 
     def __init__(
         self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
-        compile: str = "always", seeding: Seeding = _UNSEEDED, watched: Watched = _UNWATCHED,
+        compile: str = "always", seeding: Seeding = UNSEEDED, watched: Watched = UNWATCHED,
     ) -> None:  # fmt: skip
         n = len(particles)
         self._numbers, self._law = method.numbers(scene), method.law()
@@ -273,7 +272,7 @@ class Run(BaseRun):
         found: Arrays = {}
         for name, value in {"phase": self._phase, "halted": self._halted, **self.state._asdict()}.items():
             if isinstance(value, (lanes.Halted, Contacts, Crossed, Multipliers)):
-                found |= {f"{name}.{field}": array for field, array in value._asdict().items()}
+                found |= named(name, value)
             elif isinstance(value, np.ndarray):
                 found[name] = value
         return found
@@ -284,9 +283,6 @@ class Run(BaseRun):
         if have_lasted(self.state.contacts, self._phase):
             self._kinds = set(_KINDS)
             self._choose_tier()
-
-    def _summary(self, lasts: bool = False) -> dict[str, Any]:
-        return super()._summary(bool(self._kinds))
 
     def seen(self) -> dict[str, Any]:
         return super().seen() | self._present.observed()

@@ -13,9 +13,7 @@ from .doors import DoorRun
 from .engine import Run
 from .options import Task
 from .state import Seeding
-from .tally import Watched
-
-_UNWATCHED = Watched()
+from .tally import UNWATCHED, Watched
 
 
 def wing(name: str) -> ModuleType:
@@ -27,7 +25,7 @@ def wing(name: str) -> ModuleType:
     return importlib.import_module(f"{__package__.partition('.')[0]}.{name}")
 
 
-def run_of(task: Task, watched: Watched = _UNWATCHED) -> BaseRun:
+def run_of(task: Task, watched: Watched = UNWATCHED) -> BaseRun:
     """The state of a run at its start, and the threads that advance it."""
     scene, particles, method, options = task.scene, task.particles, task.method, task.options
     what: Any = particles

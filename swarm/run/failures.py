@@ -16,11 +16,9 @@ from ..surfaces.wall_law import leave_of, mirrored, said_of, why_wrong
 from .preflight import softness
 from .state import Seeding
 
-_UNSEEDED = Seeding()
-
 
 def of_frame(
-    scene: Scene, method: Method, state: State, end: tuple[Status, int], moment: float, seeding: Seeding = _UNSEEDED
+    scene: Scene, method: Method, state: State, end: tuple[Status, int], moment: float, seeding: Seeding
 ) -> str:
     """The sentence about a frame that ended with this status and particle."""
     (status, particle), first = end, seeding.first

@@ -27,6 +27,9 @@ class Seeding(NamedTuple):
         return self.seed - 2**64 if self.seed >= 2**63 else self.seed
 
 
+UNSEEDED = Seeding()
+
+
 def state_of(scene: Scene, particles: Particles, method: Method, booked: int) -> State:
     """The state with the arrays of the particles and so many rows of what walls give; energies are still to be set."""
     n, laws, surfaces = len(particles), scene.laws(), len(scene.owners())

@@ -123,6 +123,9 @@ class Watched(NamedTuple):
     counters: tuple[Counter, ...] = ()
 
 
+UNWATCHED = Watched()
+
+
 def tally_of(task: Task) -> Tally | None:
     """The tally of a run, if it has one."""
     return Tally(task.scene.members(), units_of(task)) if task.options.member_impacts else None
