@@ -4,11 +4,11 @@ import math
 from typing import Any
 
 from ..kernel.arrays import index
+from ..kernel.grid import block_of, over_entries
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, highest, lowest, norm, square
 from ..surfaces.fields.foam import Foam
-from ..surfaces.fields.grid import block_of, over_block
 from ..surfaces.fields.members import member
 from ..surfaces.in_motion.moving import Carried
 from ..surfaces.in_motion.posed import Posed
@@ -72,7 +72,7 @@ def _meets_one(field, ends, number, active, path, near):
     if not (square(path.r1) < math.inf and square(path.v1) < math.inf):
         return True
     block = block_of_path(grid, own_path(field, ends, path), near)
-    return over_block(grid, block, False, _meets_body, field, ends, number, active, path, near)
+    return over_entries(grid, block, False, _meets_body, field, ends, number, active, path, near)
 
 
 def _meets_body(found, m, field, ends, number, active, path, near):
@@ -181,7 +181,7 @@ def _out_of_unions(walls, active, path, near, remaining):
 def _first_of(members, number, active, path, near, later):
     """The first of a later `Arrival` and of those at the walls of a field, which has so many walls before it."""
     block = block_of_path(members.grid, path, near)
-    return over_block(members.grid, block, later, _sooner_body, members, number, active, path, near)
+    return over_entries(members.grid, block, later, _sooner_body, members, number, active, path, near)
 
 
 def _sooner_body(found, m, members, number, active, path, near):
@@ -216,7 +216,7 @@ def _arrival_among(field, ends, walls, number, active, path, near, remaining):
     grid = members_of(field).grid
     block = block_of_path(grid, own_path(field, ends, path), near)
     none = Arrival(math.inf, -1.0)
-    return over_block(grid, block, none, _sooner_at, walls, number, active, path, near, remaining)
+    return over_entries(grid, block, none, _sooner_at, walls, number, active, path, near, remaining)
 
 
 def _sooner_at(found, m, walls, number, active, path, near, remaining):

@@ -3,9 +3,9 @@
 import math
 
 from ..kernel.arrays import index
+from ..kernel.grid import over_entries
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, norm, square
-from ..surfaces.fields.grid import over_block
 from ..surfaces.fields.members import member
 from ..surfaces.presence.doors import Timed
 from ..surfaces.presence.openings import Doorway, outside
@@ -131,7 +131,7 @@ def _may_enter(volume, path, reach):
 @outlined
 def _may_enter_one(members, path, reach):
     block = block_of_path(members.grid, path, 0.0)
-    return over_block(members.grid, block, False, _may_enter_body, members, path, reach)
+    return over_entries(members.grid, block, False, _may_enter_body, members, path, reach)
 
 
 def _may_enter_body(found, m, members, path, reach):
@@ -185,7 +185,7 @@ def _way_into(volume, path, near):
 @outlined
 def _way_into_any(members, path, near):
     block = block_of_path(members.grid, path, near)
-    return over_block(members.grid, block, math.inf, _way_into_body, members, path, near)
+    return over_entries(members.grid, block, math.inf, _way_into_body, members, path, near)
 
 
 def _way_into_body(first, m, members, path, near):

@@ -9,6 +9,7 @@ import numpy as np
 from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
+from ..kernel.arrays import aligned_copy
 from ..methods.base import Method
 from ..particles import Particles
 from ..run import failures
@@ -24,7 +25,7 @@ from .colliding import events
 from .colliding.bounce import Gates, RandomSource
 from .colliding.box import CollisionRule, CollisionTotals
 from .colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
-from .colliding.described import aligned_copy, described, epoch_of, reach_of, with_room
+from .colliding.described import described, epoch_of, reach_of, with_room
 from .colliding.queue import FIRST
 from .colliding.window import END
 from .resting import warn_of_rest

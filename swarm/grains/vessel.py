@@ -11,11 +11,11 @@ import math
 from typing import Any
 
 from ..kernel.arrays import index
+from ..kernel.grid import block_of, over_entries
 from ..kernel.jit import outlined
 from ..kernel.vector import Vec
 from ..surfaces.balls.facet import RoundTriangle
 from ..surfaces.contract import Smooth
-from ..surfaces.fields.grid import block_of, over_block
 from ..surfaces.fields.members import GrownLike, member
 from ..surfaces.outlines.round_side import RoundSide
 from ..surfaces.rotation import Rotated
@@ -114,7 +114,7 @@ def list_in_field(wall, face, grains, near, skin, found):
         corner = Vec(reach, reach, reach)
         block, members = block_of(grid, r - corner, r + corner), wall.grown(radius).members
         given = members, face, near, (r, skin, begin)
-        end = over_block(grid, block, begin, _enter, given)
+        end = over_entries(grid, block, begin, _enter, given)
         near.used[0] = end
         if end <= near.listed.size:
             k = begin

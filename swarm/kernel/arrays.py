@@ -17,6 +17,7 @@ from numba import types
 from numba.core import cgutils
 from numba.core.imputils import impl_ret_borrowed
 from numba.np.arrayobj import populate_array
+from numpy.typing import NDArray
 
 from .trace.calls import INTRINSIC, operation
 
@@ -159,6 +160,22 @@ def _emit_fetch(context, builder, signature, args):
     # To read, of use for long, data
     builder.call(ask, [place, number(0), number(3), number(1)])
     return context.get_dummy_value()
+
+
+def aligned_copy(values: NDArray[Any]) -> NDArray[Any]:
+    """A copy that begins with a line of the cache."""
+    made = aligned(-(-values.nbytes // 8)).view(values.dtype)[: values.size].reshape(values.shape)
+    made[...] = values
+    return made
+
+
+def aligned(size: int) -> NDArray[np.float64]:
+    """An array of zeros that begins with a line of the cache."""
+    # Of zeros NumPy asks the system for no large pages.
+    made = np.empty(size + 8)
+    made.fill(0.0)
+    first = -(made.ctypes.data // 8) % 8
+    return made[first : first + size]
 
 
 def index(value: Any) -> Any:

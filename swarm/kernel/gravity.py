@@ -1,10 +1,22 @@
-"""Constant gravity, or none: the exact free flight."""
+"""Constant gravity, or none: the exact free flight, and when a parabola along it rises through 0."""
 
+import math
+
+from .jit import select
+from .record import Record
 from .vector import Vec, absolute, dot
 
 
 class Gravity(Vec):
     """Acceleration G [m/s^2]. A scene without gravity has None, which compiles to nothing."""
+
+
+class Bounds(Record):
+    """Of the speed, the acceleration and the jerk in the frame of a wall for some time, whatever their directions."""
+
+    speed: float
+    acceleration: float
+    jerk: float
 
 
 def as_vector(gravity):
@@ -33,3 +45,34 @@ def potential(gravity, r):
 def weight(gravity, s):
     """The largest change of the potential energy per mass when the coordinates change by s."""
     return 0.0 if gravity is None else dot(absolute(gravity), s)
+
+
+def rise_time(c, b, a):
+    """First t >= 0 at which c + 2 b t + a t^2 rises through 0, where c <= 0 up to round-off; else infinity.
+
+    A cavity has a > 0, a solid a < 0, a plane a = 0. Branch-free.
+    """
+    return rise_time_by(c, b, a, b * b - a * c)
+
+
+def rise_time_by(c, b, a, discriminant):
+    """`rise_time` with a discriminant better than b^2 - a c, of which nothing is left some 1e8 sizes from a solid."""
+    time, bottom = _outer_root(c, b, a, discriminant)
+    misses = (bottom <= 0.0) | ((a < 0.0) & (discriminant < 0.0))
+    return select(misses, math.inf, select(time > 0.0, time, 0.0))
+
+
+def rise_time_inside(c, b, a):
+    """`rise_time` for a >= 0: a convex cavity, which a particle that moves never misses."""
+    time, bottom = _outer_root(c, b, a, b * b - a * c)
+    return select(bottom <= 0.0, math.inf, select(time > 0.0, time, 0.0))
+
+
+def _outer_root(c, b, a, discriminant):
+    """The root at which c + 2 b t + a t^2 rises, and its denominator."""
+    # a > 0, c > 0 by round-off at a grazing hit: the flight touches, it does not miss.
+    root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
+    approaching = b > 0.0
+    # The form of the root that does not cancel: -c/(b + root) when b > 0, (root - b)/a when b <= 0.
+    bottom = select(approaching, b + root, a)
+    return select(approaching, -c, root - b) / bottom, bottom

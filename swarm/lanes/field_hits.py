@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..kernel.arrays import copy_row, index, unwritten
+from ..kernel.grid import cell_of, entries_of, until_next
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
 from ..surfaces.facets.members import Facets
 from ..surfaces.fields.foam import Foam
-from ..surfaces.fields.grid import cell_of, until_next
 from ..surfaces.fields.members import gathered, member, width
 from ..surfaces.periodic.period import on_time
 from ..surfaces.time_of_impact import flights
@@ -186,9 +186,8 @@ def _find_near(members, gravity, lanes, live, seen):
         seen.number[i] = cell.number
     # In a loop of their own: in that one they take twice as long.
     for i in range(index(live)):
-        cell = index(seen.number[i])
-        seen.first[i] = grid.first[cell]
-        seen.number[i] = grid.first[cell + index(1)] - seen.first[i]
+        first, stop = entries_of(grid, seen.number[i])
+        seen.first[i], seen.number[i] = first, stop - first
 
 
 def _close_up(seen, k, lanes, n, row):

@@ -8,12 +8,12 @@ import numpy as np
 
 from ..kernel.arrays import index, unwritten
 from ..kernel.gravity import accelerated, displacement
+from ..kernel.grid import cell_of, entries_of, until_next, until_out
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
-from ..surfaces.facets.cells import here_in, passes, until_out
-from ..surfaces.facets.room import FULL, KIND, FreeCells, all_away, room_of
-from ..surfaces.fields.grid import cell_of, until_next
+from ..surfaces.facets.cells import here_in, passes
+from ..surfaces.facets.room import FULL, KIND, all_away, room_of
 from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact import flights
 from .table import STRIDE
@@ -117,15 +117,15 @@ def _find_cells(gravity, cells, under, n):
         put(under.rows, _AHEAD, i, room.ahead)
     for i in range(index(n)):
         place, pace = under.now(gravity, i)
-        room = FreeCells(column(under.rows, _BACK, i), column(under.rows, _AHEAD, i))
-        out = until_out(gravity, cells, column(under.rows, _PLACE, i), room, place, pace)
+        at, back, ahead = (column(under.rows, row, i) for row in (_PLACE, _BACK, _AHEAD))
+        out = until_out(gravity, cells, at - back, at + ahead, place, pace)
         under.until[i], under.wall[i] = under.time[i] + out, -1.0
     for i in range(index(n)):
         cell = index(under.cell[i])
         under.count[i] = 0
         if cells.room[cell, KIND] == FULL and _may_meet(gravity, cells, under, cell, i):
-            first = cells.first[cell]
-            under.first[i], under.count[i] = first, cells.first[cell + index(1)] - first
+            first, stop = entries_of(cells, cell)
+            under.first[i], under.count[i] = first, stop - first
 
 
 def _may_meet(gravity, cells, under, cell, i):

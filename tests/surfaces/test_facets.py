@@ -8,9 +8,10 @@ from thorny import aimed, hollow, slivered, thorny
 
 import swarm
 from swarm import scene_file
+from swarm.kernel.grid import until_out
 from swarm.kernel.vector import Vec
 from swarm.serialization import tables
-from swarm.surfaces.facets import cells, room
+from swarm.surfaces.facets import room
 
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
 WIDTHS = (0.5, 1.0, 1.5)
@@ -95,7 +96,7 @@ def test_when_a_flight_leaves_a_block(gravity):
         r, v = random.uniform(-0.5, 0.5, 3), random.normal(size=3)
         place = np.floor((r - np.array(grid.low)) * np.array(grid.inverse))
         free = room.FreeCells(*(Vec(*random.integers(0, 3, 3).astype(float)) for _end in range(2)))
-        time = cells.until_out(gravity, grid, Vec(*place), free, Vec(*r), Vec(*v))
+        time = until_out(gravity, grid, Vec(*place) - free.back, Vec(*place) + free.ahead, Vec(*r), Vec(*v))
         pull = np.zeros(3) if gravity is None else np.array(gravity)
         low = np.array(grid.low) + (place - np.array(free.back)) * np.array(grid.width) - np.array(grid.margin)
         high = np.array(grid.low) + (place + np.array(free.ahead) + 1.0) * np.array(grid.width) + np.array(grid.margin)

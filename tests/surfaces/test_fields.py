@@ -13,10 +13,10 @@ from swarm import scene_file
 from swarm.common import checks
 from swarm.errors import SceneError
 from swarm.kernel.gravity import Gravity
+from swarm.kernel.grid import cell_of, entries_of
 from swarm.kernel.vector import vec
 from swarm.serialization import tables
 from swarm.surfaces import ALL_SURFACES
-from swarm.surfaces.fields import grid as grids
 from swarm.surfaces.time_of_impact import flights
 
 EPSILON = np.finfo(np.float64).eps
@@ -144,8 +144,7 @@ def test_the_cells_hold_what_reaches_into_them():
     points = random.uniform(-0.2, 1.2, (3, 3000))
     inside = ((points[:, None, :] - field.centers.T[:, :, None]) ** 2).sum(axis=0) < field.radii[:, None] ** 2
     for point, bodies in zip(points.T, inside.T, strict=True):
-        cell = grids.cell_of(members.grid, vec(point)).number
-        entries = members.grid.entries[members.grid.first[cell] : members.grid.first[cell + 1]]
+        entries = members.grid.entries[slice(*entries_of(members.grid, cell_of(members.grid, vec(point)).number))]
         assert set(np.flatnonzero(bodies)) <= set(entries.tolist())
 
 

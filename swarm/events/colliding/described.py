@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...contact.laws import NONE
+from ...kernel.arrays import aligned, aligned_copy
 from ...pairs import Pairs
 from ...particles import Particles
 from ...scene import Scene
@@ -78,22 +79,6 @@ def with_room(flock: Flock, grid: BallGrid) -> tuple[Flock, BallGrid]:
     place = np.arange(len(order)) - np.repeat(first, counts)
     room[np.repeat(numbers, counts), 1 + place] = order
     return flock._replace(room=aligned_copy(room.ravel())), grid._replace(stride=stride)
-
-
-def aligned_copy(values: NDArray[Any]) -> NDArray[Any]:
-    """A copy that begins with a line of the cache."""
-    made = aligned(-(-values.nbytes // 8)).view(values.dtype)[: values.size]
-    made[:] = values
-    return made
-
-
-def aligned(size: int) -> Floats:
-    """An array of zeros that begins with a line of the cache."""
-    # Of zeros NumPy asks the system for no large pages.
-    made = np.empty(size + 8)
-    made.fill(0.0)
-    first = -(made.ctypes.data // 8) % 8
-    return made[first : first + size]
 
 
 def described(scene: Scene, particles: Particles) -> tuple[Domain, Flock]:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ...kernel import cache
 from ...kernel.gravity import as_vector, displacement
+from ...kernel.grid import MARGIN
 from ...kernel.jit import Array, select
 from ...kernel.record import Record
-from ...kernel.vector import ZERO, Vec, absolute, dot, square, total, vec
-from ..fields.grid import MARGIN
-from ..fields.many import enter_bodies
+from ...kernel.vector import Vec, absolute, dot, square, total, vec
+from ..fields.grid import enter_bodies
 
 # Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
 # ones more are crossed. For each facet there are at most so many cells, which take 5 bytes each.
@@ -178,35 +178,3 @@ def passes(cells, k, here):
 
 def _row(rows, k, first, scale):
     return Vec(float(rows[k, first]), float(rows[k, first + 1]), float(rows[k, first + 2])) * scale
-
-
-# --- Where a flight leaves cells -------------------------------------------------------------------------
-
-
-def until_out(gravity, cells, place, room, r, v):
-    """When a flight from a cell has left it and the `Room` around it."""
-    pull = ZERO if gravity is None else gravity
-    is_straight, low, width, margin = gravity is None, cells.low, cells.width, cells.margin
-    back, ahead = place - room.back, place + room.ahead
-    x = _along(is_straight, (low.x, width.x, margin.x), back.x, ahead.x, (r.x, v.x, pull.x))
-    y = _along(is_straight, (low.y, width.y, margin.y), back.y, ahead.y, (r.y, v.y, pull.y))
-    z = _along(is_straight, (low.z, width.z, margin.z), back.z, ahead.z, (r.z, v.z, pull.z))
-    sooner = select(y < x, y, x)
-    return select(z < sooner, z, sooner)
-
-
-def _along(is_straight, axis, first, last, flight):
-    """When a flight (x, v, pull) leaves these layers of cells, and a margin. Branch-free."""
-    (low, width, margin), (x, v, pull) = axis, flight
-    below, above = low + first * width - margin, low + (last + 1.0) * width + margin
-    if is_straight:
-        return select(v == 0.0, math.inf, (select(v > 0.0, above, below) - x) / v)
-    # Towards the side to which it is pulled it leaves, unless it leaves before through the other one.
-    turned = pull < 0.0
-    a, b = 0.5 * abs(pull), 0.5 * select(turned, -v, v)
-    ahead, behind = select(turned, x - below, above - x), select(turned, above - x, x - below)
-    backwards = (b < 0.0) & (b * b >= a * behind)
-    root = math.sqrt(b * b + a * select(backwards, -behind, ahead))
-    over = select(backwards, behind, select(b > 0.0, ahead, root - b))
-    under = select(backwards, root - b, select(b > 0.0, root + b, a))
-    return select(under > 0.0, over / under, math.inf)

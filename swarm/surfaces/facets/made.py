@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from ...common import checks
 from ...errors import SceneError
+from ...kernel.arrays import aligned_copy
 from ...kernel.vector import Vec
 from ..balls.facet import RoundTriangle
-from ..fields.grid import aligned
 from ..fields.many import field_of
 from ..fields.members import Members
 from .members import Facets
@@ -83,13 +83,13 @@ def table_of_facets(corners: Floats, room: float) -> Floats:
         inwards = np.cross(normal, q - p)
         inwards /= np.linalg.norm(inwards, axis=1)[:, None]
         columns += [inwards, ((inwards * p).sum(axis=1) - room)[:, None]]
-    return aligned(np.concatenate(columns, axis=1))
+    return aligned_copy(np.concatenate(columns, axis=1))
 
 
 def triangles_of_balls(corners: Floats, largest: float) -> Members:
     """The triangles with these corners (T, 3, 3) as balls meet them, with radii of at most the largest one [m]."""
     a, b, c = np.moveaxis(corners, 1, 0)
-    table = aligned(np.concatenate([a, b - a, c - a, np.zeros((len(a), 1))], axis=1))
+    table = aligned_copy(np.concatenate([a, b - a, c - a, np.zeros((len(a), 1))], axis=1))
     zero = Vec(0.0, 0.0, 0.0)
     low, high = (np.ascontiguousarray(end(corners, axis=1).T) for end in (np.min, np.max))
     return field_of(RoundTriangle(zero, zero, zero, 0.0), table, lambda: (low, high), None, largest)

@@ -4,14 +4,14 @@ import math
 
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, displacement
+from ...kernel.grid import cell_of, entries_at, entries_of, until_next, until_out
 from ...kernel.jit import outlined
 from ...kernel.vector import cross, dot, square
-from ..fields.grid import cell_of, until_next
 from ..fields.members import Members, member
 from ..presence.patched import Patched
 from ..shapes.plane import PlaneNumbers
 from ..time_of_impact import flights
-from .cells import here_in, passes, until_out
+from .cells import here_in, passes
 from .room import FULL, KIND, room_of
 
 # So many cells and blocks of cells are crossed before a flight is said to be free so far.
@@ -46,9 +46,9 @@ class Facets(Members, Patched):
 
 @outlined
 def _is_behind_another(facets, number, r):
-    cells, cell = facets.grid, index(cell_of(facets.grid, r).number)
-    for k in range(cells.first[cell], cells.first[cell + index(1)]):
-        m = cells.entries[k]
+    first, stop = entries_at(facets.grid, r)
+    for k in range(first, stop):
+        m = facets.grid.entries[k]
         if float(m) != number and member(facets, index(m)).distance(r) > 0.0:
             return True
     return False
@@ -57,10 +57,10 @@ def _is_behind_another(facets, number, r):
 @outlined
 def _on_plane_of(facets, number, r, near):
     """The facet that goes on with the plane of another one at a place, or -1."""
-    cells, cell = facets.grid, index(cell_of(facets.grid, r).number)
+    first, stop = entries_at(facets.grid, r)
     normal, found, widest = facets.wall(number).normal, -1.0, -near
-    for k in range(cells.first[cell], cells.first[cell + index(1)]):
-        m = cells.entries[k]
+    for k in range(first, stop):
+        m = facets.grid.entries[k]
         other = member(facets, index(m))
         turn, within = cross(normal, other.normal), other.within(r)
         is_flat = dot(normal, other.normal) > 0.0 and square(turn) <= _PARALLEL * _PARALLEL
@@ -78,7 +78,8 @@ def _first_hit(facets, gravity, r, v):
         cell = cell_of(cells, place)
         if cell.inside:
             number = index(cell.number)
-            until = t + until_out(gravity, cells, cell.place, room_of(cells.room, number), place, pace)
+            room = room_of(cells.room, number)
+            until = t + until_out(gravity, cells, cell.place - room.back, cell.place + room.ahead, place, pace)
             if cells.room[number, KIND] == FULL:
                 here = here_in(gravity, cells, cell.place, place, pace, until - t)
                 found = hit_in(facets, gravity, (r, v), (number, t), here)
@@ -96,7 +97,8 @@ def hit_in(facets, gravity, flight, cell, here):
     """The first hit in a cell with this number of a flight (r, v), which leaves it `here.span` after `cell[1]`."""
     (r, v), (number, begin) = flight, cell
     found, cells = flights.Hit(begin + here.span, -1.0), facets.grid
-    for k in range(cells.first[number], cells.first[number + index(1)]):
+    first, stop = entries_of(cells, number)
+    for k in range(first, stop):
         if passes(cells, index(k), here):
             m = cells.entries[k]
             time, _hits = flights.hit(gravity, member(facets, index(m)), r, v)

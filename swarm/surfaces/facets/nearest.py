@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from ...kernel.arrays import index, scratch
+from ...kernel.grid import cell_of
 from ...kernel.jit import kernel, outlined
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, cross, dot, norm, put, square
-from ..fields.grid import cell_of
 from .room import FREE, FULL, KIND
 
 # Of a squared distance, the part by which those from two triangles that share a corner or an edge differ, and that of

@@ -6,6 +6,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ...kernel.arrays import aligned_copy
+from ...kernel.grid import Floats
 from ...kernel.vector import vec
 from ..shapes.box import Box
 from ..shapes.capsule import Capsule
@@ -14,7 +16,6 @@ from ..shapes.ellipsoid import Ellipsoid
 from ..shapes.sphere import Sphere, ball, cavity
 from ..surface import Surface
 from .foam import Foam
-from .grid import Floats, aligned
 from .many import Many, field_of
 from .members import Members
 
@@ -67,7 +68,7 @@ class Spheres(Many):
         return self._field(largest)
 
     def _field(self, largest: float | None) -> Members:
-        table = aligned(np.column_stack([self.centers, self.radii]))
+        table = aligned_copy(np.column_stack([self.centers, self.radii]))
         made = ball if self.is_solid() else cavity
         return field_of(made(vec(table[0, :3]), table[0, 3]), table, self.corners, self.repeated, largest)
 

@@ -4,12 +4,12 @@ import math
 
 from ...kernel.arrays import index
 from ...kernel.gravity import displacement
+from ...kernel.grid import cell_of, entries_at, until_next
 from ...kernel.jit import outlined
 from ...kernel.vector import absolute, total
 from ..presence.patched import Patched
 from ..time_of_impact import flights
-from .grid import cell_of, until_next
-from .members import Members, entries_at, member
+from .members import Members, member
 
 # Round-off of a distance, in units of the last place of coordinates; by so many times that is a flight inside of
 # another cavity where it goes on.

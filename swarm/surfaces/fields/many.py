@@ -11,23 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 from ... import motion as motions
 from ...common.rows import balls, bodies, directions, lengths, quaternions, widths
 from ...errors import SceneError
-from ...kernel import cache
-from ...kernel.arrays import index
-from ...kernel.jit import kernel
-from ...kernel.vector import Vec, vec
+from ...kernel.grid import Floats, one_cell
 from ..presence.patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
-from .grid import MARGIN, Floats, Grid, cells_of, one_cell
-from .members import Few, GrownLike, Members, alike, gathered, nearest, table_of, touched, within
+from .grid import grid_of
+from .members import Few, GrownLike, Members, alike, nearest, table_of, touched, within
 
 # So many bodies are looked at one after the other by all lanes together, where flights are straight: in a sphere an
 # impact among 10, 24 and 40 balls takes 18, 37 and 57 ns, from cell to cell 55, 73 and 91. Of other bodies, which take
 # longer, fewer; and in a cell that repeats, whose faces end flights too: among 27 balls 87 ns, from cell to cell 52.
 # Under gravity cells are faster from 16 on: so few are in one cell.
 _FEW, _FEW_BALLS, _IN_ONE_CELL = 24, 48, 16
-# So many bodies are entered in plain Python: to compile what does it takes a second.
-_SOME = 2000
 
 
 class _BodyRows(NamedTuple):
@@ -248,60 +243,3 @@ def _corners_of(surfaces: Sequence[Surface]) -> tuple[Floats, Floats]:
     """The lowest and the highest corners of solids (3, n): those of their cavities."""
     boxes = np.array([replace(surface, side="inside").bounds() for surface in surfaces])  # type: ignore[call-arg]
     return np.ascontiguousarray(boxes[:, 0].T), np.ascontiguousarray(boxes[:, 1].T)
-
-
-# --- Which bodies reach into which cells -----------------------------------------------------------------
-
-
-def grid_of(
-    like: Any, table: Floats, bounds: tuple[Floats, Floats], repeated: tuple[Floats, Floats] | None = None
-) -> Grid:
-    """The grid of the bodies of a table.
-
-    Args:
-        like: the numbers of one of them.
-        table: those of all, one in each row.
-        bounds: lowest and highest corner of each body (3, n), infinite where it has no end [m].
-        repeated: the corners (3,) of the cell of the scene that repeats, infinite where it does not; None: none does.
-    """
-    corner, shape, width = cells_of(*bounds, repeated)
-    low, wide, inverse, margin, along = (
-        vec(row.tolist()) for row in (corner, width, 1.0 / width, MARGIN * width, shape)
-    )
-    first, nothing = np.zeros(int(shape.prod()) + 2, np.int32), np.empty(0, np.int32)
-    grid = Grid(low, wide, inverse, margin, along, first, nothing)
-    enter = cache.in_python(enter_bodies) if len(table) <= _SOME else enter_bodies
-    # Each body counts in the cell after its own, so that the sums are where the entries of a cell begin.
-    enter(like, table, bounds, grid, first[1:], nothing)
-    np.cumsum(first, out=first)
-    entries = np.empty(first[-1], np.int32)
-    enter(like, table, bounds, grid, first[:-1].copy(), entries)
-    return grid._replace(entries=entries)
-
-
-@kernel
-def enter_bodies(like, table, bounds, grid, place, entries):
-    """Write every body to the place of each cell that it reaches into; count them where there are no `entries`."""
-    low, high = bounds
-    n, margin = grid.shape, Vec(2.0 * grid.margin.x, 2.0 * grid.margin.y, 2.0 * grid.margin.z)
-    for m in range(table.shape[0]):
-        body = gathered(like, table, index(m), 0)
-        x, x_end = _layers(low[0, m] - margin.x - grid.low.x, high[0, m] + margin.x - grid.low.x, grid.width.x, n.x)
-        y, y_end = _layers(low[1, m] - margin.y - grid.low.y, high[1, m] + margin.y - grid.low.y, grid.width.y, n.y)
-        z, z_end = _layers(low[2, m] - margin.z - grid.low.z, high[2, m] + margin.z - grid.low.z, grid.width.z, n.z)
-        for i in range(x, x_end):
-            for j in range(y, y_end):
-                for k in range(z, z_end):
-                    near = grid.low + Vec(i * grid.width.x, j * grid.width.y, k * grid.width.z)
-                    far = grid.low + Vec((i + 1.0) * grid.width.x, (j + 1.0) * grid.width.y, (k + 1.0) * grid.width.z)
-                    if body.may_reach(near - margin, far + margin):
-                        cell = int((i * n.y + j) * n.z + k)
-                        if entries.size > 0:
-                            entries[place[cell]] = m
-                        place[cell] += 1
-
-
-def _layers(begin, end, width, count):
-    """The layers of cells between two places, from the first to the one after the last."""
-    first, last = np.floor(begin / width), np.floor(end / width)
-    return int(min(max(first, 0.0), count - 1.0)), int(min(max(last, 0.0), count - 1.0)) + 1

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernel.arrays import index
+from ...kernel.arrays import aligned_copy, index
+from ...kernel.grid import Grid, cell_of, entries_at, entries_of, layer_of, number_of, until_next
 from ...kernel.jit import Array, kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, put
@@ -19,7 +20,6 @@ from ..shapes.slab import AXES, SlabNumbers
 from ..shapes.solid import SolidNumbers
 from ..shapes.sphere import SphereCavity, SphereNumbers, ball, cavity
 from ..time_of_impact import flights
-from .grid import Grid, aligned, cell_of, until_next
 
 # The rows of a rotation that turns nothing.
 _UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
@@ -137,12 +137,6 @@ class Few(Members):
         return Members(*self)
 
 
-def entries_at(grid, r):
-    """The begin and the end of the entries of the cell of a point."""
-    cell = index(cell_of(grid, r).number)
-    return grid.first[cell], grid.first[cell + 1]
-
-
 def member(members, m):
     """The numbers of one body."""
     return gathered(members.like, members.table, m, 0)
@@ -178,7 +172,7 @@ def width(like):
 
 def table_of(bodies: Sequence[Any]) -> NDArray[np.float64]:
     """The table of bodies, each the numbers of a wall, all of one kind."""
-    return aligned(np.array([_written(body) for body in bodies]))
+    return aligned_copy(np.array([_written(body) for body in bodies]))
 
 
 def can_be_member(wall: Any) -> bool:
@@ -265,8 +259,8 @@ def _first_hit(members, gravity, r, v):
     """The first hit in the cell of a particle, or when it is in another one."""
     grid = members.grid
     cell = cell_of(grid, r)
-    found, number = flights.Hit(until_next(gravity, grid, cell, r, v), -1.0), index(cell.number)
-    for k in range(grid.first[number], grid.first[number + 1]):
+    found, (first, stop) = flights.Hit(until_next(gravity, grid, cell, r, v), -1.0), entries_of(grid, cell.number)
+    for k in range(first, stop):
         m = grid.entries[k]
         time, hits = flights.hit(gravity, member(members, index(m)), r, v)
         if time < found.time:
@@ -285,7 +279,7 @@ def nearest(members, points, found):
     for i in range(points.shape[1]):
         r = column(points, 0, i)
         place = cell_of(grid, r).place
-        center = Vec(_within(place.x, grid.shape.x), _within(place.y, grid.shape.y), _within(place.z, grid.shape.z))
+        center = Vec(*(layer_of(layer, count) for layer, count in zip(place, grid.shape, strict=True)))
         best, which, last, shell = math.inf, 0, cells, 0.0
         while shell <= last:
             phi, m = _least_in_shell(members, r, center, shell)
@@ -299,10 +293,6 @@ def nearest(members, points, found):
         found[3, i] = best
 
 
-def _within(place, count):
-    return min(max(place, 0.0), count - 1.0)
-
-
 @outlined
 def _least_in_shell(members, r, center, shell):
     """The least phi in the cells that are `shell` cells away from one, and whose it is."""
@@ -312,8 +302,8 @@ def _least_in_shell(members, r, center, shell):
             for z in _around(center.z, shell, grid.shape.z):
                 if max(abs(x - center.x), max(abs(y - center.y), abs(z - center.z))) < shell:
                     continue
-                number = index(int((x * grid.shape.y + y) * grid.shape.z + z))
-                for k in range(grid.first[number], grid.first[number + 1]):
+                first, stop = entries_of(grid, int(number_of(grid.shape, x, y, z)))
+                for k in range(first, stop):
                     m = grid.entries[k]
                     phi = member(members, index(m)).phi(r)
                     if phi < best:
@@ -331,8 +321,8 @@ def within(members, points, found):
     grid = members.grid
     for i in range(points.shape[1]):
         r = column(points, 0, i)
-        cell, inside = index(cell_of(grid, r).number), False
-        for k in range(grid.first[cell], grid.first[cell + index(1)]):
+        (first, stop), inside = entries_at(grid, r), False
+        for k in range(first, stop):
             inside = inside or member(members, index(grid.entries[k])).phi(r) < 0.0
         found[i] = inside
 

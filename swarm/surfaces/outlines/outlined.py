@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...common.checks import Vector
 from ...errors import SceneError
+from ...kernel.grid import one_cell
 from ...kernel.vector import Vec, vec
 from .. import rotation as rotations
-from ..fields.grid import one_cell
-from ..fields.many import Many, field_of, grid_of
+from ..fields.grid import grid_of
+from ..fields.many import Many, field_of
 from ..fields.members import Members, table_of
 from ..rotation import Rotated
 from ..shapes.quadratic import QuadricNumbers

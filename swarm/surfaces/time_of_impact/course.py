@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...kernel.gravity import rise_time as rise_time
+from ...kernel.gravity import rise_time_by as rise_time_by
+from ...kernel.gravity import rise_time_inside as rise_time_inside
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import cross, dot, square
@@ -92,37 +95,6 @@ class Quartic(Majorant):
         time = self.leaves(self.steepest(window))
         time = select(self.b <= 0.0, select(time < window, time, window), 0.0)
         return time, select(time < math.inf, math.inf, 0.0)
-
-
-def rise_time(c, b, a):
-    """First t >= 0 at which c + 2 b t + a t^2 rises through 0, where c <= 0 up to round-off; else infinity.
-
-    A cavity has a > 0, a solid a < 0, a plane a = 0. Branch-free.
-    """
-    return rise_time_by(c, b, a, b * b - a * c)
-
-
-def rise_time_by(c, b, a, discriminant):
-    """`rise_time` with a discriminant better than b^2 - a c, of which nothing is left some 1e8 sizes from a solid."""
-    time, bottom = _outer_root(c, b, a, discriminant)
-    misses = (bottom <= 0.0) | ((a < 0.0) & (discriminant < 0.0))
-    return select(misses, math.inf, select(time > 0.0, time, 0.0))
-
-
-def rise_time_inside(c, b, a):
-    """`rise_time` for a >= 0: a convex cavity, which a particle that moves never misses."""
-    time, bottom = _outer_root(c, b, a, b * b - a * c)
-    return select(bottom <= 0.0, math.inf, select(time > 0.0, time, 0.0))
-
-
-def _outer_root(c, b, a, discriminant):
-    """The root at which c + 2 b t + a t^2 rises, and its denominator."""
-    # a > 0, c > 0 by round-off at a grazing hit: the flight touches, it does not miss.
-    root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
-    approaching = b > 0.0
-    # The form of the root that does not cancel: -c/(b + root) when b > 0, (root - b)/a when b <= 0.
-    bottom = select(approaching, b + root, a)
-    return select(approaching, -c, root - b) / bottom, bottom
 
 
 def ball_rise_time(side, radius2, d, v):

@@ -11,6 +11,7 @@ digits, or doubles them where only f'' has a bound.
 import math
 from typing import Any
 
+from ...kernel.gravity import Bounds as Bounds
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, norm, times, total
@@ -49,14 +50,6 @@ class Flight(Record):
             self.speed + t * self.weight, wall.arm_length(p), self.weight,
             total(absolute(p)) + total(absolute(wall.pose.shift)),
         )  # fmt: skip
-
-
-class Bounds(Record):
-    """Of the speed, the acceleration and the jerk in the frame of a wall for some time."""
-
-    speed: float
-    acceleration: float
-    jerk: float
 
 
 class InWallFrame(Record):

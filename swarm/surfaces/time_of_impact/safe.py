@@ -5,10 +5,10 @@ from typing import Any
 
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated
+from ...kernel.grid import cell_of, entries_at, until_next
 from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO
-from ..fields.grid import cell_of, until_next
 from ..fields.members import member
 from ..presence.rooms import leaving
 from ..walls import Field, Following, Walls
@@ -74,8 +74,8 @@ def _nearest_in_cell(field, number, found, flight, t, longest):
     until = until_next_cell(grid, seen, min(found.time, longest))
     if until < found.time:
         found = ShortestStep(until, -1.0, math.inf, 0.0, found.past, found.depth)
-    cell = index(cell_of(grid, seen.r).number)
-    for k in range(grid.first[cell], grid.first[cell + 1]):
+    first, stop = entries_at(grid, seen.r)
+    for k in range(first, stop):
         m = grid.entries[k]
         found = _nearer(seen, member(field.body, index(m)), number + m, found, min(found.time, longest))
     return found

@@ -1,0 +1,243 @@
+"""A uniform grid of cells: which cell a point is in, what is in a cell, and when a flight is in the next one.
+
+The entries of a cell are `entries[first[cell]:first[cell + 1]]`, in the order in which they were entered.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import index
+from .gravity import Bounds, rise_time
+from .jit import Array, select
+from .record import Record
+from .vector import ZERO, Vec, vec
+
+# A flight ends this part of a cell beyond the cell's wall, where no round-off takes it back; what reaches into a cell
+# is what comes nearer to it than twice that.
+MARGIN = 1e-6
+# An endless direction is one cell of this width, and what has no end has bounds beyond half of it.
+ENDLESS = 1e200
+
+Floats = NDArray[np.float64]
+
+
+class Grid(Record):
+    """Cells from `low` on, numbered along z first; the one after the last stands for all that is outside."""
+
+    low: Vec
+    width: Vec
+    inverse: Vec  # 1/width
+    margin: Vec
+    shape: Vec  # how many cells along x, y, z
+    first: Array  # int32, where the entries of a cell begin
+    entries: Array  # int32
+    known: Any = None  # a record of what else is known of the cells
+
+
+class GridCell(Record):
+    """The cell of a point: its number, its place along x, y, z, and whether it is one of the grid."""
+
+    number: int
+    place: Vec
+    inside: bool
+
+
+# --- The cell of a point ---------------------------------------------------------------------------------
+
+
+def cell_of(grid, r):
+    """The `GridCell` of a point."""
+    n, d = grid.shape, r - grid.low
+    x = _place(d.x, grid.inverse.x, n.x)
+    y = _place(d.y, grid.inverse.y, n.y)
+    z = _place(d.z, grid.inverse.z, n.z)
+    inside = (x >= 0.0) & (x < n.x) & (y >= 0.0) & (y < n.y) & (z >= 0.0) & (z < n.z)
+    return GridCell(int(select(inside, number_of(n, x, y, z), n.x * n.y * n.z)), Vec(x, y, z), inside)
+
+
+def number_of(shape, x, y, z):
+    """The number of the cell at a place."""
+    return (x * shape.y + y) * shape.z + z
+
+
+def layer_of(place, count):
+    """The layer of cells that a coordinate, in cells from the first on, is in; the outermost layers have no end."""
+    layer, last = np.floor(place), count - 1.0
+    return select(layer < 0.0, 0.0, select(layer > last, last, layer))
+
+
+def _place(d, inverse, count):
+    """The layer of cells, the outermost ones a little wider: where a flight leaves the grid it goes farther.
+
+    What is before the first is -1, and beyond the last `count`: layers without end, whose other wall is like any other.
+    """
+    place = d * inverse
+    outside = select(place >= count + 0.5 * MARGIN, count, layer_of(place, count))
+    return select(place < -0.5 * MARGIN, -1.0, outside)
+
+
+# --- What is in cells ------------------------------------------------------------------------------------
+
+
+def entries_of(grid, number):
+    """The begin and the end of the entries of the cell with this number."""
+    cell = index(number)
+    return grid.first[cell], grid.first[cell + index(1)]
+
+
+def entries_at(grid, r):
+    """The begin and the end of the entries of the cell of a point."""
+    return entries_of(grid, cell_of(grid, r).number)
+
+
+class Block(Record):
+    """Cells from one place on, so many along x, y, z."""
+
+    x: int
+    y: int
+    z: int
+    along_x: int
+    along_y: int
+    along_z: int
+
+
+def block_of(grid, low, high):
+    """The cells of the grid that a box with these corners reaches into."""
+    first, last = cell_of(grid, low).place, cell_of(grid, high).place
+    x, y, z = int(max(first.x, 0.0)), int(max(first.y, 0.0)), int(max(first.z, 0.0))
+    return Block(
+        x, y, z,
+        int(min(last.x, grid.shape.x - 1.0)) - x + 1,
+        int(min(last.y, grid.shape.y - 1.0)) - y + 1,
+        int(min(last.z, grid.shape.z - 1.0)) - z + 1,
+    )  # fmt: skip
+
+
+def over_entries(grid, block, found, ask, *given):
+    """`found` after ask(found, m, *given) for each entry m of the cells of a block."""
+    for k in range(max(block.along_x, 0) * max(block.along_y, 0) * max(block.along_z, 0)):
+        x, y, z = k // (block.along_z * block.along_y), k // block.along_z % block.along_y, k % block.along_z
+        begin, end = entries_of(grid, int(number_of(grid.shape, block.x + x, block.y + y, block.z + z)))
+        for entry in range(begin, end):
+            found = ask(found, grid.entries[entry], *given)
+    return found
+
+
+# --- From cell to cell -----------------------------------------------------------------------------------
+
+
+def until_next(gravity, grid, cell, r, v):
+    """When a flight is beyond the wall of its cell; from outside, until when it surely does not come into the grid.
+
+    Of its acceleration there may be `Bounds` only.
+    """
+    p, n = cell.place, grid.shape
+    x = _until_next_layer(gravity, 0, (grid.low.x, grid.width.x, grid.margin.x, n.x), p.x, r.x, v.x)
+    y = _until_next_layer(gravity, 1, (grid.low.y, grid.width.y, grid.margin.y, n.y), p.y, r.y, v.y)
+    z = _until_next_layer(gravity, 2, (grid.low.z, grid.width.z, grid.margin.z, n.z), p.z, r.z, v.z)
+    leaves = select(y < x, y, x)
+    in_x, in_y, in_z = _comes(x, p.x, n.x), _comes(y, p.y, n.y), _comes(z, p.z, n.z)
+    enters = select(in_y > in_x, in_y, in_x)
+    return select(cell.inside, select(z < leaves, z, leaves), select(in_z > enters, in_z, enters))
+
+
+def _comes(time, place, count):
+    """When a flight comes into the layers of cells, 0 where it is in them."""
+    return select((place >= 0.0) & (place < count), 0.0, time)
+
+
+def _until_next_layer(gravity, axis, cells, place, x, v):
+    """When a flight leaves its layer of cells, (low, width, margin, how many) of which are given.
+
+    Of a flight beside them, before when it does not come in. Where of its acceleration there is only a bound, at the
+    soonest.
+    """
+    low, width, margin, count = cells
+    if gravity is None:
+        never = select(v > 0.0, place >= count, place < 0.0)
+        return select(never, np.inf, _until_edge((low, width, margin), place, place, x, v))
+    among, below = (place >= 0.0) & (place < count), place < 0.0
+    sign, face = select(below, 1.0, -1.0), select(below, low + margin, low + count * width - margin)
+    b = 0.5 * v
+    if isinstance(gravity, Bounds):
+        # Whatever its direction
+        ahead = towards = back = 0.5 * gravity.acceleration
+    else:
+        a = 0.5 * (gravity.x if axis == 0 else gravity.y if axis == 1 else gravity.z)
+        ahead, towards, back = a, sign * a, -a
+    up = rise_time(
+        select(among, x - (low + (place + 1.0) * width + margin), sign * (x - face)),
+        select(among, b, sign * b),
+        select(among, ahead, towards),
+    )
+    down = rise_time(low + place * width - margin - x, -b, back)
+    return select(among & (down < up), down, up)
+
+
+def until_out(gravity, grid, first, last, r, v):
+    """When a flight among the cells from one place to another one has left these."""
+    pull = ZERO if gravity is None else gravity
+    is_straight, low, width, margin = gravity is None, grid.low, grid.width, grid.margin
+    x = _until_out_of_layers(is_straight, (low.x, width.x, margin.x), first.x, last.x, (r.x, v.x, pull.x))
+    y = _until_out_of_layers(is_straight, (low.y, width.y, margin.y), first.y, last.y, (r.y, v.y, pull.y))
+    z = _until_out_of_layers(is_straight, (low.z, width.z, margin.z), first.z, last.z, (r.z, v.z, pull.z))
+    sooner = select(y < x, y, x)
+    return select(z < sooner, z, sooner)
+
+
+def _until_out_of_layers(is_straight, layers, first, last, flight):
+    """When a flight (x, v, pull) leaves layers of cells, and a margin. Branch-free, and with one root only."""
+    (low, width, margin), (x, v, pull) = layers, flight
+    if is_straight:
+        return _until_edge(layers, first, last, x, v)
+    below, above = low + first * width - margin, low + (last + 1.0) * width + margin
+    # Towards the side to which it is pulled it leaves, unless it leaves before through the other one.
+    turned = pull < 0.0
+    a, b = 0.5 * abs(pull), 0.5 * select(turned, -v, v)
+    ahead, behind = select(turned, x - below, above - x), select(turned, above - x, x - below)
+    backwards = (b < 0.0) & (b * b >= a * behind)
+    root = math.sqrt(b * b + a * select(backwards, -behind, ahead))
+    over = select(backwards, behind, select(b > 0.0, ahead, root - b))
+    under = select(backwards, root - b, select(b > 0.0, root + b, a))
+    return select(under > 0.0, over / under, math.inf)
+
+
+def _until_edge(layers, first, last, x, v):
+    """When a straight flight leaves layers of cells, and a margin."""
+    (low, width, margin), ahead = layers, v > 0.0
+    edge = low + select(ahead, last + 1.0, first) * width + select(ahead, margin, -margin)
+    return select(v == 0.0, math.inf, (edge - x) / v)
+
+
+# --- How it is made --------------------------------------------------------------------------------------
+
+
+def one_cell(count: int) -> Grid:
+    """The grid of so many entries that all are looked at."""
+    low, width, margin = (Vec(*3 * [size]) for size in (-0.5 * ENDLESS, ENDLESS, MARGIN * ENDLESS))
+    entries, first = np.arange(count, dtype=np.int32), np.array([0, count, count], np.int32)
+    return Grid(low, width, Vec(*3 * [1.0 / ENDLESS]), margin, Vec(1.0, 1.0, 1.0), first, entries)
+
+
+def filled_grid(low: Floats, shape: Floats, width: Floats, enter: Callable[[Grid, Any, Any], None]) -> Grid:
+    """The grid of cells from a corner on, filled by a counting sort.
+
+    Args:
+        low: the corner of the first cell (3,) [m].
+        shape: how many cells there are along each axis.
+        width: how wide they are [m].
+        enter: `enter(grid, place, entries)` writes each entry to the place of each cell that it is in, which is then
+            one more; where `entries` has no room it only counts.
+    """
+    first, nothing = np.zeros(int(shape.prod()) + 2, np.int32), np.empty(0, np.int32)
+    grid = Grid(*(vec(row.tolist()) for row in (low, width, 1.0 / width, MARGIN * width, shape)), first, nothing)
+    # What is in a cell counts in the one after it, so that the sums are where the entries of a cell begin.
+    enter(grid, first[1:], nothing)
+    np.cumsum(first, out=first)
+    entries = np.empty(first[-1], np.int32)
+    enter(grid, first[:-1].copy(), entries)
+    return grid._replace(entries=entries)
