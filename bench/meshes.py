@@ -72,7 +72,15 @@ def first_call(corners: Any, triangles: Any) -> float:
 
 def _bytes(mesh: Any) -> float:
     """Bytes of a triangle in the arrays of a mesh."""
-    arrays = [mesh.vertices, mesh.triangles, mesh.group, mesh.members.table, *mesh.members.grid, *mesh._tree]
+    arrays = [
+        mesh.vertices,
+        mesh.triangles,
+        mesh.group,
+        mesh.members.table,
+        *mesh.members.grid,
+        *mesh.members.grid.known,
+        *mesh._tree,
+    ]
     known = {one.ctypes.data: one.nbytes for one in arrays if isinstance(one, np.ndarray)}
     return sum(known.values()) / len(mesh)
 

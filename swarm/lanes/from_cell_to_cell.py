@@ -112,7 +112,7 @@ def _find_cells(gravity, cells, under, n):
     # What is outside of the grid is in the cell after its last, which holds nothing.
     for i in range(index(n)):
         cell = index(under.cell[i])
-        room = room_of(cells.room, cell)
+        room = room_of(cells.known.room, cell)
         put(under.rows, _BACK, i, room.back)
         put(under.rows, _AHEAD, i, room.ahead)
     for i in range(index(n)):
@@ -123,7 +123,7 @@ def _find_cells(gravity, cells, under, n):
     for i in range(index(n)):
         cell = index(under.cell[i])
         under.count[i] = 0
-        if cells.room[cell, KIND] == FULL and _may_meet(gravity, cells, under, cell, i):
+        if cells.known.room[cell, KIND] == FULL and _may_meet(gravity, cells, under, cell, i):
             first, stop = entries_of(cells, cell)
             under.first[i], under.count[i] = first, stop - first
 
@@ -132,9 +132,9 @@ def _may_meet(gravity, cells, under, cell, i):
     """Whether a lane may move towards a facet of its cell, at the start of its way through it or at the end."""
     v = column(under.rows, _SPEED, i)
     if gravity is None:
-        return not all_away(cells.room, cell, v)
+        return not all_away(cells.known.room, cell, v)
     now, then = accelerated(gravity, v, under.time[i]), accelerated(gravity, v, under.until[i])
-    return not (all_away(cells.room, cell, now) and all_away(cells.room, cell, then))
+    return not (all_away(cells.known.room, cell, now) and all_away(cells.known.room, cell, then))
 
 
 def _look(gravity, facets, under, maybe, n):
@@ -144,7 +144,7 @@ def _look(gravity, facets, under, maybe, n):
         for i in range(index(n)):
             ahead = line * _PER_LINE
             if under.count[i] > ahead:
-                maybe.seen[i] = float(cells.planes[index(under.first[i] + ahead), 0])
+                maybe.seen[i] = float(cells.known.planes[index(under.first[i] + ahead), 0])
     for i in range(index(n)):
         if under.count[i] > 0:
             place, pace = under.now(gravity, i)

@@ -81,10 +81,10 @@ def test_every_cell_has_the_facets_that_come_into_it():
     for m, cell in enumerate((places[:, 0] * shape[1] + places[:, 1]) * shape[2] + places[:, 2]):
         assert m in grid.entries[grid.first[cell] : grid.first[cell + 1]]
     held = np.diff(grid.first[:-1]).reshape(shape) > 0
-    assert np.array_equal(grid.room[:-1, room.KIND].reshape(shape) == room.FULL, held)
-    for cell in random.choice(np.flatnonzero(grid.room[:-1, room.KIND] == room.FREE), 300):
+    assert np.array_equal(grid.known.room[:-1, room.KIND].reshape(shape) == room.FULL, held)
+    for cell in random.choice(np.flatnonzero(grid.known.room[:-1, room.KIND] == room.FREE), 300):
         x, y, z = np.unravel_index(cell, shape)
-        a, b, c, d, e, f = grid.room[cell, :6].astype(int)
+        a, b, c, d, e, f = grid.known.room[cell, :6].astype(int)
         assert not held[x - a : x + b + 1, y - c : y + d + 1, z - e : z + f + 1].any()
 
 
@@ -278,7 +278,12 @@ def test_memory_of_a_triangle():
     ball = trimesh.creation.icosphere(5)
     mesh = swarm.Mesh(np.array(ball.vertices), np.array(ball.faces))
     members = mesh.members
-    arrays = [members.table, *(one for one in members.grid if isinstance(one, np.ndarray)), *mesh._tree]
+    arrays = [
+        members.table,
+        *(one for one in members.grid if isinstance(one, np.ndarray)),
+        *members.grid.known,
+        *mesh._tree,
+    ]
     assert sum(one.nbytes for one in (*arrays, mesh.group)) < 400 * len(mesh)
 
 

@@ -4,6 +4,7 @@ The facets of a mesh are on a surface, so most cells are empty: a flight leaps t
 """
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,10 @@ from numpy.typing import NDArray
 
 from ...kernel import cache
 from ...kernel.gravity import as_vector, displacement
-from ...kernel.grid import MARGIN
+from ...kernel.grid import MARGIN, Floats, Grid, filled_grid
 from ...kernel.jit import Array, select
 from ...kernel.record import Record
-from ...kernel.vector import Vec, absolute, dot, square, total, vec
+from ...kernel.vector import Vec, absolute, dot, square, total
 from ..fields.grid import enter_bodies
 
 # Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
@@ -32,51 +33,32 @@ _BESIDE = 4.0 / _OFF_SPEED
 # So few facets are entered in plain Python.
 _SOME = 60
 
-Floats = NDArray[np.float64]
-
 
 class FacetCells(Record):
-    """A `Grid` of facets."""
+    """What is known of the cells of facets: `Grid.known`."""
 
-    low: Vec
-    width: Vec
-    inverse: Vec
-    margin: Vec
-    shape: Vec
-    first: Array
-    entries: Array
     planes: Array  # (entries, 8) int16, of each the normal, and from the middle of the cell: see `passes`
     room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
 
 
-def cells_around(like, table: Floats, corners: Floats) -> FacetCells:
-    """The cells of the facets of a table.
+def cells_around(like, table: Floats, corners: Floats) -> Grid:
+    """The grid of the facets of a table, without what is free around its cells.
 
     Args:
         like: one of them.
         table: their numbers, one in each row.
         corners: of each its three (T, 3, 3) [m].
     """
-    low, high = corners.min(axis=1).T, corners.max(axis=1).T
-    shape, first, width = _shape(corners, low.min(axis=1), high.max(axis=1))
-    count = int(shape.prod())
-    numbers = (first, width, 1.0 / width, MARGIN * width, shape)
-    starts, nothing = np.zeros(count + 2, np.int32), np.empty(0, np.int32)
-    flat = np.empty((0, 8), np.int16)
-    grid = FacetCells(*(vec(row.tolist()) for row in numbers), starts, nothing, flat, np.empty((0, 8), np.int8))
+    low, high = (np.ascontiguousarray(end(corners, axis=1).T) for end in (np.min, np.max))
     enter = cache.in_python(enter_bodies) if len(table) <= _SOME else enter_bodies
-    bounds = np.ascontiguousarray(low), np.ascontiguousarray(high)
-    enter(like, table, bounds, grid, starts[1:], nothing)
-    np.cumsum(starts, out=starts)
-    entries = np.empty(starts[-1], np.int32)
-    enter(like, table, bounds, grid, starts[:-1].copy(), entries)
-    held = np.diff(starts[:-1])
-    grid = grid._replace(entries=entries)
-    return grid._replace(planes=_planes(grid, table, corners, np.repeat(np.arange(count), held)))
+    cells = _cells(corners, low.min(axis=1), high.max(axis=1))
+    grid = filled_grid(*cells, partial(enter, like, table, (low, high)))
+    numbers = np.repeat(np.arange(len(grid.first) - 2), np.diff(grid.first[:-1]))
+    return grid._replace(known=FacetCells(_planes(grid, table, corners, numbers), np.empty((0, 8), np.int8)))
 
 
-def _shape(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
-    """How many cells there are along each axis, the corner of the first, and how wide they are."""
+def _cells(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
+    """The corner of the first cell, how many there are along each axis, and how wide they are."""
     a, b, c = np.moveaxis(corners, 1, 0)
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / len(corners)
     extent = high - low
@@ -88,10 +70,10 @@ def _shape(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, 
     room = 4.0 * MARGIN * extent
     middle = 0.5 * (low + high)
     width = (extent + 2.0 * room) / shape
-    return shape, middle - 0.5 * shape * width, width
+    return middle - 0.5 * shape * width, shape, width
 
 
-def _planes(grid: FacetCells, table: Floats, corners: Floats, cells: NDArray[np.int64]) -> NDArray[np.int16]:
+def _planes(grid: Grid, table: Floats, corners: Floats, cells: NDArray[np.int64]) -> NDArray[np.int16]:
     """The planes and the balls of all entries, each in the cell with this number."""
     width = np.array(grid.width)
     diagonal = float(np.linalg.norm(width))
@@ -146,8 +128,8 @@ def passes(cells, k, here):
 
     Most do not, and no facet is looked up. What is known of the entry is round-off of whole numbers.
     """
-    normal = _row(cells.planes, k, 0, 1.0 / _FULL)
-    depth = dot(normal, here.from_middle) - float(cells.planes[k, 3]) * (here.near * (1.0 / (_FULL * _OFF)))
+    normal = _row(cells.known.planes, k, 0, 1.0 / _FULL)
+    depth = dot(normal, here.from_middle) - float(cells.known.planes[k, 3]) * (here.near * (1.0 / (_FULL * _OFF)))
     rate, bend = dot(normal, here.v), 0.0 if here.half_pull is None else dot(normal, here.half_pull)
     faster = rate + here.slow
     rises, is_inside = select(faster > 0.0, faster, 0.0) * here.span, depth <= here.near
@@ -157,12 +139,12 @@ def passes(cells, k, here):
         faster, rises = faster + 2.0 * more * here.span, rises + (more + here.weak) * here.span * here.span
     if not ((faster > 0.0) & is_inside & (depth + rises >= -here.near)):
         return False
-    radius, scale = float(cells.planes[k, 7]), here.near * (_REACH / (_FULL * _OFF))
+    radius, scale = float(cells.known.planes[k, 7]), here.near * (_REACH / (_FULL * _OFF))
     if here.half_pull is None:
         # All lengths times the speed along the normal, so that nothing is divided: a third of such tests.
         if radius == _FULL or rate <= 2.0 * here.slow:
             return True
-        away = rate * (here.from_middle - _row(cells.planes, k, 4, scale)) - depth * here.v
+        away = rate * (here.from_middle - _row(cells.known.planes, k, 4, scale)) - depth * here.v
         beside = radius * scale * rate + 2.0 * _BESIDE * here.near * here.slow
         return not square(away) > beside * beside
     # Where it comes through the plane, at the speed 2 root along the normal
@@ -173,7 +155,7 @@ def passes(cells, k, here):
         return True
     away = here.from_middle + displacement(here.pull(), here.v, -depth / (b + root))
     beside = radius * scale + _BESIDE * here.near * here.slow / root
-    return not square(away - _row(cells.planes, k, 4, scale)) > beside * beside
+    return not square(away - _row(cells.known.planes, k, 4, scale)) > beside * beside
 
 
 def _row(rows, k, first, scale):

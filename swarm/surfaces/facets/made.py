@@ -113,7 +113,7 @@ def with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
     held = np.diff(grid.first[:-1]).reshape(shape) > 0
     normals, starts = np.asarray(facets.table[grid.entries, :3], np.float64), np.asarray(grid.first, np.int32)
     rows = rooms_of(held, normals, starts)
-    facets = facets._replace(grid=grid._replace(room=rows))
+    facets = facets._replace(grid=grid._replace(known=grid.known._replace(room=rows)))
     parts, count = label(~held)
     if count:
         # The middle of one cell of each part says on which side it is.

@@ -22,7 +22,7 @@ _PARALLEL, _ON = 1e-9, 1.0
 
 
 class Facets(Members, Patched):
-    """The facets of a mesh: walls on one side, each between its edges; their grid is `Cells`."""
+    """The facets of a mesh: walls on one side, each between its edges; what is known of their grid is `FacetCells`."""
 
     def field_hit(self, gravity, r, v):
         return _first_hit(self, gravity, r, v)
@@ -78,9 +78,9 @@ def _first_hit(facets, gravity, r, v):
         cell = cell_of(cells, place)
         if cell.inside:
             number = index(cell.number)
-            room = room_of(cells.room, number)
+            room = room_of(cells.known.room, number)
             until = t + until_out(gravity, cells, cell.place - room.back, cell.place + room.ahead, place, pace)
-            if cells.room[number, KIND] == FULL:
+            if cells.known.room[number, KIND] == FULL:
                 here = here_in(gravity, cells, cell.place, place, pace, until - t)
                 found = hit_in(facets, gravity, (r, v), (number, t), here)
                 if found.wall >= 0.0:

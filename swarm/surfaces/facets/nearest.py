@@ -58,7 +58,7 @@ def within(facets, mesh, points, found):
     for i in range(points.shape[1]):
         r = column(points, 0, i)
         cell = cell_of(cells, r)
-        kind = cells.room[index(cell.number), KIND]
+        kind = cells.known.room[index(cell.number), KIND]
         found[i] = kind == FREE if kind != FULL else _nearest(facets, mesh, r).height(r) < 0.0
 
 

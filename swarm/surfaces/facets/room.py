@@ -1,7 +1,7 @@
 """What is free around each cell of a grid of facets: most cells are empty, and a flight leaps through blocks of these.
 
-A row of `Cells.room` are eight whole numbers. Of an empty cell: how many cells before and behind it along x, y, z are
-empty too, all together a block, and whether it is admissible. Of a cell with facets: a cone of their normals.
+A row of `FacetCells.room` are eight whole numbers. Of an empty cell: how many cells before and behind it along x, y, z
+are empty too, all together a block, and whether it is admissible. Of a cell with facets: a cone of their normals.
 """
 
 import numpy as np
