@@ -7,9 +7,9 @@ coefficients are differences of these: bounds that hold, not samples.
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernel.grid import MARGIN
 from ...kernel.jit import Array
 from ...kernel.record import Record
-from .spline import MARGIN
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

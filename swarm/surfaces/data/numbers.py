@@ -6,12 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernel.arrays import index
+from ...kernel.grid import MARGIN, layer_of
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Symmetric, Vec, absolute, dot, lowest, norm, square, times, total
 from .. import contract
 from ..time_of_impact.course import rise_time
 from .cells import SPREAD, SampleCells
-from .spline import MARGIN, Spline
+from .spline import Spline
 
 _EPSILON = float(np.finfo(np.float64).eps)
 # Cells without the surface that a straight flight comes through in one go.
@@ -29,10 +30,6 @@ class SampleCell(NamedTuple):
 
 def _is_in(u, count):
     return (u >= -0.5 * MARGIN) & (u <= count + 0.5 * MARGIN)
-
-
-def _layer(u, count):
-    return min(max(np.floor(u), 0.0), count - 1.0)
 
 
 def _layers(low, around, count):
@@ -119,7 +116,7 @@ class CellNumbers(contract.Smooth):
     def _cell_of(self, r):
         u, n = times(r - self.spline.low, self.spline.inverse), self.spline.shape
         inside = _is_in(u.x, n.x) & _is_in(u.y, n.y) & _is_in(u.z, n.z)
-        low = Vec(_layer(u.x, n.x), _layer(u.y, n.y), _layer(u.z, n.z))
+        low = Vec(layer_of(u.x, n.x), layer_of(u.y, n.y), layer_of(u.z, n.z))
         i, j, k = index(int(low.x)), index(int(low.y)), index(int(low.z))
         cells = self.cells
         return SampleCell(low, int(cells.row[i, j, k]), (float(cells.clear[i, j, k]) - 1.0) * cells.unit, inside)
@@ -154,7 +151,7 @@ class CellNumbers(contract.Smooth):
         rate, pace = cells.unit / norm(v), Vec(_inverse(w.x), _inverse(w.y), _inverse(w.z))
         for _i in range(_MANY):
             p = u + t * w
-            low = Vec(_layer(p.x, n.x), _layer(p.y, n.y), _layer(p.z, n.z))
+            low = Vec(layer_of(p.x, n.x), layer_of(p.y, n.y), layer_of(p.z, n.z))
             clear = float(cells.clear[index(int(low.x)), index(int(low.y)), index(int(low.z))])
             if clear == 0.0 or not (_is_in(p.x, n.x) & _is_in(p.y, n.y) & _is_in(p.z, n.z)):
                 break

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel.fours import Four, over_block, sum_of
+from ...kernel.grid import MARGIN
 from ...kernel.jit import Array, outlined
 from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, absolute, norm, times
@@ -16,9 +17,6 @@ from ...kernel.vector import Symmetric, Vec, absolute, norm, times
 Floats = NDArray[np.float64]
 # Samples along each axis, at least: the ends of the spline take four.
 LEAST = 4
-# A flight that leaves a cell ends this part of a cell beyond it, where no round-off takes it back: so far is known what
-# is known of the cell, and so far outside of the grid the spline goes on.
-MARGIN = 1e-6
 
 
 # --- Coefficients ----------------------------------------------------------------------------------------
@@ -71,6 +69,7 @@ class SplinePlace(NamedTuple):
 
 
 def _within(u, count):
+    # As far as a flight goes beyond a cell that it leaves
     return np.minimum(np.maximum(u, -MARGIN), count + MARGIN)
 
 
