@@ -70,6 +70,11 @@ def layer_of(place, count):
     return select(layer < 0.0, 0.0, select(layer > last, last, layer))
 
 
+def wrapped(layer, count):
+    """The layer of cells along a periodic axis that one beside its ends is."""
+    return select(layer < 0, layer + count, select(layer >= count, layer - count, layer))
+
+
 def _place(d, inverse, count):
     """The layer of cells, the outermost ones a little wider: where a flight leaves the grid it goes farther.
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..kernel import cache
 from ..kernel.arrays import index
+from ..kernel.grid import layer_of, number_of, wrapped
 from ..kernel.jit import Array, kernel, outlined, select
 from ..kernel.vector import Vec, column
 from ..state import Floats
@@ -72,8 +73,7 @@ def empty_cells(low: Floats, high: Floats, period: tuple[float | None, ...] | No
 
 def _layer(cells, level, axis, x):
     """The layer of cells in which a coordinate is."""
-    place = np.floor((x - cells.low[axis]) * cells.inverse[level, axis])
-    return int(min(max(place, 0.0), cells.shape[level, axis] - 1.0))
+    return int(layer_of((x - cells.low[axis]) * cells.inverse[level, axis], cells.shape[level, axis]))
 
 
 def _around(cells, level, axis, x):
@@ -81,10 +81,6 @@ def _around(cells, level, axis, x):
     count, middle = cells.shape[level, axis], _layer(cells, level, axis, x)
     repeats = (cells.period[axis] > 0.0) & (count > 2)
     return select(repeats, middle - 1, max(middle - 1, 0)), select(repeats, middle + 2, min(middle + 2, count))
-
-
-def _wrapped(layer, count):
-    return select(layer < 0, layer + count, select(layer >= count, layer - count, layer))
 
 
 def _apart(cells, axis, x):
@@ -101,15 +97,15 @@ def _met(cells, r, radius, stops):
     count, deepest, most = 0, -1, 0.0
     for k in range(cells.begin.size):
         level = index(k)
-        nx, ny, nz = cells.shape[level, 0], cells.shape[level, 1], cells.shape[level, 2]
+        shape = Vec(cells.shape[level, 0], cells.shape[level, 1], cells.shape[level, 2])
         x, x_end = _around(cells, level, 0, r.x)
         y, y_end = _around(cells, level, 1, r.y)
         z, z_end = _around(cells, level, 2, r.z)
         for i in range(x, x_end):
             for j in range(y, y_end):
-                row = (_wrapped(i, nx) * ny + _wrapped(j, ny)) * nz + cells.begin[level]
+                row = number_of(shape, wrapped(i, shape.x), wrapped(j, shape.y), cells.begin[level])
                 for layer in range(z, z_end):
-                    m = cells.first[index(row + _wrapped(layer, nz))]
+                    m = cells.first[index(row + wrapped(layer, shape.z))]
                     while m >= 0:
                         at = index(m)
                         dx = _apart(cells, 0, cells.position[0, at] - r.x)
@@ -132,7 +128,8 @@ def _enter(cells, i, r):
     """Ball i is at r from now on."""
     level = index(cells.level[i])
     x, y, z = _layer(cells, level, 0, r.x), _layer(cells, level, 1, r.y), _layer(cells, level, 2, r.z)
-    cell = index((x * cells.shape[level, 1] + y) * cells.shape[level, 2] + z + cells.begin[level])
+    shape = Vec(cells.shape[level, 0], cells.shape[level, 1], cells.shape[level, 2])
+    cell = index(number_of(shape, x, y, z + cells.begin[level]))
     cells.position[0, i] = r.x
     cells.position[1, i] = r.y
     cells.position[2, i] = r.z
