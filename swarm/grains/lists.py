@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel.arrays import index
+from ..kernel.grid import wrapped
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
 from ..surfaces.in_motion.posed import Posed
@@ -61,11 +62,7 @@ def _first_from(key, wanted):
 
 def _beside(cells, k, here, step):
     """The number of a cell along an axis that is one step beside another one."""
-    there = here + step
-    if cells.wraps[k]:
-        count = cells.counts[k]
-        there = count if there < 1 else (1 if there > count else there)
-    return there
+    return wrapped(here + step - 1, cells.counts[k]) + 1 if cells.wraps[k] else here + step
 
 
 def _is_again(cells, k, step):
