@@ -10,11 +10,11 @@ import pytest
 from children import python
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pages import Read
-from swarm.pages import html, pictures
 
 import swarm
 from swarm.commands import summary
 from swarm.files import paths
+from swarm.pages import html, pictures
 from swarm.pictures import drawing, style
 from swarm.triangles.shapes import shapes_of
 
