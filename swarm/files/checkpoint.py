@@ -79,12 +79,15 @@ class SavedRun:
 
     def require_same(self, other: "SavedRun", path: Path) -> None:
         """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""
-        for name, told in _NAMES.items():
+        for name, what in _NAMES.items():
             mine, its = (
                 ", ".join(line for line in str(getattr(job, name)).splitlines() if line) for job in (self, other)
             )
             if getattr(self, name) != getattr(other, name):
-                raise SceneError(f"{path} is of another run: its {told} {mine}, got {its}; {_HINT}")
+                raise SceneError(
+                    f"{path} is of another run: its {what} {mine}, got {its}; {_HINT}; swarm {self.version} wrote it, "
+                    f"this is {other.version}"
+                )
 
 
 _NAMES = {
