@@ -137,6 +137,12 @@ def test_on_a_union_each_wall_once():
     assert uniform(r[0][np.abs(r[0]) < 1.0 - 1e-9], -1.0, 1.0) > 1e-3
 
 
+def test_no_place_is_on_a_face_that_two_parts_share():
+    union = swarm.Union([swarm.Box((0.5, 0.5, 0.5), center=(x, 0.0, 0.0)) for x in (-0.5, 0.5)])
+    r = on(union, 200).position
+    assert np.max(np.abs(r) - [[1.0], [0.5], [0.5]], axis=0) == pytest.approx(np.zeros(200), abs=1e-12)
+
+
 def test_on_many_bodies_by_their_areas():
     spheres = swarm.Spheres([(-0.5, 0, 0), (0.5, 0, 0)], [0.1, 0.2])
     scene = swarm.Scene([swarm.Box((1, 1, 1)), spheres])
