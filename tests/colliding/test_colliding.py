@@ -157,6 +157,15 @@ def test_epochs_fit_the_speed(restitution):
         assert math.log2(length) % 1.0 == 0.0
 
 
+def test_of_a_frame_at_its_end_all_is_done():
+    scene, start = gas(8)
+    with run_of(scene, start) as run:
+        run.observe()
+        for before, moment in itertools.pairwise((0.0, 0.2, 0.3)):
+            assert run.advance(moment - before, moment)
+            assert run.share_done(moment - before) == pytest.approx(1.0, abs=1e-12)
+
+
 def test_two_dimensions_stay_exact():
     scene = swarm.Scene([swarm.Box((1.0, 1.0, 1.0), open=["-z", "+z"])], plane="z")
     random = np.random.default_rng(2)
