@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ from conftest import rarely
 from test_sessions import require_resumed_is_whole
 
 import swarm
+from swarm.contact import passing
 from swarm.contact.events import ARRIVED, CAREFUL
+from swarm.kernel.vector import Vec
 from swarm.lanes import careful
 from swarm.run.engine import Run
 
@@ -231,6 +234,20 @@ def reflected(gaps, hits, normals, r, v, until, opened):
         n = normals[wall](r)
         v = v - 2.0 * (v @ n) * n
         r = gaps[wall](r)
+
+
+@pytest.mark.parametrize(("depth", "wall"), [(3e-4, 1.0), (2e-4, 2.0)])
+def test_of_closed_walls_at_an_opening_the_first_on_the_way_is_hit(depth, wall):
+    """One 5e-4 ahead, and one that is nearer, but 60 degrees off the way: it is reached after twice its distance."""
+    opening, slanted = swarm.Sphere(1.0), (0.5, math.sqrt(0.75), 0.0)
+    walls = [
+        swarm.Plane((1.0, 0.0, 0.0), 0.5, openings=[opening]),
+        swarm.Plane((1.0, 0.0, 0.0), 0.5 + 5e-4),
+        swarm.Plane(slanted, 0.25 + depth),
+    ]
+    scene, rules = swarm.Scene(walls), SimpleNamespace(size=1.0, laws=SimpleNamespace(moving=None))
+    motion = Vec(0.5, 0.0, 0.0), Vec(1.0, 0.0, 0.0)
+    assert passing.hit_wall(scene.openings(), rules, scene.walls(), motion, 0.0, 1e-3) == wall
 
 
 def test_a_wall_before_an_opening_covers_it():
