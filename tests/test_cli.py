@@ -61,13 +61,13 @@ def folder(tmp_path):
 def test_run_and_info(folder):
     done = process("run", "scene.toml", cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
-    for word in ("impacts", "energy drift", "largest penetration", "wall time", "scene.h5 (3 frames)"):
+    for word in ("impacts", "energy", "✓ no particle was outside", "wall time", "scene.h5 (3 frames)"):
         assert word in done.stdout
     with swarm.load(folder / "scene.h5") as trajectory:
         assert trajectory.scene_text == GOOD
     told = command("info", "scene.h5", cwd=folder)
     assert told.returncode == 0
-    for word in ("3, 0 s to 1 s", "10", "Sphere(radius=0.5", "Impact("):
+    for word in ("3, 0 s to 1 s", "10", "a sphere of radius 0.5 m", "Impact"):
         assert word in told.stdout
 
 

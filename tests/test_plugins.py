@@ -222,7 +222,7 @@ def test_a_trajectory_of_a_law_of_ones_own_is_shown_without_its_code(folder, tmp
     with swarm.load(tmp_path / "run.h5") as trajectory:
         scene = trajectory.scene
         assert scene.surfaces[0].laws == ("Damped(e=0.5)", swarm.Lambert())
-        assert "Damped(e=0.5)" in summary.of_file(tmp_path / "run.h5")["surfaces"]
+        assert "the law Damped(e=0.5), diffuse" in summary.of_file(tmp_path / "run.h5")["surface 0, sphere"]
         assert trajectory.plot(figsize=(10.0, 6.0)).axes
         assert trajectory.export(tmp_path / "run.xyz")
         assert len(trajectory.to_xarray()["time"]) == 5

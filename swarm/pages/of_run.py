@@ -22,10 +22,6 @@ class Note(NamedTuple):
     command: str = ""
 
 
-# Rows of `facts` that a page shows in other places.
-_ELSEWHERE = ("surfaces", "gravity", "method", "verdicts")
-
-
 def report(trajectory: Any, path: Any, overwrite: bool) -> Page:
     """The report of a `Trajectory`, which is written where a path is given; see `Trajectory.report`."""
     return html.written(functools.partial(of_trajectory, trajectory), path, overwrite, (trajectory.path,))
@@ -46,10 +42,7 @@ def of_trajectory(trajectory: Any) -> Page:
     content = content_of(trajectory)
     makers, wall_times = trajectory.makers, trajectory.wall_times
     spent = None if wall_times is None else float(wall_times[-1])
-    size = trajectory.path.stat().st_size
-    about = [trajectory.path.name, *_when(makers, trajectory.path), f"{size / 1e6:.1f} MB"]
-    numbers = facts.of_trajectory(trajectory)
-    told = dict(words.details(content))
+    about = [trajectory.path.name, *_when(makers, trajectory.path), facts.file_size(trajectory.path)]
     page = filled(
         "run.html.j2",
         title=words.title(content),
@@ -58,8 +51,8 @@ def of_trajectory(trajectory: Any) -> Page:
         verdicts=verdicts.judged(content),
         places=pictures.of_places(content),
         series=pictures.of_series(content),
-        scene=list(told.items()),
-        numbers=[(name, value) for name, value in numbers.items() if name not in _ELSEWHERE],
+        scene=facts.of_setting(content),
+        numbers=facts.of_numbers(content.seen),
         speed=_speed(content, spent, trajectory.threads) + _versions(makers, trajectory.seed),
         again=reproduce.of_trajectory(trajectory),
     )
@@ -70,7 +63,6 @@ def of_content(content: Content, wall_time: float) -> Page:
     """The report of a run that has written no trajectory, which took so many seconds."""
     from ..files.provenance import makers
 
-    numbers = {"particles": many(content.count), **facts.of_scene(content.scene), **facts.of_run(content.seen)}
     why = "It cannot be reproduced from this page: it was run in Python and has written no trajectory; keep the script."
     page = filled(
         "run.html.j2",
@@ -80,8 +72,8 @@ def of_content(content: Content, wall_time: float) -> Page:
         verdicts=verdicts.judged(content),
         places=pictures.of_places(content),
         series=pictures.of_series(content),
-        scene=words.details(content),
-        numbers=[(name, value) for name, value in numbers.items() if name not in ("surfaces", "gravity")],
+        scene=facts.of_setting(content),
+        numbers=facts.of_numbers(content.seen),
         speed=_speed(content, wall_time, None) + _versions(makers(), None),
         again=reproduce.Again([why]),
     )

@@ -101,12 +101,10 @@ class Result:
         return f"Result({', '.join(parts)})"
 
     def _repr_html_(self) -> str:
-        what = {"particles": f"{len(self.particles)}"} if self.bodies is None else {"bodies": repr(self.bodies)}
-        times = self.observables["time"]
-        rows = what | {"frames": f"{len(times)}, {times[0]:g} s to {times[-1]:g} s"}
-        facts = view("facts")
-        rows |= facts.of_meshes(self.scene) | facts.of_run(self.observables, self.particles.radius)
-        rows |= {"wall time": f"{self.wall_time:.2f} s", "trajectory": str(self.trajectory or "none")}
+        try:
+            rows = view("facts").of_result(self)
+        except SceneError as error:
+            rows = {"problem": str(error)}
         return notebook.table("Result", rows.items())
 
     def table(self) -> "pandas.DataFrame":

@@ -84,8 +84,11 @@ def amounts(values: Sequence[float], unit: str, digits: int = 4) -> str:
 
     >>> amounts([0.002, 0.03], "m"), amounts([0.5, 0.5, 0.7], "m")
     ('2 and 30 mm', '0.5, 0.5 and 0.7 m')
+    >>> amount(9.996e-7, "m", 2)
+    '1 µm'
     """
-    factor, written = prefixed(max((abs(value) for value in values if math.isfinite(value)), default=0.0), unit)
+    largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    factor, written = prefixed(float(f"{largest:.{digits}g}"), unit)
     told = [plain(float(f"{value * factor:.12g}"), digits) for value in values]
     return f"{listed(told)} {written}"
 

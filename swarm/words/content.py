@@ -1,5 +1,6 @@
 """The part of a run that plots, titles and verdicts are made of."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,6 +24,7 @@ class Content:
         seen: the observables, one entry a frame.
         frames: the particles at the "start" and at the "end", as far as they are known.
         gone: of each frame a mask of the particles that had escaped or been absorbed by then.
+        counters: the counters of the run, as far as a file keeps them.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Content:
     seen: dict[str, NDArray[Any]]
     frames: dict[str, Particles]
     gone: dict[str, Gone] = field(default_factory=dict)
+    counters: Sequence[Any] = ()
 
     def inside(self, name: str) -> Particles:
         """The particles of a frame; those that left the scene have positions of NaN."""
@@ -55,6 +58,7 @@ def content_of(trajectory: Any) -> Content:
         trajectory.observed(),
         {name: trajectory.frame(k) for name, k in numbers.items()},
         {name: one for name, one in left.items() if one is not None},
+        trajectory.counters,
     )
 
 
@@ -64,12 +68,15 @@ def content_of_result(result: Any, what: str) -> Content:
         raise SceneError(f"{what} needs a Result that knows its scene and its method, got one without them")
     body = None if result.bodies is None else result.bodies.body
     name, frames = "", {}
+    counters: Sequence[Any] = ()
     if result.trajectory is not None and result.trajectory.is_file():
         from ..files.trajectory import load
 
         name = result.trajectory.name
         with load(result.trajectory) as written:
+            counters = written.counters
             frames = {"start": written.frame(0)} if written.has_particles() else {}
     frames["end"] = result.particles
     left = {"end": gone_of((result.escape_time, result.absorbed_time))} if body is None else {}
-    return Content(name, result.scene, result.method, body, len(result.particles), result.observables, frames, left)
+    count, seen = len(result.particles), result.observables
+    return Content(name, result.scene, result.method, body, count, seen, frames, left, counters)

@@ -1,57 +1,76 @@
-"""The content of a trajectory or a log of impacts, and whether its run went well: texts by their names."""
+"""The statements on a run, on a trajectory and on a log of impacts."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..ball_numbers import balls_volume
-from ..common.notebook import shortened
+from ..bodies.body import Body
+from ..common.catalog import OBSERVABLES
 from ..files.sources import DamagedError
-from ..observables import drift
-from ..surfaces.facets.mesh import Mesh
-from .content import Content, content_of
-from .verdicts import marked
+from ..methods import Method
+from ..scene import Scene
+from ..surfaces.union import part_at
+from . import nouns, titles
+from .amounts import amount, amounts, direction, listed, many, plain
+from .content import Content, content_of, content_of_result
+from .statements import Statement, rows_of
+from .verdicts import judged
+
+# A table has at most this many surfaces, and a statement this many numbers.
+_MOST = 8
+# Observables with one number for each of these are stated; members of fields are too many.
+_NUMBERED = ("surface", "part", "cavity", "source")
+
+
+def of_content(content: Content, most: int | None = None) -> list[Statement]:
+    """All statements on a run: what ran, whether it went well, and its numbers; of `most` surfaces (None: of all)."""
+    return [*of_setting(content, most), *judged(content), *of_numbers(content.seen)]
 
 
 def of_trajectory(trajectory: Any) -> dict[str, str]:
-    """The content of a `Trajectory`, and whether the run went well."""
-    times, seen = trajectory.times, trajectory.observed() if len(trajectory) else {}
-    last = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ": the run ended before the first was written"
-    rows = {
-        "frames": f"{len(times)}{last}",
-        **_what(trajectory),
-        **of_scene(trajectory.scene),
-        **of_counters(trajectory.counters),
-        "method": call(trajectory.method),
-        "observables": ", ".join(seen) or "none",
-        "size": f"{trajectory.path.stat().st_size / 1e6:.1f} MB",
+    """The content of a `Trajectory`, and whether the run went well: the rows of a table."""
+    scene, seen = trajectory.scene, trajectory.observed() if len(trajectory) else {}
+    if seen:
+        stated = of_content(content_of(trajectory), _MOST)
+    else:
+        stated = [Statement("frames", "0: the run ended before the first was written"), *of_surroundings(scene, _MOST)]
+        stated.append(of_method(trajectory.method))
+    return {**rows_of(stated), "observables": ", ".join(seen) or "none", "size": file_size(trajectory.path)}
+
+
+def of_result(result: Any) -> dict[str, str]:
+    """The outcome of a run: the rows of a table."""
+    seen = result.observables
+    # What a second run of the kind will do.
+    rate = seen["impacts"][-1] / max(result.wall_time - result.compile_time, 1e-3)
+    compiled = f", {result.compile_time:.2f} s of it compiling" if result.compile_time > 0.0 else ""
+    # A page counts all of the wall time: it is all that a file keeps.
+    rest = " in the rest" if result.compile_time > 0.0 else ""
+    known = result.scene is not None and result.method is not None
+    stated = of_content(content_of_result(result, "a summary"), _MOST) if known else of_numbers(seen)
+    return {
+        **rows_of(stated),
+        "wall time": f"{result.wall_time:.2f} s{compiled}, {rate:.3g} impacts/s{rest}",
+        "trajectory": str(result.trajectory or "none"),
     }
-    if len(times):
-        rows |= of_run(seen, trajectory.radius) | of_verdicts(content_of(trajectory))
-    return rows
-
-
-def of_verdicts(content: Content) -> dict[str, str]:
-    """Whether a run went well: a line for each thing that should hold."""
-    return {"verdicts": "\n".join(marked(content))}
 
 
 def of_log(log: Any) -> dict[str, str]:
-    """The content of an `ImpactLog`."""
-    times, scene, counts = log.times, log.scene, log.counts()
+    """The content of an `ImpactLog`: the rows of a table."""
+    counts = log.counts()
     which = len(range(log.count)[:: log.kept]) if isinstance(log.kept, int) else len(log.kept)
     return {
-        "impacts": f"{counts.sum():,}".replace(",", " "),
-        "frames": f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""),
+        "impacts": many(counts.sum()),
+        "frames": frames_of(log.times),
         "particles": f"{which} of {log.count}",
-        "surfaces": "\n".join(
-            f"{call(surface)}: {count}" for surface, count in zip(scene.surfaces, counts, strict=True)
-        ),
-        **of_counters(log.counters, log.crossings()),
-        **_period(scene),
-        "method": call(log.method),
+        **rows_of(of_surroundings(log.scene, impacts=counts)),
+        **rows_of(of_counters(log.counters, log.crossings())),
+        **rows_of([of_method(log.method)]),
         "columns": ", ".join(log.dtype.names or ()),
-        "size": f"{log.path.stat().st_size / 1e6:.1f} MB",
+        "size": file_size(log.path),
     }
 
 
@@ -66,151 +85,160 @@ def of_checksums(stored: Any) -> dict[str, str]:
     return {"checksums": "all values match theirs"}
 
 
-def of_counters(counters: Any, crossings: Any = None) -> dict[str, str]:
-    """The counters of a run, with the numbers of their crossings in a log; empty for a run without counters."""
-    told = [call(one.surface if one.inside is None else one) for one in counters]
-    if crossings is not None:
-        told = [f"{one}: {out} out, {back} back" for one, (out, back) in zip(told, crossings.tolist(), strict=True)]
-    return {"counters": "\n".join(told)} if told else {}
+def file_size(path: Any) -> str:
+    """The size of a file."""
+    return f"{path.stat().st_size / 1e6:.1f} MB"
 
 
-def of_scene(scene: Any) -> dict[str, str]:
-    """The surfaces of a `Scene`, gravity, and its period."""
-    return {
-        "surfaces": call(", ".join(shortened(scene.surfaces))),
-        **of_meshes(scene),
-        "gravity": "none" if scene.gravity is None else f"{scene.gravity} m/s^2",
-        **({} if scene.pairs is None else {"pairs": call(scene.pairs)}),
-        **_period(scene),
-    }
+def frames_of(times: Any) -> str:
+    """How many frames there are, and from when to when."""
+    return f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else "")
 
 
-def of_meshes(scene: Any) -> dict[str, str]:
-    """The meshes of a `Scene`, and the distances of surfaces from the meshes that they are made from; {} without."""
-    surfaces = () if scene is None else scene.surfaces
-    made = {i: one for i, one in enumerate(surfaces) if getattr(one, "mesh_error", None) is not None}
-    said = [
-        f"surfaces[{i}] within {one.mesh_error:.2g} m of its mesh"
-        + (f", whose corners were moved by up to {one.mesh_weld:.1e} m to close seams" if one.mesh_weld else "")
-        for i, one in made.items()
+# --- What runs where -----------------------------------------------------------------------------------------
+
+
+def of_setting(content: Content, most: int | None = None) -> list[Statement]:
+    """What runs where, by which method, and for how long; of `most` surfaces (None: of all)."""
+    seen = content.seen
+    return [
+        Statement("frames", frames_of(seen["time"])),
+        Statement("what runs", _what_runs(content)),
+        *_of_body(content.body),
+        *_packing(content),
+        *of_surroundings(content.scene, most),
+        *of_counters(content.counters, seen["crossings"][-1] if "crossings" in seen else ()),
+        of_method(content.method),
     ]
-    found = {"mesh error": "\n".join(said)} if said else {}
-    exact = [
-        f"surfaces[{i}]: {len(one)} triangles, {one.volume():.6g} m^3"
-        + (f", corners moved by up to {one.mesh_weld:.1e} m" if one.mesh_weld else "")
-        for i, one in enumerate(surfaces) if isinstance(one, Mesh)
-    ]  # fmt: skip
-    return found | ({"mesh": "\n".join(exact)} if exact else {})
 
 
-def of_run(seen: dict[str, Any], radius: Any = None) -> dict[str, str]:
-    """The figures that show whether a run went well; `radius` has those of the particles, None of points."""
-    counts = [name for name in ("impacts", "collisions") if name in seen]
-    rows: dict[str, str] = {name: f"{int(seen[name][-1]):,}".replace(",", " ") for name in counts}
-    if slid := seen.get("sliding_time", [0.0])[-1]:
-        rows["sliding"] = f"{int(seen['sliding'][-1])} at the end, {slid:.4g} s in all"
-    worst = seen["energy_error"].max()
-    rows["energy drift"] = f"{drift(seen):.1e} of the energy that moved, {worst:.1e} of the worst particle"
-    rows["largest penetration"] = f"{seen['max_penetration'].max():.1e} m"
-    rows |= _overlap(seen, radius)
-    if np.any(seen.get("link_error", 0.0)):
-        rows["link error"] = f"{seen['link_error'].max():.1e} of its length"
-    if np.any(seen.get("work", 0.0)):
-        rows["work"] = f"{seen['work'][-1]:.4g} J of led anchors"
-    if lost := seen.get("dissipated_energy", [0.0])[-1]:
-        # Not of the total energy: the zero of the potential one is arbitrary.
-        first, last = (f"{seen['kinetic_energy'][k]:.4g} J" for k in (0, -1))
-        rows["dissipated"] = f"{lost:.4g} J; the kinetic energy: {first}, then {last}"
-    for what in ("heat", "work"):
-        given = enumerate(seen.get(f"wall_{what}", [[]])[-1])
-        if told := ", ".join(f"{energy:.4g} J from surfaces[{i}]" for i, energy in given if energy):
-            rows[f"wall {what}"] = told
-    for what, unit in (("impulse", "N s"), ("heat", "J")):
-        of_parts = np.array(seen.get(f"part_{what}", [[]])[-1])
-        if of_parts.any():
-            rows[f"{what} of parts"] = f"{', '.join(f'{given:.4g}' for given in of_parts)} {unit}"
-    if "crossings" in seen:
-        of_each = enumerate(seen["crossings"][-1].tolist())
-        rows["crossings"] = "\n".join(f"counters[{k}]: {out} out, {back} back" for k, (out, back) in of_each)
-    return rows | _escaped(seen)
+def _what_runs(content: Content) -> str:
+    """What runs, with masses and speeds at the start as far as frames are kept."""
+    stated, frame = titles.of_particles(content), content.frames.get("start")
+    if frame is None:
+        return stated
+    masses = frame.mass * (1 if content.body is None else len(content.body))
+    speeds = np.sqrt((frame.velocity**2).sum(axis=0))
+    for what, values, unit in (
+        (" of" if content.body is None else ", each of", masses, "kg"),
+        (", at the start with", speeds[~np.isnan(speeds)], "m/s"),
+    ):
+        if not len(values):
+            continue
+        low, high = float(values.min()), float(values.max())
+        same = high - low <= 1e-9 * abs(high)
+        stated += f"{what} {amount(low, unit) if same else amounts([low, high], unit).replace(' and ', ' to ')}"
+    return stated.replace(" radius of ", " radius and ")
 
 
-def _overlap(seen: dict[str, Any], radius: Any) -> dict[str, str]:
-    """How deep soft balls were in one another and in walls."""
-    if "largest_overlap" not in seen:
-        return {}
-    deepest = float(seen["largest_overlap"].max())
-    part = "" if radius is None else f", {100.0 * deepest / float(np.min(radius)):.2g} % of the smallest radius"
-    return {"largest overlap": f"{deepest:.1e} m{part}"}
-
-
-def _escaped(seen: dict[str, Any]) -> dict[str, str]:
-    rows = {}
-    if seen.get("escaped", [0])[-1]:
-        rows["escaped"] = f"{int(seen['escaped'][-1])} particles"
-    return rows | _born(seen) | _absorbed(seen)
-
-
-def _born(seen: dict[str, Any]) -> dict[str, str]:
-    """How many particles have come from each source, and what they have brought."""
-    if not np.any(born := seen.get("born", [[]])[-1]):
-        return {}
-    each = ", ".join(f"{int(count)} from sources[{k}]" for k, count in enumerate(born))
-    return {"born": f"{each}, with {seen['source_energy'][-1]:.4g} J"}
-
-
-def _absorbed(seen: dict[str, Any]) -> dict[str, str]:
-    """How many particles each surface has absorbed."""
-    taken = enumerate(seen.get("absorbed", [[]])[-1])
-    told = ", ".join(f"{int(number)} by surfaces[{i}]" for i, number in taken if number)
-    return {"absorbed": told} if told else {}
-
-
-def _what(trajectory: Any) -> dict[str, str]:
-    """The row that says what was run: particles, or bodies and what they are made of."""
-    body = trajectory.body
+def _of_body(body: Body | None) -> list[Statement]:
+    """The parts of one body."""
     if body is None:
-        return {"particles": f"{trajectory.count}", **of_balls(trajectory)}
-    parts = {
-        "point": len(body),
-        "link": len(body.links),
-        "spring": len(body.springs),
-        "elastic edge": 0 if body.strain is None else len(body.strain.edges),
-        "anchor": len(body.anchors),
-        "guide": len(body.guides),
-    }
-    told = [f"{count} {name}{'' if count == 1 else 's'}" for name, count in parts.items() if count]
-    return {"bodies": f"{trajectory.copies} of {', '.join(told)}"}
+        return []
+    edges = () if body.strain is None else body.strain.edges
+    parts: dict[str, Any] = {
+        "point": body, "link": body.links, "spring": body.springs, "elastic edge": edges, "anchor": body.anchors,
+        "guide": body.guides,
+    }  # fmt: skip
+    counted = [_counted(len(some), name) for name, some in parts.items() if len(some)]
+    return [Statement("body", ", ".join(counted))]
 
 
-def of_balls(trajectory: Any) -> dict[str, str]:
-    """The radii of balls, and the part of the volume that they fill; {} for points."""
-    if not trajectory.has_particles() or trajectory.radius is None:
-        return {}
-    balls = trajectory.frame(0)
-    rows = {"radius": sizes_of(balls.radius)}
-    if balls.volume is not None and len(balls) == trajectory.count:
-        rows["packing"] = f"{balls_volume(trajectory.scene, balls.radius) / balls.volume:.4g} of {balls.volume:.4g} m^3"
-    if trajectory.scene.plane is not None and "packing" in rows:
-        rows["packing"] = rows["packing"].replace("m^3", "m^2")
-    return rows
+def _packing(content: Content) -> list[Statement]:
+    """The part of the volume that balls fill; [] for points, and where no volume is known."""
+    balls, scene = content.frames.get("start"), content.scene
+    if balls is None or balls.radius is None or balls.volume is None or len(balls) != content.count:
+        return []
+    part, unit = balls_volume(scene, balls.radius) / balls.volume, "m³" if scene.plane is None else "m²"
+    return [Statement("packing", f"{plain(100.0 * part)} % of {amount(balls.volume, unit)}")]
 
 
-def sizes_of(radius: Any) -> str:
-    """One radius, or the smallest and the largest."""
-    least, most = radius.min(), radius.max()
-    return f"{least:.4g} m" if least == most else f"{least:.4g} m to {most:.4g} m"
+def of_surroundings(scene: Scene, most: int | None = None, impacts: Sequence[int] = ()) -> list[Statement]:
+    """The surfaces of a scene, at most so many, and the impacts on each; then what holds for the whole scene."""
+    stated, names, count = [], nouns.labels(scene), len(scene.surfaces)
+    shown = count if most is None or count <= most else most - 1
+    for i, surface in enumerate(scene.surfaces[:shown]):
+        met = f"; {_counted(int(impacts[i]), 'impact')}" if len(impacts) else ""
+        stated.append(Statement(f"surface {i}, {names[i, ()]}", nouns.in_full(surface, scene) + met))
+    if shown < count:
+        stated.append(Statement("more surfaces", many(count - shown)))
+    for i, where in scene.parts:
+        part = part_at(scene.surfaces[i], where)
+        if i < shown and (changed := nouns.laws_of(part) + nouns.changes_of(part)):
+            label = f"part {'.'.join(map(str, where))} of surface {i}, {names[i, where]}"
+            stated.append(Statement(label, ", ".join(changed)))
+    return stated + _of_space(scene)
 
 
-def _period(scene: Any) -> dict[str, str]:
-    """The rows of a scene that repeats, and of one of two dimensions."""
-    plane = {} if scene.plane is None else {"plane": f"{scene.plane} = 0"}
-    if scene.period is None:
-        return plane
-    lengths = ", ".join("none" if length is None else f"{length:g}" for length in scene.period)
-    return {"period": f"({lengths}) m", **plane}
+def _of_space(scene: Scene) -> list[Statement]:
+    """What holds for a whole scene: gravity, its period, its plane, what particles do to one another."""
+    stated = [Statement("gravity", "none")]
+    if scene.gravity is not None:
+        size = amount(math.hypot(*scene.gravity), "m/s²")
+        stated = [Statement("gravity", f"{size} along {direction(scene.gravity)}")]
+    if scene.period is not None:
+        along = [
+            f"{amount(length, 'm')} along {axis}" for axis, length in zip("xyz", scene.period, strict=True)
+            if length is not None
+        ]  # fmt: skip
+        stated.append(Statement("period", f"a cell that repeats after {listed(along)}"))
+    if scene.plane is not None:
+        stated.append(Statement("plane", f"two dimensions, {scene.plane} = 0"))
+    if scene.pairs is not None:
+        restitution, friction = plain(scene.pairs.restitution), plain(scene.pairs.friction)
+        stated.append(Statement("impacts of two", f"restitution {restitution}, friction {friction}"))
+    return stated
 
 
-def call(described: Any) -> str:
-    """A surface or method as Python code writes it."""
-    return str(described).replace("swarm.", "")
+def of_counters(counters: Sequence[Any], crossings: Any) -> list[Statement]:
+    """The counters of a run, as far as known, and how many particles crossed each; [] for a run without counters."""
+    stated = []
+    for k, (out, back) in enumerate(np.asarray(crossings).tolist()):
+        described = ""
+        if k < len(counters):
+            within = counters[k].inside
+            described = nouns.in_full(counters[k].surface)
+            described += "; " if within is None else f", within {nouns.in_full(within)}; "
+        stated.append(Statement(f"counter {k}", f"{described}{many(out)} out, {many(back)} back"))
+    return stated
+
+
+def of_method(method: Method) -> Statement:
+    """A method, its step and its other numbers by their names."""
+    shown = {"penalty", "exponent", "tolerance", "max_sweeps", "sliding_tolerance", "shortest_flight", "contact_step"}
+    numbers = [
+        f"{name.replace('_', ' ')} {plain(value)}" for name, value in vars(method).items()
+        if name in shown and isinstance(value, (int, float)) and value
+    ] + ["contact start centred"] * (getattr(method, "contact_start", "") == "centred")  # fmt: skip
+    return Statement("method", ", ".join([titles.of_method(method), *numbers]))
+
+
+# --- Numbers -------------------------------------------------------------------------------------------------
+
+
+def of_numbers(seen: dict[str, Any]) -> list[Statement]:
+    """What a run counted, and what each surface, part and source gave or took, without zeros."""
+    stated = [Statement(name, many(seen[name][-1])) for name in ("impacts", "collisions") if name in seen]
+    if slid := seen.get("sliding_time", [0.0])[-1]:
+        stated.append(Statement("sliding", f"{many(seen['sliding'][-1])} at the end, {amount(slid, 's')} in all"))
+    if np.any(seen.get("dissipated_energy", 0.0)):
+        # Not of the total energy: the zero of the potential one is arbitrary.
+        lost, first, last = (
+            amount(float(seen[name][k]), "J")
+            for name, k in (("dissipated_energy", -1), ("kinetic_energy", 0), ("kinetic_energy", -1))
+        )
+        stated.append(Statement("dissipated", f"{lost}; the kinetic energy: {first}, then {last}"))
+    for name, one in OBSERVABLES.items():
+        if name in seen and len(one.axes) == 1 and one.axes[0] in _NUMBERED and one.joined == "sum":
+            each = [
+                f"{many(value) if one.unit == '1' else amount(value, one.unit)} of {one.axes[0]} {k}"
+                for k, value in enumerate(np.asarray(seen[name][-1]).tolist()) if value
+            ]  # fmt: skip
+            more = [f"{len(each) - _MOST + 1} more"] if len(each) > _MOST else []
+            if each:
+                stated.append(Statement(name.replace("_", " "), listed([*each[: _MOST - len(more)], *more])))
+    return stated
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{many(number)} {noun}{'s' * (number != 1)}"

@@ -8,6 +8,7 @@ import numpy as np
 
 from .. import motion as motions
 from ..scene import Scene
+from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many
 from ..surfaces.presence.doors import Opening
 from ..surfaces.surface import Surface
@@ -124,8 +125,8 @@ def size_of(surface: Surface) -> str:
             told.append(f"{noun} {amounts(numbers.tolist(), 'm')}")
     if hasattr(surface, "half_angle"):
         told.append(f"half angle {math.degrees(surface.half_angle):.4g}°")
-    if hasattr(surface, "triangles"):
-        told.append(f"{many(len(surface.triangles))} triangles")
+    if isinstance(surface, Mesh):
+        told.append(f"{many(len(surface))} triangles, volume {amount(surface.volume(), 'm³')}")
     if is_outlined(surface):
         told.append(f"{many(len(surface))} sides")  # type: ignore[arg-type]
     if hasattr(surface, "formula"):
@@ -151,7 +152,14 @@ def in_full(surface: Surface, scene: Scene | None = None) -> str:
         told.append(f"centre at {place(center)}")
     if surface.rotation is not None:
         told.append(f"turned by {math.degrees(2.0 * math.acos(min(1.0, abs(surface.rotation[0])))):.4g}°")
-    return ", ".join(told + laws_of(surface) + changes_of(surface))
+    return ", ".join(told + _of_mesh(surface) + laws_of(surface) + changes_of(surface))
+
+
+def _of_mesh(surface: Any) -> list[str]:
+    """How far a surface is from the mesh that it is made of, and how far corners were moved to close seams."""
+    error, moved = getattr(surface, "mesh_error", None), getattr(surface, "mesh_weld", None)
+    told = [] if error is None else [f"within {amount(error, 'm', 2)} of its mesh"]
+    return told + ([f"corners moved by up to {amount(moved, 'm', 2)} to close seams"] if moved else [])
 
 
 def laws_of(surface: Surface) -> list[str]:
@@ -176,7 +184,7 @@ def law_of(law: Any) -> str:
         chance = float(law.probability)
         return "absorbs" if chance == 1.0 else f"absorbs {plain(100.0 * chance)} %"
     named = {"CercignaniLampis": "Cercignani and Lampis' law", "Lambert": "diffuse by Lambert's law"}
-    told = named.get(kind, {"Sticky": "holds particles for a time"}.get(kind, f"the law {kind}"))
+    told = named.get(kind, {"Sticky": "holds particles for a time"}.get(kind, f"the law {law}"))
     if kind == "CercignaniLampis":
         told += f" at k_B T = {amount(float(law.temperature), 'J')}"
     return told

@@ -12,7 +12,7 @@ from ..scene import Scene
 from ..surfaces.surface import Surface
 from ..surfaces.union import part_at
 from . import nouns
-from .amounts import amount, amounts, counted_in_words, direction, listed, many, one, plain, plural_of
+from .amounts import amount, amounts, counted_in_words, listed, many, one, plural_of
 
 # Most letters of a title.
 LONGEST = 90
@@ -186,79 +186,3 @@ def title(content: Any) -> str:
         if len(told) < LONGEST:
             return told
     return f"{what}: {name}, {end}"
-
-
-def details(content: Any) -> list[tuple[str, str]]:
-    """A run in full, for reports: what each fact is about, and the fact in words."""
-    scene, seen, end = content.scene, content.seen, amount(float(content.seen["time"][-1]), "s")
-    rows = [("what runs", _in_full(content))]
-    names = nouns.labels(scene)
-    for i, surface in enumerate(scene.surfaces):
-        rows.append((f"surface {i}, {names[i, ()]}", nouns.in_full(surface, scene)))
-    for i, where in scene.parts:
-        part = part_at(scene.surfaces[i], where)
-        if told := nouns.laws_of(part) + nouns.changes_of(part):
-            rows.append((f"part {'.'.join(map(str, where))} of surface {i}, {names[i, where]}", ", ".join(told)))
-    rows += facts_of_space(scene)
-    if "born" in seen:
-        born = [counted_in_words(int(count), "particle") for count in np.atleast_1d(seen["born"][-1])]
-        rows.append(("sources", f"{listed(born)} came" if len(born) < 7 else f"{len(born)} of them"))
-    if "crossings" in seen and seen["crossings"].shape[1]:
-        rows.append(("counters", counted_in_words(seen["crossings"].shape[1], "surface") + " that stop no particle"))
-    rows.append(("method", ", ".join([of_method(content.method), *_numbers(content.method)])))
-    frames = counted_in_words(len(seen["time"]), "frame")
-    return [*rows, ("time", f"{end}, {frames}")]
-
-
-def facts_of_space(scene: Scene) -> list[tuple[str, str]]:
-    """What holds for a whole scene: gravity, its period, its plane, what particles do to one another."""
-    told = []
-    if scene.gravity is None:
-        told.append(("gravity", "none"))
-    else:
-        size = float(np.linalg.norm(scene.gravity))
-        told.append(("gravity", f"{amount(size, 'm/s²')} along {direction(scene.gravity)}"))
-    if scene.period is not None:
-        along = [
-            f"{amount(length, 'm')} along {axis}" for axis, length in zip("xyz", scene.period, strict=True)
-            if length is not None
-        ]  # fmt: skip
-        told.append(("period", f"a cell that repeats after {listed(along)}"))
-    if scene.plane is not None:
-        told.append(("plane", f"two dimensions, {scene.plane} = 0"))
-    if scene.pairs is not None:
-        told.append(
-            ("impacts of two", f"restitution {plain(scene.pairs.restitution)}, friction {plain(scene.pairs.friction)}")
-        )
-    return told
-
-
-def _in_full(content: Any) -> str:
-    """What runs, with masses and speeds at the start as far as frames are kept."""
-    told, frame = of_particles(content), content.frames.get("start")
-    if frame is None:
-        return told
-    masses, speeds = (
-        frame.mass * (1 if content.body is None else len(content.body)),
-        np.sqrt((frame.velocity**2).sum(axis=0)),
-    )
-    speeds = speeds[~np.isnan(speeds)]
-    for what, values, unit in (
-        (" of" if content.body is None else ", each of", masses, "kg"),
-        (", at the start with", speeds, "m/s"),
-    ):
-        if not len(values):
-            continue
-        low, high = float(values.min()), float(values.max())
-        same = high - low <= 1e-9 * abs(high)
-        told += f"{what} {amount(low, unit) if same else amounts([low, high], unit).replace(' and ', ' to ')}"
-    return told.replace(" radius of ", " radius and ")
-
-
-def _numbers(method: Method) -> list[str]:
-    """The numbers of a method besides its step, by their names."""
-    shown = {"penalty", "exponent", "tolerance", "max_sweeps", "sliding_tolerance", "shortest_flight", "contact_step"}
-    return [
-        f"{name.replace('_', ' ')} {plain(value)}" for name, value in vars(method).items()
-        if name in shown and isinstance(value, (int, float)) and value
-    ] + ["contact start centred"] * (getattr(method, "contact_start", "") == "centred")  # fmt: skip

@@ -5,7 +5,7 @@ impact or a step, so errors of round-off grow at most in proportion to their num
 to 1e5 impacts of a particle the project's own tests ask for 1e-12.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..common.catalog import OBSERVABLES
 from ..observables import books, drift
 from ..pairs import MOST_PRESSED
 from .amounts import amount, counted_in_words, listed, many, plain
+from .statements import Statement, lines_of
 
 # Of whatever should be kept: the bound of the project's tests, and how much of a number one operation may round away.
 ROUND_OFF, _OPERATION = 1e-12, 8.0 * float(np.finfo(np.float64).eps)
@@ -20,18 +21,10 @@ ROUND_OFF, _OPERATION = 1e-12, 8.0 * float(np.finfo(np.float64).eps)
 _CONSERVING = ("Impact", "Penalty", "AugmentedLagrangian")
 
 
-class Verdict(NamedTuple):
-    """What should hold, as "energy", whether it does (None: nothing to judge), and how well, in words."""
-
-    about: str
-    holds: bool | None
-    text: str
-
-
-def judged(content: Any) -> list[Verdict]:
+def judged(content: Any) -> list[Statement]:
     """The verdicts on a run, of what plots show of it (`Content`)."""
     found = _numbers(content)
-    if any(verdict.holds is False for verdict in found):
+    if any(one.verdict is False for one in found):
         return found  # with values that are not finite other verdicts mean nothing
     for judge in (_energy, _balance, _penetration, _overlap, _momentum, _multipliers, _links, _books):
         found[-1:-1] = judge(content)
@@ -39,13 +32,8 @@ def judged(content: Any) -> list[Verdict]:
 
 
 def marked(content: Any) -> list[str]:
-    """The verdicts as lines of a picture, such as "✓ energy: kept to round-off: ...".
-
-    The verdict on numbers has a line only if some values are not finite.
-    """
-    marks = {True: "✓", False: "✗", None: "·"}
-    found = [one for one in judged(content) if one.about != "numbers" or not one.holds]
-    return [f"{marks[one.holds]} {one.about}: {one.text}" for one in found]
+    """The verdicts as lines of a picture; that on numbers only if some values are not finite."""
+    return lines_of(one for one in judged(content) if one.label != "numbers" or not one.verdict)
 
 
 def energy_limit(content: Any) -> float:
@@ -71,7 +59,7 @@ def _tolerated(content: Any, each: float) -> float:
     return (1.0 + each) * 4.0 * impulse / method.dt * gap / most if most else 0.0
 
 
-def _numbers(content: Any) -> list[Verdict]:
+def _numbers(content: Any) -> list[Statement]:
     """Whether all observables of every run are numbers."""
     bad = []
     for name, values in content.seen.items():
@@ -79,28 +67,28 @@ def _numbers(content: Any) -> list[Verdict]:
             wrong = ~np.isfinite(np.asarray(values).reshape(len(values), -1)).all(axis=1)
             bad += [f"{name} from {amount(content.seen['time'][wrong.argmax()], 's')} on"] if wrong.any() else []
     if bad:
-        return [Verdict("numbers", False, f"not finite: {listed(bad)}")]
-    return [Verdict("numbers", True, "every observable is finite in every frame")]
+        return [Statement("numbers", f"not finite: {listed(bad)}", False)]
+    return [Statement("numbers", "every observable is finite in every frame", True)]
 
 
-def _energy(content: Any) -> list[Verdict]:
+def _energy(content: Any) -> list[Statement]:
     """The worst particle, its books of losses and heat included."""
     worst, limit = float(content.seen["energy_error"].max()), energy_limit(content)
     one, name = "particle" if content.body is None else "body", type(content.method).__name__
     figure = f"the worst {one}'s error is {plain(worst, 2)} of its energy"
     if worst == 0.0:
-        return [Verdict("energy", True, f"every {one}'s is as it should be, to the last bit")]
+        return [Statement("energy", f"exact to the last bit for every {one}", True)]
     if worst <= max(ROUND_OFF, limit if not content.method.has_multipliers() else 0.0):
-        return [Verdict("energy", True, f"kept to round-off: {figure}")]
+        return [Statement("energy", f"kept to round-off: {figure}", True)]
     if worst <= limit:
-        return [Verdict("energy", True, f"kept to the tolerance of the loop: {figure}")]
+        return [Statement("energy", f"kept to the tolerance of the loop: {figure}", True)]
     why = "the tolerance of the loop" if content.method.has_multipliers() else "round-off"
     if name not in _CONSERVING:
-        return [Verdict("energy", False, f"not kept, {name} does not conserve it: {figure}")]
-    return [Verdict("energy", False, f"not kept: {figure}, and {why} explains {plain(limit, 1)}")]
+        return [Statement("energy", f"not kept, {name} does not conserve it: {figure}", False)]
+    return [Statement("energy", f"not kept: {figure}, and {why} explains {plain(limit, 1)}", False)]
 
 
-def _balance(content: Any) -> list[Verdict]:
+def _balance(content: Any) -> list[Statement]:
     """The energy of all against what walls, sources and anchors have taken and given."""
     changes, part = books(content.seen), drift(content.seen)
     limit = energy_limit(content)
@@ -109,39 +97,39 @@ def _balance(content: Any) -> list[Verdict]:
         known = type(content.method).__name__ in _CONSERVING
         why = "" if holds or known else f", {type(content.method).__name__} does not conserve it"
         if part == 0.0:
-            return [Verdict("total energy", True, "constant to the last bit")]
-        kept = "constant" if holds else "not constant"
-        return [Verdict("total energy", holds, f"{kept}: it changes by {plain(part, 2)} of the energy that moved{why}")]
+            return [Statement("total energy", "constant to the last bit", True)]
+        kept, moved = "constant" if holds else "not constant", f"{plain(part, 2)} of the energy that moved"
+        return [Statement("total energy", f"{kept}: it changes by {moved}{why}", holds)]
     told = [
         f"{name} {amount(float(values[-1]) * (-1 if name == 'dissipated' else 1), 'J', 3)}"
         for name, values in changes.items()
     ]
     closes = "closes" if holds else "does not close: it is off by"
     to = f"to {plain(part, 2)}" if holds else plain(part, 2)
-    return [Verdict("balance of energy", holds, f"{closes} {to} of what moved ({listed(told)})")]
+    return [Statement("balance of energy", f"{closes} {to} of what moved ({listed(told)})", holds)]
 
 
-def _penetration(content: Any) -> list[Verdict]:
+def _penetration(content: Any) -> list[Statement]:
     """How far outside a wall a particle was."""
     if not content.scene.surfaces:
         return []
     deepest, one = float(content.seen["max_penetration"].max()), "particle" if content.body is None else "point"
     if deepest == 0.0:
         kind = "a rigid wall" if content.method.law() is None else "a wall"
-        return [Verdict("walls", True, f"no {one} was outside {kind}")]
+        return [Statement("walls", f"no {one} was outside {kind}", True)]
     size = reach_of(content.scene)
     if content.method.law() is not None and not content.method.has_multipliers():
         part = f", {plain(100.0 * deepest / size, 2)} % of the vessel" if size else ""
-        return [Verdict("walls", None, f"springs gave way by at most {amount(deepest, 'm', 2)}{part}")]
+        return [Statement("walls", f"springs gave way by at most {amount(deepest, 'm', 2)}{part}", None)]
     limit = penetration_limit(content)
     outside = f"at most {amount(deepest, 'm', 2)} outside a rigid wall"
     if deepest <= limit:
-        return [Verdict("walls", True, f"{outside}, round-off of {amount(size, 'm', 2)}")]
+        return [Statement("walls", f"{outside}, round-off of {amount(size, 'm', 2)}", True)]
     why = "the tolerance of the loop" if content.method.has_multipliers() else "round-off"
-    return [Verdict("walls", False, f"{outside}, where {why} explains {amount(limit, 'm', 1)}")]
+    return [Statement("walls", f"{outside}, where {why} explains {amount(limit, 'm', 1)}", False)]
 
 
-def _overlap(content: Any) -> list[Verdict]:
+def _overlap(content: Any) -> list[Statement]:
     """How deep soft balls pressed on one another and on walls, at any step."""
     radius = next((frame.radius for frame in content.frames.values() if frame.radius is not None), None)
     if "largest_overlap" not in content.seen or radius is None:
@@ -150,13 +138,13 @@ def _overlap(content: Any) -> list[Verdict]:
         float(f(x)) for f, x in ((np.max, content.seen["largest_overlap"]), (np.min, radius), (np.max, radius))
     )
     if deepest == 0.0:
-        return [Verdict("contacts", True, "no ball pressed on another one or on a wall")]
+        return [Statement("contacts", "no ball pressed on another one or on a wall", True)]
     found = f"balls overlapped by at most {amount(deepest, 'm', 2)}, {plain(100.0 * deepest / least, 2)} % of "
     found += "their radius" if least == most else "the smallest radius"
     if deepest <= MOST_PRESSED * least:
-        return [Verdict("contacts", True, found)]
+        return [Statement("contacts", found, True)]
     wanted = f"{found}; up to {100.0 * MOST_PRESSED:g} % of a radius they are small: use a larger penalty"
-    return [Verdict("contacts", False if deepest > MOST_PRESSED * most else None, wanted)]
+    return [Statement("contacts", wanted, False if deepest > MOST_PRESSED * most else None)]
 
 
 def penetration_limit(content: Any) -> float:
@@ -173,7 +161,7 @@ def reach_of(scene: Any) -> float:
     return float(max(size for size in sizes if np.isfinite(size)))
 
 
-def _momentum(content: Any) -> list[Verdict]:
+def _momentum(content: Any) -> list[Statement]:
     """Momentum, which nothing changes in a cell that repeats, without walls and gravity."""
     scene, seen = content.scene, content.seen
     if scene.surfaces or scene.gravity is not None or content.body is not None or "born" in seen:
@@ -184,32 +172,32 @@ def _momentum(content: Any) -> list[Verdict]:
     scale = float(np.sqrt(2.0 * mass * seen["kinetic_energy"].max()))
     part = change / scale if scale else change
     holds = part <= energy_limit(content)
-    return [Verdict("momentum", holds, f"{'kept' if holds else 'not kept'}: it changes by {plain(part, 2)} of all")]
+    return [Statement("momentum", f"{'kept' if holds else 'not kept'}: it changes by {plain(part, 2)} of all", holds)]
 
 
-def _multipliers(content: Any) -> list[Verdict]:
+def _multipliers(content: Any) -> list[Statement]:
     """Whether loops of multipliers ended by themselves."""
     if not content.method.has_multipliers():
         return []
     failed = int(content.seen["unconverged"][-1])
     if failed:
-        return [Verdict("loops", False, f"{counted_in_words(failed, 'contact')} did not converge")]
+        return [Statement("loops", f"{counted_in_words(failed, 'contact')} did not converge", False)]
     sweeps = float(content.seen.get("sweeps", [0])[-1])
     each = sweeps / max(1.0, float(content.seen["impacts"][-1]))
-    return [Verdict("loops", True, f"every contact converged, in {plain(each, 2)} sweeps an impact")]
+    return [Statement("loops", f"every contact converged, in {plain(each, 2)} sweeps an impact", True)]
 
 
-def _links(content: Any) -> list[Verdict]:
+def _links(content: Any) -> list[Statement]:
     """Whether links keep their lengths."""
     if content.body is None or not len(content.body.links):
         return []
     worst, limit = float(np.max(content.seen["link_error"])), energy_limit(content)
     holds = worst <= limit
     kept = "keep their lengths" if holds else "do not keep their lengths"
-    return [Verdict("links", holds, f"they {kept}: the worst is off by {plain(worst, 2)} of it")]
+    return [Statement("links", f"they {kept}: the worst is off by {plain(worst, 2)} of it", holds)]
 
 
-def _books(content: Any) -> list[Verdict]:
+def _books(content: Any) -> list[Statement]:
     """Whether the numbers of particles balance: all are inside, or were absorbed, or escaped.
 
     Empty for a run without sources that no particle left.
@@ -220,7 +208,9 @@ def _books(content: Any) -> list[Verdict]:
         return []
     if body is not None:
         whole = content.scene.is_open()
-        return [Verdict("number", whole or None, f"{many(ends['escaped'])} of {many(content.count // len(body))} left")]
+        return [
+            Statement("particles", f"{many(ends['escaped'])} of {many(content.count // len(body))} left", whole or None)
+        ]
     born = int(np.sum(seen["born"][-1])) if "born" in seen else 0
     there = content.count if "born" not in seen else at_start(content) + born
     inside = there - sum(ends.values())
@@ -230,10 +220,10 @@ def _books(content: Any) -> list[Verdict]:
     kept = content.count == (there if frame is None else len(frame.mass))
     came = f", {many(born)} of them from sources" if born else ""
     if inside < 0 or (kept and frame is not None and seen_there != there):
-        return [Verdict("number", False, f"{listed(parts)} are not the {many(there)} that there are{came}")]
+        return [Statement("particles", f"{listed(parts)} do not add up to {many(there)}{came}", False)]
     if ends["escaped"] and not content.scene.is_open() and not _has_openings(content.scene):
-        return [Verdict("number", False, f"{many(ends['escaped'])} of {many(there)} passed through a closed wall")]
-    return [Verdict("number", True, f"{many(there)} = {' + '.join(parts)}{came}")]
+        return [Statement("particles", f"{many(ends['escaped'])} of {many(there)} passed through a closed wall", False)]
+    return [Statement("particles", f"{many(there)} = {' + '.join(parts)}{came}", True)]
 
 
 def at_start(content: Any) -> int:

@@ -320,14 +320,16 @@ def test_an_overlap_is_in_files_and_in_verdicts(tmp_path):
     drawn = {line.path: line.observable for line in lines_of(scene, SOFT, [], None, result.observables)}
     assert drawn["/overlap"] == "largest_overlap"
     percent = f"{100.0 * deepest / RADIUS:.2g} %"
-    assert of_trajectory(path)["largest overlap"] == f"{deepest:.1e} m, {percent} of the smallest radius"
+    assert of_trajectory(path)["contacts"].startswith(
+        f"✗ balls overlapped by at most {1e3 * deepest:.2g} mm, {percent}"
+    )
     content = Content("", scene, SOFT, None, 2, dict(result.observables), {"end": result.particles})
-    (told,) = [one for one in judged(content) if one.about == "contacts"]
-    assert told.holds is False
+    (told,) = [one for one in judged(content) if one.label == "contacts"]
+    assert told.verdict is False
     assert f"balls overlapped by at most {1e3 * deepest:.2g} mm, {percent} of their radius" in told.text
     content.seen["largest_overlap"] = 0.4 * content.seen["largest_overlap"]
-    (told,) = [one for one in judged(content) if one.about == "contacts"]
-    assert told.holds is True
+    (told,) = [one for one in judged(content) if one.label == "contacts"]
+    assert told.verdict is True
 
 
 # --- Everywhere -------------------------------------------------------------------------------------------

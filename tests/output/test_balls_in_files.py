@@ -175,13 +175,13 @@ def test_exports_have_the_radii(run, tmp_path):
 def test_texts_say_how_large_and_how_full(run):
     with swarm.load(run.trajectory) as trajectory:
         told = facts.of_trajectory(trajectory)
-        assert "restitution=0.9" in told["pairs"]
+        assert told["impacts of two"].startswith("restitution 0.9, ")
         assert "Pairs(" in trajectory.scene._repr_html_()
-    assert told["radius"] == "0.05 m to 0.12 m"
-    unit = "m^3" if run.scene.plane is None else "m^2"
+    assert " of 50 to 120 mm radius" in told["what runs"] or " of 0.05 to 0.12 m radius" in told["what runs"]
+    unit = "m³" if run.scene.plane is None else "m²"
     volume = 0.48 if run.scene.plane is None else 0.8
     filled = 4.0 / 3.0 * np.pi * (RADIUS**3).sum() if run.scene.plane is None else np.pi * (RADIUS**2).sum()
-    assert told["packing"] == f"{filled / volume:.4g} of {volume:.4g} {unit}"
+    assert told["packing"] == f"{100.0 * filled / volume:.4g} % of {volume:.4g} {unit}"
     assert told["collisions"] == str(run.observables["collisions"][-1])
     assert numbers(run.trajectory)["collisions"] == run.observables["collisions"][-1]
     assert "radius" in run.particles._repr_html_()

@@ -120,7 +120,8 @@ def test_tables_and_arrays(path):
         np.testing.assert_array_equal(dataset.birth_time.values[n:], TIMES)
         assert dataset.born.dims == ("time", "source")
         told = facts.of_trajectory(trajectory)
-    assert told["born"].startswith("4 from sources[0], with ")
+    assert told["born"] == "4 of source 0"
+    assert "4 of them from sources" in told["particles"]
     found = numbers(path)
     assert found["born"] == [4]
     assert found["source_energy"] > 0.0

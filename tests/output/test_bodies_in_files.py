@@ -170,7 +170,7 @@ def test_particles_are_no_bodies(tmp_path):
         assert (trajectory.body, trajectory.copies) == (None, 0)
         with pytest.raises(swarm.SceneError, match=r"run\.h5 holds particles, not bodies; use frame\(0\)"):
             trajectory.bodies(0)
-    assert summary.of_trajectory(tmp_path / "run.h5")["particles"] == "1"
+    assert summary.of_trajectory(tmp_path / "run.h5")["what runs"].startswith("1 particle of ")
 
 
 @pytest.mark.parametrize(
@@ -365,10 +365,10 @@ def test_pictures_show_bodies_and_the_error_of_links(run, tmp_path, monkeypatch)
 def test_the_summary_says_what_they_are(run, tmp_path):
     path, frames = run
     rows, told = summary.of_trajectory(path), summary.numbers(path)
-    assert rows["bodies"] == f"{COPIES} of " + ("4 points, 6 links" if frames[0].body is CUBE else "3 points, 2 links")
-    assert "particles" not in rows
-    assert rows["link error"] == "9.0e-16 of its length"
-    assert "work" not in rows
+    assert rows["body"] == ("4 points, 6 links" if frames[0].body is CUBE else "3 points, 2 links")
+    assert rows["what runs"].startswith(f"{COPIES} ")
+    assert rows["links"] == "✓ they keep their lengths: the worst is off by 9·10⁻¹⁶ of it"
+    assert "work of anchors" not in " ".join(rows.values())
     assert (told["bodies"], told["link_error"], told["work"]) == (COPIES, 9e-16, 0.0)
     with swarm.load(path) as trajectory:
         recorded.record(trajectory, tmp_path / "run.rrd", recording.Settings())
@@ -385,8 +385,8 @@ def test_work_of_anchors_is_no_drift(tmp_path):
         file["observables/work/value"][:] = [0.0, 0.25]
         file["observables/total_energy/value"][:] = [1.0, 1.25]
     rows = summary.of_trajectory(tmp_path / "run.h5")
-    assert rows["bodies"] == "1 of 2 points, 1 spring, 1 anchor"
-    assert rows["work"] == "0.25 J of led anchors"
+    assert rows["body"] == "2 points, 1 spring, 1 anchor"
+    assert "work of anchors 0.25 J" in rows["balance of energy"]
     with swarm.load(tmp_path / "run.h5") as trajectory:
         assert observables.drift(trajectory.observables) == 0.0
         lines = {line.path: line for line in series.lines_of(BOX, METHOD, [], trajectory.body)}

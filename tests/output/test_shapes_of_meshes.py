@@ -79,7 +79,7 @@ def test_in_files(tmp_path):
         scene, start, swarm.Impact(), until=0.2, every=0.1, trajectory=tmp_path / "run.h5",
         recording=tmp_path / "run.rrd",
     )  # fmt: skip
-    assert "12 triangles, 1 m^3" in run._repr_html_()
+    assert "12 triangles, volume 1 m³" in run._repr_html_()
     with swarm.load(run.trajectory) as trajectory:
         _points, walls = trajectory.export(tmp_path / "run.vtkhdf")
     with h5py.File(walls) as file:

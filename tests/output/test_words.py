@@ -9,7 +9,7 @@ from conftest import METHODS, WALLS, row, surface_of
 
 import swarm
 from swarm.bodies.elastic import block
-from swarm.words import nouns
+from swarm.words import facts, nouns
 from swarm.words import titles as words
 
 SOFT = swarm.elastic(block((0.1, 0.1, 0.1), (2, 2, 2)), young=1e4, poisson=0.3, density=100.0)
@@ -38,11 +38,11 @@ def content(scene, method=None, count=1000, body=None, radius=None, until=1.0, *
     frame = swarm.Particles(np.zeros((3, 2)), np.ones((3, 2)) * 1e-3, 1e-4, radius=radius)
     seen = {"time": np.array([0.0, until]), **{name: np.asarray(values) for name, values in seen.items()}}
     given = {"scene": scene, "method": method or swarm.Impact(), "count": count, "body": body, "seen": seen}
-    return types.SimpleNamespace(name="", frames={"start": frame, "end": frame}, **given)
+    return types.SimpleNamespace(name="", frames={"start": frame, "end": frame}, counters=(), **given)
 
 
 def every_text(run):
-    return [words.of_scene(run.scene), words.title(run), *(text for row in words.details(run) for text in row)]
+    return [words.of_scene(run.scene), words.title(run), *(text for one in facts.of_setting(run) for text in one[:2])]
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -60,7 +60,7 @@ def test_every_surface_is_said(law):
                 assert not PYTHON.search(text.replace(formula, "")), text
             assert len(words.title(run)) < words.LONGEST
             if law != "plain":
-                said = next(text for about, text in words.details(run) if about.startswith("surface 0"))
+                said = next(one.text for one in facts.of_setting(run) if one.label.startswith("surface 0"))
                 assert len(said) > len(nouns.in_full(bare, scene))
 
 
