@@ -1,6 +1,5 @@
 """The run of balls that meet one another, and walls of which some have a mass."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -13,9 +12,6 @@ from .colliding.heavy import COUNTS, Heavy
 from .reacting.described import freedoms_of, observed, scenery_of, walls_now
 from .reacting.freedoms import Freedoms
 
-# The first leases have this part of the balls' speed as their width.
-_WIDTH = 0.1
-
 
 class HeavyRun(CollidingRun):
     """A `CollidingRun` in which impacts move walls."""
@@ -26,8 +22,7 @@ class HeavyRun(CollidingRun):
     def _with_heavy(self, box: Any) -> Any:
         state, scene = self.state, self._of
         n, rows = state.mass.size, len(scene.owners())
-        speed = math.sqrt(float((state.velocity**2).sum(axis=0).mean()))
-        self._freedoms = freedoms_of(scene, _WIDTH * speed or _WIDTH)
+        self._freedoms = freedoms_of(scene, state.velocity)
         scenery = scenery_of(scene, 0.0)
         ways = tuple({wall.freedom.row: wall.freedom for wall in scenery.reacting}.values())
         self._given_rows = scenery.owners

@@ -1,6 +1,5 @@
 """The run of particles and walls that react: all depend on all others."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -23,11 +22,9 @@ from ..scene import Scene
 from ..state import State
 from .reacting import queue as events
 from .reacting.described import freedoms_of, observed, scenery_of, walls_now
+from .reacting.freedoms import TOO_LONG, TOO_SHORT
 from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule
 
-# The first leases have this part of the particles' speed as their width. They are too narrow where they end before so
-# many events a particle, and too wide where they last longer than that many.
-_WIDTH, _TOO_SHORT, _TOO_LONG = 0.1, 4.0, 32.0
 # Of a clock, how many events were taken where no lease is made yet: so much less for each particle that is predicted.
 _ALL_AHEAD = -1.0
 
@@ -57,8 +54,7 @@ class ReactingRun(BaseRun):
             np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
             Heap(np.zeros(n), number.copy(), number.copy()), None if tally is None else tally.of_thread(0).impacts,
         )  # fmt: skip
-        speed = math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))
-        self._freedoms = freedoms_of(scene, _WIDTH * speed or _WIDTH)
+        self._freedoms = freedoms_of(scene, particles.velocity)
         self._clock = np.zeros(CLOCK)
         self._show(0.0)
         self._choose_tier()
@@ -113,9 +109,9 @@ class ReactingRun(BaseRun):
         """Wider leases where they ended soon, narrower ones where they lasted long."""
         width: Any = self._freedoms.width
         a_particle = self._clock[TAKEN] / len(self.state.mass)
-        if a_particle < _TOO_SHORT:
+        if a_particle < TOO_SHORT:
             width *= 2.0
-        elif a_particle > _TOO_LONG:
+        elif a_particle > TOO_LONG:
             width *= 0.5
 
     def _moving(self, rule: ReactionRule) -> tuple[Any, ...]:

@@ -12,6 +12,9 @@ from numba import types
 from .jit import Array, inlined, select
 from .trace.calls import operation
 
+# What a velocity is scaled by to restore its square is 1 within round-off, unless next to nothing is left of it.
+_NEAR = 1e-6
+
 
 class Vec(NamedTuple):
     """A vector. In plain Python its components may be arrays of the same shape."""
@@ -104,6 +107,18 @@ def dot(a, b):
 def square(a):
     """|a|^2"""
     return a.x * a.x + a.y * a.y + a.z * a.z
+
+
+@inlined
+def with_square(v, speed2):
+    """A velocity whose square is speed2, from within round-off, without a bias, which 1e8 collisions would show.
+
+    By one Newton step of the square root, as a sum: a factor 1 + x rounds x up and down by different steps.
+    """
+    now = square(v)
+    miss = speed2 - now
+    near = (abs(miss) <= _NEAR * now) & (now > 0.0)
+    return v + select(near, 0.5 * miss / select(near, now, 1.0), 0.0) * v
 
 
 @inlined

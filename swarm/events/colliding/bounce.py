@@ -13,11 +13,10 @@ from ...kernel.gravity import accelerated, potential
 from ...kernel.jit import outlined, select
 from ...kernel.random import Stream
 from ...kernel.record import Record
-from ...kernel.vector import ZERO, Vec, dot, either, norm, square
+from ...kernel.vector import ZERO, Vec, dot, either, norm, square, with_square
 from ...surfaces.presence.openings import is_open
 from .clock import moment_of
 from .journal import note_wall
-from .meet import squared
 from .rows import FLOATS, WALL
 from .window import walls_at
 
@@ -106,7 +105,7 @@ def _turned(box, flock, books, walls, wall, ball):
     hit = exact(box.laws, walls, box.pull, wall, r, v, energy)
     if box.loss is not None and box.loss.spares(flock, i, now):
         hit = exact(box.laws._replace(restitution=None), walls, box.pull, wall, r, v, energy)
-    v1 = squared(hit.v, hit.twice_energy - fall)
+    v1 = with_square(hit.v, hit.twice_energy - fall)
     turned = BouncedBall(v1, hit.impulse, twice - (hit.twice_energy - hit.work), 0.0, hit.work, 0.0, hit.twice_energy)
     if box.laws.send_off:
         random = Stream(box.source.seed, box.source.first + i, books.impacts[index(i)], 0, box.laws.across)
@@ -115,7 +114,7 @@ def _turned(box, flock, books, walls, wall, ball):
             # The energy decides the speed, as of a mirror: the square of a velocity that is drawn has a bias.
             left = select(sent.keeps, twice + sent.work, square(sent.v) + fall)
             heat = select(sent.keeps, 0.0, left - sent.work - twice)
-            v1 = either(sent.keeps, squared(sent.v, left - fall), sent.v)
+            v1 = either(sent.keeps, with_square(sent.v, left - fall), sent.v)
             turned = BouncedBall(v1, sent.impulse, *_shares(box.laws, heat, sent.lost), sent.work, sent.wait, left)
     return _lifted(box, walls, wall, r, turned)
 
@@ -151,7 +150,7 @@ def _lifted(box, walls, wall, r, turned):
         lift = least - away
         v, gained, work, speed2 = turned.v - lift * n, lift * (least + away), given(u, -lift * n), square(turned.v)
         if not box.laws.change_energy and speed2 > 4.0 * least * least:
-            v, gained = squared(v * math.sqrt(speed2 / square(v)), speed2), 0.0
+            v, gained = with_square(v * math.sqrt(speed2 / square(v)), speed2), 0.0
         return turned._replace(
             v=v, impulse=turned.impulse + lift, lost=turned.lost - gained, work=turned.work + work,
             twice=turned.twice + gained + work,

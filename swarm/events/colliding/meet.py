@@ -6,11 +6,9 @@ from typing import Any
 from ...kernel.arrays import index
 from ...kernel.jit import select
 from ...kernel.record import Record
-from ...kernel.vector import dot, square
+from ...kernel.vector import dot, square, with_square
 from .aim import between
 
-# What the relative velocity is scaled by to restore its square is 1 within round-off, unless next to nothing is left.
-_NEAR = 1e-6
 # The square of the part of their speeds with which balls part at least: four roundings.
 _PARTS = 2.0**-100
 
@@ -35,24 +33,13 @@ class Met(Record):
     lost: float
 
 
-def squared(v, speed2):
-    """A velocity whose square is speed2, from within round-off, without a bias, which 1e8 collisions would show.
-
-    By one Newton step of the square root, as a sum: a factor 1 + x rounds x up and down by different steps.
-    """
-    now = square(v)
-    miss = speed2 - now
-    near = (abs(miss) <= _NEAR * now) & (now > 0.0)
-    return v + select(near, 0.5 * miss / select(near, now, 1.0), 0.0) * v
-
-
 def turned(u, n, closing, distance2, restitution):
     """The relative velocity after a collision, with |u|^2 less what is lost restored, and twice what is lost."""
     e = 1.0 if restitution is None else restitution
     share = (1.0 + e) * closing / distance2
     w = u - share * n
     lost = 0.0 if restitution is None else (1.0 - e) * (1.0 + e) * closing * closing / distance2
-    return squared(w, square(u) - lost), lost
+    return with_square(w, square(u) - lost), lost
 
 
 def _parted(u, b, distance2, speed2):

@@ -4,21 +4,15 @@ from ...kernel.arrays import index
 from ...kernel.gravity import potential
 from ...kernel.jit import outlined, select
 from ...kernel.vector import ZERO, square
-from ..reacting.freedoms import ParticleFlight
-from ..reacting.walls import all_stay, strike
+from ..reacting.freedoms import TOO_LONG, TOO_SHORT, ParticleFlight
+from ..reacting.walls import all_stay, strike, with_energy
 from .again import aim_again, queue_both
 from .aim import find_wall
 from .clock import EVENTS
 from .heavy import LISTED, SINCE, STRIKES, first_number
-from .meet import squared
 from .queue import FIRST, requeue
 from .rows import FLOATS, WALL
 from .window import END
-
-# Leases are too narrow where they end before so many events a ball, too wide where they last longer than that many.
-_TOO_SHORT, _TOO_LONG = 4.0, 32.0
-# The energy is that which it is to be where the square of the speed is off by no more than this part.
-_NEAR = 1e-9
 
 
 @outlined
@@ -33,13 +27,10 @@ def strike_heavy(box, flock, books, clock, i, now):
         walls = tuple(one._replace(restitution=select(spares, 1.0, one.restitution)) for one in walls)
     twice = flock.kept.at(i, flock.stamp(i), square(v) + 2.0 * potential(box.pull, r))
     blow = strike(walls, wall, heavy.freedoms, ParticleFlight(r, v, ZERO, now, 0.0), m)
-    # The energy decides the speed: round-off of the impulse has a bias.
     left, fall = twice - 2.0 * (blow.given + blow.lost) / m, 2.0 * potential(box.pull, blow.r)
-    v1 = squared(blow.v, left - fall)
+    v1, kept = with_energy(blow.v, left, fall)
     flock.put(i, now, blow.r, v1)
-    # Of a ball that all but stops nothing is restored.
-    is_near = abs(square(v1) + fall - left) <= _NEAR * square(v1)
-    flock.kept.keep(i, flock.stamp(i), select(is_near, left, square(v1) + fall))
+    flock.kept.keep(i, flock.stamp(i), kept)
     heavy.impulse[index(blow.owner)] += blow.impulse
     if books.dissipated.size > 0:
         books.dissipated[index(i)] += blow.lost
@@ -84,9 +75,9 @@ def renew_leases(box, flock, clock, now):
         short = freedom.away(freedoms) >= width or (
             ends and freedom.keeps(freedoms, 2.0 * width) > freedom.keeps(freedoms, width)
         )
-        if short and each < _TOO_SHORT:
+        if short and each < TOO_SHORT:
             freedoms.width[k] = 2.0 * width
-        elif each > _TOO_LONG:
+        elif each > TOO_LONG:
             freedoms.width[k] = 0.5 * width
         freedom.renew(freedoms, now)
     heavy.counts[SINCE] = clock[EVENTS]

@@ -13,7 +13,7 @@ from ...run.observed import Observed
 from ...scene import Scene
 from ...surfaces.surface import Surface
 from ...surfaces.walls import Walls
-from .freedoms import Freedoms, Shifted
+from .freedoms import WIDTH, Freedoms, Shifted
 from .pendulum import TERMS, Hinged, Pendulum
 from .queue import SceneWalls
 from .walls import Reacting
@@ -83,8 +83,9 @@ def _vector(values: Floats) -> Vec:
     return vec(values.tolist())
 
 
-def freedoms_of(scene: Scene, width: float) -> Freedoms:
-    """The walls that react at the start, with leases of this width [m/s]."""
+def freedoms_of(scene: Scene, velocity: Floats) -> Freedoms:
+    """The walls that react at the start, with leases for particles of these velocities (3, N) [m/s]."""
+    width = WIDTH * math.sqrt(float((velocity**2).sum(axis=0).mean())) or WIDTH
     surfaces = [surface for surface in scene.surfaces if surface.reacts()]
     count = len(surfaces)
     shift, velocity, rest, middle = np.zeros((4, 3, count))

@@ -18,6 +18,10 @@ from ...surfaces.time_of_impact import flights, safe
 from ...surfaces.time_of_impact.rising import flight_of
 from ...surfaces.walls import Walls
 
+# The first leases have this part of the particles' speed as their width. They are too narrow where they end before so
+# many events a particle, and too wide where they last longer than that many.
+WIDTH, TOO_SHORT, TOO_LONG = 0.1, 4.0, 32.0
+
 
 class Freedoms(NamedTuple):
     """The motion of the walls that react: arrays of one column a wall."""

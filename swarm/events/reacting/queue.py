@@ -15,11 +15,11 @@ from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, displacement, potential
 from ...kernel.heap import Heap, build, change
 from ...kernel.jit import Array, long_kernel, outlined, select
-from ...kernel.vector import ZERO, column, put, square
+from ...kernel.vector import ZERO, column, put
 from ...surfaces.in_motion.moving import Marched
 from ...surfaces.time_of_impact import flights, safe
 from .freedoms import ParticleFlight
-from .walls import all_stay, first_hit, reach_of_all, strike
+from .walls import all_stay, first_hit, reach_of_all, strike, with_energy
 
 # What is next for a particle besides the impact on a wall that reacts, whose number is 0 or more: nothing that was
 # found, so that it is looked at again.
@@ -31,8 +31,6 @@ NOW, BEFORE, STRIKES, TAKEN, CLOCK = 0, 1, 2, 3, 4
 MOST_HITS = 10_000_000
 # Each of those between which no time passes is as many: an inelastic collapse ends sooner, the tip of a wedge does not.
 AT_ONCE = 1000
-# |v|^2 is restored where it is off by no more than this part: of a particle that all but stops nothing is left.
-_NEAR = 1e-6
 
 
 class SceneWalls(NamedTuple):
@@ -144,15 +142,11 @@ def _strike(scenery, walls, queue, i, now):
     """The impact of particle i on a wall that reacts."""
     r, v, m = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i]
     blow = strike(scenery.reacting, queue.struck[i], walls, ParticleFlight(r, v, ZERO, now, 0.0), m)
-    # The energy decides the speed, as for walls that stay: round-off of J has a bias, 1e-16 of the energy an impact.
-    energy = queue.energy[i] - (blow.given + blow.lost) / m
-    speed2 = 2.0 * (energy - potential(scenery.pull, blow.r))
-    error = speed2 - square(blow.v)
-    near = (abs(error) <= _NEAR * speed2) & (speed2 > 0.0)
-    turned = blow.v * (1.0 + select(near, 0.5 * error / select(near, speed2, 1.0), 0.0))
+    left = 2.0 * queue.energy[i] - 2.0 * (blow.given + blow.lost) / m
+    v1, kept = with_energy(blow.v, left, 2.0 * potential(scenery.pull, blow.r))
     put(queue.position, 0, i, blow.r)
-    put(queue.velocity, 0, i, turned)
-    queue.energy[i] = select(near, energy, 0.5 * square(turned) + potential(scenery.pull, blow.r))
+    put(queue.velocity, 0, i, v1)
+    queue.energy[i] = 0.5 * kept
     queue.impulse[index(blow.owner), i] += blow.impulse
     queue.dissipated[i] += blow.lost
     queue.impacts[i] += blow.impulse > 0.0

@@ -5,8 +5,11 @@ from typing import Any, NamedTuple
 
 from ...kernel.jit import select
 from ...kernel.record import Record
-from ...kernel.vector import Vec, dot, square
+from ...kernel.vector import Vec, dot, square, with_square
 from ...surfaces.time_of_impact.flights import NEVER, sooner
+
+# The energy is that which is left where the square of the speed is off by no more than this part.
+_NEAR = 1e-9
 
 
 class WallImpact(NamedTuple):
@@ -73,6 +76,17 @@ def strike(reacting, wall, walls, flight, mass):
         if wall == k:
             return one.strike(walls, flight, mass)
     return WallImpact(flight.r, flight.v, 0.0, 0.0, 0.0, -1)
+
+
+def with_energy(v, left, fall):
+    """A velocity after a strike with the energy that is left, and that energy: both twice and per mass, with weight.
+
+    The energy decides the speed: round-off of the impulse has a bias, 1e-16 of the energy an impact. Of a particle that
+    all but stops nothing is restored, and the energy is that of its velocity.
+    """
+    v1 = with_square(v, left - fall)
+    now = square(v1) + fall
+    return v1, select(abs(now - left) <= _NEAR * square(v1), left, now)
 
 
 def all_stay(reacting, wall, walls):
