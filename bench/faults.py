@@ -6,6 +6,7 @@ run without the fault, so that what fails anyway is not counted.
 
 import argparse
 import contextlib
+import csv
 import json
 import os
 import queue
@@ -22,7 +23,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from .planting import Fault, chosen
+from .planting import Fault, chosen, found_again
 
 ROOT = Path(__file__).parents[1]
 # README's test command, without its processes: a test that fails ends the run.
@@ -201,6 +202,17 @@ def _fails_alone(tree: Tree, fault: Fault, arguments: list[str]) -> bool:
     return planted != 0 and without == 0
 
 
+def again(folder: Path, table: Path) -> Iterator[tuple[int, Fault, str]]:
+    """Number, fault and test of each row of a table, whose lines may be elsewhere in their files by now."""
+    for row in csv.DictReader(table.read_text("utf-8").splitlines()):
+        source, line = (folder / row["file"]).read_bytes(), int(row["line"])
+        fault = found_again(source, row["file"], line, row["before"], row["after"])
+        if fault is None:
+            print(f"{row['number']:>3} is gone: {row['file']} has no line {row['before']}")
+        else:
+            yield int(row["number"]), fault, row["seen by"]
+
+
 def main() -> None:
     """List the faults of a seed, or measure which of them the tests see."""
     parser = argparse.ArgumentParser(prog="python -m bench.faults", description=__doc__)
@@ -215,13 +227,18 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=3600.0, help="seconds for the tests of a fault (3600)")
     parser.add_argument("--nearest-limit", type=float, default=600.0, help="seconds for the nearest of them (600)")
     parser.add_argument("--processes", type=int, default=1, help="faults that are tested at a time (1)")
+    parser.add_argument("--again", type=Path, metavar="TABLE", help="the faults of this table, and first its tests")
     parser.add_argument("--json", type=Path, help="file for the outcomes")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="swarm-faults-") as temporary:
         trees = [Tree(Path(temporary) / str(k), asked.commit) for k in range(asked.processes)]
-        faults = list(enumerate(chosen(trees[0].folder / "swarm", asked.seed)))
+        faults = list(enumerate(chosen(trees[0].folder / "swarm", asked.seed))) if asked.again is None else []
+        asked.seen_by = {}
+        for number, fault, test in again(trees[0].folder, asked.again) if asked.again else ():
+            faults.append((number, fault))
+            asked.seen_by[number] = test
         if asked.only is not None:
-            faults = [faults[k] for k in asked.only]
+            faults = [(number, fault) for number, fault in faults if number in asked.only]
         if asked.sample is not None:
             faults = random.Random(asked.seed).sample(faults, asked.sample)
         if asked.list:
@@ -245,8 +262,12 @@ def _measure(trees: list[Tree], faults: list[tuple[int, Fault]], asked: argparse
                 number, fault = left.get_nowait()
                 rounds = [(shlex.split(asked.tests), asked.limit)]
                 if asked.nearest or asked.nearest_only:
-                    rounds.insert(0, (nearest(tree.folder, fault.file), asked.nearest_limit))
-                outcome = measured(tree, number, fault, rounds[:1] if asked.nearest_only else rounds, failing)
+                    near = (nearest(tree.folder, fault.file), asked.nearest_limit)
+                    rounds = [near] if asked.nearest_only else [near, *rounds]
+                # Its whole file: a test that is named by itself runs also where it is slow.
+                if file := asked.seen_by.get(number, "").partition("::")[0]:
+                    rounds.insert(0, ([file], asked.nearest_limit))
+                outcome = measured(tree, number, fault, rounds, failing)
                 with saying:
                     outcomes.append(outcome)
                     print(outcome, flush=True)

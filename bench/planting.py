@@ -126,6 +126,19 @@ def chosen(package: Path, seed: int) -> list[Fault]:
     return [fault for module, text in zip(taken, texts, strict=True) for fault in _five(module, text, draw)]
 
 
+def found_again(source: bytes, file: str, line: int, before: str, after: str) -> Fault | None:
+    r"""The fault that makes of one line another, nearest to where that was found; None where that line is gone.
+
+    Examples:
+        >>> print(found_again(b"a = 1\n\nb = a + 1\n", "module.py", 1, "b = a + 1", "b = a - 1"))
+        module.py:3 [sign] b = a + 1 → b = a - 1
+        >>> found_again(b"a = 1\n", "module.py", 1, "b = a + 1", "b = a - 1") is None
+        True
+    """
+    found = [one for one in sites(source, file) if (one.before, one.after) == (before, after)]
+    return min(found, key=lambda one: abs(one.line - line), default=None)
+
+
 def _five(module: list[Fault], source: bytes, draw: random.Random) -> list[Fault]:
     """Faults of a module: of each kind in turn, no two in one line."""
     kinds, five, lines = list(KINDS), [], set()

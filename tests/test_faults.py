@@ -1,6 +1,7 @@
 """Faults are planted as `bench/faults.py` says: each kind, in code alone, and the same for the same seed."""
 
 import ast
+import csv
 import os
 import shutil
 from pathlib import Path
@@ -97,6 +98,21 @@ def test_the_test_that_failed_is_read():
         faults._failed(failed + "FAILED tests/test_a.py::test_b[0] - assert 1 == 2\n") == "tests/test_a.py::test_b[0]"
     )
     assert faults._failed("tests/test_a.py::test_b PASSED [ 50%]\n") is None
+
+
+def test_faults_of_a_table_are_found_where_their_lines_are_now(tmp_path, capsys):
+    (tmp_path / "module.py").write_text("\n\n" + CODE)
+    fault = planting.sites(CODE.encode(), "module.py")[0]
+    table = tmp_path / "table.csv"
+    with table.open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["number", "file", "line", "kind", "before", "after", "seen by"])
+        rows.writerow([3, fault.file, fault.line, fault.kind, fault.before, fault.after, "tests/test_a.py::test_b"])
+        rows.writerow([4, fault.file, fault.line, fault.kind, "x = 1", "x = 2", ""])
+    ((number, found, test),) = faults.again(tmp_path, table)
+    assert (number, found.line, test) == (3, fault.line + 2, "tests/test_a.py::test_b")
+    assert (found.before, found.after) == (fault.before, fault.after)
+    assert "4 is gone: module.py has no line x = 1" in capsys.readouterr().out
 
 
 def test_nearest_tests_of_a_module():

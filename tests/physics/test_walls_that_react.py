@@ -101,6 +101,12 @@ def test_impacts_count_the_digits_of_pi(digits, impacts):
     assert result.observables["energy_error"].max() <= 1e-14
 
 
+def test_half_of_the_impacts_come_before_the_wall_is_nearest():
+    result = run(*galperin(3), until=1.0, compile="never")
+    assert result.observables["impacts"][-1] == 1570
+    assert result.observables["energy_error"].max() <= 1e-14
+
+
 def test_galperin_unfolded():
     """In the coordinates sqrt(m) x the motion is a straight line in a wedge, and its end has a closed form."""
     digits, until = 2, 5.0
