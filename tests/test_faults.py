@@ -101,7 +101,8 @@ def test_the_test_that_failed_is_read():
 
 
 def test_faults_of_a_table_are_found_where_their_lines_are_now(tmp_path, capsys):
-    (tmp_path / "module.py").write_text("\n\n" + CODE)
+    (tmp_path / "swarm").mkdir()
+    (tmp_path / "swarm" / "moved.py").write_text("\n\n" + CODE)
     fault = planting.sites(CODE.encode(), "module.py")[0]
     table = tmp_path / "table.csv"
     with table.open("w", newline="") as file:
@@ -110,9 +111,9 @@ def test_faults_of_a_table_are_found_where_their_lines_are_now(tmp_path, capsys)
         rows.writerow([3, fault.file, fault.line, fault.kind, fault.before, fault.after, "tests/test_a.py::test_b"])
         rows.writerow([4, fault.file, fault.line, fault.kind, "x = 1", "x = 2", ""])
     ((number, found, test),) = faults.again(tmp_path, table)
-    assert (number, found.line, test) == (3, fault.line + 2, "tests/test_a.py::test_b")
+    assert (number, found.file, found.line, test) == (3, "swarm/moved.py", fault.line + 2, "tests/test_a.py::test_b")
     assert (found.before, found.after) == (fault.before, fault.after)
-    assert "4 is gone: module.py has no line x = 1" in capsys.readouterr().out
+    assert "4 is gone: no module has the line x = 1" in capsys.readouterr().out
 
 
 def test_nearest_tests_of_a_module():
