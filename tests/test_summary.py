@@ -51,7 +51,7 @@ def test_sliding_and_wall_heat_are_told(path):
     observed(path, **LASTING)
     rows, told = summary.of_trajectory(path), summary.numbers(path)
     assert rows["sliding"] == "12 at the end, 3.4 s in all"
-    assert rows["wall heat"] == "0.75 J of surface 0 and -0.5 J of surface 1"
+    assert rows["wall heat"] == "surface 0: 0.75 J, surface 1: -0.5 J"
     assert rows["balance of energy"].startswith("✓ closes to 0 of what moved")
     assert [told[name] for name in YOUNGER] == [12, 3.4, [0.75, -0.5]]
     assert told["energy_drift"] == 0.0
@@ -89,7 +89,7 @@ def test_the_work_of_walls_is_told(tmp_path, path):
     file = tmp_path / "piston.h5"
     result = swarm.simulate(scene, start, swarm.Impact(), until=1.0, every=0.5, trajectory=file, compile="never")
     rows, told = summary.of_trajectory(file), summary.numbers(file)
-    assert rows["wall work"] == summary.of_result(result, None)["wall work"] == "3 J of surface 1"
+    assert rows["wall work"] == summary.of_result(result, None)["wall work"] == "surface 1: 3 J"
     assert rows["balance of energy"].startswith("✓ closes to 0 of what moved")
     assert told["wall_work"] == [0.0, 3.0]
     assert told["energy_drift"] == 0.0

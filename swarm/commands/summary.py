@@ -38,10 +38,10 @@ def numbers(trajectory: Path) -> dict[str, Any]:
 
 
 def _at_the_end(seen: dict[str, Any], name: str) -> Any:
-    """An observable at the end, or its largest value; 0 or [] where a file of an older version has none."""
+    """An observable at the end, or its largest value; 0 or [] if a file of an older version does not have it."""
     one = OBSERVABLES[name]
     if name not in seen:
-        return [] if one.axes else 0
+        return [] if one.axes else 0 if one.unit == "1" and one.joined == "sum" else 0.0
     return (np.max(seen[name]) if one.joined == "largest" else seen[name][-1]).tolist()
 
 

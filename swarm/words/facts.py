@@ -231,12 +231,12 @@ def of_numbers(seen: dict[str, Any]) -> list[Statement]:
     for name, one in OBSERVABLES.items():
         if name in seen and len(one.axes) == 1 and one.axes[0] in _NUMBERED and one.joined == "sum":
             each = [
-                f"{many(value) if one.unit == '1' else amount(value, one.unit)} of {one.axes[0]} {k}"
+                f"{one.axes[0]} {k}: {many(value) if one.unit == '1' else amount(value, one.unit)}"
                 for k, value in enumerate(np.asarray(seen[name][-1]).tolist()) if value
             ]  # fmt: skip
             more = [f"{len(each) - _MOST + 1} more"] if len(each) > _MOST else []
             if each:
-                stated.append(Statement(name.replace("_", " "), listed([*each[: _MOST - len(more)], *more])))
+                stated.append(Statement(name.replace("_", " "), ", ".join([*each[: _MOST - len(more)], *more])))
     return stated
 
 

@@ -120,7 +120,7 @@ def test_tables_and_arrays(path):
         np.testing.assert_array_equal(dataset.birth_time.values[n:], TIMES)
         assert dataset.born.dims == ("time", "source")
         told = facts.of_trajectory(trajectory)
-    assert told["born"] == "4 of source 0"
+    assert told["born"] == "source 0: 4"
     assert "4 of them from sources" in told["particles"]
     found = numbers(path)
     assert found["born"] == [4]
