@@ -1,17 +1,27 @@
 """Summaries show what lasts of contacts, and the heat of walls, only where there is some."""
 
+import json
+import re
+from html import unescape
+
 import h5py
 import numpy as np
 import pytest
 from conftest import edited
+from pages import Read
 
 import swarm
 from swarm import observables
 from swarm.commands import summary
+from swarm.common.catalog import OBSERVABLES
+from swarm.pages import pictures as page_pictures
 from swarm.pictures import graphs, plots, series
 from swarm.recording import playback, recorded, sheet
 from swarm.recording import writer as recording
+from swarm.words import facts, verdicts
 from swarm.words.amounts import plain
+from swarm.words.content import content_of
+from swarm.words.statements import rows_of
 
 HOT = swarm.Scene([swarm.Sphere(0.5, temperature=300.0), swarm.Sphere(0.2, side="outside")])
 FRAMES = 3
@@ -164,3 +174,62 @@ def test_info_and_the_end_of_a_run_say_whether_it_went_well(tmp_path):
     assert "Sphere(" not in " ".join(rows.values())
     observed(file, energy_error=1e-3)
     assert summary.of_trajectory(file)["energy"].startswith("✗ not kept")
+
+
+def test_every_printer_reads_one_list(tmp_path, monkeypatch):
+    """Files, results, notebooks, pages, pictures and recordings make the same statements, without Python in them."""
+    monkeypatch.setattr(page_pictures, "of_series", lambda content: [])
+    monkeypatch.setattr(page_pictures, "of_places", lambda content: [])
+    file = tmp_path / "run.h5"
+    lossy = swarm.Box((0.5, 0.5, 0.5), restitution=0.9, openings=[swarm.Sphere(0.2, (0.0, 0.0, -0.5))])
+    mouth = swarm.Counter(swarm.Plane((0.0, 0.0, -1.0), 0.4), inside=swarm.Sphere(0.2, (0.0, 0.0, -0.4)))
+    scene = swarm.Scene([lossy, swarm.Sphere(0.2, side="outside", temperature=1.0)], gravity=(0.0, 0.0, -9.81))
+    start = swarm.fill(scene, 30, speed=2.0, seed=1)
+    result = swarm.simulate(
+        scene, start, swarm.Impact(), until=1.0, every=0.25, trajectory=file, counters=[mouth], compile="never",
+    )  # fmt: skip
+    with swarm.load(file) as trajectory:
+        listed = facts.of_content(content_of(trajectory))
+        page = Read(trajectory.report().html)
+        told = verdicts.marked(content_of(trajectory))
+    rows = rows_of(listed)
+    assert len(rows) == len(listed)
+    assert {"surface 0, box", "counter 0", "balance of energy", "particles", "wall heat"} <= set(rows)
+    assert rows["counter 0"].startswith("a plane of offset 0.4 m, normal along -z, within a sphere of radius 0.2 m")
+    assert not re.search(r"\w\(\w+=|[\[\]{}<>]|None|True|False|array|  ", " ".join(rows.values()))
+    assert summary.of_file(file).items() >= rows.items() <= summary.of_result(result, None).items()
+    assert {f"{text[:1]} {label}: {text[2:]}" for label, text in rows.items() if text[0] in "✓✗·"} >= set(told)
+    html = result._repr_html_()
+    texts = " ".join(" ".join(page.texts.values()).split())
+    for one in listed:
+        assert one.text in unescape(html)
+        assert " ".join(one.text.split()) in texts
+
+
+def test_a_table_has_a_few_of_many_surfaces(tmp_path):
+    """And a page all of them; the numbers of surfaces likewise."""
+    scene = swarm.Scene([swarm.Sphere(1.0, (3.0 * k, 0.0, 0.0), side="outside") for k in range(12)], plane="z")
+    start, file = swarm.Particles([-2.0, 0.0, 0.0], [1.0, 0.0, 0.0]), tmp_path / "run.h5"
+    swarm.simulate(scene, start, swarm.Impact(), until=2.0, trajectory=file, compile="never")
+    with edited(file) as stored:
+        stored["observables/impulse/value"][:] = 1.5
+    rows = summary.of_file(file)
+    assert [name for name in rows if name.startswith("surface ")] == [f"surface {k}, disc {k + 1}" for k in range(7)]
+    assert rows["more surfaces"] == "5"
+    assert rows["impulse"].endswith("surface 6: 1.5 N s, 5 more")
+    with swarm.load(file) as trajectory:
+        assert sum(one.label.startswith("surface ") for one in facts.of_setting(content_of(trajectory))) == 12
+
+
+def test_the_numbers_of_json_have_their_types(path):
+    """Also where a file of an older version does not have them."""
+    with h5py.File(path, "r+") as file:
+        for name in ("sliding", "sliding_time", "wall_heat"):
+            del file[f"observables/{name}"]
+    told = summary.numbers(path)
+    floats = {"time", "energy_drift", *(name for name in told if name in OBSERVABLES and not OBSERVABLES[name].axes)}
+    counts = {"impacts", "sliding", "escaped", "unconverged"}
+    assert {name: type(told[name]) for name in counts} == dict.fromkeys(counts, int)
+    assert {name: type(told[name]) for name in floats - counts} == dict.fromkeys(floats - counts, float)
+    assert told["wall_heat"] == told["born"] == []
+    assert json.loads(json.dumps(told)) == told

@@ -111,6 +111,8 @@ OBSERVABLES: dict[str, Observable] = {
 CHUNK_SUMS = "chunk_sums"
 NAMES = frozenset((*OBSERVABLES, CHUNK_SUMS))
 MAIN = tuple(name for name, one in OBSERVABLES.items() if one.main)
+# The errors that every run has: 0, or those of round-off, if all went well.
+ERRORS = tuple(name for name, one in OBSERVABLES.items() if one.every and one.joined == "largest")
 
 
 def may_be_nan(name: str) -> bool:

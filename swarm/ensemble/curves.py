@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.catalog import MAIN, NAMES, OBSERVABLES
+from ..common.catalog import ERRORS, MAIN, NAMES, OBSERVABLES
 from ..pages.pictures import PagePicture, svg
 from ..pictures import style
 from ..words.amounts import plain
@@ -13,7 +13,7 @@ from .folder import SweepFolder
 # Graphs of each parameter, curves of another parameter in one, and values of a parameter that are numbers on an axis.
 _MOST, _CURVES, _LABELS = 6, 6, 12
 # Numbers that differ by less, as a part of the largest, are one; errors below are those of round-off.
-_SAME, _ROUND_OFF, _ERRORS = 1e-9, 1e-12, ("energy_error", "max_penetration")
+_SAME, _ROUND_OFF = 1e-9, 1e-12
 _REPEATS = "seed"
 
 
@@ -31,7 +31,7 @@ def main_observables(sweep: SweepFolder) -> list[str]:
     columns = {name: _numbers([row.get(name) for row in sweep.rows]) for name in sweep.observables}
     columns = {name: values[np.isfinite(values)] for name, values in columns.items()}
     found = [name for name, values in columns.items() if len(values) and _differ(values)]
-    found = [name for name in found if name not in _ERRORS or columns[name].max() > _ROUND_OFF]
+    found = [name for name in found if name not in ERRORS or columns[name].max() > _ROUND_OFF]
     own = [name for name in found if not any(name == known or name.startswith(f"{known}_") for known in NAMES)]
     told = sorted((name for name in found if _stem(name) in MAIN), key=lambda name: MAIN.index(_stem(name)))
     chosen: list[str] = []
@@ -53,9 +53,7 @@ def _alike(one: Any, other: Any) -> bool:
 def worst(sweep: SweepFolder) -> list[tuple[str, str]]:
     """The largest error of the energy and the largest penetration of all runs, as far as these have them."""
     told = []
-    for name, what, unit in zip(
-        _ERRORS, ("largest error of the energy", "largest penetration"), ("", "m"), strict=True
-    ):
+    for name, what, unit in zip(ERRORS, ("largest error of the energy", "largest penetration"), ("", "m"), strict=True):
         values = {str(row["file"]): row[name] for row in sweep.rows if isinstance(row.get(name), (int, float))}
         if values:
             file = max(values, key=lambda file: values[file])

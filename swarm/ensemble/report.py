@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from ..common.catalog import ERRORS
 from ..common.checks import flag, path_of
 from ..common.extras import needed_by
 
@@ -94,7 +95,7 @@ def of_folder(folder: Path, place: Path) -> "Page":
     )
     failed = ["error"] * ("failed" in states)
     shown = [*sweep.parameters, "state", *failed, "wall_time", *curves.main_observables(sweep)]
-    shown += [one for one in ("energy_error", "max_penetration") if one in sweep.observables and one not in shown]
+    shown += [one for one in ERRORS if one in sweep.observables and one not in shown]
     page = filled(
         "sweep.html.j2",
         title=title,

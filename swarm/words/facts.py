@@ -53,7 +53,7 @@ def of_result(result: Any) -> dict[str, str]:
     stated = of_content(content_of_result(result, "a summary"), _MOST) if known else of_numbers(seen)
     return {
         **rows_of(stated),
-        "wall time": f"{result.wall_time:.2f} s{compiled}, {rate:.3g} impacts/s{rest}",
+        "wall time": f"{result.wall_time:.2f} s{compiled}, {plain(float(f'{rate:.3g}'))} impacts/s{rest}",
         "trajectory": str(result.trajectory or "none"),
     }
 
