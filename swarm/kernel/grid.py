@@ -14,7 +14,7 @@ from .arrays import index
 from .gravity import Bounds, rise_time
 from .jit import Array, select
 from .record import Record
-from .vector import ZERO, Vec, vec
+from .vector import Vec, vec
 
 # A flight ends this part of a cell beyond the cell's wall, where no round-off takes it back; what reaches into a cell
 # is what comes nearer to it than twice that.
@@ -100,33 +100,30 @@ def entries_at(grid, r):
 
 
 class Block(Record):
-    """Cells from one place on, so many along x, y, z."""
+    """Cells from one place on, so many along each axis."""
 
-    x: int
-    y: int
-    z: int
-    along_x: int
-    along_y: int
-    along_z: int
+    place: Vec
+    along: Vec
 
 
 def block_of(grid, low, high):
     """The cells of the grid that a box with these corners reaches into."""
-    first, last = cell_of(grid, low).place, cell_of(grid, high).place
-    x, y, z = int(max(first.x, 0.0)), int(max(first.y, 0.0)), int(max(first.z, 0.0))
-    return Block(
-        x, y, z,
-        int(min(last.x, grid.shape.x - 1.0)) - x + 1,
-        int(min(last.y, grid.shape.y - 1.0)) - y + 1,
-        int(min(last.z, grid.shape.z - 1.0)) - z + 1,
-    )  # fmt: skip
+    return block_between(grid, cell_of(grid, low).place, cell_of(grid, high).place)
+
+
+def block_between(grid, first, last):
+    """The cells of the grid from one place to another one, which may be beyond its ends."""
+    place = Vec(*(int(max(one, 0.0)) for one in first))
+    ends = zip(place, last, grid.shape, strict=True)
+    return Block(place, Vec(*(int(min(one, count - 1.0)) - begin + 1 for begin, one, count in ends)))
 
 
 def over_entries(grid, block, found, ask, *given):
     """`found` after ask(found, m, *given) for each entry m of the cells of a block."""
-    for k in range(max(block.along_x, 0) * max(block.along_y, 0) * max(block.along_z, 0)):
-        x, y, z = k // (block.along_z * block.along_y), k // block.along_z % block.along_y, k % block.along_z
-        begin, end = entries_of(grid, int(number_of(grid.shape, block.x + x, block.y + y, block.z + z)))
+    place, along = block
+    for k in range(max(along.x, 0) * max(along.y, 0) * max(along.z, 0)):
+        x, y, z = k // (along.z * along.y), k // along.z % along.y, k % along.z
+        begin, end = entries_of(grid, int(number_of(grid.shape, place.x + x, place.y + y, place.z + z)))
         for entry in range(begin, end):
             found = ask(found, grid.entries[entry], *given)
     return found
@@ -140,11 +137,11 @@ def until_next(gravity, grid, cell, r, v):
 
     Of its acceleration there may be `Bounds` only.
     """
-    p, n = cell.place, grid.shape
-    x = _until_next_layer(gravity, 0, (grid.low.x, grid.width.x, grid.margin.x, n.x), p.x, r.x, v.x)
-    y = _until_next_layer(gravity, 1, (grid.low.y, grid.width.y, grid.margin.y, n.y), p.y, r.y, v.y)
-    z = _until_next_layer(gravity, 2, (grid.low.z, grid.width.z, grid.margin.z, n.z), p.z, r.z, v.z)
-    leaves = select(y < x, y, x)
+    pulls = 3 * (gravity,) if gravity is None or isinstance(gravity, Bounds) else gravity
+    layers = zip(grid.low, grid.width, grid.margin, grid.shape, strict=True)
+    flight = zip(layers, cell.place, r, v, pulls, strict=True)
+    x, y, z = (_until_next_layer(*one) for one in flight)
+    p, n, leaves = cell.place, grid.shape, select(y < x, y, x)
     in_x, in_y, in_z = _comes(x, p.x, n.x), _comes(y, p.y, n.y), _comes(z, p.z, n.z)
     enters = select(in_y > in_x, in_y, in_x)
     return select(cell.inside, select(z < leaves, z, leaves), select(in_z > enters, in_z, enters))
@@ -155,25 +152,23 @@ def _comes(time, place, count):
     return select((place >= 0.0) & (place < count), 0.0, time)
 
 
-def _until_next_layer(gravity, axis, cells, place, x, v):
-    """When a flight leaves its layer of cells, (low, width, margin, how many) of which are given.
+def _until_next_layer(layers, place, x, v, pull):
+    """When a flight leaves its layer of cells (low, width, margin, count); beside them, before when it is in none.
 
-    Of a flight beside them, before when it does not come in. Where of its acceleration there is only a bound, at the
-    soonest.
+    Where of its acceleration there is only a bound, at the soonest.
     """
-    low, width, margin, count = cells
-    if gravity is None:
+    low, width, margin, count = layers
+    if pull is None:
         never = select(v > 0.0, place >= count, place < 0.0)
         return select(never, np.inf, _until_edge((low, width, margin), place, place, x, v))
     among, below = (place >= 0.0) & (place < count), place < 0.0
     sign, face = select(below, 1.0, -1.0), select(below, low + margin, low + count * width - margin)
     b = 0.5 * v
-    if isinstance(gravity, Bounds):
+    if isinstance(pull, Bounds):
         # Whatever its direction
-        ahead = towards = back = 0.5 * gravity.acceleration
+        ahead = towards = back = 0.5 * pull.acceleration
     else:
-        a = 0.5 * (gravity.x if axis == 0 else gravity.y if axis == 1 else gravity.z)
-        ahead, towards, back = a, sign * a, -a
+        ahead, towards, back = 0.5 * pull, sign * (0.5 * pull), -(0.5 * pull)
     up = rise_time(
         select(among, x - (low + (place + 1.0) * width + margin), sign * (x - face)),
         select(among, b, sign * b),
@@ -185,19 +180,17 @@ def _until_next_layer(gravity, axis, cells, place, x, v):
 
 def until_out(gravity, grid, first, last, r, v):
     """When a flight among the cells from one place to another one has left these."""
-    pull = ZERO if gravity is None else gravity
-    is_straight, low, width, margin = gravity is None, grid.low, grid.width, grid.margin
-    x = _until_out_of_layers(is_straight, (low.x, width.x, margin.x), first.x, last.x, (r.x, v.x, pull.x))
-    y = _until_out_of_layers(is_straight, (low.y, width.y, margin.y), first.y, last.y, (r.y, v.y, pull.y))
-    z = _until_out_of_layers(is_straight, (low.z, width.z, margin.z), first.z, last.z, (r.z, v.z, pull.z))
+    layers = zip(grid.low, grid.width, grid.margin, strict=True)
+    pulls = (None, None, None) if gravity is None else gravity
+    x, y, z = (_until_out_of_layers(*one) for one in zip(layers, first, last, r, v, pulls, strict=True))
     sooner = select(y < x, y, x)
     return select(z < sooner, z, sooner)
 
 
-def _until_out_of_layers(is_straight, layers, first, last, flight):
-    """When a flight (x, v, pull) leaves layers of cells, and a margin. Branch-free, and with one root only."""
-    (low, width, margin), (x, v, pull) = layers, flight
-    if is_straight:
+def _until_out_of_layers(layers, first, last, x, v, pull):
+    """When a flight leaves layers of cells, and a margin. Branch-free, and with one root only."""
+    low, width, margin = layers
+    if pull is None:
         return _until_edge(layers, first, last, x, v)
     below, above = low + first * width - margin, low + (last + 1.0) * width + margin
     # Towards the side to which it is pulled it leaves, unless it leaves before through the other one.

@@ -39,14 +39,11 @@ def cells_of(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) 
     shape = np.where(endless, 1.0, np.maximum(np.rint(extent / max(side, np.finfo(np.float64).tiny)), 1.0))
     # A little wider than the bodies, so that a flight from outside comes in before it meets one.
     room = 4.0 * MARGIN * extent
-    before, behind = (room, room) if repeated is None else _room_up_to(repeated, first, last, room)
+    before = behind = room
+    if repeated is not None:
+        before, behind = np.where(first > repeated[0], room, 0.0), np.where(last < repeated[1], room, 0.0)
     width = np.where(endless, ENDLESS, (extent + before + behind) / shape)
     return np.where(endless, -0.5 * ENDLESS, first - before), shape, width
-
-
-def _room_up_to(repeated: tuple[Floats, Floats], first: Floats, last: Floats, room: Floats) -> tuple[Floats, Floats]:
-    """The room before and behind the bodies, none at the faces of a cell that repeats."""
-    return np.where(first > repeated[0], room, 0.0), np.where(last < repeated[1], room, 0.0)
 
 
 def grid_of(
