@@ -14,7 +14,7 @@ from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
-from .arrays import FACE, RADIUS, X, vector_at
+from .arrays import FACE, RADIUS, X, set_vector, vector_at
 from .cell import nearest
 from .vessel import list_in_field
 
@@ -155,7 +155,5 @@ def list_walls(walls, faces, grains, near, skin):
     near.wall_first[len(walls.each)] = found
     for k in range(grains.place.shape[0]):
         i = index(k)
-        grains.listed[i, 0], grains.listed[i, 1], grains.listed[i, 2] = (
-            grains.place[i, X], grains.place[i, X + 1], grains.place[i, X + 2],
-        )  # fmt: skip
+        set_vector(grains.listed, i, 0, vector_at(grains.place, i, X))
     return found

@@ -108,11 +108,7 @@ class Block(Record):
 
 def block_of(grid, low, high):
     """The cells of the grid that a box with these corners reaches into."""
-    return block_between(grid, cell_of(grid, low).place, cell_of(grid, high).place)
-
-
-def block_between(grid, first, last):
-    """The cells of the grid from one place to another one, which may be beyond its ends."""
+    first, last = cell_of(grid, low).place, cell_of(grid, high).place
     place = Vec(*(int(max(one, 0.0)) for one in first))
     ends = zip(place, last, grid.shape, strict=True)
     return Block(place, Vec(*(int(min(one, count - 1.0)) - begin + 1 for begin, one, count in ends)))

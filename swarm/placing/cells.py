@@ -14,7 +14,7 @@ from ..kernel import cache
 from ..kernel.arrays import index
 from ..kernel.grid import layer_of, number_of, wrapped
 from ..kernel.jit import Array, kernel, outlined, select
-from ..kernel.vector import Vec, column
+from ..kernel.vector import Vec, column, put
 from ..state import Floats
 
 # So few places are looked at in plain Python, before a compiler is done.
@@ -98,9 +98,7 @@ def _met(cells, r, radius, stops):
     for k in range(cells.begin.size):
         level = index(k)
         shape = Vec(cells.shape[level, 0], cells.shape[level, 1], cells.shape[level, 2])
-        x, x_end = _around(cells, level, 0, r.x)
-        y, y_end = _around(cells, level, 1, r.y)
-        z, z_end = _around(cells, level, 2, r.z)
+        (x, x_end), (y, y_end), (z, z_end) = (_around(cells, level, axis, one) for axis, one in enumerate(r))
         for i in range(x, x_end):
             for j in range(y, y_end):
                 row = number_of(shape, wrapped(i, shape.x), wrapped(j, shape.y), cells.begin[level])
@@ -130,9 +128,7 @@ def _enter(cells, i, r):
     x, y, z = _layer(cells, level, 0, r.x), _layer(cells, level, 1, r.y), _layer(cells, level, 2, r.z)
     shape = Vec(cells.shape[level, 0], cells.shape[level, 1], cells.shape[level, 2])
     cell = index(number_of(shape, x, y, z + cells.begin[level]))
-    cells.position[0, i] = r.x
-    cells.position[1, i] = r.y
-    cells.position[2, i] = r.z
+    put(cells.position, 0, i, r)
     cells.others[i] = cells.first[cell]
     cells.first[cell] = i
 
@@ -151,7 +147,7 @@ def _enter_free(cells, points, numbers, done):
     for i in range(points.shape[1]):
         number = index(numbers[i])
         if not done[number]:
-            r = Vec(points[0, i], points[1, i], points[2, i])
+            r = column(points, 0, i)
             count, _deepest, _most = _met(cells, r, cells.radius[number], True)
             if count == 0:
                 _enter(cells, number, r)

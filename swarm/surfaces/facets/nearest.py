@@ -44,7 +44,7 @@ def nearest(facets, mesh, points, found):
     for i in range(points.shape[1]):
         r = column(points, 0, i)
         near = _nearest(facets, mesh, r)
-        normal, height = _normal(facets.table, index(int(near.which))), near.height(r)
+        normal, height = _row(facets.table, int(near.which)), near.height(r)
         away = norm(r - near.foot)
         sign = 1.0 if height > 0.0 else -1.0
         put(found, 0, i, (r - near.foot) * (sign / away) if away > 0.0 and height != 0.0 else normal)
@@ -96,17 +96,13 @@ def _away(boxes, k, r):
     return square(Vec(max(x, 0.0), max(y, 0.0), max(z, 0.0)))
 
 
-def _normal(table, m):
-    return Vec(table[m, 0], table[m, 1], table[m, 2])
-
-
 @outlined
 def _nearer(facets, mesh, r, m, near):
     """The nearer one of the nearest triangle so far and this one; both, where they meet at the foot."""
     vertices, triangles = mesh[0], mesh[1]
-    a, b, c = (_corner(vertices, triangles[m, k]) for k in range(3))
+    a, b, c = (_row(vertices, triangles[m, k]) for k in range(3))
     foot = _foot(r, a, b, c)
-    away, normal = square(r - foot), _normal(facets.table, m) * _angle_at(foot, a, b, c)
+    away, normal = square(r - foot), _row(facets.table, m) * _angle_at(foot, a, b, c)
     if near.square < math.inf and square(foot - near.foot) <= _SAME * near.square:
         return NearestTriangle(near.square, near.foot, near.which, near.normal + normal)
     return NearestTriangle(away, foot, float(m), normal) if away < near.square else near
@@ -121,9 +117,9 @@ def _angle_at(foot, a, b, c):
     return np.arctan2(norm(cross(one, other)), dot(one, other))
 
 
-def _corner(vertices, k):
+def _row(rows, k):
     k = index(k)
-    return Vec(vertices[k, 0], vertices[k, 1], vertices[k, 2])
+    return Vec(rows[k, 0], rows[k, 1], rows[k, 2])
 
 
 def _foot(r, a, b, c):
