@@ -105,6 +105,33 @@ def test_a_run_that_is_halted_and_taken_over_has_the_same_bits(name):
     assert seen["energy_error"] < (1e-3 if name == "grains" else 1e-9)
 
 
+def in_pieces(halted):
+    """The arrays at the end of one frame, cut at two instants, and the shares done at each halt in a piece."""
+    run, shares = begun("doors"), []
+    run.observe()
+    while True:
+        # Once in each piece that is begun.
+        for one in [run] * halted:
+            switch = one._switch
+            one._switch = lambda instant, one=one, switch=switch: (switch(instant), one.halt())
+        if run.advance(1.0, 1.0):
+            break
+        shares.append(run.share_done(1.0))
+        with run:
+            arrays = {name: array.copy() for name, array in run.arrays().items()}
+        run = begun("doors")
+        run.restore(arrays, cut_short=True)
+    with run:
+        return {one: array.tobytes() for one, array in run.arrays().items()}, shares
+
+
+def test_a_frame_is_halted_in_each_of_its_pieces():
+    (whole, none), (halted, shares) = in_pieces(False), in_pieces(True)
+    assert none == []
+    assert shares == pytest.approx([0.0, 0.1, 0.45])
+    assert halted == whole
+
+
 @pytest.mark.parametrize("kind", dict.fromkeys(kind for kind, *_rest in CASES.values()))
 def test_an_engine_does_not_write_the_shell_again(kind):
     assert issubclass(kind, BaseRun)
