@@ -70,8 +70,8 @@ class BaseRun:
     _observed: Observed | None = None
     # What is no flight, of contacts that have lasted.
     _kinds: Set[int] = frozenset()
-    # The times at which frames are cut into pieces [s].
-    _instants: Sequence[float] = ()
+    # The times at which frames are cut into pieces [s]; None: they are not.
+    _instants: Sequence[float] | None = None
 
     def __init__(
         self, scene: Scene, method: Method, n: int, threads: int, tier: Tier, seeding: Seeding,
@@ -171,16 +171,16 @@ class BaseRun:
         Raises:
             RunError: a step failed.
         """
+        if self._instants is None:
+            return self._advance_piece(span, moment, writing, latest)
         times = self._times(moment)
         for k in range(int(self._done[0]), len(times) - 1):
             before, after = times[k : k + 2]
-            if self._instants:
-                span = after - before
-                if not self._cut_short:
-                    self._switch(before)
-                if self._impacts is not None:
-                    self._impacts.begin = before
-            if not self._advance_piece(span, after, writing, latest):
+            if not self._cut_short:
+                self._switch(before)
+            if self._impacts is not None:
+                self._impacts.begin = before
+            if not self._advance_piece(after - before, after, writing, latest):
                 return False
             self._done[0] = k + 1
         self._begun[0], self._done[0] = moment, 0
@@ -188,9 +188,8 @@ class BaseRun:
 
     def _times(self, end: float) -> list[float]:
         """The times between which the pieces of a frame are."""
-        begin = float(self._begun[0])
-        first, last = bisect.bisect_right(self._instants, begin), bisect.bisect_left(self._instants, end)
-        return [begin, *self._instants[first:last], end]
+        begin, instants = float(self._begun[0]), self._instants or ()
+        return [begin, *instants[bisect.bisect_right(instants, begin) : bisect.bisect_left(instants, end)], end]
 
     def _advance_piece(self, span: float, moment: float, writing: float, latest: float) -> bool:
         """Advance by a piece of a frame, as `advance` does by all of it."""
@@ -215,7 +214,7 @@ class BaseRun:
 
     def share_done(self, span: float) -> float:
         """The share of a frame that was cut short that is done, on average over the particles, or bodies."""
-        if not self._instants:
+        if self._instants is None:
             return self._share_done(span)
         k, times = int(self._done[0]), self._times(float(self._begun[0] + span))
         before, after = times[k : k + 2]
@@ -251,20 +250,21 @@ class BaseRun:
         """Observe a frame."""
         self._tier.kernel(observables.observe)(*self._observing())
         if self._ball_numbers is not None:
-            self._ball_numbers.frame(self.state, moment, self._summary()["kinetic_energy"])
+            self._ball_numbers.frame(self.state, moment, self._summed()["kinetic_energy"])
 
     def _observing(self, drawn: NDArray[Any] | None = None) -> tuple[Any, ...]:
         """Arguments of `observe`: of all chunks, or of the draws of a thread."""
         drawn = np.arange(len(self._partial)) if drawn is None else drawn
         return self._law, self._walls, self._gravity, self._seen_state(), drawn, self._size, self._partial
 
+    def _summed(self) -> dict[str, Any]:
+        """The observables that are sums over particles."""
+        return observables.summary(self._partial, self._seen_state(), self._owners, bool(self._kinds), self._parts)
+
     def _summary(self) -> dict[str, Any]:
-        """The observables that are sums over particles and walls."""
-        state = self._seen_state()
-        seen = self._with_stored(
-            observables.summary(self._partial, state, self._owners, bool(self._kinds), self._parts)
-        )
-        seen = seen if self._ball_numbers is None else self._ball_numbers.added(seen, state)
+        """The observables that are sums over particles, contacts and walls."""
+        seen = self._with_stored(self._summed())
+        seen = seen if self._ball_numbers is None else self._ball_numbers.added(seen, self.state)
         return seen if self._observed is None else with_walls(seen, self._observed)
 
     def seen(self) -> dict[str, Any]:

@@ -35,8 +35,9 @@ class DoorRun(Run):
     # --- At an instant -----------------------------------------------------------------------------------
 
     def _switch(self, instant: float) -> None:
-        k = bisect.bisect_left(self._instants, instant)
-        if k == len(self._instants) or self._instants[k] != instant:
+        instants = self._scene.instants
+        k = bisect.bisect_left(instants, instant)
+        if k == len(instants) or instants[k] != instant:
             return
         if (came := comers(self._scene, instant)).any():
             # Particles from sources are born later, where no wall is at that time.
