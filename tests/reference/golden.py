@@ -10,8 +10,8 @@ processor; what that bit changes by their ends is 1e-13, and 1e-8 where Uzawa's 
 tori, and of capsules and the drum that fall or slide, were written again when steps in lanes took the place of
 marches. Ten chords in walls whose steps are found by Newton's method were written again when a last step took them to
 round-off: 1.5e-13 at their ends.
-Eleven cells of points and walls with a mass were written again when a strike restored its energy as that of a ball does,
-`with_energy`: 1e-16 of the scene at their ends, and the energy of 186 464 impacts 8e-16 off in place of 1.2e-15.
+Eleven cells of points and walls with a mass were written again when a strike restored its energy as that of a ball
+does, `with_energy`: 1e-16 of the scene at their ends; the energy of 186 464 impacts is 8e-16 off, 1.2e-15 before.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,
