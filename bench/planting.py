@@ -38,8 +38,8 @@ GROUPS: dict[str, str] = {
     "motion": "",
     "pictures": "series|speeds",
     "placing": "",
-    "run": "base|counting|doors|engine|impacts|knows|measures|observed|overlaps|present|result|sequence|softness|state"
-    "|tally|turns",
+    "run": "base|counting|doors|engine|impacts|knows|measures|observed|overlaps|present|result|sequence|softness"
+    "|starting_state|tally|turns",
     "sources": "",
     "surfaces": "",
     "triangles": "cut|parts",

@@ -11,10 +11,10 @@ from .version import VERSION
 
 if TYPE_CHECKING:
     from .bodies.body import Body, Strain
+    from .bodies.copies import Bodies
     from .bodies.elastic import elastic
     from .bodies.placing import place
     from .bodies.shapes import chain, dumbbell, rigid, tetrahedron
-    from .bodies.state import Bodies
     from .common.frames import Frame
     from .ensemble.report import report
     from .ensemble.sweeping import sweep
@@ -74,7 +74,7 @@ _HOMES = {
     "bodies.elastic": ("elastic",),
     "bodies.placing": ("place",),
     "bodies.shapes": ("chain", "dumbbell", "rigid", "tetrahedron"),
-    "bodies.state": ("Bodies",),
+    "bodies.copies": ("Bodies",),
     "ensemble.report": ("report",),
     "ensemble.sweeping": ("sweep",),
     "errors": ("FileError", "CompleteError", "RunError", "SceneError", "SwarmError", "WallTimeError"),

@@ -24,7 +24,7 @@ from .surfaces import ALL_FIELDS
 from .surfaces.data.files import samples_of
 
 if TYPE_CHECKING:
-    from .bodies.state import Bodies
+    from .bodies.copies import Bodies
     from .bodies.table import Made
 
 _SCENE = ("gravity", "period", "plane", "pairs")

@@ -11,7 +11,7 @@ from test_sessions import stopped_at
 import swarm
 from swarm.methods import Penalty
 from swarm.run.engine import Run
-from swarm.run.state import Seeding
+from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched
 from swarm.surfaces.counter import checked_counters
 from swarm.surfaces.instant import side_of

@@ -19,7 +19,7 @@ from swarm.kernel.frozen import Frozen
 from swarm.kernel.trace import calls
 from swarm.kernel.trace.helpers import Helper
 from swarm.lanes import block
-from swarm.lanes.arrays import Lanes
+from swarm.lanes.lane_arrays import Lanes
 from swarm.run.machine import run_of
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of

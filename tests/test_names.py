@@ -3,7 +3,7 @@
 import ast
 import re
 import tokenize
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import pytest
@@ -50,6 +50,12 @@ def test_a_class_name_stands_once():
             if isinstance(node, ast.ClassDef):
                 found[node.name].append(str(path.relative_to(ROOT)))
     assert {name: places for name, places in found.items() if len(places) > 1} == {}
+
+
+def test_a_file_name_stands_at_most_twice():
+    """But for those that Python gives."""
+    found = Counter(path.name for path in ROOT.rglob("*.py") if not path.name.startswith("__"))
+    assert {name: count for name, count in found.items() if count > 2} == {}
 
 
 def test_texts_are_in_plain_words():

@@ -12,7 +12,7 @@ from swarm.common.status import Status
 from swarm.contact import events
 from swarm.kernel.arrays import next_of
 from swarm.kernel.jit import kernel
-from swarm.lanes import arrays as lanes
+from swarm.lanes import lane_arrays as lanes
 from swarm.lanes.share import Draws, Share, ThreadPlace
 from swarm.lanes.table import LANES
 from swarm.run.engine import Run

@@ -16,7 +16,7 @@ from swarm.run.machine import run_of
 from swarm.run.observed import balance
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
-from swarm.run.state import Seeding
+from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched, tally_of
 
 BOX, DOWN, ACROSS = swarm.Box((1.0, 1.0, 1.0)), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)

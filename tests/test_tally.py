@@ -11,7 +11,7 @@ from test_sessions import stopped_at
 import swarm
 from swarm.lanes.watching.counts import PARTS, Sums
 from swarm.run.engine import Run
-from swarm.run.state import Seeding
+from swarm.run.starting_state import Seeding
 from swarm.run.tally import Tally, Units, Watched, value_of
 
 # What slides takes a third of the steps of the default.

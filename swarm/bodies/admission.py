@@ -14,7 +14,7 @@ from ..run.options import RunOptions, Task
 from ..run.preflight.starts import require_inside
 from ..scene import Scene
 from . import passing
-from .state import Bodies
+from .copies import Bodies
 
 _LOG = logging.getLogger("swarm")
 # A body that turns farther in a step [rad], and how far it may.

@@ -14,17 +14,17 @@ from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import Particles
 from ..run.base import Arrays, BaseRun
-from ..run.state import UNSEEDED, Seeding
+from ..run.starting_state import UNSEEDED, Seeding
 from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
 from ..scene import Scene
 from ..state import Floats, State
+from .copies import Bodies
 from .energies import BodyEnergies, summed
 from .lanes.advance import advance_bodies
-from .lanes.arrays import BodyState, StepRule
+from .lanes.body_arrays import BodyState, StepRule
 from .lanes.contacts import MOST_CONTACTS
 from .numbers import led_points, most_contacts_of, own_surfaces, ties_of, touching_of, walls_of
-from .state import Bodies
 
 # Round-off of a position on a wall, as a part of the scene's size.
 _ROUND_OFF = 8.0 * np.finfo(np.float64).eps

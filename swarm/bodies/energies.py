@@ -10,7 +10,7 @@ from ..kernel.vector import column
 from ..scene import Scene
 from ..state import Floats
 from .body import Body
-from .lanes.arrays import Ties
+from .lanes.body_arrays import Ties
 from .numbers import led_points
 
 

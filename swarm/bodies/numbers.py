@@ -11,7 +11,7 @@ from ..state import Floats
 from ..surfaces.surface import Surface
 from .body import Body
 from .checked import Pairs
-from .lanes.arrays import Ties, Touching
+from .lanes.body_arrays import Ties, Touching
 from .lanes.contacts import MOST_CONTACTS
 from .lanes.penalty_contact import Soft
 

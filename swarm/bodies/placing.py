@@ -8,7 +8,7 @@ from ..placing.filling import bounding_box
 from ..scene import Scene
 from ..state import Floats
 from .body import Body
-from .state import Bodies
+from .copies import Bodies
 
 # Points whose gaps are found at once.
 _BATCH = 1 << 19

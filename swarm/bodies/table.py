@@ -22,9 +22,9 @@ from ..state import Floats
 from ..surfaces import ALL_SURFACES
 from . import room, shapes
 from .body import Body, Strain
+from .copies import Bodies
 from .elastic import block, elastic
 from .placing import place
-from .state import Bodies
 
 T = TypeVar("T")
 _MOTIONS = {"translation": Translation, "oscillation": Oscillation, "rotation": Rotation}

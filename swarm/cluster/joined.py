@@ -19,7 +19,7 @@ from ..common.snapshot import Snapshot
 from ..files.layout import UNIT, UNITS
 from ..files.trajectory import Trajectory, load
 from ..files.writer import TrajectoryWriter
-from ..lanes.arrays import booked
+from ..lanes.lane_arrays import booked
 from ..run.machine import Columns
 from ..run.measures import NONE, Measures
 from ..run.options import Task

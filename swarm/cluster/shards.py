@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bodies.body import Body
-from ..bodies.state import Bodies
+from ..bodies.copies import Bodies
 from ..errors import SceneError
 from ..files import marks, paths
 from ..methods.base import Method

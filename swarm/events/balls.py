@@ -8,8 +8,8 @@ from ..methods.base import Method
 from ..pairs import MOST_PRESSED
 from ..particles import Particles
 from ..placing.cells import overlaps_of
+from ..placing.fitting_shapes import require_shapes
 from ..placing.sequential import require_size
-from ..placing.shapes import require_shapes
 from ..run.preflight.starts import error_of
 from ..scene import Scene
 

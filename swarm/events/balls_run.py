@@ -16,7 +16,7 @@ from ..run import failures
 from ..run.base import Arrays, BaseRun
 from ..run.doors import comers, require_free
 from ..run.impacts import ThreadLog
-from ..run.state import Seeding
+from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..scene import Scene

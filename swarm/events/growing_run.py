@@ -6,7 +6,7 @@ import numpy as np
 
 from ..methods import Impact
 from ..particles import Particles
-from ..run.state import Seeding
+from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..scene import Scene
 from ..state import Floats

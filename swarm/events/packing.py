@@ -12,8 +12,8 @@ from ..errors import SceneError
 from ..motion import pose
 from ..particles import Particles
 from ..placing.filling import check_velocities, fill_velocities, room_of
+from ..placing.fitting_shapes import require_shapes
 from ..placing.sequential import VolumeBox, place_balls, require_size, told
-from ..placing.shapes import require_shapes
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces.surface import Surface

@@ -15,7 +15,7 @@ from ..particles import Particles
 from ..run import failures
 from ..run.base import Arrays, BaseRun, named
 from ..run.observed import Observed
-from ..run.state import Seeding
+from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..scene import Scene

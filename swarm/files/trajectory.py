@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..bodies.body import Body
-    from ..bodies.state import Bodies
+    from ..bodies.copies import Bodies
     from ..exports.exported import Progress
     from ..pages.html import Page
     from ..pictures.shown_film import Film

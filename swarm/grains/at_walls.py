@@ -7,7 +7,20 @@ from ..kernel.jit import outlined
 from ..kernel.vector import dot, square
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
-from .arrays import (
+from .contacts import (
+    Closing,
+    begin_solve,
+    changed,
+    damper,
+    improved,
+    lasting,
+    pressed,
+    relative,
+    size_of,
+    weight_of,
+    worse,
+)
+from .grain_arrays import (
     AFTER,
     BEFORE,
     BEGIN,
@@ -28,19 +41,6 @@ from .arrays import (
     X,
     set_vector,
     vector_at,
-)
-from .contacts import (
-    Closing,
-    begin_solve,
-    changed,
-    damper,
-    improved,
-    lasting,
-    pressed,
-    relative,
-    size_of,
-    weight_of,
-    worse,
 )
 from .vessel import met
 

@@ -6,9 +6,9 @@ from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
 from ..kernel.vector import dot, norm
 from ..surfaces.in_motion.posed import Posed
-from .arrays import AFTER, COAST, GAP, IMPULSE, PUSH, RADIUS, SIZE, START, vector_at
 from .at_walls import rising
 from .contacts import closing
+from .grain_arrays import AFTER, COAST, GAP, IMPULSE, PUSH, RADIUS, SIZE, START, vector_at
 from .vessel import met
 
 

@@ -15,7 +15,8 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import absolute, dot, square, total
-from .arrays import (
+from .cell import nearest
+from .grain_arrays import (
     AFTER,
     BEFORE,
     COAST,
@@ -36,7 +37,6 @@ from .arrays import (
     set_vector,
     vector_at,
 )
-from .cell import nearest
 
 _TINY = 1e-300
 # Where a damper acts, a change of an impulse counts so much less: what it takes is booked by what it did.

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import FACE
+from .grain_arrays import FACE
 
 # More than a field has.
 _FACES = 1 << 31

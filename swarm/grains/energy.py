@@ -3,8 +3,8 @@
 from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import norm
-from .arrays import BEFORE, RADIUS, X, vector_at
 from .contacts import apart
+from .grain_arrays import BEFORE, RADIUS, X, vector_at
 from .vessel import met
 
 

@@ -17,7 +17,9 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, cross, dot, square
 from ..surfaces.in_motion.posed import Posed
-from .arrays import (
+from .at_walls import press_at_wall, rising
+from .contacts import changed, press_pair, relative, size_of, worse
+from .grain_arrays import (
     AFTER,
     BEFORE,
     COAST,
@@ -33,8 +35,6 @@ from .arrays import (
     set_vector,
     vector_at,
 )
-from .at_walls import press_at_wall, rising
-from .contacts import changed, press_pair, relative, size_of, worse
 from .vessel import met
 
 # 1/(2/5), of the moment of inertia of a ball.

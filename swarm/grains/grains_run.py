@@ -14,17 +14,18 @@ from ..methods import Penalty
 from ..methods.base import Method
 from ..particles import Particles
 from ..run.base import Arrays, BaseRun, named
-from ..run.state import Seeding
+from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..scene import Scene
 from ..state import Balls, State
-from . import arrays, energy, lists, refused
-from .arrays import DONE, LOST, SINCE, SKIN, TAKEN, X
+from . import energy, lists, refused
+from . import grain_arrays as arrays
 from .booking import ContactTotals
-from .described import matter_of
 from .drags import kept_drags, set_drags
 from .faces import Fields
+from .grain_arrays import DONE, LOST, SINCE, SKIN, TAKEN, X
+from .matter import matter_of
 from .overlaps import COLUMNS
 from .step import MarchRule, World, march
 

@@ -14,8 +14,8 @@ from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
-from .arrays import FACE, RADIUS, X, set_vector, vector_at
 from .cell import nearest
+from .grain_arrays import FACE, RADIUS, X, set_vector, vector_at
 from .vessel import list_in_field
 
 # More cells than this along an axis, of which three numbers still make one.

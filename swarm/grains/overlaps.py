@@ -19,8 +19,8 @@ from ..surfaces.fields.members import member
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
-from .arrays import AFTER, BEFORE, BEGIN, END, RADIUS, X, vector_at
 from .contacts import apart
+from .grain_arrays import AFTER, BEFORE, BEGIN, END, RADIUS, X, vector_at
 from .vessel import is_of_faces, met
 
 # Columns of the failure of a step: the place of a ball in the order of cells, that of the other one or -1, the wall or

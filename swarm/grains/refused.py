@@ -10,8 +10,8 @@ from ..kernel.vector import dot, norm, square
 from ..methods import Penalty
 from ..pairs import MOST_PRESSED
 from ..scene import Scene
-from .arrays import AFTER, BEFORE, LIGHTNESS, RADIUS, X, vector_at
 from .contacts import apart
+from .grain_arrays import AFTER, BEFORE, LIGHTNESS, RADIUS, X, vector_at
 from .overlaps import BALL, OTHER, SIZE, WALL
 
 _TINY = float(np.finfo(np.float64).tiny)

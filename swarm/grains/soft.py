@@ -9,7 +9,7 @@ from ..methods import Penalty
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
-from .described import MOST_DAMPED, contact_time
+from .matter import MOST_DAMPED, contact_time
 
 _LOG = logging.getLogger("swarm")
 # Steps in the shortest contact: with fewer than the first there is a warning, which proposes the second.

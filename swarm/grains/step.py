@@ -13,11 +13,11 @@ from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
-from .arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall
 from .contacts import gather_pairs, push_pairs, sweep_pairs, worse
 from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
+from .grain_arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
 from .overlaps import look_at_pairs, look_at_wall
 
 # A sweep that changes no impulse by more than this part is the last one; also one that gains no more than half of the

@@ -20,7 +20,7 @@ from ..surfaces.fields.members import GrownLike, member
 from ..surfaces.outlines.round_side import RoundSide
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
-from .arrays import BEGIN, END, FACE, RADIUS, X, vector_at
+from .grain_arrays import BEGIN, END, FACE, RADIUS, X, vector_at
 
 
 class NearestMembers(Smooth):

@@ -12,9 +12,9 @@ from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import ZERO, column, put, square
 from ..surfaces.in_motion.moving import Carried
 from .accounts import book_step, lose
-from .arrays import booked, speed2_scale
 from .carried import NOT_CARRIED, carry
 from .escape import come_through, leave
+from .lane_arrays import booked, speed2_scale
 from .one_by_one import one_by_one
 from .periodic import return_particle
 from .watching.crossings import ParticleMoment

@@ -17,9 +17,9 @@ from ..kernel.jit import long_kernel, outlined, select
 from ..kernel.random import Stream
 from ..kernel.vector import column, put, square
 from .accounts import book, book_sent, book_work
-from .arrays import speed2_scale
 from .carried import is_carried
 from .escape import absorb, come_through, end_frame, leave
+from .lane_arrays import speed2_scale
 from .one_by_one import one_by_one
 from .watching import log as impact_log
 

@@ -20,8 +20,8 @@ from ..surfaces.periodic.period import on_time
 from ..surfaces.time_of_impact import flights
 from ..surfaces.time_of_impact.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.walls import Walls
-from .arrays import Flying
 from .from_cell_to_cell import go_through
+from .lane_arrays import Flying
 from .table import STRIDE, marked_lanes
 
 # Safe steps are for all lanes where more than this part of them needs one.

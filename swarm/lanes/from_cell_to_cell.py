@@ -12,8 +12,8 @@ from ..kernel.grid import cell_of, entries_of, until_next, until_out
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
-from ..surfaces.facets.cells import here_in, passes
-from ..surfaces.facets.room import FULL, KIND, all_away, room_of
+from ..surfaces.facets.facet_cells import here_in, passes
+from ..surfaces.facets.free_room import FULL, KIND, all_away, room_of
 from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact import flights
 from .table import STRIDE

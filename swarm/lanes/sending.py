@@ -16,9 +16,9 @@ from ..kernel.jit import select
 from ..kernel.random import Stream
 from ..kernel.vector import put, square
 from .accounts import add_work, book_sent
-from .arrays import Flying
 from .escape import absorb
 from .hit_member import of_lane
+from .lane_arrays import Flying
 from .table import LaneView, Rows, marked_lanes
 
 _named = Rows()

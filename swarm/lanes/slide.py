@@ -15,7 +15,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import column, put, square
 from ..surfaces.presence.rooms import inside_of
-from .arrays import speed2_scale
+from .lane_arrays import speed2_scale
 from .periodic import return_particle, return_sliding
 from .sliding import AGAIN, Slide
 from .sliding_ends import decide, set_going

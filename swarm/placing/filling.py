@@ -8,8 +8,8 @@ from ..errors import SceneError
 from ..particles import Particles
 from ..scene import Scene
 from ..state import Floats
+from .fitting_shapes import require_shapes
 from .sequential import VolumeBox, place_balls, require_packing, require_size
-from .shapes import require_shapes
 
 _BATCH = 1 << 18
 # The search ends after this many points if fewer than one in a million was admissible.

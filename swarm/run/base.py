@@ -21,7 +21,7 @@ from ..scene import Scene
 from ..state import State
 from . import failures
 from .observed import Observed, balance, gone_of, poses_of, with_walls
-from .state import Seeding
+from .starting_state import Seeding
 from .tally import Watched
 from .tiers import Tier
 from .watch import Watch

@@ -13,9 +13,9 @@ from .. import observables
 from ..common.status import Status
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, HELD, PHASES
 from ..contact.hold import One, Two
-from ..lanes import arrays as lanes
 from ..lanes import block as blocks
 from ..lanes import careful, contact_events, slide, sliding, table
+from ..lanes import lane_arrays as lanes
 from ..lanes.sending import Sending
 from ..lanes.share import Draws, Share, take
 from ..lanes.watching import log as impact_log
@@ -28,7 +28,7 @@ from .base import Arrays, BaseRun, named, result_of
 from .impacts import ThreadLog
 from .preflight.counting import counters_of, crossed_of
 from .present import Presence
-from .state import UNSEEDED, Seeding, begin, have_lasted, holders_of_resting, state_of
+from .starting_state import UNSEEDED, Seeding, begin, have_lasted, holders_of_resting, state_of
 from .tally import UNWATCHED, Watched
 from .tiers import Tier
 from .turns import End, Turns, left_behind

@@ -12,7 +12,7 @@ from .base import BaseRun
 from .doors import DoorRun
 from .engine import Run
 from .options import Task
-from .state import Seeding
+from .starting_state import Seeding
 from .tally import UNWATCHED, Watched
 
 

@@ -14,7 +14,7 @@ from ..scene import Scene
 from ..state import State
 from ..surfaces.wall_law import leave_of, mirrored, said_of, why_wrong
 from .preflight import softness
-from .state import Seeding
+from .starting_state import Seeding
 
 
 def of_frame(

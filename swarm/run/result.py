@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-    from ..bodies.state import Bodies
+    from ..bodies.copies import Bodies
     from ..pages.html import Page
     from ..pictures.shown_film import Film
     from ..words.content import Content

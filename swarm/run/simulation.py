@@ -20,7 +20,7 @@ from .result import Result
 from .session import Session
 
 if TYPE_CHECKING:
-    from ..bodies.state import Bodies
+    from ..bodies.copies import Bodies
 
 
 def simulate(  # noqa: PLR0913  the keywords are the public interface

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from ..common.status import Status
 from ..contact.events import ARRIVED, FLYING
-from ..lanes.arrays import Halted
+from ..lanes.lane_arrays import Halted
 from ..lanes.share import Draws
 from ..state import Contacts
 from .watch import Watch

@@ -7,7 +7,7 @@ import pytest
 from grains_runs import ROOM, cloud, ran
 
 import swarm
-from swarm.grains.described import damping_of
+from swarm.grains.matter import damping_of
 
 MASS, RADIUS, ALPHA, G = 0.3, 0.1, 2e4, 10.0
 FLOOR = (0.0, 0.0, -1.0)

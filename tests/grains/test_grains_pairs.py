@@ -7,7 +7,8 @@ import pytest
 from grains_runs import ROOM, cloud, ran
 
 import swarm
-from swarm.grains import arrays, lists
+from swarm.grains import grain_arrays as arrays
+from swarm.grains import lists
 from swarm.grains.cell import Lengths, nearest
 from swarm.kernel.vector import Vec
 

@@ -8,7 +8,7 @@ import swarm
 from swarm.errors import RunError, SceneError
 from swarm.files import checkpoint
 from swarm.grains.grains_run import GrainsRun
-from swarm.run.state import Seeding
+from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched
 
 METHOD = swarm.Penalty(0.002, 400.0, 1.5)

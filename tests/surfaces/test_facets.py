@@ -11,7 +11,7 @@ from swarm import scene_file
 from swarm.kernel.grid import until_out
 from swarm.kernel.vector import Vec
 from swarm.serialization import tables
-from swarm.surfaces.facets import room
+from swarm.surfaces.facets import free_room as room
 
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
 WIDTHS = (0.5, 1.0, 1.5)

@@ -9,7 +9,7 @@ from ...kernel.arrays import next_of, scratch
 from ...kernel.jit import long_kernel, select
 from ...kernel.vector import column
 from . import impact, impact_time, prescribed
-from .arrays import PACES, BodyLanes, HeldContacts, LaneNumbers, arrays_of_held, shapes_of_lanes
+from .body_arrays import PACES, BodyLanes, HeldContacts, LaneNumbers, arrays_of_held, shapes_of_lanes
 from .newton import BRIEF, solve
 from .penalty_contact import SoftContacts
 from .persistent_contact import HardContacts

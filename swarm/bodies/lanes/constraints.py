@@ -18,7 +18,7 @@ from typing import Any
 from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import column, dot, put, square
-from .arrays import BodyLanes, HeldContacts, LaneNumbers, StepRule, Ties, Touching
+from .body_arrays import BodyLanes, HeldContacts, LaneNumbers, StepRule, Ties, Touching
 
 # Where the relative error of |y|^2 would be below this after a correction, it is the last.
 _TOLERANCE = 1e-15

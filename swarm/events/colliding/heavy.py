@@ -12,7 +12,7 @@ from ...kernel.jit import Array, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO
 from ..reacting.freedoms import ParticleFlight
-from ..reacting.walls import first_hit, reach_of_all
+from ..reacting.strikes import first_hit, reach_of_all
 from .clock import LENGTH, moment_of
 from .rows import DUE, FLOATS, LEAVES, WALL
 from .window import UNKNOWN

@@ -5,7 +5,7 @@ from ...kernel.gravity import potential
 from ...kernel.jit import outlined, select
 from ...kernel.vector import ZERO, square
 from ..reacting.freedoms import TOO_LONG, TOO_SHORT, ParticleFlight
-from ..reacting.walls import all_stay, strike, with_energy
+from ..reacting.strikes import all_stay, strike, with_energy
 from .again import aim_again, queue_both
 from .aim import find_wall
 from .clock import EVENTS

@@ -16,7 +16,7 @@ from ...surfaces.walls import Walls
 from .freedoms import WIDTH, Freedoms, Shifted
 from .pendulum import TERMS, Hinged, Pendulum
 from .queue import SceneWalls
-from .walls import Reacting
+from .strikes import Reacting
 
 Floats = NDArray[np.float64]
 

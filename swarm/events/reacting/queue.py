@@ -19,7 +19,7 @@ from ...kernel.vector import ZERO, column, put
 from ...surfaces.in_motion.moving import Marched
 from ...surfaces.time_of_impact import flights, safe
 from .freedoms import ParticleFlight
-from .walls import all_stay, first_hit, reach_of_all, strike, with_energy
+from .strikes import all_stay, first_hit, reach_of_all, strike, with_energy
 
 # What is next for a particle besides the impact on a wall that reacts, whose number is 0 or more: nothing that was
 # found, so that it is looked at again.

@@ -14,7 +14,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, dot, norm, total
 from ..time_of_impact.course import rise_time
 from ..time_of_impact.march import LOOKS, SafeStep, lets_go
-from .numbers import CellNumbers, known, least_of
+from .sampled_numbers import CellNumbers, known, least_of
 
 _EPSILON = float(np.finfo(np.float64).eps)
 # A flight that is past the wall by so many times the round-off of its place is at it.

@@ -17,8 +17,8 @@ from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
 from . import spline
 from .arrays import read_samples
-from .cells import SampleCells, cells_of, eigenvalues, least_at_border
 from .flight import SampledNumbers
+from .sample_cells import SampleCells, cells_of, eigenvalues, least_at_border
 from .spline import Spline
 
 Floats = NDArray[np.float64]

@@ -12,10 +12,10 @@ from ...kernel.vector import Vec
 from ..balls.facet import RoundTriangle
 from ..fields.many import field_of
 from ..fields.members import Members
+from .free_room import CLOSED, FREE, KIND, rooms_of, with_blocks
 from .members import Facets
 from .mesh_files import Floats, Soup
 from .nearest import nearest
-from .room import CLOSED, FREE, KIND, rooms_of, with_blocks
 from .triangles import TriangleMesh as Closed
 
 # Bits of a place along each axis, by which triangles are sorted.

@@ -11,8 +11,8 @@ from ..fields.members import Members, member
 from ..presence.patched import Patched
 from ..shapes.plane import PlaneNumbers
 from ..time_of_impact import flights
-from .cells import here_in, passes
-from .room import FULL, KIND, room_of
+from .facet_cells import here_in, passes
+from .free_room import FULL, KIND, room_of
 
 # So many cells and blocks of cells are crossed before a flight is said to be free so far.
 _MOST = 4000

@@ -17,9 +17,9 @@ from ...kernel.vector import Vec
 from .. import rotation as rotations
 from ..fields.members import Members
 from ..surface import UNBOUNDED, Box, Surface, side_sign
-from .cells import cells_around
 from .faces import faces_of
 from .facet import FacetNumbers, Shared
+from .facet_cells import cells_around
 from .made import given_arrays, sorted_by_place, table_of_facets, triangles_of_balls, with_room
 from .members import Facets
 from .mesh_files import Floats, Indices, read_soup

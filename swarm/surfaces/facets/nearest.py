@@ -9,7 +9,7 @@ from ...kernel.grid import cell_of
 from ...kernel.jit import kernel, outlined
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, cross, dot, norm, put, square
-from .room import FREE, FULL, KIND
+from .free_room import FREE, FULL, KIND
 
 # Of a squared distance, the part by which those from two triangles that share a corner or an edge differ, and that of
 # the distance of their feet: round-off.

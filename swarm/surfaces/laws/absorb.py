@@ -5,7 +5,7 @@ from typing import Any
 from ...errors import SceneError
 from ...kernel.vector import dot
 from ..wall_law import Leave, WallLaw, mirrored
-from .numbers import require_magnitude, require_probability
+from .law_numbers import require_magnitude, require_probability
 
 
 class Absorb(WallLaw):

@@ -6,7 +6,7 @@ from typing import Any
 from ...kernel.random import circle, logarithm, tangents
 from ...kernel.vector import cross, dot
 from ..wall_law import WallLaw
-from .numbers import require_magnitude, require_part, require_probability
+from .law_numbers import require_magnitude, require_part, require_probability
 
 # The accommodation at which the tangential momentum is reversed; the variance sigma_t (2 - sigma_t) is 0 there.
 _REVERSED = 2.0

@@ -5,7 +5,7 @@ from typing import Any
 from ...kernel.jit import select
 from ...kernel.vector import either, norm
 from ..wall_law import WallLaw, mirrored
-from .numbers import require_probability
+from .law_numbers import require_probability
 
 
 class Lambert(WallLaw):

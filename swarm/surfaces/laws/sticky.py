@@ -1,7 +1,7 @@
 """A wall on which particles stay for a while."""
 
 from ..wall_law import Leave, WallLaw, mirrored
-from .numbers import require_magnitude
+from .law_numbers import require_magnitude
 
 
 class Sticky(WallLaw):

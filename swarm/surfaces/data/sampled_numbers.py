@@ -11,7 +11,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.vector import Symmetric, Vec, absolute, dot, lowest, norm, square, times, total
 from .. import contract
 from ..time_of_impact.course import rise_time
-from .cells import SPREAD, SampleCells
+from .sample_cells import SPREAD, SampleCells
 from .spline import Spline
 
 _EPSILON = float(np.finfo(np.float64).eps)
