@@ -122,7 +122,7 @@ def test_folders_can_be_looked_through():
 
 
 def test_the_page_has_the_folders_the_files_and_the_engines_that_there_are():
-    page = (PACKAGE.parent / "docs" / "architecture.md").read_text()
+    page = (PACKAGE.parent / "examples" / "guide" / "architecture.md").read_text()
     for path in re.findall(r"`((?:[a-z_]+/)*[a-z_]+(?:/|\.py))", page):
         with row(path):
             assert any(PACKAGE.rglob(path)) or (PACKAGE.parent / path).exists()
