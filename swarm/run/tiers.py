@@ -78,9 +78,15 @@ def spent(kinds: Iterable[str]) -> float:
 
 def _same_bits(numbers: Any) -> bool:
     """Whether the kernels of these numbers, nested tuples, are known to use + - * / and sqrt alone."""
-    if not isinstance(numbers, tuple):
-        return True
-    kind = type(numbers)
-    if getattr(kind, "calls_library", False) or kind.__module__.partition(".")[0] not in ("builtins", "swarm"):
-        return getattr(kind, "same_in_python", False)
-    return all(map(_same_bits, numbers))
+    rest = [numbers]
+    while rest:
+        one = rest.pop()
+        if not isinstance(one, tuple):
+            continue
+        kind = type(one)
+        if getattr(kind, "calls_library", False) or kind.__module__.partition(".")[0] not in ("builtins", "swarm"):
+            if not getattr(kind, "same_in_python", False):
+                return False
+        else:
+            rest.extend(one)
+    return True

@@ -731,15 +731,22 @@ def sentence(engine: str, capability: str) -> str | None:
     return one.sentence(engine) or (sentence(engine, one.within) if one.within else None)
 
 
+def _refused_by(engine: str) -> list[tuple[Capability, str]]:
+    return [(one, text) for one in CAPABILITIES if (text := one.sentence(engine)) is not None]
+
+
+# Of each engine what it does not support, in the order in which it is looked for, with the sentence.
+_REFUSED = {engine: _refused_by(engine) for engine in (*ENGINES, OTHER_POINTS, OTHER_BALLS, OTHER_BODIES)}
+
+
 def require_known(asked: Asked) -> None:
     """Raise a `SceneError` with the first sentence that applies to a run."""
-    engine, method = engine_of(asked), asked.method
+    method = asked.method
     fields = {"method": type(method).__name__, "whole": method, "step": getattr(method, "contact_step", 0.0)}
-    for capability in CAPABILITIES:
-        text = capability.sentence(engine)
-        for one in () if text is None else capability.found(asked):
+    for capability, text in _REFUSED[engine_of(asked)]:
+        for one in capability.found(asked):
             kind = type(one.get("got")).__name__
-            raise SceneError(text.format(**fields, kind=kind, **one))  # type: ignore[union-attr]
+            raise SceneError(text.format(**fields, kind=kind, **one))
 
 
 def markdown() -> list[str]:
