@@ -14,7 +14,7 @@ from ..surfaces.in_motion.moving import Carried
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.presence.patched import Patched
 from ..surfaces.walls import Field
-from .path import StepPath, at_part, bisected, members_of
+from .path import StepPath, at_part, first_true, members_of
 from .rooms import leaving
 
 _EPSILON = 2.220446049250313e-16
@@ -22,8 +22,6 @@ _EPSILON = 2.220446049250313e-16
 _ALONG = 1e-9
 # Fraction of the size of a scene that counts as 0.
 _NEAR = 1e-13
-# Places of a step that are looked at for another wall.
-_PLACES = 16
 
 
 def meets(walls, ends, active, path, near):
@@ -269,18 +267,12 @@ def _deep_after(body, path, near):
     """The part of a step after which it is deeper than `near` in a wall; 0 where it is there and goes in."""
     if body.depth(path.r0, 0.0) >= -near and body.pace_into(path) > 0.0:
         return 0.0
-    low, high = 0.0, math.inf
-    for k in range(1, _PLACES + 1):
-        s = k / _PLACES
-        if body.depth(at_part(path, s), s * path.h) > near:
-            high = s
-            break
-        low = s
-    return bisected(_is_deep, (body, path), low, high) if high < math.inf else body.straight(path)
+    time = first_true(_is_deep, (body, path), 0.0, near, 0.0)
+    return time if time < math.inf else body.straight(path)
 
 
-def _is_deep(body, path, s):
-    return body.depth(at_part(path, s), s * path.h) > 0.0
+def _is_deep(body, path, depth, part):
+    return body.depth(at_part(path, part), part * path.h) > depth
 
 
 def near(rules, r):

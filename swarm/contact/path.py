@@ -1,5 +1,6 @@
 """A step of a particle that slides: the places on its way."""
 
+import math
 from typing import Any
 
 from ..kernel.record import Record
@@ -7,8 +8,8 @@ from ..kernel.vector import Vec
 from ..surfaces.in_motion.moving import Moving
 from ..surfaces.in_motion.posed import Posed
 
-# Halvings down to an instant.
-_HALVINGS = 60
+# Places of a step that are looked at, and halvings down to an instant.
+PLACES, _HALVINGS = 16, 60
 
 
 class StepPath(Record):
@@ -21,11 +22,29 @@ class StepPath(Record):
     h: Any
 
 
-def bisected(has_happened, given, low, high):
-    """The part of a step from which on has_happened(*given, part), which it is at `high` and not at `low`."""
+def first_true(question, given, start, surely, about, closer=None):
+    """The part of a step, later than `start`, from which on question(*given, margin, part) is true; or infinity.
+
+    Equidistant parts of the step are asked with the margin `surely`. From the first one where the answer is yes, it is
+    bisected down to where the answer with the margin `about` changes. `closer`, if any, is a function
+    closer(*given, margin, low, part, high) that returns the part to ask in place of `part`, between two others.
+    """
+    low = start
+    for k in range(1, PLACES + 1):
+        part = k / PLACES
+        if part > start:
+            asked = part if closer is None else closer(*given, surely, low, part, min(k + 1, PLACES) / PLACES)
+            if question(*given, surely, asked):
+                return bisected(question, (*given, about), low, asked)
+            low = part
+    return math.inf
+
+
+def bisected(question, given, low, high):
+    """The part of a step from which on question(*given, part) is true, as it is at `high` and not at `low`."""
     for _i in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if has_happened(*given, middle):
+        if question(*given, middle):
             high = middle
         else:
             low = middle
