@@ -13,13 +13,11 @@ from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, square
 from ..surfaces.presence.patched import Patched
 from ..surfaces.presence.rooms import gap_in, gaps_in
-from .path import at_part, bisected, members_of
+from .path import at_part, first_true, members_of
 
 # Of the slack, how deep in another room what slides flies: at the start of a step, where a step is cut, and where it
 # must be. A step that is cut ends between the first two, to round-off.
 _FLIES, _CUT, _BEYOND = 1.0, 2.0, 4.0
-# Places of a step that are looked at.
-_PLACES = 16
 # The sine of the angle between walls that lie on each other.
 _PARALLEL = 1e-7
 
@@ -122,13 +120,8 @@ def are_one(walls, number, other, r):
 @outlined
 def part_until_end(walls, active, path, near, remaining):
     """The part of a step after which a wall that holds the particle is no longer there; infinite: it is all along."""
-    low = 0.0
-    for k in range(_PLACES + 1):
-        high = k / _PLACES
-        if _ends_at(walls, active, path, near, remaining, _BEYOND, high):
-            return bisected(_ends_at, (walls, active, path, near, remaining, _CUT), low, high)
-        low = high
-    return math.inf
+    given = walls, active, path, near, remaining
+    return 0.0 if _ends_at(*given, _BEYOND, 0.0) else first_true(_ends_at, given, 0.0, _BEYOND, _CUT)
 
 
 def _ends_at(walls, active, path, near, remaining, much, part):
@@ -206,19 +199,13 @@ def _left(walls, span, active, path, near, remaining, part):
     number = _wall_ahead(walls, span, active, path, near, remaining) if part == 0.0 else -1.0
     if number >= 0.0:
         return 0.0, number
-    low = part
-    for k in range(1, _PLACES + 1):
-        high = k / _PLACES
-        if high > part:
-            if _deepest(walls, span, active, path, remaining, high)[0] > near:
-                left = bisected(_is_out, (walls, span, active, path, remaining), low, high)
-                return left, _deepest(walls, span, active, path, remaining, left)[1]
-            low = high
-    return math.inf, -1.0
+    given = walls, span, active, path, remaining
+    left = first_true(_is_out, given, part, near, 0.0)
+    return left, _deepest(*given, left)[1] if left < math.inf else -1.0
 
 
-def _is_out(walls, span, active, path, remaining, part):
-    return _deepest(walls, span, active, path, remaining, part)[0] > 0.0
+def _is_out(walls, span, active, path, remaining, depth, part):
+    return _deepest(walls, span, active, path, remaining, part)[0] > depth
 
 
 @outlined
