@@ -13,12 +13,12 @@ from ..surfaces.walls import Field
 from .crossing import block_of_path
 from .doorways import is_pressed, leads_on, lets_through
 from .events import TOUCH
-from .path import at_part, bisected
+from .path import PLACES, at_part, first_true
 from .reflection import relative, wall_velocity
 from .rooms import has_ended
 
-# Places of a step between which the distance to an opening has one least value, and steps of the search for it.
-_PLACES, _THIRDS = 16, 80
+# Steps of the search for the least distance to an opening between three places of a step.
+_THIRDS = 80
 # The sine of the angle between walls that hold a particle as one.
 _PARALLEL = 1e-7
 
@@ -150,14 +150,10 @@ def part_until_open(openings, rules, walls, active, path, near):
 def _part_uncovered(openings, rules, walls, wall, path, near):
     """`part_until_open` of one wall. If its opening does not let the particle out, the rest of the step is examined."""
     low = _part(openings, wall, path, near)
-    if not low < math.inf or _lets_out_at(openings, rules, walls, wall, path, near, low):
+    given = openings, rules, walls, wall, path
+    if not low < math.inf or _lets_out_at(*given, near, low):
         return low
-    for k in range(1, _PLACES + 1):
-        high = k / _PLACES
-        if high > low and _lets_out_at(openings, rules, walls, wall, path, near, high):
-            return bisected(_lets_out_at, (openings, rules, walls, wall, path, near), low, high)
-        low = max(low, high)
-    return math.inf
+    return first_true(_lets_out_at, given, low, near, near)
 
 
 def _lets_out_at(openings, rules, walls, wall, path, near, part):
@@ -195,25 +191,17 @@ def _way_into_body(first, m, members, path, near):
 @outlined
 def _way_in(volume, path, near):
     """`_way_into` of one volume, whose distance is looked at at some places of the step and where it is least."""
-    reach = _reach(path)
-    if not outside(volume, path.r1) <= reach:
+    if not outside(volume, path.r1) <= _reach(path):
         return math.inf
-    last = 0.0
-    for k in range(_PLACES + 1):
-        place = k / _PLACES
-        here = outside(volume, at_part(path, place))
-        if here <= reach / _PLACES and not here < -near:
-            place = _nearest(volume, path, last, min(k + 1, _PLACES) / _PLACES)
-            here = outside(volume, at_part(path, place))
-        if here < -near:
-            return bisected(_is_in, (volume, path), last, place)
-        last = k / _PLACES
-    return math.inf
+    given = volume, path
+    return 0.0 if _is_in(*given, near, 0.0) else first_true(_is_in, given, 0.0, near, 0.0, _nearest)
 
 
-@outlined
-def _nearest(volume, path, low, high):
-    """The part of a step at which it is nearest to a volume, between two others."""
+def _nearest(volume, path, near, low, part, high):
+    """The part of a step at which it is nearest to a volume, between two others, if it may be in it there."""
+    here = outside(volume, at_part(path, part))
+    if here < -near or not here <= _reach(path) / PLACES:
+        return part
     for _third in range(_THIRDS):
         one, other = low + (high - low) / 3.0, high - (high - low) / 3.0
         if outside(volume, at_part(path, one)) <= outside(volume, at_part(path, other)):
@@ -223,5 +211,5 @@ def _nearest(volume, path, low, high):
     return 0.5 * (low + high)
 
 
-def _is_in(volume, path, part):
-    return outside(volume, at_part(path, part)) <= 0.0
+def _is_in(volume, path, depth, part):
+    return outside(volume, at_part(path, part)) <= -depth

@@ -35,12 +35,12 @@ def first_true(question, given, start, surely, about, closer=None):
         if part > start:
             asked = part if closer is None else closer(*given, surely, low, part, min(k + 1, PLACES) / PLACES)
             if question(*given, surely, asked):
-                return bisected(question, (*given, about), low, asked)
+                return _bisected(question, (*given, about), low, asked)
             low = part
     return math.inf
 
 
-def bisected(question, given, low, high):
+def _bisected(question, given, low, high):
     """The part of a step from which on question(*given, part) is true, as it is at `high` and not at `low`."""
     for _i in range(_HALVINGS):
         middle = 0.5 * (low + high)
