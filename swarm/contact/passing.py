@@ -7,7 +7,6 @@ from ..kernel.grid import over_entries
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, norm, square
 from ..surfaces.fields.members import member
-from ..surfaces.presence.doors import Timed
 from ..surfaces.presence.openings import Doorway, outside
 from ..surfaces.walls import Field
 from .crossing import block_of_path
@@ -121,8 +120,6 @@ def _may_lead_on(walls, wall, path):
 
 
 def _may_enter(volume, path, reach):
-    if isinstance(volume, Timed):
-        return volume.if_open(_may_enter(volume.volume, path, reach), False)
     if isinstance(volume, Field):
         return _may_enter_one(volume.members, path, reach)
     return outside(volume, path.r1) <= reach
@@ -171,8 +168,6 @@ def _part(openings, wall, path, near):
 
 def _way_into(volume, path, near):
     """The part of a step after which it is in a volume."""
-    if isinstance(volume, Timed):
-        return volume.if_open(_way_into(volume.volume, path, near), math.inf)
     if isinstance(volume, Field):
         return _way_into_any(volume.members, path, near)
     return _way_in(volume, path, near)

@@ -1,8 +1,8 @@
 """Doors: openings that are open, and walls that are there, between some times only.
 
 Kernels do not depend on these times. A run cuts its frames at the instants at which something opens, shuts, comes or
-goes. From one instant to the next a number says of each such wall whether it is there, and of each such volume whether
-it is open.
+goes. From one instant to the next a number says of each such wall whether it is there, and an opening that is shut
+opens no wall.
 """
 
 import bisect
@@ -16,7 +16,6 @@ from ...common import checks
 from ...errors import SceneError
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
-from ...kernel.record import Record
 from ..frames import Unturned
 from ..time_of_impact.course import Fall, Quartic, close
 from ..time_of_impact.rising import LevelStep
@@ -181,17 +180,6 @@ class Present(Unturned):
         return LevelStep(
             self._if_there(step.level, -1.0), self._if_there(step.half, 0.0), self._if_there(step.time, longest)
         )
-
-
-class Timed(Record):
-    """A volume in which a wall is open for a time, and whether it is open: 1 or 0."""
-
-    volume: Any
-    open: float
-
-    def if_open(self, value, other):
-        """A value where it is open, else the other one."""
-        return select(self.open > 0.0, value, other)
 
 
 def walls_then(surface: Any, moment: float, largest: float | None = None) -> tuple[Any, ...]:

@@ -27,7 +27,7 @@ from ..periodic.images import Lengths, images_of
 from ..surface import Surface
 from ..union import Joined
 from ..walls import Field, Walls, all_walls
-from .doors import Spans, Timed, is_there, was_there
+from .doors import is_there, was_there
 
 # Most walls that all openings of a scene may be compiled for.
 _MOST = 24
@@ -38,9 +38,9 @@ _REACH = 2.0
 class Opened(Record):
     """The volumes in which some walls are open."""
 
-    volumes: tuple[Any, ...]  # each `Walls`, a `Field`, or one of these that is `Timed`
+    volumes: tuple[Any, ...]  # each `Walls` or a `Field`
     first: float  # the number of the first of these walls
-    last: float  # that of the first after them
+    last: float  # that of the first after them; `first` while the volumes are shut: they open no wall then
 
     def is_of(self, wall):
         """Whether a wall is one of these."""
@@ -69,7 +69,7 @@ def openings_in(
 
 def compiled(openings: Sequence[Opened]) -> int:
     """The number of walls of volumes that kernels are compiled for: one for a field, and once for walls in a row."""
-    volumes = (one.volume if isinstance(one, Timed) else one for opened in openings for one in opened.volumes)
+    volumes = (one for opened in openings for one in opened.volumes)
     return sum(1 if isinstance(one, Field) else len(one.each) for one in volumes)
 
 
@@ -87,41 +87,41 @@ def _opened(
     spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]], moment: float, kind: type[Opened],
     together: bool,
 ) -> tuple[Opened, ...]:  # fmt: skip
-    """The openings of one kind; volumes of one kind are one field if they are taken `together`."""
+    """The openings of one kind, those that are open at the same times together.
+
+    Volumes of one kind are one field if they are taken `together`.
+    """
     runs, number = [], 0
     for given, some in itertools.groupby(spans, lambda span: volumes[span[0]]):
         first, number = number, number + sum(walls for _piece, walls in some)
-        runs += [kind(_taken(given, moment, together), float(first), float(number))] if given else []
+        for times in dict.fromkeys(volume.present for volume in given):
+            last = number if was_there(times, moment) else first
+            alike = [volume for volume in given if volume.present == times]
+            runs.append(kind(_taken(alike, together), float(first), float(last)))
     return tuple(reversed(by_kind(runs, lambda run: run.volumes)))
 
 
-def _taken(volumes: Sequence[Surface], moment: float, together: bool = False) -> tuple[Any, ...]:
+def _taken(volumes: Sequence[Surface], together: bool = False) -> tuple[Any, ...]:
     fields, rest = _fields_of(volumes) if together else ([], volumes)
-    ordered = reversed(by_kind(rest, lambda volume: (volume.walls(), volume.present is None)))
-    alone = tuple(_timed(Field(one.members) if isinstance(one, Many) else all_walls([one]), one.present, moment)
-                  for one in ordered)  # fmt: skip
-    return (*(_timed(Field(members), present, moment) for members, present in fields), *alone)
+    alone = reversed(by_kind(rest, lambda volume: volume.walls()))
+    return (
+        *map(Field, fields),
+        *(Field(one.members) if isinstance(one, Many) else all_walls([one]) for one in alone),
+    )
 
 
-def _timed(volume: Any, present: Spans, moment: float) -> Any:
-    return volume if present is None else Timed(volume, float(was_there(present, moment)))
-
-
-def _fields_of(volumes: Sequence[Surface]) -> tuple[list[tuple[Members, Spans]], list[Surface]]:
-    """Several volumes of one kind, which are open at the same times, as the insides of the solids of a field each.
-
-    And the others.
-    """
+def _fields_of(volumes: Sequence[Surface]) -> tuple[list[Members], list[Surface]]:
+    """Several volumes of one kind as the insides of the solids of a field each, and the others."""
     found: dict[Any, list[Surface]] = defaultdict(list)
     rest = []
     for one in volumes:
         solid = replace(one, side="outside") if getattr(one, "side", None) == "inside" else None  # type: ignore[call-arg]
         walls = () if solid is None or isinstance(one, (Many, Joined)) else solid.walls()
         if solid is not None and len(walls) == 1 and can_be_member(walls[0]):
-            found[kind_of(walls[0]), one.present].append(solid)
+            found[kind_of(walls[0])].append(solid)
         else:
             rest.append(one)
-    return [(members_of(solids, None), present) for (_kind, present), solids in found.items()], rest
+    return [members_of(solids, None) for solids in found.values()], rest
 
 
 def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
@@ -165,7 +165,7 @@ def volumes_of_counter(volume: Surface, period: Lengths | None, name: str) -> tu
 
 def volumes_in(volumes: Sequence[Surface]) -> tuple[Any, ...]:
     """Volumes as kernels take them."""
-    return _taken(volumes, 0.0)
+    return _taken(volumes)
 
 
 def _images(opening: Surface, period: Lengths, name: str) -> list[Surface]:
@@ -248,8 +248,6 @@ def outside(volume, r):
 
     What is neither `Walls` nor a `Field` is the inside of one body of a field, whose admissible side is outside of it.
     """
-    if isinstance(volume, Timed):
-        return volume.if_open(outside(volume.volume, r), math.inf)
     if isinstance(volume, Field):
         return -volume.members.deepest_in_cell(r)
     if not isinstance(volume, Walls):
