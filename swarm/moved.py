@@ -22,6 +22,7 @@ _FOLDERS = [
     ("run.cluster", "cluster", "*"),
     ("colliding", "events.colliding", "*"),
     ("reacting", "events.reacting", "*"),
+    ("contact", "contact", "doorways=absence passing=absence"),
     ("lanes", "bodies", "bodies=lanes"),
     ("lanes.bodies", "bodies.lanes", "*"),
     ("lanes.bodies", "bodies.lanes", "arrays=body_arrays"),

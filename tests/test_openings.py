@@ -10,7 +10,7 @@ from conftest import rarely
 from test_sessions import require_resumed_is_whole
 
 import swarm
-from swarm.contact import passing
+from swarm.contact import absence
 from swarm.contact.events import ARRIVED, CAREFUL
 from swarm.kernel.vector import Vec
 from swarm.lanes import careful
@@ -247,7 +247,7 @@ def test_of_closed_walls_at_an_opening_the_first_on_the_way_is_hit(depth, wall):
     ]
     scene, rules = swarm.Scene(walls), SimpleNamespace(size=1.0, laws=SimpleNamespace(moving=None))
     motion = Vec(0.5, 0.0, 0.0), Vec(1.0, 0.0, 0.0)
-    assert passing.hit_wall(scene.openings(), rules, scene.walls(), motion, 0.0, 1e-3) == wall
+    assert absence.hit_wall(scene.openings(), rules, scene.walls(), motion, 0.0, 1e-3) == wall
 
 
 def test_a_wall_before_an_opening_covers_it():

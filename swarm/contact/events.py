@@ -6,13 +6,13 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, norm, square
+from ..surfaces.presence.absence import are_one
 from ..surfaces.time_of_impact import flights
 from . import hold, sliding, touching
 from .hold import One, Two
 from .laws import NONE
 from .projection import ALLOWED
 from .reflection import Energy, exact, relative, wall_velocity
-from .rooms import are_one
 
 # What a particle does: it flies, slides along one wall or an edge, has arrived, or is at a wall where that is to be
 # decided; or it is left to `careful`.

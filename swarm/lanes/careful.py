@@ -3,9 +3,8 @@
 import numpy as np
 
 from ..contact import crossing, events, touching
-from ..contact.doorways import leads_on
+from ..contact.absence import open_wall_at
 from ..contact.events import ARRIVED, CAREFUL, FLYING
-from ..contact.passing import open_wall_at
 from ..kernel.arrays import scratch
 from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined
@@ -13,7 +12,7 @@ from ..kernel.vector import ZERO, column, put, square
 from ..surfaces.in_motion.moving import Carried
 from .accounts import book_step, lose
 from .carried import NOT_CARRIED, carry
-from .escape import come_through, leave
+from .escape import let_out
 from .lane_arrays import booked, speed2_scale
 from .one_by_one import one_by_one
 from .periodic import return_particle
@@ -93,12 +92,8 @@ def _step(method, walls, gravity, share, i):
     now = walls.at(remaining)
     if state.openings is not None:
         wall = open_wall_at(state.openings, method, now, gravity, (r, v), crossing.near(method, r))
-        if wall >= 0.0 and leads_on(now, wall, r):
-            contacts.remaining[i] = remaining
-            come_through(now, gravity, share, i, wall, r, v)
-            return
         if wall >= 0.0:
-            leave(share, i, wall, r, v, remaining)
+            let_out(now, gravity, share, i, wall, r, v, remaining)
             return
     p = events.Particle(r, v, remaining, 2.0 * state.energy[i], speed2_scale(state, i))
     active = scratch((2, walls.length()), np.float64)

@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from ..contact import crossing, events
-from ..contact.doorways import leads_on, lets_through
+from ..contact.absence import hit_wall, lets_through
 from ..contact.events import CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.hold import One, Two, drift
-from ..contact.passing import hit_wall
 from ..contact.reflection import given, wall_velocity
 from ..contact.sending import Arriving, send
 from ..kernel.arrays import scratch
@@ -18,7 +17,7 @@ from ..kernel.random import Stream
 from ..kernel.vector import column, put, square
 from .accounts import book, book_sent, book_work
 from .carried import is_carried
-from .escape import absorb, come_through, end_frame, leave
+from .escape import absorb, end_frame, let_out
 from .lane_arrays import speed2_scale
 from .one_by_one import one_by_one
 from .watching import log as impact_log
@@ -105,10 +104,7 @@ def _let_out(method, walls, gravity, share, i, r, v, remaining):
     met[i] = hit_wall(openings, method, walls, (r, v), met[i], near)
     if not lets_through(openings, walls, met[i], r, near):
         return False
-    if leads_on(walls, met[i], r):
-        come_through(walls, gravity, share, i, met[i], r, v)
-    else:
-        leave(share, i, met[i], r, v, remaining)
+    let_out(walls, gravity, share, i, met[i], r, v, remaining)
     return True
 
 

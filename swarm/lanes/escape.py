@@ -3,13 +3,13 @@
 import numpy as np
 
 from ..contact import crossing
-from ..contact.doorways import closeness, leads_on, lets_through, through
+from ..contact.absence import closeness, hit_wall, lets_through, open_wall_of, through
 from ..contact.events import ARRIVED, FLYING
-from ..contact.passing import hit_wall, open_wall_of
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import norm, put
 from ..surfaces.presence.openings import is_open
+from ..surfaces.presence.rooms import leads_on
 from .table import marked_lanes
 from .watching import log as impact_log
 from .watching.crossings import ParticleMoment
@@ -74,9 +74,13 @@ def is_at_opening(slide, now, i):
 
 
 @outlined
-def come_through(walls, gravity, share, i, wall, r, v):
-    """Particle i flies into the room on the other side of a wall, with the speed that it has kept across its walls."""
+def let_out(walls, gravity, share, i, wall, r, v, remaining):
+    """Particle i escapes through an open wall, or flies into the room behind it with the speed that it has kept."""
     state, contacts = share.state, share.state.contacts
+    if not leads_on(walls, wall, r):
+        escape(share, i, wall, r, v, remaining)
+        end_frame(share, i)
+        return
     first, second, keep = contacts.walls[0, i], contacts.walls[1, i], contacts.keep[i]
     if keep > 0.0 and first >= 0.0:
         n = walls.unit_normal(first, r)
@@ -85,17 +89,10 @@ def come_through(walls, gravity, share, i, wall, r, v):
     r, v = through(walls, gravity, wall, (r, v))
     put(state.position, 0, i, r)
     put(state.velocity, 0, i, v)
-    contacts.keep[i], contacts.step[i] = 0.0, 0.0
+    contacts.remaining[i], contacts.keep[i], contacts.step[i] = remaining, 0.0, 0.0
     contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0
     contacts.phase[i] = FLYING
     share.hand_over(i, FLYING)
-
-
-@outlined
-def leave(share, i, wall, r, v, remaining):
-    """Particle i has escaped through a wall."""
-    escape(share, i, wall, r, v, remaining)
-    end_frame(share, i)
 
 
 def end_frame(share, i):

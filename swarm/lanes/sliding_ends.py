@@ -5,16 +5,15 @@ import math
 import numpy as np
 
 from ..contact import crossing, events
+from ..contact.absence import ended_wall, ends_of, part_until_absent, wall_after
 from ..contact.events import ARRIVED, CAREFUL, EVENT, FLYING, HELD
-from ..contact.passing import part_until_open
 from ..contact.path import StepPath, cubic
-from ..contact.rooms import ended_wall, have_ends, part_until_end, wall_after
 from ..kernel.gravity import potential
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, square
 from ..surfaces.periodic.period import part_until
 from .escape import is_at_opening
-from .sliding import ENDS, FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK
+from .sliding import ABSENT, FAILED, LEAVES, LIFTED, MET, STOPPED, STUCK
 from .sliding_step import SHORTEST, twice_after
 from .sticking import stay
 
@@ -34,7 +33,7 @@ def set_going(slide, i):
     now = walls.at(remaining)
     if lanes.openings is not None and is_at_opening(slide, now, i):
         return EVENT
-    if have_ends(walls):
+    if ends_of(walls):
         phase = _past_ends(slide, now, i)
         if phase != slide.phase():
             return phase
@@ -72,7 +71,11 @@ def decide(slide, i):
     if event & FAILED:
         return _shorten(slide, i)
     active, r, v = slide.active(lane), lane.r, lane.v
-    if event & ENDS and ended_wall(walls.at(lane.remaining), active, r, crossing.near(method, r)) >= 0.0:
+    if (
+        ends_of(walls)
+        and event & ABSENT
+        and ended_wall(walls.at(lane.remaining), active, r, crossing.near(method, r)) >= 0.0
+    ):
         return set_going(slide, i)
     path, near = StepPath(r, v, lane.r1, lane.v1, h), crossing.near(method, r)
     cut = 1.0
@@ -101,12 +104,11 @@ def decide(slide, i):
 def _until_gone(slide, event, active, path, remaining):
     """The part of a step after which a wall ends, or is open, or a cell that repeats does; infinite where none does."""
     lanes, near, found = slide.lanes, crossing.near(slide.method, path.r0), np.inf
-    if event & ENDS:
-        found = part_until_end(slide.walls, active, path, near, remaining)
-    if event & (LEAVES | PASSES):
-        found = min(found, part_until(lanes.period, cubic(path)))
-        now = slide.walls.at(remaining)
-        found = min(found, part_until_open(lanes.openings, slide.method, now, active, path, near))
+    if event & (LEAVES | ABSENT):
+        found = part_until(lanes.period, cubic(path))
+    if event & ABSENT:
+        absent = part_until_absent(lanes.openings, slide.method, slide.walls, active, path, near, remaining)
+        found = min(found, absent)
     return found
 
 

@@ -6,15 +6,14 @@ import numpy as np
 
 from ..contact import crossing, hold
 from ..contact import sliding as slides
-from ..contact.passing import may_pass
+from ..contact.absence import may_be_absent
 from ..contact.path import StepPath
 from ..contact.reflection import relative, wall_velocity
-from ..contact.rooms import have_ends, may_end
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, either, square
 from ..surfaces.periodic.period import is_beyond
-from .sliding import ENDS, FAILED, LEAVES, LIFTED, MET, PASSES, STOPPED, STUCK
+from .sliding import ABSENT, FAILED, LEAVES, LIFTED, MET, STOPPED, STUCK
 
 # A step of this part of a crossing, or of the size, is the shortest.
 SHORTEST, _NO_WAY = 1e-10, 1e-15
@@ -151,12 +150,10 @@ def _end_step(slide, i):
     met = crossing.meets(start, now, active, path, crossing.near(method, r1))
     good = (ratio <= 1.0) & (lanes.event[i] == 0)
     leaves = is_beyond(lanes.period, r1)
-    passes = may_pass(lanes.openings, now, active, path)
-    ends = have_ends(walls) and may_end(now, active, r1, crossing.near(method, r1))
-    fine = good & (not lifted) & (not met) & (not leaves) & (not passes) & (not ends)
+    absent = may_be_absent(lanes.openings, now, active, path, crossing.near(method, r1))
+    fine = good & (not lifted) & (not met) & (not leaves) & (not absent)
     happened = select(lifted, LIFTED, 0) | select(met, MET, 0) | select(leaves, LEAVES, 0)
-    happened |= select(passes, PASSES, 0)
-    happened |= select(ends, ENDS, 0)
+    happened |= select(absent, ABSENT, 0)
     lanes.event[i] |= select(good, happened, 0)
     lanes.unsolved[i] = fine
     # What the end of the frame or an event cuts says nothing of the length; and a step that is to be cut must be

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...kernel.jit import select
-from ...kernel.record import Record
 from .. import required
 from ..fields.grouped import by_kind
 from ..fields.many import Many, members_of
@@ -27,7 +26,9 @@ from ..periodic.images import Lengths, images_of
 from ..surface import Surface
 from ..union import Joined
 from ..walls import Field, Walls, all_walls
+from .absence import OPEN, Absence
 from .doors import is_there, was_there
+from .rooms import leads_on
 
 # Most walls that all openings of a scene may be compiled for.
 _MOST = 24
@@ -35,7 +36,7 @@ _MOST = 24
 _REACH = 2.0
 
 
-class Opened(Record):
+class Opened(Absence):
     """The volumes in which some walls are open."""
 
     volumes: tuple[Any, ...]  # each `Walls` or a `Field`
@@ -46,9 +47,18 @@ class Opened(Record):
         """Whether a wall is one of these."""
         return (wall >= self.first) & (wall < self.last)
 
+    # Whether they are open only where another room of their union is on the other side.
+    between = False
+
+    def takes(self, walls, wall, r, near, depth):
+        taken = self.is_of(wall) & _is_deep_in(self.volumes, r, near, depth)
+        return taken & leads_on(walls, wall, r) if self.between else taken
+
 
 class Doorway(Opened):
-    """The volumes in which they are open where another room of their union is on the other side."""
+    """The volumes in which walls between rooms are open."""
+
+    between = True
 
 
 # --- From a description ----------------------------------------------------------------------------------
@@ -259,20 +269,25 @@ def outside(volume, r):
     return farthest
 
 
-def is_in_any(volumes, r):
-    """Whether a place is in any of some volumes."""
+def _is_deep_in(volumes, r, near, depth):
+    """Whether a place is deeper in any of some volumes than so many times `near`."""
     found = False
     for volume in reversed(volumes):
-        found = (outside(volume, r) <= 0.0) | found
+        found = (outside(volume, r) <= -depth * near) | found
     return found
 
 
+def is_in_any(volumes, r):
+    """Whether a place is in any of some volumes."""
+    return _is_deep_in(volumes, r, 0.0, OPEN)
+
+
 def is_open(openings, wall, r, near):
-    """Whether a place on this wall is open, or nearer to what is than that; False for no wall, which is -1."""
-    is_open_in_any = False
+    """Whether a place on this wall is in an opening of it, or nearer to one than that; False for no wall, which is -1.
+
+    Where another room has to be on the other side it is not asked whether one is.
+    """
+    found = False
     for opening in reversed(openings or ()):
-        found = False
-        for volume in reversed(opening.volumes):
-            found = (outside(volume, r) <= near) | found
-        is_open_in_any = (opening.is_of(wall) & found) | is_open_in_any
-    return is_open_in_any
+        found = (opening.is_of(wall) & _is_deep_in(opening.volumes, r, near, OPEN)) | found
+    return found

@@ -5,7 +5,10 @@ on a wall of it goes on, where its patch ends, on the wall that `wall_after` say
 re-entrant ones between parts is a union, rooms.py.
 """
 
+from typing import Any
+
 from ...kernel.record import Record
+from .absence import Absence
 
 
 class Patched(Record):
@@ -34,3 +37,20 @@ class Patched(Record):
     def goes_on(self, number, other):
         """Whether another wall joins this one smoothly where it ends: what slides on this one does not meet it."""
         return False
+
+
+class Patches(Absence):
+    """A field of `Patched` walls among the walls of a scene: a wall is absent beyond its patch."""
+
+    first: float  # the number of the first of its walls
+    members: Any
+
+    def is_of(self, wall):
+        return (wall >= self.first) & (wall < self.first + self.members.count())
+
+    def takes(self, walls, wall, r, near, depth):
+        return self.is_of(wall) & (not self.members.is_there(wall - self.first, r, depth * near))
+
+    def wall_after(self, walls, wall, r, near):
+        after = self.members.wall_after(wall - self.first, r, near)
+        return self.first + after if after >= 0.0 else -1.0

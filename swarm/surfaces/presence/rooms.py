@@ -14,12 +14,15 @@ from typing import Any
 from ...kernel.gravity import accelerated, displacement
 from ...kernel.jit import select
 from ...kernel.vector import square
+from .absence import BEYOND, FLIES, Absence, lie_on_each_other
 
 # A flight goes on into a room that it is inside of by so many times the slack.
 _INSIDE = 4.0
 # So many walls at most are gone through in one pass: two balls 6.1 ns an impact, and 6.7 in two; but a box, a tube and
 # a box, which have eight and are left seldom, 18 and 14.
 _AT_ONCE = 4
+# Of the slack, how far beyond its wall a particle goes on: it is in the other room alone then.
+_THROUGH = 2.0
 # Walls nearer than so many times the slack touch a particle; more of them than any room has.
 _TOUCH, _OUT = 1024.0, 1e6
 
@@ -150,3 +153,69 @@ def owner_of(walls, rooms, r):
             select(better, gap, deepest),
         )
     return owner
+
+
+# --- For what is on their walls --------------------------------------------------------------------------
+
+
+class Rooms(Absence):
+    """The rooms of a union: a wall is absent in another room, and outside of its own.
+
+    Edges between rooms are re-entrant: particles that slide on a wall of one into another one fly on there. Where walls
+    of two rooms lie on each other, as the floors of two boxes side by side, they go on on that of the other one.
+    """
+
+    rooms: Any
+
+    def is_of(self, wall):
+        found = False
+        for room in self.rooms:
+            found = is_of_room(room, wall) | found
+        return found
+
+    def takes(self, walls, wall, r, near, depth):
+        least, gaps, found = depth * walls.slack, gaps_in(self.rooms, r), False
+        for k, room in enumerate(self.rooms):
+            beyond = gaps[k] > least
+            for j, gap in enumerate(gaps):
+                beyond = beyond | (gap < -least) if j != k else beyond
+            found = (is_of_room(room, wall) & beyond) | found
+        return found
+
+    def wall_after(self, walls, wall, r, near):
+        """A wall of another room that lies on this one, where the particle is inside of no other room."""
+        found, flies = -1.0, False
+        for room in self.rooms:
+            if not is_of_room(room, wall):
+                gap = gap_in(room, r)
+                flies = flies or gap < -FLIES * walls.slack
+                if gap <= BEYOND * walls.slack:
+                    for other, _wall, _gentle in room:
+                        found = other if lie_on_each_other(walls, wall, other, r) else found
+        return -1.0 if flies else found
+
+
+def is_of_room(room, wall):
+    """Whether a wall is one of a room."""
+    return (wall >= room[0][0]) & (wall <= room[-1][0])
+
+
+def depth_behind(walls):
+    """How deep in the next room particles go on that came through an open wall [m]."""
+    return _THROUGH * walls.slack if walls.inset is None else walls.inset
+
+
+def other_side(walls, wall, r):
+    """The other side of a wall at a place on it."""
+    return walls.project(wall, r) + depth_behind(walls) * walls.unit_normal(wall, r)
+
+
+def leads_on(walls, wall, r):
+    """Whether another room of its union is on the other side of a wall, at a place on it."""
+    found = False
+    for rooms in walls.joined():
+        gaps = gaps_in(rooms, other_side(walls, wall, r))
+        for k, room in enumerate(rooms):
+            for j, gap in enumerate(gaps):
+                found = (is_of_room(room, wall) & (gap <= walls.slack)) | found if j != k else found
+    return found

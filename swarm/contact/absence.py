@@ -1,0 +1,280 @@
+"""Where walls are absent, for particles at them: the one place where kernels ask for openings, patches and rooms.
+
+A wall `stands` at a place on it unless it has ended there, beyond its patch or in another room, or is open: each is an
+`Absence`. Where a wall has ended, particles that slide go on on the wall after it, or fly. At an opening they escape,
+or come into the room behind it.
+"""
+
+import math
+
+from ..kernel.arrays import index
+from ..kernel.gravity import accelerated
+from ..kernel.grid import over_entries
+from ..kernel.jit import outlined, select
+from ..kernel.vector import ZERO, dot, norm, square
+from ..surfaces.fields.members import member
+from ..surfaces.presence.absence import BEYOND, CUT, FLIES, OPEN, face_alike, is_absent
+from ..surfaces.presence.openings import outside
+from ..surfaces.presence.patched import Patched, Patches
+from ..surfaces.presence.rooms import Rooms, depth_behind, leads_on, other_side
+from ..surfaces.walls import Field
+from .crossing import block_of_path
+from .events import TOUCH
+from .path import PLACES, at_part, first_true, members_of
+from .reflection import relative, wall_velocity
+
+# Steps of the search for the least distance to an opening between three places of a step.
+_THIRDS = 80
+# The part of a velocity, or of gravity, that does not press on a wall.
+_PRESSED = 1e-9
+
+
+# --- At a place ------------------------------------------------------------------------------------------
+
+
+def ends_of(walls):
+    """The ways in which walls end: a constant number for the compiler, 0 where none does."""
+    patches = tuple((first, field.members) for first, field in walls.fields())
+    return (
+        *(Patches(first, members) for first, members in patches if isinstance(members_of(members), Patched)),
+        *(Rooms(rooms) for rooms in walls.joined()),
+    )
+
+
+def lets_through(openings, walls, wall, r, near):
+    """Whether an opening takes a wall away at a place on it, or nearer to it than `near`."""
+    return is_absent(openings, walls, wall, r, near, OPEN)
+
+
+def stands(openings, walls, wall, r, near):
+    """Whether a wall has not ended at a place on it, and no opening lets through there."""
+    ended = is_absent(ends_of(walls), walls, wall, r, near, BEYOND)
+    return not ended and not lets_through(openings, walls, wall, r, near)
+
+
+@outlined
+def _lets_out(openings, rules, walls, wall, r, near):
+    """Whether a wall that a particle is on lets it out: it is open there, and no closed wall lies on it."""
+    if not lets_through(openings, walls, wall, r, near):
+        return False
+    return not _is_covered(openings, rules, walls, wall, r, near)
+
+
+@outlined
+def _is_covered(openings, rules, walls, wall, r, near):
+    """Whether a closed wall that faces the same way is at the same place: both hold what slides on one."""
+    number, touch = walls.numbers_near(r), TOUCH * rules.size + near
+    for i in range(number.size):
+        here = face_alike(walls, wall, number[i], r) and abs(walls.distance(number[i], r)) <= touch
+        if here and number[i] != wall and stands(openings, walls, number[i], r, near):
+            return True
+    return False
+
+
+@outlined
+def hit_wall(openings, rules, walls, motion, wall, near):
+    """The wall that a particle (r, v) hits that has reached this one: where this is open, a closed one at the place.
+
+    Of several closed ones it is the one that it reaches first.
+    """
+    r, v = motion
+    if not lets_through(openings, walls, wall, r, near):
+        return wall
+    moving, touch = rules.laws.moving, TOUCH * rules.size + near
+    number = walls.numbers_near(r)
+    found, soonest = wall, math.inf
+    for i in range(number.size):
+        w = relative(wall_velocity(moving, walls, number[i], r), v)
+        towards, distance = dot(walls.unit_normal(number[i], r), w), walls.distance(number[i], r)
+        # A wall is reached within the distance `touch` along the way, not across it: a particle that leaves at a corner
+        # does not hit the other wall.
+        here = towards > 0.0 and distance <= touch and -distance * norm(w) <= touch * towards
+        if here and -distance < soonest * towards and stands(openings, walls, number[i], r, near):
+            found, soonest = number[i], max(-distance, 0.0) / towards
+    return found
+
+
+@outlined
+def open_wall_at(openings, rules, walls, gravity, motion, near):
+    """A wall at the place of a particle (r, v) that lets it out there, or -1; into another room if it is pressed."""
+    r, v = motion
+    number, touch, ways = walls.numbers_near(r), TOUCH * rules.size, ends_of(walls)
+    for i in range(number.size):
+        here = walls.distance(number[i], r) >= -touch and not is_absent(ways, walls, number[i], r, near, BEYOND)
+        if not here or not _lets_out(openings, rules, walls, number[i], r, near):
+            continue
+        if _is_pressed(walls, gravity, number[i], r, v) or not leads_on(walls, number[i], r):
+            return number[i]
+    return -1.0
+
+
+def _is_pressed(walls, gravity, wall, r, v):
+    """Whether a particle that is at a wall moves into it, or is pulled into it."""
+    n, pull = walls.unit_normal(wall, r), accelerated(gravity, ZERO, 1.0)
+    return dot(n, v) > _PRESSED * norm(v) or dot(n, pull) > _PRESSED * norm(pull)
+
+
+def closeness(walls):
+    """A distance from an opening that counts as 0 for a flight: round-off of where rooms meet, 0 without unions."""
+    return 2.0 * depth_behind(walls) if len(walls.unions) > 0 else 0.0
+
+
+def through(walls, gravity, wall, motion):
+    """A particle (r, v) that is at an open wall, on its other side, with the same energy."""
+    r, v = motion
+    there, speed2 = other_side(walls, wall, r), square(v)
+    gained = dot(accelerated(gravity, ZERO, 1.0), there - r)
+    return there, v + (select(speed2 > abs(gained), gained / select(speed2 > 0.0, speed2, 1.0), 0.0)) * v
+
+
+# --- Of the walls that hold a particle -------------------------------------------------------------------
+
+
+@outlined
+def open_wall_of(openings, rules, walls, active, r, near):
+    """The wall of those that hold a particle that lets it out at its place, or -1."""
+    if _lets_out(openings, rules, walls, active.first, r, near):
+        return active.first
+    return active.second if _lets_out(openings, rules, walls, active.second, r, near) else -1.0
+
+
+@outlined
+def ended_wall(walls, active, r, near):
+    """The wall of those that hold a particle that has ended where it is, or -1."""
+    if is_absent(ends_of(walls), walls, active.first, r, near, FLIES):
+        return active.first
+    return active.second if is_absent(ends_of(walls), walls, active.second, r, near, FLIES) else -1.0
+
+
+@outlined
+def wall_after(walls, wall, r, near):
+    """The wall on which particles that slide on this one go on where it ends, or -1: they fly."""
+    found = -1.0
+    for way in ends_of(walls):
+        if way.is_of(wall):
+            found = way.wall_after(walls, wall, r, near)
+    return found
+
+
+# --- Steps -----------------------------------------------------------------------------------------------
+
+
+def may_be_absent(openings, walls, active, path, near):
+    """Whether a wall that holds the particle may be absent where a step ends, or in an opening on its way."""
+    found, ways = False, ends_of(walls)
+    for wall in active:
+        found = found | is_absent(ways, walls, wall, path.r1, near, BEYOND)
+    for opening in openings or ():
+        enters = False
+        for volume in opening.volumes:
+            enters = enters | _over_bodies(volume, path, 0.0, False, _may_enter, _reach(path))
+        for wall in active:
+            here = opening.is_of(wall) & enters
+            found = found | (here & _may_lead_on(walls, wall, path) if opening.between else here)
+    return found
+
+
+def _may_lead_on(walls, wall, path):
+    """Whether another room is behind a wall at some place of a step: a wall of its own, such as a floor, has none."""
+    middle = 0.5 * (path.r0 + path.r1)
+    return leads_on(walls, wall, path.r0) | leads_on(walls, wall, middle) | leads_on(walls, wall, path.r1)
+
+
+def part_until_absent(openings, rules, walls, active, path, near, remaining):
+    """The part of a step after which a wall that holds the particle is absent; infinite where none is."""
+    first = _part_until_end(walls, active, path, near, remaining) if ends_of(walls) else math.inf
+    if openings is None:
+        return first
+    now = walls.at(remaining)
+    first = min(first, _part_until_open(openings, rules, now, active.first, path, near))
+    return min(first, _part_until_open(openings, rules, now, active.second, path, near))
+
+
+@outlined
+def _part_until_end(walls, active, path, near, remaining):
+    given = walls, active, path, near, remaining
+    return 0.0 if _ends_at(*given, BEYOND, 0.0) else first_true(_ends_at, given, 0.0, BEYOND, CUT)
+
+
+def _ends_at(walls, active, path, near, remaining, depth, part):
+    now, r = walls.at(remaining - part * path.h), at_part(path, part)
+    ways = ends_of(now)
+    return is_absent(ways, now, active.first, r, near, depth) or is_absent(ways, now, active.second, r, near, depth)
+
+
+@outlined
+def _part_until_open(openings, rules, walls, wall, path, near):
+    """`part_until_absent` of one wall. If its opening does not let the particle out, the rest of the step is asked."""
+    low = math.inf
+    for opening in openings:
+        if opening.is_of(wall):
+            for volume in reversed(opening.volumes):
+                low = _over_bodies(volume, path, near, low, _way_into, near)
+    given = openings, rules, walls, wall, path
+    if not low < math.inf or _lets_out_at(*given, near, low):
+        return low
+    return first_true(_lets_out_at, given, low, near, near)
+
+
+def _lets_out_at(openings, rules, walls, wall, path, near, part):
+    return _lets_out(openings, rules, walls, wall, at_part(path, part), near)
+
+
+# --- Into volumes ----------------------------------------------------------------------------------------
+
+
+def _reach(path):
+    """Twice the length of a step: what is farther from its end, by a distance of first order, is not on its way."""
+    return norm(path.r1 - path.r0) + path.h * (norm(path.v0) + norm(path.v1))
+
+
+def _over_bodies(volume, path, near, found, ask, given):
+    """`found` after ask(found, volume, path, given), of a field for each body that a step may come near to."""
+    if isinstance(volume, Field):
+        return _over_members(volume.members, path, near, found, ask, given)
+    return ask(found, volume, path, given)
+
+
+@outlined
+def _over_members(members, path, near, found, ask, given):
+    block = block_of_path(members.grid, path, near)
+    return over_entries(members.grid, block, found, _ask_member, members, ask, path, given)
+
+
+def _ask_member(found, m, members, ask, path, given):
+    return ask(found, member(members, index(m)), path, given)
+
+
+def _may_enter(found, volume, path, reach):
+    return found | (outside(volume, path.r1) <= reach)
+
+
+def _way_into(first, volume, path, near):
+    """The sooner of a part of a step and of that after which the step is in a volume."""
+    return min(_way_in(volume, path, near), first)
+
+
+@outlined
+def _way_in(volume, path, near):
+    if not outside(volume, path.r1) <= _reach(path):
+        return math.inf
+    given = volume, path
+    return 0.0 if _is_in(*given, near, 0.0) else first_true(_is_in, given, 0.0, near, 0.0, _nearest)
+
+
+def _nearest(volume, path, near, low, part, high):
+    """The part of a step at which it is nearest to a volume, between two others, if it may be in it there."""
+    here = outside(volume, at_part(path, part))
+    if here < -near or not here <= _reach(path) / PLACES:
+        return part
+    for _third in range(_THIRDS):
+        one, other = low + (high - low) / 3.0, high - (high - low) / 3.0
+        if outside(volume, at_part(path, one)) <= outside(volume, at_part(path, other)):
+            high = other
+        else:
+            low = one
+    return 0.5 * (low + high)
+
+
+def _is_in(volume, path, depth, part):
+    return outside(volume, at_part(path, part)) <= -depth
