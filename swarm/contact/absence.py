@@ -20,7 +20,7 @@ from ..surfaces.presence.rooms import Rooms, depth_behind, leads_on, other_side
 from ..surfaces.walls import Field
 from .crossing import block_of_path
 from .events import TOUCH
-from .path import PLACES, at_part, first_true, members_of
+from .path import BEFORE, PLACES, at_part, first_true, members_of
 from .reflection import relative, wall_velocity
 
 # Steps of the search for the least distance to an opening between three places of a step.
@@ -192,8 +192,7 @@ def part_until_absent(openings, rules, walls, active, path, near, remaining):
 
 @outlined
 def _part_until_end(walls, active, path, near, remaining):
-    given = walls, active, path, near, remaining
-    return 0.0 if _ends_at(*given, BEYOND, 0.0) else first_true(_ends_at, given, 0.0, BEYOND, CUT)
+    return first_true(_ends_at, (walls, active, path, near, remaining), BEFORE, BEYOND, CUT)
 
 
 def _ends_at(walls, active, path, near, remaining, depth, part):
@@ -258,8 +257,7 @@ def _way_into(first, volume, path, near):
 def _way_in(volume, path, near):
     if not outside(volume, path.r1) <= _reach(path):
         return math.inf
-    given = volume, path
-    return 0.0 if _is_in(*given, near, 0.0) else first_true(_is_in, given, 0.0, near, 0.0, _nearest)
+    return first_true(_is_in, (volume, path), BEFORE, near, 0.0, _nearest)
 
 
 def _nearest(volume, path, near, low, part, high):

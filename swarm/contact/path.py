@@ -10,6 +10,8 @@ from ..surfaces.in_motion.posed import Posed
 
 # Places of a step that are looked at, and halvings down to an instant.
 PLACES, _HALVINGS = 16, 60
+# A part before all of a step.
+BEFORE = -1.0
 
 
 class StepPath(Record):
@@ -25,12 +27,13 @@ class StepPath(Record):
 def first_true(question, given, start, surely, about, closer=None):
     """The part of a step, later than `start`, from which on question(*given, margin, part) is true; or infinity.
 
-    Equidistant parts of the step are asked with the margin `surely`. From the first one where the answer is yes, it is
-    bisected down to where the answer with the margin `about` changes. `closer`, if any, is a function
-    closer(*given, margin, low, part, high) that returns the part to ask in place of `part`, between two others.
+    With BEFORE as the `start` that of the step is asked too. Equidistant parts are asked with the margin `surely`; from
+    the first one where the answer is yes, it is bisected down to where the answer with the margin `about` changes.
+    `closer`, if any, is a function closer(*given, margin, low, part, high) that returns the part to ask in place of
+    `part`, between two others.
     """
-    low = start
-    for k in range(1, PLACES + 1):
+    low = max(start, 0.0)
+    for k in range(PLACES + 1):
         part = k / PLACES
         if part > start:
             asked = part if closer is None else closer(*given, surely, low, part, min(k + 1, PLACES) / PLACES)
