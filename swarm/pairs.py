@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from .common import checks
+from .common.validated import Magnitude, Part, Validated
 from .errors import SceneError
 
 # Of soft contacts: the largest overlap that a start may have, as a part of the radius of the smaller ball.
@@ -11,7 +11,7 @@ MOST_PRESSED = 0.2
 
 
 @dataclass(frozen=True)
-class Pairs:
+class Pairs(Validated):
     """The impact of two particles that have a radius, for the whole scene.
 
     Args:
@@ -31,19 +31,9 @@ class Pairs:
     Pairs(restitution=0.9, friction=0.0, contact_duration=None)
     """
 
-    restitution: float = 1.0
-    friction: float = 0.0
-    contact_duration: float | None = None
-
-    def __post_init__(self) -> None:
-        restitution = checks.number("pairs.restitution", self.restitution, "a number from 0 to 1")
-        if not 0.0 <= restitution <= 1.0:
-            raise SceneError(f"pairs.restitution must be from 0 to 1, got {restitution:g}")
-        checks.assign(
-            self, restitution=restitution, friction=checks.magnitude("pairs.friction", self.friction),
-            contact_duration=None if self.contact_duration is None
-            else checks.magnitude("pairs.contact_duration", self.contact_duration),
-        )  # fmt: skip
+    restitution: Part = 1.0
+    friction: Magnitude = 0.0
+    contact_duration: Magnitude | None = None
 
 
 def checked_pairs(value: Any) -> Pairs | None:

@@ -99,6 +99,19 @@ def magnitude(name: str, value: Any) -> float:
     return result
 
 
+def positive_magnitude(name: str, value: Any) -> float:
+    """`value` as a number above zero whose square is finite."""
+    return magnitude(name, positive(name, value))
+
+
+def part(name: str, value: Any) -> float:
+    """`value` as a number from 0 to 1."""
+    result = number(name, value, "a number from 0 to 1")
+    if not 0.0 <= result <= 1.0:
+        raise SceneError(f"{name} must be from 0 to 1, got {result:g}")
+    return result
+
+
 def bounded(name: str, value: Any) -> float:
     """`value` as a number of either sign, whose square is finite."""
     result = number(name, value)
@@ -247,6 +260,12 @@ def vector(name: str, value: Any) -> Vector:
     if isinstance(value, (str, bytes)):
         raise SceneError(f"{name} must be three numbers, got {shown(value)}")
     x, y, z = (number(f"{name}[{i}]", part) for i, part in enumerate(entries(name, value, 3, "three numbers")))
+    return x, y, z
+
+
+def three_lengths(name: str, value: Any) -> Vector:
+    """`value` as three lengths [m] above zero."""
+    x, y, z = (length(f"{name}[{i}]", part) for i, part in enumerate(vector(name, value)))
     return x, y, z
 
 

@@ -10,6 +10,8 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from .validated import bare
+
 # The columns of a terminal; the modules of a type, before its name.
 _COLUMNS, _MODULES = 80, re.compile(r"\b(?:\w+\.)+(?=[A-Za-z])")
 # What NumPy's name of all that becomes an array stands for: a line of 300 characters.
@@ -72,8 +74,9 @@ def show_in_lines(value: Any) -> None:
 
 
 def _line(function: FunctionType) -> None:
-    """Give a function a `Lined` signature, if its own is long."""
+    """Give a function a `Lined` signature, if its own is long; checks of arguments are not part of it."""
     if "__signature__" not in vars(function):
+        function.__annotations__ = {name: bare(kind) for name, kind in function.__annotations__.items()}
         signature = Lined.from_callable(function)
         if len(inspect.Signature.__str__(signature)) > _COLUMNS:
             function.__signature__ = signature  # type: ignore[attr-defined]

@@ -1,9 +1,9 @@
 """AugmentedLagrangian: the paper's method, with Uzawa's loop in every contact step."""
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Annotated, Any
 
-from ..common import checks
+from ..common.validated import Count, Flag, Positive, choice
 from ..contact import uzawa
 from ..contact.discrete_gradient import form_of, reaction_needs
 from ..contact.reflection import CHORD_NEEDS
@@ -87,23 +87,17 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     swarm.errors.SceneError: gradient must be "composite" for exponent = 1, got "mean-value"
     """
 
-    tolerance: float = 1e-10
-    max_sweeps: int = 50
-    gradient: str = "composite"
-    adaptive: bool = False
-    acceleration: str = "none"
-    on_unconverged: str = "raise"
-    contact_start: str = base.younger("impact")
+    tolerance: Positive = 1e-10
+    max_sweeps: Count = 50
+    gradient: fixed_step.Gradient = "composite"
+    adaptive: Flag = False
+    acceleration: Annotated[str, choice(*_ACCELERATIONS)] = "none"
+    on_unconverged: Annotated[str, choice(*_POLICIES)] = "raise"
+    contact_start: base.ContactStart = field(default="impact", metadata=base.YOUNGER)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         fixed_step.check_gradient(self)
-        object.__setattr__(self, "tolerance", checks.positive("tolerance", self.tolerance))
-        object.__setattr__(self, "max_sweeps", checks.count("max_sweeps", self.max_sweeps))
-        object.__setattr__(self, "adaptive", checks.flag("adaptive", self.adaptive))
-        checks.one_of("acceleration", self.acceleration, _ACCELERATIONS)
-        checks.one_of("on_unconverged", self.on_unconverged, _POLICIES)
-        checks.one_of("contact_start", self.contact_start, base.CONTACT_STARTS)
         if self.contact_start == "centred":
             self._require_centred()
 

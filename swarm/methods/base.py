@@ -1,9 +1,10 @@
 """The description of a method for users, checked. Methods as kernels take them are in contract.py."""
 
 import math
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
+from ..common.validated import Validated, choice
 from ..errors import SceneError
 from ..kernel.jit import select
 from ..particles import Particles
@@ -11,19 +12,16 @@ from ..scene import Scene
 from ..surfaces import required
 from ..surfaces.in_motion.moving import lacks_bend
 
+# Of an argument that methods of older files lack: tables leave it out at its default, so that they are the same.
+YOUNGER = {"younger": True}
 # Where a contact step begins: at the impact, or half of it before.
-CONTACT_STARTS = ("impact", "centred")
+ContactStart = Annotated[str, choice("impact", "centred")]
 # Default shortest flight as a part of the crossing time size/|v|.
 SHORTEST = 1e-4
 
 
-def younger(default: Any) -> Any:
-    """An argument that methods of older files lack: tables leave it out at its default, so that they are the same."""
-    return field(default=default, metadata={"younger": True})
-
-
 @dataclass(frozen=True)
-class Method:
+class Method(Validated):
     """A way to advance particles. See the subclasses."""
 
     def check(self, scene: Scene, particles: Particles) -> None:

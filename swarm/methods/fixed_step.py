@@ -2,12 +2,14 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from ..common import checks
 from ..common.status import Status
+from ..common.validated import Positive, choice
 from ..contact import medial
 from ..contact.discrete_gradient import MeanValue
 from ..contact.laws import Moves
@@ -28,21 +30,16 @@ from . import base, contract
 _WHOLE = 1e-6
 # More steps than this are not counted exactly.
 _MOST_STEPS = 2.0**53
-GRADIENTS = ("composite", "mean-value")
+Gradient = Annotated[str, choice("composite", "mean-value")]
 
 
 @dataclass(frozen=True)
 class SoftWalls(base.Method):
     """A method of fixed step whose walls are springs, and nothing else. See the subclasses."""
 
-    dt: float
-    penalty: float
-    exponent: float = 1.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "dt", checks.positive("dt", self.dt))
-        object.__setattr__(self, "penalty", checks.positive("penalty", self.penalty))
-        object.__setattr__(self, "exponent", checks.at_least("exponent", self.exponent, 1.0))
+    dt: Positive
+    penalty: Positive
+    exponent: Annotated[float, partial(checks.at_least, bound=1.0)] = 1.0
 
     def check(self, scene: Scene, particles: Particles) -> None:
         if particles.radius is None:
@@ -77,7 +74,6 @@ class SoftWalls(base.Method):
 
 def check_gradient(method: Any) -> None:
     """Raise a `SceneError` if a method of this exponent has no such gradient."""
-    checks.one_of("gradient", method.gradient, GRADIENTS)
     if method.gradient == "mean-value" and method.exponent == 1.0:
         raise SceneError(
             'gradient must be "composite" for exponent = 1, got "mean-value": that form is the gradient of Phi at a '

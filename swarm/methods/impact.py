@@ -1,12 +1,12 @@
 """Impact: from impact to impact, with the converged multiplier of the conserving scheme."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..common import checks
+from ..common.validated import Count, NotNegative, Positive
 from ..contact import sliding, touching
 from ..contact.laws import NONE, Laws
 from ..contact.reflection import CHORD_NEEDS, Energy, chord_end, chord_step, chord_turn, exact, restore, speed2_at
@@ -88,27 +88,20 @@ class Impact(base.Method):
     swarm.errors.SceneError: contact_step must be 0 or more, got -1
     """
 
-    contact_step: float = 0.0
-    shortest_flight: float | None = None
-    sliding_tolerance: float = 1e-9
-    dt: float | None = None
-    order: int = 2
-    contact_start: str = base.younger("impact")
+    contact_step: NotNegative = 0.0
+    shortest_flight: Positive | None = None
+    sliding_tolerance: Positive = 1e-9
+    dt: Positive | None = None
+    order: Count = 2
+    contact_start: base.ContactStart = field(default="impact", metadata=base.YOUNGER)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "contact_step", checks.at_least("contact_step", self.contact_step, 0.0))
-        if self.shortest_flight is not None:
-            object.__setattr__(self, "shortest_flight", checks.positive("shortest_flight", self.shortest_flight))
-        tolerance = checks.positive("sliding_tolerance", self.sliding_tolerance)
+        super().__post_init__()
+        tolerance = self.sliding_tolerance
         if not _FINEST <= tolerance <= _COARSEST:
             raise SceneError(f"sliding_tolerance must be from {_FINEST:g} to {_COARSEST:g}, got {tolerance:g}")
-        object.__setattr__(self, "sliding_tolerance", tolerance)
-        if self.dt is not None:
-            object.__setattr__(self, "dt", checks.positive("dt", self.dt))
-        object.__setattr__(self, "order", checks.count("order", self.order))
         if self.order not in (2, 4):
             raise SceneError(f"order must be 2 or 4, got {self.order}")
-        checks.one_of("contact_start", self.contact_start, base.CONTACT_STARTS)
         if self.contact_start == "centred" and self.contact_step == 0.0:
             raise SceneError(
                 'contact_step must be above 0 with contact_start = "centred", got 0: an exact reflection takes no '

@@ -66,7 +66,7 @@ class Penalty(fixed_step.SoftWalls):
     swarm.errors.SceneError: exponent must be 1 or more, got 0.5
     """
 
-    gradient: str = "composite"
+    gradient: fixed_step.Gradient = "composite"
 
     def __post_init__(self) -> None:
         super().__post_init__()

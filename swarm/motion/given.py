@@ -6,19 +6,38 @@ A led point has one form for all, so that one kernel serves every motion:
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..common import checks
 from ..common.checks import Vector
+from ..common.validated import Bounded, Number, PositiveMagnitude, Validated
 from ..errors import SceneError
 
 Floats = NDArray[np.float64]
 
 # The largest angle of a motion [rad], where float64 numbers are 1.2e-7 rad apart; of far larger ones a sine is chance.
 LARGEST_ANGLE = 1e9
+
+
+def vector_of(name: str, value: Vector) -> Vector:
+    """`value` as three numbers whose squares are finite."""
+    x, y, z = (checks.bounded(f"{name}[{i}]", part) for i, part in enumerate(checks.vector(name, value)))
+    return x, y, z
+
+
+def axis_of(name: str, value: Vector) -> Vector:
+    """`value` as the direction of an axis."""
+    axis = vector_of(name, value)
+    if not any(axis):
+        raise SceneError(f"{name} must have a direction, got (0, 0, 0)")
+    return axis
+
+
+BoundedVector = Annotated[Vector, vector_of]
+Axis = Annotated[Vector, axis_of]
 
 
 class Led(NamedTuple):
@@ -52,7 +71,7 @@ class Led(NamedTuple):
         return self.velocity + self.rate * (self.sine * math.cos(angle) - self.cosine * math.sin(angle))
 
 
-class Given:
+class Given(Validated):
     """A motion that is given; motions add up: `Translation(...) + Rotation(...)`."""
 
     # How many of its kind a sum may have, and what there is for more.
@@ -80,10 +99,7 @@ class Translation(Given):
     array([6., 0., 1.])
     """
 
-    velocity: Vector
-
-    def __post_init__(self) -> None:
-        checks.assign(self, velocity=vector_of("velocity", self.velocity))
+    velocity: BoundedVector
 
     def harmonic(self, start: ArrayLike) -> Led:
         """The path of a point that is at `start` (3,) [m] at time 0."""
@@ -106,20 +122,18 @@ class Oscillation(Given):
     array([1. , 0. , 0.1])
     """
 
-    amplitude: Vector
-    frequency: float
-    phase: float = 0.0
+    amplitude: BoundedVector
+    frequency: PositiveMagnitude
+    phase: Number = 0.0
 
     def __post_init__(self) -> None:
-        amplitude, frequency = vector_of("amplitude", self.amplitude), checks.positive("frequency", self.frequency)
-        checks.magnitude("frequency", frequency)
-        phase = checks.number("phase", self.phase)
+        super().__post_init__()
+        phase = self.phase
         if abs(phase) > LARGEST_ANGLE:
             raise SceneError(
                 f"phase must be from {-LARGEST_ANGLE:g} to {LARGEST_ANGLE:g} rad, got {phase:g}, next to which float64 "
                 f"numbers are {math.ulp(phase):.1g} rad apart; take it modulo 2 pi"
             )
-        checks.assign(self, amplitude=amplitude, frequency=frequency, phase=phase)
 
     def harmonic(self, start: ArrayLike) -> Led:
         """The path of a point that is at `start` (3,) [m] at time 0."""
@@ -147,15 +161,11 @@ class Rotation(Given):
     array([0., 1., 5.])
     """
 
-    axis: Vector
-    rate: float
-    center: Vector = (0.0, 0.0, 0.0)
+    axis: Axis
+    rate: Bounded
+    center: BoundedVector = (0.0, 0.0, 0.0)
     most: ClassVar[float] = 1
     instead: ClassVar[str] = "about one axis their rates add up to that of a single one"
-
-    def __post_init__(self) -> None:
-        axis, rate = axis_of(self.axis), checks.bounded("rate", self.rate)
-        checks.assign(self, axis=axis, rate=rate, center=vector_of("center", self.center))
 
     def harmonic(self, start: ArrayLike) -> Led:
         """The path of a point that is at `start` (3,) [m] at time 0."""
@@ -232,20 +242,6 @@ def unit_axis(rotation: Any) -> Floats:
     # By the largest part first: the squares of small components are 0.
     axis = np.array(rotation.axis) / np.abs(rotation.axis).max()
     return np.asarray(axis / np.sqrt((axis**2).sum()))
-
-
-def axis_of(value: Vector) -> Vector:
-    """`value` as the direction of an axis."""
-    axis = vector_of("axis", value)
-    if not any(axis):
-        raise SceneError("axis must have a direction, got (0, 0, 0)")
-    return axis
-
-
-def vector_of(name: str, value: Vector) -> Vector:
-    """`value` as three numbers whose squares are finite."""
-    x, y, z = (checks.bounded(f"{name}[{i}]", part) for i, part in enumerate(checks.vector(name, value)))
-    return x, y, z
 
 
 def point_of(start: ArrayLike) -> Floats:

@@ -17,8 +17,10 @@ from numpy.typing import ArrayLike
 
 from ..common import checks
 from ..common.checks import Vector
+from ..common.validated import Bounded, Magnitude
 from ..errors import SceneError
 from .given import (
+    Axis,
     Floats,
     Given,
     Led,
@@ -26,7 +28,6 @@ from .given import (
     Rotation,
     Sum,
     Translation,
-    axis_of,
     parts_of,
     point_of,
     unit_axis,
@@ -128,15 +129,11 @@ class Guide(Given):
     0.0
     """
 
-    axis: Vector
-    speed: float = 0.0
-    stiffness: float = 0.0
+    axis: Axis
+    speed: Bounded = 0.0
+    stiffness: Magnitude = 0.0
     most: ClassVar[float] = 0
     instead: ClassVar[str] = "impacts move the wall along it and nothing else does; give it alone"
-
-    def __post_init__(self) -> None:
-        axis, speed = axis_of(self.axis), checks.bounded("speed", self.speed)
-        checks.assign(self, axis=axis, speed=speed, stiffness=checks.magnitude("stiffness", self.stiffness))
 
     def harmonic(self, start: ArrayLike) -> Led:
         """The path of a point of the wall without its motion along the guide: a point at rest."""
@@ -166,7 +163,7 @@ KINDS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def parts_of_wall(value: Any, where: str = "motion", within: tuple[Any, ...] = ()) -> "WallMotion | None":
+def parts_of_wall(where: str, value: Any, within: tuple[Any, ...] = ()) -> "WallMotion | None":
     """`value` as the motion of a wall: None, a motion, its table, or a list of several; errors say where it is.
 
     `within` are the lists that it is in.
@@ -181,7 +178,7 @@ def parts_of_wall(value: Any, where: str = "motion", within: tuple[Any, ...] = (
     if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and len(value):
         if any(value is one for one in within):
             raise SceneError(f"{where} must not contain itself, got a list that does")
-        parts = [parts_of_wall(one, f"{where}[{k}]", (*within, value)) for k, one in enumerate(value)]
+        parts = [parts_of_wall(f"{where}[{k}]", one, (*within, value)) for k, one in enumerate(value)]
         try:
             return parts[0] if len(parts) == 1 else Sum(tuple(parts))  # type: ignore[arg-type]
         except SceneError as error:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.checks import closest, listed, one_of
+from ..common.validated import bare
 from ..errors import SceneError
 from ..methods import ALL_METHODS, Method
 from ..motion import table_of as motion_table
@@ -40,17 +41,8 @@ def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None,
             "surface: expected at least one [[surface]] table, or none for balls in free space, got something else"
         )
     built = [surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
-    met = None if pairs is None else _pairs_of(pairs)
+    met = None if pairs is None else convert(pairs, Pairs, "pairs")
     return Scene(surfaces=built, gravity=gravity, period=period, plane=plane, pairs=met)
-
-
-def _pairs_of(table: Any) -> Pairs:
-    """What particles with a radius do to one another, from the table [pairs]."""
-    try:
-        return convert(table, Pairs, "pairs")
-    except SceneError as error:
-        # The checks of `Pairs` name the key by its full path.
-        raise SceneError(str(error).replace("pairs.pairs.", "pairs.")) from None
 
 
 def surface_of(table: Any, where: str) -> Surface:
@@ -211,6 +203,7 @@ def of_kind(table: Any, where: str, kinds: Mapping[str, type[T]], base: type[Any
 
 
 def _type_name(kind: Any) -> str:
+    kind = bare(kind)
     if "..." in str(kind):
         return "a list"
     return {"float": "a number", "int": "a whole number", "Vector": "three numbers"}.get(

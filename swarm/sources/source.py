@@ -1,11 +1,12 @@
 """The description of a source for users, checked."""
 
 from dataclasses import MISSING, dataclass, fields
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..common import checks
+from ..common.validated import Count, Flag, Magnitude, NotNegative, Number, Positive, Validated
 from ..errors import SceneError
 from ..surfaces.presence.doors import Opening
 from ..surfaces.surface import Surface
@@ -13,8 +14,23 @@ from ..surfaces.surface import Surface
 _HALF_TURN = np.pi
 
 
+def _mass(name: str, value: Any) -> float:
+    mass = checks.number(name, value)
+    if not checks.SMALLEST <= mass <= checks.LARGEST:
+        raise SceneError(f"{name} must be from {checks.SMALLEST:g} to {checks.LARGEST:g} kg, got {mass:g}")
+    return mass
+
+
+def _beam(name: str, value: Any) -> checks.Vector:
+    beam = checks.vector(name, value)
+    checks.magnitude(f"|{name}|", float(np.sqrt(np.sum(np.square(beam)))))
+    if not any(beam):
+        raise SceneError(f"{name} must be a velocity, three numbers that are not all 0, got (0, 0, 0)")
+    return beam
+
+
 @dataclass(frozen=True, repr=False)
-class Source:
+class Source(Validated):
     """A source of particles that come during a run; `simulate(..., sources=[...])` has a list of them.
 
     All births are drawn before the run, from its seed, each source by itself: the same bits for any threads, blocks,
@@ -55,25 +71,25 @@ class Source:
     """
 
     where: Any
-    volume: bool = False
+    volume: Flag = False
     within: Any = None
-    rate: float | None = None
+    rate: Positive | None = None
     times: Any = None
-    count: int | None = None
-    even: bool = False
-    start: float = 0.0
-    stop: float | None = None
-    temperature: float | None = None
-    speed: float | None = None
-    beam: Any = None
-    divergence: float = 0.0
-    mass: float = 1.0
+    count: Count | None = None
+    even: Flag = False
+    start: NotNegative = 0.0
+    stop: Number | None = None
+    temperature: Magnitude | None = None
+    speed: Magnitude | None = None
+    beam: Annotated[Any, _beam] | None = None
+    divergence: NotNegative = 0.0
+    mass: Annotated[float, _mass] = 1.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._check_place()
         self._check_times()
         self._check_velocity()
-        checks.assign(self, mass=_mass(self.mass))
 
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults."""
@@ -81,7 +97,6 @@ class Source:
         return f"Source({', '.join(f'{f.name}={_said(getattr(self, f.name))}' for f in said)})"
 
     def _check_place(self) -> None:
-        checks.flag("volume", self.volume)
         if isinstance(self.where, (int, np.integer)) and not isinstance(self.where, bool):
             checks.assign(self, where=checks.count("where", self.where, least=0))
         elif not isinstance(self.where, (Surface, Opening)):
@@ -103,20 +118,14 @@ class Source:
             )
         if not given and self.count is None:
             raise SceneError("a source needs one of rate, times and count, got none")
-        if self.rate is not None:
-            checks.assign(self, rate=checks.positive("rate", self.rate))
-        if self.count is not None:
-            checks.assign(self, count=checks.count("count", self.count))
-        if checks.flag("even", self.even) and self.rate is None:
+        if self.even and self.rate is None:
             raise SceneError("even must go with a rate, got True without one; give rate=, or the times themselves")
         self._check_span()
         if self.times is not None:
             self._check_list()
 
     def _check_span(self) -> None:
-        checks.assign(self, start=checks.at_least("start", self.start, 0.0))
         if self.stop is not None:
-            checks.assign(self, stop=checks.number("stop", self.stop))
             if not self.stop >= self.start:
                 raise SceneError(f"stop must be at start = {self.start:g} s or later, got {self.stop:g}")
         elif self.count is not None and self.rate is None:
@@ -140,21 +149,10 @@ class Source:
         given = [name for name in ("temperature", "speed", "beam") if getattr(self, name) is not None]
         if len(given) != 1:
             raise SceneError(f"a source needs one of temperature, speed and beam, got {' and '.join(given) or 'none'}")
-        for name in ("temperature", "speed"):
-            if getattr(self, name) is not None:
-                checks.assign(self, **{name: checks.magnitude(name, getattr(self, name))})
-        if self.beam is not None:
-            beam = checks.vector("beam", self.beam)
-            checks.magnitude("|beam|", float(np.sqrt(np.sum(np.square(beam)))))
-            if not any(beam):
-                raise SceneError("beam must be a velocity, three numbers that are not all 0, got (0, 0, 0)")
-            checks.assign(self, beam=beam)
-        divergence = checks.at_least("divergence", self.divergence, 0.0)
-        if divergence >= _HALF_TURN:
-            raise SceneError(f"divergence must be below pi, the half angle of a cone [rad], got {divergence:g}")
-        if divergence > 0.0 and self.beam is None:
-            raise SceneError(f"divergence must go with a beam, got {divergence:g} without one; give beam=")
-        checks.assign(self, divergence=divergence)
+        if self.divergence >= _HALF_TURN:
+            raise SceneError(f"divergence must be below pi, the half angle of a cone [rad], got {self.divergence:g}")
+        if self.divergence > 0.0 and self.beam is None:
+            raise SceneError(f"divergence must go with a beam, got {self.divergence:g} without one; give beam=")
 
 
 def checked_sources(value: Any) -> tuple[Source, ...]:
@@ -168,13 +166,6 @@ def checked_sources(value: Any) -> tuple[Source, ...]:
         if not isinstance(one, Source):
             raise SceneError(f"sources[{k}] must be a swarm.Source, got {one!r:.200}")
     return tuple(given)
-
-
-def _mass(value: Any) -> float:
-    mass = checks.number("mass", value)
-    if not checks.SMALLEST <= mass <= checks.LARGEST:
-        raise SceneError(f"mass must be from {checks.SMALLEST:g} to {checks.LARGEST:g} kg, got {mass:g}")
-    return mass
 
 
 def _said(value: Any) -> str:

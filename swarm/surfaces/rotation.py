@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,9 @@ def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
         # What was scaled before keeps its bits: a surface from its own repr or table is the same one.
         return parts
     return tuple(part / length for part in scaled)
+
+
+Direction = Annotated[Vector, unit]
 
 
 def matrix(turn: Quaternion | None) -> NDArray[np.float64]:

@@ -2,14 +2,15 @@
 
 import math
 from dataclasses import MISSING, dataclass, field, fields, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import motion as motions
 from ..common import checks
-from ..common.checks import Vector, array, magnitude, number, one_of, positive, vector
+from ..common.checks import Vector, array, one_of
+from ..common.validated import Magnitude, Part, PositiveMagnitude, Validated
 from ..errors import SceneError
 from ..kernel.vector import Vec, vec
 from . import rotation as rotations
@@ -25,8 +26,29 @@ HalfSpace = tuple[Vector, float]
 UNBOUNDED: Box = ((-math.inf,) * 3, (math.inf,) * 3)
 
 
+def _openings(name: str, value: Any) -> "tuple[Surface | Opening, ...]":
+    """`value` as a tuple of openings."""
+    given = None if isinstance(value, (Surface, Opening)) else checks.parts_of(value)
+    if given is None:
+        raise SceneError(f"{name} must be a list of surfaces such as swarm.Sphere, got {checks.shown(value)}")
+    for k, one in enumerate(given):
+        opening = one.surface if isinstance(one, Opening) else one
+        if not isinstance(opening, Surface):
+            raise SceneError(f"{name}[{k}] must be a surface such as swarm.Sphere, got {opening!r:.200}")
+        for law in fields(Surface):
+            came = getattr(opening, law.name)
+            if law.name == "present" and came is not None:
+                raise SceneError(
+                    f"{name}[{k}].present must be left out, an opening is no wall, got {came!r:.200}; say when it is "
+                    "open as swarm.Opening(surface, times=...)"
+                )
+            if law.name != "rotation" and came != law.default:
+                raise SceneError(f"{name}[{k}].{law.name} must be left out, an opening is no wall, got {came!r:.200}")
+    return given
+
+
 @dataclass(frozen=True, repr=False)
-class Surface:
+class Surface(Validated):
     """A rigid surface. See the subclasses for their arguments; these are common to all.
 
     Args:
@@ -52,55 +74,40 @@ class Surface:
             which is infinite in the last pair if it stays. None: it is always there.
     """
 
-    rotation: Any = field(default=None, kw_only=True)
-    restitution: float = field(default=1.0, kw_only=True)
-    friction: float = field(default=0.0, kw_only=True)
-    temperature: float | None = field(default=None, kw_only=True)
-    accommodation: float = field(default=1.0, kw_only=True)
-    laws: Any = field(default=(), kw_only=True)
-    motion: Any = field(default=None, kw_only=True)
-    mass: float | None = field(default=None, kw_only=True)
-    inertia: float | None = field(default=None, kw_only=True)
-    openings: Any = field(default=(), kw_only=True)
-    present: Spans = field(default=None, kw_only=True)
+    rotation: Annotated[Any, rotations.quaternion] = field(default=None, kw_only=True)
+    restitution: Part = field(default=1.0, kw_only=True)
+    friction: Magnitude = field(default=0.0, kw_only=True)
+    temperature: Magnitude | None = field(default=None, kw_only=True)
+    accommodation: Part = field(default=1.0, kw_only=True)
+    laws: Annotated[Any, checked_laws] = field(default=(), kw_only=True)
+    motion: Annotated[Any, motions.parts_of_wall] = field(default=None, kw_only=True)
+    mass: PositiveMagnitude | None = field(default=None, kw_only=True)
+    inertia: PositiveMagnitude | None = field(default=None, kw_only=True)
+    openings: Annotated[Any, _openings] = field(default=(), kw_only=True)
+    present: Annotated[Spans, checked_spans] = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", rotations.quaternion("rotation", self.rotation))
-        object.__setattr__(self, "restitution", _part("restitution", self.restitution))
-        object.__setattr__(self, "friction", magnitude("friction", self.friction))
-        object.__setattr__(self, "accommodation", _part("accommodation", self.accommodation))
-        if self.temperature is not None:
-            object.__setattr__(self, "temperature", magnitude("temperature", self.temperature))
-        elif self.accommodation != 1.0:
+        super().__post_init__()
+        if hasattr(self, "center"):
+            checks.assign(self, center=checks.vector("center", self.center))
+        side_sign(getattr(self, "side", "inside"))
+        if self.temperature is None and self.accommodation != 1.0:
             raise SceneError(
                 f"accommodation must go with a temperature, got {self.accommodation:g} and none; give temperature= "
                 "(k_B T in joule), or leave accommodation out"
             )
-        object.__setattr__(self, "laws", checked_laws(self.laws))
         if self.laws and self.temperature is not None and self.accommodation == 1.0:
             raise SceneError(
                 f"laws must be left out where all particles leave with the temperature, got {self.laws} and "
                 "accommodation 1; give an accommodation below 1, or swarm.CercignaniLampis(temperature, 1.0, 1.0) as "
                 "the first of the laws in place of the temperature"
             )
-        if hasattr(self, "center"):
-            object.__setattr__(self, "center", vector("center", self.center))
-        side_sign(getattr(self, "side", "inside"))
-        object.__setattr__(self, "motion", motions.parts_of_wall(self.motion))
-        for name in ("mass", "inertia"):
-            value = getattr(self, name)
-            if value is not None:
-                checked = positive(name, value)
-                magnitude(name, checked)
-                object.__setattr__(self, name, checked)
         motions.require_freedom(self.motion, self.mass, self.inertia)
         if self.mass is not None and self.inertia is not None and not hasattr(self, "center"):
             raise SceneError(
                 f"mass must be None where an inertia is given to a {type(self).__name__}, which has no center that its "
                 f"weight could be at, got {self.mass:g}"
             )
-        object.__setattr__(self, "openings", _openings(self.openings))
-        object.__setattr__(self, "present", checked_spans("present", self.present))
         if self.openings and (self.motion is not None or self.reacts()):
             raise SceneError(
                 f"openings must be of a wall at rest, got {len(self.openings)} of a {type(self).__name__} with a "
@@ -255,35 +262,6 @@ def is_along(direction: Vector, axis: Vector) -> bool:
 def volume_of(opening: Surface | Opening) -> Surface:
     """The volume of an opening, present while that is open."""
     return replace(opening.surface, present=opening.times) if isinstance(opening, Opening) else opening
-
-
-def _openings(value: Any) -> tuple[Surface | Opening, ...]:
-    """The argument `openings`, checked."""
-    given = None if isinstance(value, (Surface, Opening)) else checks.parts_of(value)
-    if given is None:
-        raise SceneError(f"openings must be a list of surfaces such as swarm.Sphere, got {checks.shown(value)}")
-    for k, one in enumerate(given):
-        opening = one.surface if isinstance(one, Opening) else one
-        if not isinstance(opening, Surface):
-            raise SceneError(f"openings[{k}] must be a surface such as swarm.Sphere, got {opening!r:.200}")
-        for law in fields(Surface):
-            came = getattr(opening, law.name)
-            if law.name == "present" and came is not None:
-                raise SceneError(
-                    f"openings[{k}].present must be left out, an opening is no wall, got {came!r:.200}; say when it is "
-                    "open as swarm.Opening(surface, times=...)"
-                )
-            if law.name != "rotation" and came != law.default:
-                raise SceneError(f"openings[{k}].{law.name} must be left out, an opening is no wall, got {came!r:.200}")
-    return given
-
-
-def _part(name: str, value: Any) -> float:
-    """`value` as a number from 0 to 1."""
-    part = number(name, value, "a number from 0 to 1")
-    if not 0.0 <= part <= 1.0:
-        raise SceneError(f"{name} must be from 0 to 1, got {part:g}")
-    return part
 
 
 def _rows(points: ArrayLike) -> Vec:

@@ -109,11 +109,11 @@ def leave_of(given):
     return given if isinstance(given, Leave) else Leave(given)
 
 
-def checked_laws(given: Any) -> tuple[Any, ...]:
+def checked_laws(name: str, given: Any) -> tuple[Any, ...]:
     """Laws as kernels take them, their fields as floats; a str is the name that a file has of a law."""
     if isinstance(given, (WallLaw, str)) or not isinstance(given, (tuple, list)):
-        raise SceneError(f"laws must be a list of WallLaw, got {shown(given)}")
-    return tuple(law if isinstance(law, str) else _checked(f"laws[{k}]", law) for k, law in enumerate(given))
+        raise SceneError(f"{name} must be a list of WallLaw, got {shown(given)}")
+    return tuple(law if isinstance(law, str) else _checked(f"{name}[{k}]", law) for k, law in enumerate(given))
 
 
 def _checked(name: str, law: Any) -> Any:

@@ -4,13 +4,14 @@ import math
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...common import checks
 from ...common.checks import Vector
+from ...common.validated import Point
 from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations
@@ -31,6 +32,13 @@ _RIPPLE = 0.1
 _ON = 1e-4
 # The width of a cell along an axis on which phi does not depend [m]: no particle leaves it.
 _ENDLESS = 1e150
+
+
+def _spacing(name: str, value: Any) -> Vector:
+    if not isinstance(value, (list, tuple)) and getattr(value, "ndim", 0) == 0:
+        one = checks.length(name, value)
+        return one, one, one
+    return checks.three_lengths(name, value)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -66,8 +74,8 @@ class Sampled(Surface):
     """
 
     values: Any
-    spacing: Any
-    origin: Vector
+    spacing: Annotated[Any, _spacing]
+    origin: Point
     side: str = "inside"
     mesh_error: float | None = field(default=None, kw_only=True)
     mesh_weld: float | None = field(default=None, kw_only=True)
@@ -76,8 +84,6 @@ class Sampled(Surface):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "spacing", _spacing(self.spacing))
-        object.__setattr__(self, "origin", checks.vector("origin", self.origin))
         if self._made is None or self._made.values is not self.values or self._made.spacing != self.spacing:
             object.__setattr__(self, "values", _samples(self.values))
             if self.mesh_error is None:
@@ -190,14 +196,6 @@ class Samples:
 
 
 # --- Checks ----------------------------------------------------------------------------------------------
-
-
-def _spacing(value: Any) -> Vector:
-    if not isinstance(value, (list, tuple)) and getattr(value, "ndim", 0) == 0:
-        one = checks.length("spacing", value)
-        return one, one, one
-    x, y, z = (checks.length(f"spacing[{k}]", part) for k, part in enumerate(checks.vector("spacing", value)))
-    return x, y, z
 
 
 def _samples(values: Any) -> Floats:

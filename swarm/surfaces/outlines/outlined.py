@@ -50,7 +50,6 @@ class Outlined(Many):
                     f"{what} must be None for {name}, whose walls end at its corners, got "
                     f"{getattr(self, what)!r:.200}; move the other surfaces, or build it of surfaces without edges"
                 )
-        object.__setattr__(self, "axis", rotations.unit("axis", self.axis))
 
     __repr__ = Surface.__repr__
 

@@ -1,12 +1,19 @@
 """Walls that stand on an outline: `Polygon`, `Stadium`, and `Prism`, which has lids."""
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from ...common.checks import Vector, at_least, length
+from ...common.checks import Vector
+from ...common.validated import Length, NotNegative
 from ...errors import SceneError
+from ..rotation import Direction
 from .outline import Outline
 from .outlined import Outlined
+
+
+def _rows(name: str, value: Any) -> tuple[tuple[float, ...], ...]:
+    """`value` as the rows of an outline, without bulges that are 0."""
+    return tuple(row if row[2] else row[:2] for row in Outline(name, value).rows)
 
 
 @dataclass(frozen=True, repr=False)
@@ -33,16 +40,12 @@ class Polygon(Outlined):
     array([-0.5,  0.5])
     """
 
-    vertices: Any
-    axis: Vector = (0.0, 0.0, 1.0)
+    vertices: Annotated[Any, _rows]
+    axis: Direction = (0.0, 0.0, 1.0)
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     given: ClassVar[str] = "vertices"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "vertices", _kept(Outline("vertices", self.vertices)))
 
 
 @dataclass(frozen=True, repr=False)
@@ -63,16 +66,11 @@ class Stadium(Outlined):
     array([-1.,  1.])
     """
 
-    radius: float
-    length: float
-    axis: Vector = (0.0, 0.0, 1.0)
+    radius: Length
+    length: NotNegative
+    axis: Direction = (0.0, 0.0, 1.0)
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "radius", length("radius", self.radius))
-        object.__setattr__(self, "length", at_least("length", self.length, 0.0))
 
     def rows(self) -> Any:
         half, r = 0.5 * self.length, self.radius
@@ -99,23 +97,16 @@ class Prism(Outlined):
     array([0.5])
     """
 
-    outline: Any
-    height: float = field()
-    axis: Vector = (0.0, 0.0, 1.0)
+    outline: Annotated[Any, _rows]
+    height: Length = field()
+    axis: Direction = (0.0, 0.0, 1.0)
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "outline", _kept(Outline("outline", self.outline)))
-        object.__setattr__(self, "height", length("height", self.height))
         if self.side != "inside":
             raise SceneError(
                 f'side must be "inside" for a Prism, got {self.side!r}; of a solid that reaches through its vessel '
                 "make a Polygon, or of a bounded one a union or a mesh"
             )
-
-
-def _kept(outline: Outline) -> tuple[tuple[float, ...], ...]:
-    """The rows of an outline, without bulges that are 0."""
-    return tuple(row if row[2] else row[:2] for row in outline.rows)

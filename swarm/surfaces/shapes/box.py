@@ -3,9 +3,10 @@
 import itertools
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from ...common.checks import Vector, length, one_of, parts_of, shown, vector
+from ...common.checks import Vector, one_of, parts_of, shown
+from ...common.validated import Lengths
 from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations
@@ -17,6 +18,20 @@ from .slab import slab_numbers
 from .solid import body
 
 FACES = tuple(sign + axis for axis, sign in itertools.product("xyz", "-+"))
+
+
+def _faces(name: str, value: Any) -> tuple[str, ...]:
+    """`value` as the faces of a box that have no wall."""
+    given = parts_of(value)
+    if given is None:
+        raise SceneError(f"{name} must be a list of faces such as '+x', got {shown(value)}")
+    faces = tuple(one_of(f"{name}[{i}]", face, FACES) for i, face in enumerate(given))
+    for i, face in enumerate(faces):
+        if face in faces[:i]:
+            raise SceneError(f"{name} must name each face once, got {face!r} twice")
+    if len(faces) == len(FACES):
+        raise SceneError(f"{name} must leave a wall, got all six faces")
+    return faces
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,18 +51,15 @@ class Box(Surface):
     array([-1. ,  0.5])
     """
 
-    half_widths: Vector
+    half_widths: Lengths
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     is_convex = True
-    open: tuple[str, ...] = ()
+    open: Annotated[tuple[str, ...], _faces] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        widths = vector("half_widths", self.half_widths)
-        object.__setattr__(self, "half_widths", tuple(length(f"half_widths[{i}]", w) for i, w in enumerate(widths)))
-        object.__setattr__(self, "open", _faces(self.open))
         if self.open and self.side == "outside":
             raise SceneError(f'open must be empty for side="outside", got {list(self.open)}')
 
@@ -97,17 +109,3 @@ class Box(Surface):
 
 def _face(normal: Vector, half: float, center: Vector) -> PlaneNumbers:
     return PlaneNumbers(vec(normal), sum(n * c for n, c in zip(normal, center, strict=True)) + half)
-
-
-def _faces(value: Any) -> tuple[str, ...]:
-    """The argument `open`."""
-    given = parts_of(value)
-    if given is None:
-        raise SceneError(f"open must be a list of faces such as '+x', got {shown(value)}")
-    faces = tuple(one_of(f"open[{i}]", face, FACES) for i, face in enumerate(given))
-    for i, face in enumerate(faces):
-        if face in faces[:i]:
-            raise SceneError(f"open must name each face once, got {face!r} twice")
-    if len(faces) == len(FACES):
-        raise SceneError("open must leave a wall, got all six faces")
-    return faces

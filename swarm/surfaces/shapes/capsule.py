@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.checks import Vector, at_least, length
+from ...common.checks import Vector
+from ...common.validated import Length, NotNegative
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
+from ..rotation import Direction
 from ..surface import Box, box_around, farthest, side_sign
 from ..time_of_impact.approach import Border, LevelBound
 from ..time_of_impact.course import ball_rise_time
@@ -37,18 +39,13 @@ class Capsule(Revolved):
     array([0.])
     """
 
-    radius: float
-    length: float
-    axis: Vector = (0.0, 0.0, 1.0)
+    radius: Length
+    length: NotNegative
+    axis: Direction = (0.0, 0.0, 1.0)
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     is_convex = True
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "radius", length("radius", self.radius))
-        object.__setattr__(self, "length", at_least("length", self.length, 0.0))
 
     def numbers(self) -> "CapsuleNumbers":
         radius, side = self.radius, side_sign(self.side)

@@ -1,8 +1,9 @@
 """Cone: phi = rho^2 cos^2 - z^2 sin^2 of one nappe, a quadric cut off by the plane through its apex."""
 
+import functools
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from ...common.checks import Vector, number
 from ...errors import SceneError
@@ -41,8 +42,8 @@ class Cone(Revolved):
     array([-2.,  1.])
     """
 
-    half_angle: float
-    axis: Vector = (0.0, 0.0, 1.0)
+    half_angle: Annotated[float, functools.partial(number, expected="a finite number of radians")]
+    axis: rotations.Direction = (0.0, 0.0, 1.0)
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
@@ -50,7 +51,7 @@ class Cone(Revolved):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        angle = number("half_angle", self.half_angle, "a finite number of radians")
+        angle = self.half_angle
         if not 0.0 < angle < 0.5 * math.pi:
             raise SceneError(f"half_angle must be between 0 and pi/2 rad, got {angle:g}")
         if angle > 0.5 * math.pi - _FLATTEST:
@@ -58,7 +59,6 @@ class Cone(Revolved):
                 f"half_angle must be at most pi/2 - {_FLATTEST:g} rad, got pi/2 - {0.5 * math.pi - angle:.3g}: so "
                 "flat a cone is a plane to round-off; use Plane"
             )
-        object.__setattr__(self, "half_angle", angle)
 
     def numbers(self) -> QuadricNumbers:
         """The numbers of both nappes in the frame in which their axis is z."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...common.checks import Vector
-from ...common.checks import length as checked_length
+from ...common.validated import Length
 from ...kernel.vector import vec
 from .. import rotation as rotations
 from ..balls.rounded import RoundCan
@@ -35,19 +35,13 @@ class Cylinder(Revolved):
     array([0.  , 0.25])
     """
 
-    radius: float
-    axis: Vector = (0.0, 0.0, 1.0)
-    length: float | None = None
+    radius: Length
+    axis: rotations.Direction = (0.0, 0.0, 1.0)
+    length: Length | None = None
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     is_convex = True
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "radius", checked_length("radius", self.radius))
-        if self.length is not None:
-            object.__setattr__(self, "length", checked_length("length", self.length))
 
     def numbers(self) -> QuadricNumbers:
         """The numbers of the endless cylinder in the frame in which its axis is z."""

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...common.checks import Vector, length, vector
+from ...common.checks import Vector
+from ...common.validated import Lengths
 from ...kernel.jit import select
 from ...kernel.vector import cross, norm, times, total, vec
 from .. import rotation as rotations
@@ -36,18 +37,11 @@ class Ellipsoid(Surface):
     array([0.])
     """
 
-    semi_axes: Vector
+    semi_axes: Lengths
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     is_convex = True
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        axes = vector("semi_axes", self.semi_axes)
-        for i, axis in enumerate(axes):
-            length(f"semi_axes[{i}]", axis)
-        object.__setattr__(self, "semi_axes", axes)
 
     def numbers(self) -> "EllipsoidNumbers":
         a = vec(1.0 / (axis * axis) for axis in self.semi_axes)

@@ -3,7 +3,9 @@
 import itertools
 from dataclasses import dataclass
 
-from ...common.checks import Vector, length
+from ...common.checks import Vector
+from ...common.validated import Length
+from ..rotation import Direction
 from ..surface import UNBOUNDED, Box, HalfSpace, farthest
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
@@ -29,16 +31,12 @@ class Paraboloid(Revolved):
     array([-1.,  0.])
     """
 
-    focal_length: float
-    axis: Vector = (0.0, 0.0, 1.0)
+    focal_length: Length
+    axis: Direction = (0.0, 0.0, 1.0)
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     is_convex = True
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "focal_length", length("focal_length", self.focal_length))
 
     def numbers(self) -> QuadricNumbers:
         a = 0.25 / self.focal_length

@@ -4,10 +4,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ...common.checks import Vector, number
+from ...common.checks import Vector
+from ...common.validated import Number
 from ...kernel.jit import select
 from ...kernel.vector import Vec, dot, vec
-from ..rotation import turned, unit
+from ..rotation import Direction, turned
 from ..surface import UNBOUNDED, Box, HalfSpace, Surface, is_along
 from ..time_of_impact.course import rise_time
 from ..time_of_impact.rising import Level
@@ -29,15 +30,10 @@ class Plane(Surface):
     array([-0.25])
     """
 
-    normal: Vector
-    offset: float = 0.0
+    normal: Direction
+    offset: Number = 0.0
 
     is_convex = True
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "normal", unit("normal", self.normal))
-        object.__setattr__(self, "offset", number("offset", self.offset))
 
     def numbers(self) -> "PlaneNumbers":
         return PlaneNumbers(vec(turned(self.rotation, self.normal)), self.offset)

@@ -3,12 +3,13 @@
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...common.checks import Vector, entries, number, vector
+from ...common.checks import Vector, entries, vector
+from ...common.validated import Number, Point
 from ...errors import SceneError
 from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, box_around, extents, farthest, side_sign
@@ -88,6 +89,19 @@ def principal_frame(matrix: NDArray[np.float64], linear: NDArray[np.float64], co
     )
 
 
+def _symmetric(name: str, value: Any) -> Matrix:
+    """`value` as the three rows of a symmetric matrix."""
+    rows = entries(name, value, 3, "three rows of three numbers")
+    a = np.array([vector(f"{name}[{i}]", row) for i, row in enumerate(rows)])
+    for i, k in ((0, 1), (0, 2), (1, 2)):
+        if abs(a[i, k] - a[k, i]) > _ASYMMETRY * abs(a).max():
+            raise SceneError(
+                f"{name} must be symmetric, got {name}[{i}][{k}] = {a[i, k]:g} and {name}[{k}][{i}] = {a[k, i]:g}"
+            )
+    first, second, third = (tuple(row) for row in (0.5 * (a + a.T)).tolist())
+    return first, second, third
+
+
 @dataclass(frozen=True, repr=False)
 class Quadric(Surface):
     """The surface d.A d + b.d + c = 0 with d = r - center: phi is the left side, and below 0 is inside.
@@ -106,17 +120,14 @@ class Quadric(Surface):
     array([0.])
     """
 
-    matrix: Matrix
-    vector: Vector = (0.0, 0.0, 0.0)
-    constant: float = 0.0
+    matrix: Annotated[Matrix, _symmetric]
+    vector: Point = (0.0, 0.0, 0.0)
+    constant: Number = 0.0
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "matrix", _symmetric(self.matrix))
-        object.__setattr__(self, "vector", vector("vector", self.vector))
-        object.__setattr__(self, "constant", number("constant", self.constant))
         if not (any(map(any, self.matrix)) or any(self.vector)):
             raise SceneError("matrix must not be all 0 where vector is, got both 0")
         if self._frame.one_sign():
@@ -156,16 +167,3 @@ class Quadric(Surface):
     def extent(self) -> float:
         lengths = [length for length in (*self._frame.semi_axes(), self.size()) if math.isfinite(length)]
         return farthest(self.center) + math.hypot(*self._frame.middle) + max(lengths, default=0.0)
-
-
-def _symmetric(value: Any) -> Matrix:
-    """The argument `matrix` as three rows."""
-    rows = entries("matrix", value, 3, "three rows of three numbers")
-    a = np.array([vector(f"matrix[{i}]", row) for i, row in enumerate(rows)])
-    for i, k in ((0, 1), (0, 2), (1, 2)):
-        if abs(a[i, k] - a[k, i]) > _ASYMMETRY * abs(a).max():
-            raise SceneError(
-                f"matrix must be symmetric, got matrix[{i}][{k}] = {a[i, k]:g} and matrix[{k}][{i}] = {a[k, i]:g}"
-            )
-    first, second, third = (tuple(row) for row in (0.5 * (a + a.T)).tolist())
-    return first, second, third

@@ -19,10 +19,6 @@ class Revolved(Surface):
     axis: Vector
     center: Vector
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "axis", rotations.unit("axis", self.axis))
-
     def turn(self) -> rotations.Quaternion | None:
         """From that frame to the scene's."""
         return rotations.after(self.rotation, rotations.onto(self.axis))

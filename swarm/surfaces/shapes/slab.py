@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ...common.checks import Vector, length
+from ...common.checks import Vector
+from ...common.validated import Length
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, dot, vec
-from ..rotation import turned, unit
+from ..rotation import Direction, turned
 from ..surface import TILT, Box, HalfSpace, Surface, box_around, farthest, is_along, side_sign
 from ..time_of_impact.course import rise_time
 from ..time_of_impact.rising import Between, Level, level_step
@@ -35,17 +36,12 @@ class Slab(Surface):
     array([0.25])
     """
 
-    normal: Vector
-    half_width: float
+    normal: Direction
+    half_width: Length
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     is_convex = True
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "normal", unit("normal", self.normal))
-        object.__setattr__(self, "half_width", length("half_width", self.half_width))
 
     def numbers(self) -> "SlabNumbers":
         return slab_numbers(turned(self.rotation, self.normal), self.half_width, self.center, side_sign(self.side))

@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from ...common.checks import Vector, length
+from ...common.checks import Vector
+from ...common.validated import Length
 from ...kernel.jit import select
 from ...kernel.vector import ZERO, Vec, absolute, dot, highest, norm, square, total, vec
 from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
@@ -31,15 +32,11 @@ class Sphere(Surface):
     array([0.])
     """
 
-    radius: float
+    radius: Length
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     is_convex = True
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "radius", length("radius", self.radius))
 
     def numbers(self) -> "SphereNumbers":
         side = side_sign(self.side)

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.checks import Vector, length
+from ...common.checks import Vector
+from ...common.validated import Length
 from ...errors import SceneError
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
@@ -40,15 +41,13 @@ class Torus(Surface):
     array([0.])
     """
 
-    major_radius: float
-    minor_radius: float
+    major_radius: Length
+    minor_radius: Length
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "major_radius", length("major_radius", self.major_radius))
-        object.__setattr__(self, "minor_radius", length("minor_radius", self.minor_radius))
         if self.minor_radius >= self.major_radius:
             raise SceneError(
                 f"minor_radius must be below major_radius = {self.major_radius:g}, got {self.minor_radius:g}"
