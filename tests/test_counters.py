@@ -176,7 +176,7 @@ def test_halts_and_sessions_lose_and_repeat_none(name):
     start, whole = run(scene, shapes, 6)
 
     def begun():
-        watched = Watched(None, None, checked_counters(shapes))
+        watched = Watched(None, None, checked_counters("counters", shapes))
         return Run(scene, start.copy(), METHOD, 1, None, "never", Seeding(), watched)
 
     halts, run_of = 0, begun()

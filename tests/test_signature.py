@@ -6,6 +6,8 @@ import pydoc
 import pytest
 
 import swarm
+from swarm.commands.run import run
+from swarm.run.options import RunOptions
 
 LINED = ["contact_history", "elastic", "fill", "pack", "place", "rigid", "simulate", "sweep"]
 SHOWN = [name for name in swarm.__all__ if callable(getattr(swarm, name))]
@@ -54,3 +56,21 @@ def test_classes_are_made_as_before():
     assert list(shown.parameters)[:3] == ["half_widths", "center", "side"]
     assert shown.bind((1, 1, 1), restitution=0.5).arguments == {"half_widths": (1, 1, 1), "restitution": 0.5}
     assert swarm.Box((1.0, 1.0, 1.0), side="outside").side == "outside"
+
+
+def test_simulate_takes_the_options_of_a_run():
+    """The same names in the same order with the same defaults, each described."""
+    shown = list(inspect.signature(swarm.simulate).parameters.values())[3:]
+    options = inspect.signature(RunOptions).parameters
+    assert [(one.name, one.default) for one in shown] == [(one.name, one.default) for one in options.values()]
+    assert all(one.kind is one.KEYWORD_ONLY for one in shown)
+    assert all(f"    {one.name}: " in swarm.simulate.__doc__ for one in shown)
+
+
+def test_the_command_line_takes_options_of_a_run():
+    """All but its own, with the defaults of Python, or None where a scene file may say something else."""
+    own = {"scene_file", "output", "quiet", "plugins", "as_json"}
+    options = inspect.signature(RunOptions).parameters
+    for one in inspect.signature(run).parameters.values():
+        if one.name not in own:
+            assert one.default in (None, options[one.name].default)

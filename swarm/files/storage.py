@@ -1,18 +1,30 @@
 """The particles that a trajectory keeps, and their form."""
 
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..common import checks
+from ..common.validated import Validated, choice
 from ..errors import SceneError
 
-_PRECISIONS = ("float32", "float64")
-_COMPRESSIONS = ("none", "gzip", "lzf")
+
+def _kept(name: str, value: Any) -> Any:
+    if not isinstance(value, str):
+        return checks.count(name, value)
+    if value not in ("all", "none"):
+        raise SceneError(f'{name} must be "all", "none", or k for every k-th particle, got {value!r}')
+    return value
+
+
+KeptParticles = Annotated[str | int, _kept]
+Precision = Annotated[str, choice("float32", "float64")]
+Compression = Annotated[str, choice("none", "gzip", "lzf")]
 
 
 @dataclass(frozen=True)
-class Storage:
+class Storage(Validated):
     """The part of every frame that a trajectory keeps; observables are always kept in full.
 
     Args:
@@ -27,18 +39,9 @@ class Storage:
     3
     """
 
-    frames: str | int = "all"
-    precision: str = "float64"
-    compression: str = "none"
-
-    def __post_init__(self) -> None:
-        if isinstance(self.frames, str):
-            if self.frames not in ("all", "none"):
-                raise SceneError(f'frames must be "all", "none", or k for every k-th particle, got {self.frames!r}')
-        else:
-            checks.count("frames", self.frames)
-        checks.one_of("precision", self.precision, _PRECISIONS)
-        checks.one_of("compression", self.compression, _COMPRESSIONS)
+    frames: KeptParticles = "all"
+    precision: Precision = "float64"
+    compression: Compression = "none"
 
     def kept(self, first: int = 0) -> slice:
         """The particles that it keeps, of those from number `first` on."""

@@ -30,8 +30,8 @@ class _NotYet(dict[str, Any]):
         )
 
 
-def checked(given: Any) -> dict[str, Function]:
-    """The argument `observables`: functions by their names.
+def checked(argument: str, given: Any) -> dict[str, Function]:
+    """The argument `observables` of a run: functions by their names.
 
     Raises:
         SceneError: it is no dict of functions, or a name cannot be that of an observable.
@@ -39,15 +39,15 @@ def checked(given: Any) -> dict[str, Function]:
     if given is None:
         return {}
     if not isinstance(given, Mapping):
-        raise SceneError(f"observables must be a dict of functions of a frame by their names, got {shown(given)}")
+        raise SceneError(f"{argument} must be a dict of functions of a frame by their names, got {shown(given)}")
     for name, function in given.items():
         if not (isinstance(name, str) and name.isidentifier()):
-            raise SceneError(f"observables must have names such as mean_radius, got {shown(name)}")
+            raise SceneError(f"{argument} must have names such as mean_radius, got {shown(name)}")
         column = _COLUMN.sub("", name)
         if name in NAMES or (column != name and (column in NAMES or column in given)):
-            raise SceneError(f"observables[{name!r}] must have another name: {name} is that of another observable")
+            raise SceneError(f"{argument}[{name!r}] must have another name: {name} is that of another observable")
         if not callable(function):
-            raise SceneError(f"observables[{name!r}] must be a function of a frame, got {shown(function)}")
+            raise SceneError(f"{argument}[{name!r}] must be a function of a frame, got {shown(function)}")
     return dict(given)
 
 

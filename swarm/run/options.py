@@ -2,17 +2,19 @@
 
 import os
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..common import checks
 from ..common.catalog import COLOURINGS
 from ..common.frames import FrameTimes
+from ..common.validated import Count, Flag, Positive, Validated, choice
 from ..errors import SceneError
 from ..files import paths
-from ..files.storage import Storage
+from ..files.storage import Compression, KeptParticles, Precision, Storage
 from ..methods.base import Method
 from ..particles import Particles, TiedParticles
 from ..scene import Scene
@@ -33,9 +35,49 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def _logged(name: str, value: Any) -> Any:
+    """`value` as "all", k for every k-th particle, or a tuple of numbers of particles."""
+    if isinstance(value, str):
+        known = value == "all"
+    elif isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
+        # A number is known when it is checked against that of the particles.
+        known = len(value) > 0 and all(isinstance(i, (int, np.integer)) and i >= 0 for i in value)
+    else:
+        return checks.count(name, value)
+    if not known:
+        raise SceneError(
+            f'{name} must be "all", k for every k-th particle, or a list of numbers of particles from 0 on, got '
+            f"{value!r:.100}"
+        )
+    return value if isinstance(value, str) else tuple(sorted({int(i) for i in value}))
+
+
+def _shown_live(name: str, value: Any) -> Any:
+    return value if isinstance(value, str) else checks.flag(name, value)
+
+
+def _displayed(name: str, value: Any) -> Any:
+    return value if callable(value) or isinstance(value, Display) else checks.flag(name, value)
+
+
+def _text(name: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise SceneError(f"{name} must be a text, or None, got {checks.shown(value)}")
+    return value
+
+
+def _target(name: str, value: Any) -> Path | None:
+    return None if value is None else paths.target_of_run(name, value)
+
+
+Target = Annotated[Any, _target]  # then a Path or None
+
+
 @dataclass(frozen=True)
-class RunOptions:
-    """The length of a run, its files, and the way it is carried out; `simulate` describes each.
+class RunOptions(Validated):
+    """The length of a run, its files, and the way it is carried out: the keywords of `simulate`, which describes each.
+
+    The keys of [run] are the fields of this class that a file has.
 
     Raises:
         SceneError: a value is out of its range, or two files are the same.
@@ -43,92 +85,44 @@ class RunOptions:
 
     until: float
     every: float | None = None
-    trajectory: Any = None  # then a Path or None, as `recording`
-    recording: Any = None
-    impacts: Any = None
-    impact_particles: Any = "all"
-    member_impacts: bool = False
-    observables: Any = field(default=None, metadata=_OF_A_SESSION)  # then functions by their names
-    counters: Any = field(default=(), metadata=_OF_A_SESSION)
-    record_particles: int = 5000
-    record_color: str = "speed"
-    record_megabytes: float = 100.0
-    live: Any = field(default=False, metadata=_OF_A_SESSION)
-    threads: int | None = None
-    progress: Any = field(default=False, metadata=_OF_A_SESSION)
-    overwrite: bool = field(default=False, metadata=_OF_A_SESSION)
-    scene_text: str | None = field(default=None, metadata=_OF_A_SESSION)
-    block_size: int | None = field(default=None, metadata=_OF_A_SESSION)
-    frames: str | int = "all"
-    precision: str = "float64"
-    compression: str = "none"
-    checkpoint: float | None = None
-    resume: bool = field(default=False, metadata=_OF_A_SESSION)
-    walltime: float | None = field(default=None, metadata=_OF_A_SESSION)
-    compile: str = "auto"
-    seed: int = 0
+    trajectory: Target = None
+    recording: Target = None
+    impacts: Target = None
+    impact_particles: Annotated[Any, _logged] = "all"
+    member_impacts: Flag = False
+    observables: Annotated[Any, measures.checked] = field(default=None, metadata=_OF_A_SESSION)
+    counters: Annotated[Any, checked_counters] = field(default=(), metadata=_OF_A_SESSION)
+    record_particles: Count = 5000
+    record_color: Annotated[str, choice(*COLOURINGS)] = "speed"
+    record_megabytes: Positive = 100.0
+    live: Annotated[Any, _shown_live] = field(default=False, metadata=_OF_A_SESSION)
+    threads: Count | None = None
+    progress: Annotated[Any, _displayed] = field(default=False, metadata=_OF_A_SESSION)
+    overwrite: Flag = field(default=False, metadata=_OF_A_SESSION)
+    scene_text: Annotated[str, _text] | None = field(default=None, metadata=_OF_A_SESSION)
+    block_size: Count | None = field(default=None, metadata=_OF_A_SESSION)
+    frames: KeptParticles = "all"
+    precision: Precision = "float64"
+    compression: Compression = "none"
+    checkpoint: Annotated[float, partial(checks.at_least, bound=_OFTEN)] | None = None
+    resume: Flag = field(default=False, metadata=_OF_A_SESSION)
+    walltime: Positive | None = field(default=None, metadata=_OF_A_SESSION)
+    compile: Annotated[str, choice(*CHOICES)] = "auto"
+    seed: Annotated[int, checks.seed] = 0
     cluster: Any = field(default=None, metadata=_OF_A_SESSION)
-    shards: int | None = field(default=None, metadata=_OF_A_SESSION)
-    sources: Any = field(default=None, metadata=_OF_A_SESSION)
+    shards: Count | None = field(default=None, metadata=_OF_A_SESSION)
+    sources: Annotated[Any, checked_sources] = field(default=None, metadata=_OF_A_SESSION)
 
     def __post_init__(self) -> None:
-        for name in ("trajectory", "recording", "impacts"):
-            value = getattr(self, name)
-            object.__setattr__(self, name, None if value is None else paths.target_of_run(name, value))
+        super().__post_init__()
+        checks.assign(self, until=self.times.until)
         paths.check_distinct({**self.files(), "recording": self.recording}, {})
-        if self.checkpoint is not None:
-            object.__setattr__(self, "checkpoint", checks.at_least("checkpoint", self.checkpoint, _OFTEN))
-        if self.walltime is not None:
-            object.__setattr__(self, "walltime", checks.positive("walltime", self.walltime))
-        times = self.times
-        object.__setattr__(self, "until", times.until)
-        for name in ("threads", "block_size", "shards"):
-            if getattr(self, name) is not None:
-                checks.count(name, getattr(self, name))
         if self.shards is not None and self.cluster is None:
             raise SceneError(f"shards must be None without a cluster, got {self.shards}; give cluster=")
-        checks.one_of("compile", self.compile, CHOICES)
-        for name in ("member_impacts", "overwrite", "resume"):
-            object.__setattr__(self, name, checks.flag(name, getattr(self, name)))
-        self._check_recording()
-        object.__setattr__(self, "observables", measures.checked(self.observables))
-        object.__setattr__(self, "counters", checked_counters(self.counters))
-        self._check_impacts()
-        object.__setattr__(self, "seed", checks.seed("seed", self.seed))
-        object.__setattr__(self, "sources", checked_sources(self.sources))
-        _ = self.storage
-
-    def _check_recording(self) -> None:
-        """Raise a SceneError if an option of a recording or a display is wrong, even if the run has neither of them."""
-        checks.count("record_particles", self.record_particles)
-        checks.one_of("record_color", self.record_color, COLOURINGS)
-        object.__setattr__(self, "record_megabytes", checks.positive("record_megabytes", self.record_megabytes))
-        if not isinstance(self.live, str):
-            checks.flag("live", self.live)
-        if not callable(self.progress) and not isinstance(self.progress, Display):
-            checks.flag("progress", self.progress)
-        if self.scene_text is not None and not isinstance(self.scene_text, str):
-            raise SceneError(f"scene_text must be a text, or None, got {checks.shown(self.scene_text)}")
-
-    def _check_impacts(self) -> None:
-        """Raise a SceneError unless impact_particles is "all", k, or numbers of particles; make these a tuple."""
-        given = self.impact_particles
-        if isinstance(given, str):
-            known = given == "all"
-        elif isinstance(given, (list, tuple)) or (isinstance(given, np.ndarray) and given.ndim):
-            # A number is known when it is checked against that of the particles.
-            known = len(given) > 0 and all(isinstance(i, (int, np.integer)) and i >= 0 for i in given)
-            object.__setattr__(self, "impact_particles", tuple(sorted({int(i) for i in given})) if known else given)
-        else:
-            object.__setattr__(self, "impact_particles", checks.count("impact_particles", given))
-            known = True
-        if not known:
-            raise SceneError(
-                'impact_particles must be "all", k for every k-th particle, or a list of numbers of particles from 0 '
-                f"on, got {given!r:.100}"
-            )
         if self.impacts is None and self.impact_particles != "all":
-            raise SceneError(f"impact_particles must go with a log of impacts, got {given!r:.100}; give impacts=")
+            raise SceneError(
+                f"impact_particles must go with a log of impacts, got {self.impact_particles!r:.100}; give impacts="
+            )
 
     @property
     def times(self) -> FrameTimes:

@@ -136,9 +136,15 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     >>> result.observables["time"]
     array([0. , 0.5, 1. , 1.5, 2. ])
     """
-    # So far the only local names are the arguments.
-    keywords = {name: value for name, value in locals().items() if name not in ("scene", "particles", "method")}
-    return carry_out(scene, particles, method, RunOptions(**keywords))
+    options = RunOptions(
+        until=until, every=every, trajectory=trajectory, recording=recording, impacts=impacts,
+        impact_particles=impact_particles, member_impacts=member_impacts, observables=observables, counters=counters,
+        record_particles=record_particles, record_color=record_color, record_megabytes=record_megabytes, live=live,
+        threads=threads, progress=progress, overwrite=overwrite, scene_text=scene_text, block_size=block_size,
+        frames=frames, precision=precision, compression=compression, checkpoint=checkpoint, resume=resume,
+        walltime=walltime, compile=compile, seed=seed, cluster=cluster, shards=shards, sources=sources,
+    )  # fmt: skip
+    return carry_out(scene, particles, method, options)
 
 
 def carry_out(

@@ -155,16 +155,16 @@ class Source(Validated):
             raise SceneError(f"divergence must go with a beam, got {self.divergence:g} without one; give beam=")
 
 
-def checked_sources(value: Any) -> tuple[Source, ...]:
+def checked_sources(name: str, value: Any) -> tuple[Source, ...]:
     """The argument `sources` of a run, checked."""
     if value is None:
         return ()
     given = [value] if isinstance(value, Source) else list(value) if isinstance(value, (list, tuple)) else None
     if given is None:
-        raise SceneError(f"sources must be a list of swarm.Source, got {checks.shown(value)}")
+        raise SceneError(f"{name} must be a list of swarm.Source, got {checks.shown(value)}")
     for k, one in enumerate(given):
         if not isinstance(one, Source):
-            raise SceneError(f"sources[{k}] must be a swarm.Source, got {one!r:.200}")
+            raise SceneError(f"{name}[{k}] must be a swarm.Source, got {one!r:.200}")
     return tuple(given)
 
 

@@ -51,14 +51,14 @@ def require_bare(name: str, given: Any, why: str) -> None:
             raise SceneError(f"{name}.{law.name} must be left out, {why}, got {came!r:.200}")
 
 
-def checked_counters(value: Any) -> tuple[Counter, ...]:
+def checked_counters(name: str, value: Any) -> tuple[Counter, ...]:
     """The argument `counters`: each as a `Counter`."""
     given = None if isinstance(value, (Surface, Counter)) else parts_of(value)
     if given is None:
-        raise SceneError(f"counters must be a list of surfaces such as swarm.Plane, got {shown(value)}")
+        raise SceneError(f"{name} must be a list of surfaces such as swarm.Plane, got {shown(value)}")
     found = []
     for k, one in enumerate(given):
         if not isinstance(one, Counter):
-            require_bare(f"counters[{k}]", one, "a counter stops no particle")
+            require_bare(f"{name}[{k}]", one, "a counter stops no particle")
         found.append(one if isinstance(one, Counter) else Counter(one))
     return tuple(found)
