@@ -8,7 +8,7 @@ from test_openings import run
 
 import swarm
 from swarm import scene_file
-from swarm.run.preflight.overlaps import warn_of_overlap
+from swarm.run.preflight.hints import warn_of_overlap
 
 SENTENCE = (
     "surfaces[0] (Sphere) and surfaces[2] (Box) overlap only in part: particles are kept in what they have in common; "

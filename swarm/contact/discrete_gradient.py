@@ -90,7 +90,7 @@ class Reaction(Record):
 def reaction(form, law, multiplier, surface, step):
     """The reaction of one wall in a step.
 
-    `form` is Composite or MeanValue (or that of methods/implicit_rule.py), `multiplier` a float or None.
+    `form` is Composite or MeanValue (or that of methods/implicit.py), `multiplier` a float or None.
     """
     return form.reaction(law, multiplier, surface, step)
 

@@ -9,9 +9,8 @@ below. examples/own_method.py is a complete method.
 from .augmented_lagrangian import AugmentedLagrangian
 from .base import Method
 from .impact import Impact
-from .midpoint import Midpoint
+from .implicit import Midpoint, Trapezoidal
 from .penalty import Penalty
-from .trapezoidal import Trapezoidal
 from .verlet import Verlet
 
 __all__ = ["ALL_METHODS", "AugmentedLagrangian", "Impact", "Method", "Midpoint", "Penalty", "Trapezoidal", "Verlet"]

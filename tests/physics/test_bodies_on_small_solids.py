@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.bodies import passing
+from swarm.bodies.admission import warn_of_passing
 
 CUBE = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
 VESSEL = swarm.Sphere(10.0)
@@ -93,7 +93,7 @@ SMALL = swarm.rigid(0.1 * CUBE, 1.0)
     ],
 )
 def test_what_is_said(surface, body, said, caplog):
-    passing.warn(swarm.Scene([VESSEL, surface]), body)
+    warn_of_passing(swarm.Scene([VESSEL, surface]), body)
     if said is None:
         assert not caplog.text
     else:
@@ -108,8 +108,8 @@ def test_what_is_said(surface, body, said, caplog):
 ])  # fmt: skip
 def test_the_spacing_that_is_said_is_enough(surface, caplog):
     scene = swarm.Scene([VESSEL, surface])
-    passing.warn(scene, swarm.rigid(CUBE, 1.0))
+    warn_of_passing(scene, swarm.rigid(CUBE, 1.0))
     spacing = float(caplog.text.split("contacts = ")[1].split(" ")[0])
     caplog.clear()
-    passing.warn(scene, swarm.rigid(CUBE, 1.0, contacts=spacing))
+    warn_of_passing(scene, swarm.rigid(CUBE, 1.0, contacts=spacing))
     assert not caplog.text

@@ -1,17 +1,20 @@
 """What a user may not have meant, said before a run starts: cavities, times, steps, gravity."""
 
+import itertools
 import logging
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...methods import Impact
 from ...methods.verlet import Verlet
 from ...scene import Scene
+from ...surfaces.instant import box_of, gaps_of
+from ...surfaces.surface import Surface
 from ...surfaces.union import Joined
 from ..options import Task
 from . import softness, workload
-from .overlaps import warn_of_overlap
 
 _LOG = logging.getLogger("swarm")
 # The parts of the time between impacts from which a step, a contact, and the round-off of a time are said.
@@ -23,6 +26,8 @@ _SURELY = 1e-2
 _STABLE = 2.0
 # Particles that are looked at.
 _LOOKED_AT = 1000
+# Points at which two cavities are compared, and the part of one beyond the other that says that it is cut.
+_POINTS, _CUT = 4096, 0.01
 
 
 def give(task: Task) -> None:
@@ -172,3 +177,46 @@ def _contact(task: Task, speed: float) -> tuple[float, float]:
         return 0.0, 0.0
     depth = math.pow(0.5 * mass * speed * speed * (a + 1.0) / alpha, p) / slope
     return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + p) / math.gamma(0.5 + p) * depth / speed, depth
+
+
+def warn_of_overlap(scene: Scene) -> None:
+    """Warn of the first two cavities, each bounded by itself, of which neither is inside the other."""
+    boxes = [_box_in(scene, one) for one in scene.surfaces]
+    bounded = [(i, one) for i, one in enumerate(scene.surfaces) if _is_cavity(one) and np.isfinite(boxes[i]).all()]
+    for (i, one), (j, other) in itertools.combinations(bounded, 2):
+        if _are_there_together(one, other) and _cut_one_another(one, other, np.array([boxes[i], boxes[j]])):
+            _LOG.warning(
+                "surfaces[%d] (%s) and surfaces[%d] (%s) overlap only in part: particles are kept in what they have in "
+                'common; a vessel of both is one surface, swarm.Union([...]), in a scene file kind = "union"',
+                i, type(one).__name__, j, type(other).__name__,
+            )  # fmt: skip
+            return
+
+
+def _is_cavity(surface: Surface) -> bool:
+    return not surface.is_solid() and getattr(surface, "side", "inside") == "inside"
+
+
+def _box_in(scene: Scene, surface: Surface) -> NDArray[np.float64]:
+    """The bounds of a surface at 0 s, and of its part in the plane of a scene of two dimensions."""
+    box = np.array(box_of(surface, 0.0))
+    if (across := scene.across()) is not None:
+        box[:, across] = 0.0
+    return box
+
+
+def _are_there_together(one: Surface, other: Surface) -> bool:
+    """Whether two surfaces are there at one time."""
+    always = ((0.0, math.inf),)
+    pairs = itertools.product(one.present or always, other.present or always)
+    return any(max(begins) < min(ends) for begins, ends in (zip(*pair, strict=True) for pair in pairs))
+
+
+def _cut_one_another(one: Surface, other: Surface, boxes: NDArray[np.float64]) -> bool:
+    """Whether a part of each of two cavities, with these bounds, is outside of the other one at 0 s."""
+    low, high = boxes[:, 0].min(axis=0)[:, None], boxes[:, 1].max(axis=0)[:, None]
+    points = low + (high - low) * np.random.default_rng(0).random((3, _POINTS))
+    with np.errstate(all="ignore"):
+        inside, inside_other = (gaps_of((surface,), points, 0.0)[0] <= 0.0 for surface in (one, other))
+    mine, theirs = int((inside & ~inside_other).sum()), int((inside_other & ~inside).sum())
+    return bool(mine > _CUT * inside.sum() and theirs > _CUT * inside_other.sum())

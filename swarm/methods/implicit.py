@@ -1,25 +1,29 @@
-"""The common part of the implicit baselines: the pass of a rule that takes the force at a point it has to find.
+"""Midpoint and Trapezoidal: implicit steps with soft walls, which do not conserve the energy: baselines for the charts.
 
-A rule says where that point would be without walls (`reach`), and the step that follows from where it is (`end`). The
-point r is pushed by the force at itself: s = r - c V'(g(s)) grad g(s). With kappa = c V'(g(s)) g'(q(s)) it is
-s = r - kappa grad q(s), which the surface solves for s (`resolve`), so that one equation in one unknown is left:
+A rule takes the force at a point that it has to find: it says where that point would be without walls (`reach`), and
+the step that follows from where it is (`end`). The point r is pushed by the force at itself: s = r - c V'(g(s)) grad
+g(s). With kappa = c V'(g(s)) g'(q(s)) it is s = r - kappa grad q(s), which the surface solves for s (`resolve`), so
+that one equation in one unknown is left:
     F(kappa) = kappa - c V'(g) g'(q) = 0 at s(kappa).                                        (I)
 c = h^2/(4m) for the midpoint and the trapezoidal rule.
 """
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..contact import corner
 from ..contact.discrete_gradient import Reaction, illinois, narrowed
 from ..contact.energy import NEEDS as FORCE_NEEDS
-from ..contact.energy import strength
+from ..contact.energy import add_impulses, add_works, strength, walls_force
 from ..contact.impulse import Step
 from ..kernel.arrays import scratch
+from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, Vec, norm, square
+from ..scene import Scene
 from . import contract, fixed_step
 
 # The derivative of F is a difference quotient over this part of kappa: right to about the same part, so that a step of
@@ -30,8 +34,6 @@ _TOLERANCE = 1e-8
 _SWEEPS = 10
 _CAREFUL_ITERATIONS = 200
 _EPSILON = 2.220446049250313e-16
-# The equation needs these of every wall.
-NEEDS = (*FORCE_NEEDS, "resolve", "farthest_push")
 
 
 # --- The equation ----------------------------------------------------------------------------------------
@@ -166,3 +168,122 @@ class RuleNumbers(fixed_step.SoftNumbers):
         work = self.add_impulses(walls, lane, reactions, impulse, i)
         step = self.end(before, gravity, lane, point, corner.total(reactions))
         return fixed_step.Careful(step.r, step.v, solved, work)
+
+
+class MidpointNumbers(RuleNumbers):
+    """The midpoint rule."""
+
+    point = 0.5
+
+    def reach(self, before, gravity, lane):
+        # rm = r0 + h/2 v0 + h^2/4 a(rm)
+        return 0.5 * self.dt * accelerated(gravity, lane.v, 0.5 * self.dt)
+
+    def end(self, before, gravity, lane, s, push):
+        # r1 = 2 rm - r0, v1 = v0 + h G - (4/h) kappa grad q(rm)
+        kick = 4.0 / self.dt * push
+        return RuleStep(2.0 * s - lane.r, accelerated(gravity, lane.v, self.dt) - kick, kick)
+
+    def add_impulses(self, walls, lane, reactions, impulse, i):
+        h = self.dt
+        corner.add_reaction_impulses(reactions, 0.5 * h, impulse, i)
+        return corner.add_reaction_works(
+            self.moving, self.over(walls, lane.remaining), -4.0 / (h * h), reactions, impulse, i
+        )
+
+
+class TrapezoidalNumbers(RuleNumbers):
+    """The trapezoidal rule."""
+
+    def reach(self, before, gravity, lane):
+        # r1 = r0 + h v0 + h^2/2 G + h^2/(4m) (F0 + F1)
+        return displacement(gravity, lane.v, self.dt) + lane.own.over_mass * walls_force(before, self.law, lane.r)
+
+    def end(self, before, gravity, lane, s, push):
+        # v1 = v0 + h G + h/(2m) F0 - (2/h) kappa grad q(r1)
+        kick = 2.0 / self.dt * (push - lane.own.over_mass * walls_force(before, self.law, lane.r))
+        return RuleStep(s, accelerated(gravity, lane.v, self.dt) - kick, kick)
+
+    def add_impulses(self, walls, lane, reactions, impulse, i):
+        h, law, moving = self.dt, self.law, self.moving
+        before, over = self.before(walls, lane.remaining), self.over(walls, lane.remaining)
+        corner.add_reaction_impulses(reactions, h, impulse, i)
+        # h/(2m) |F0|
+        factor = 2.0 * lane.own.over_mass / h
+        add_impulses(before, law, factor, lane.r, impulse, i)
+        work = add_works(moving, over, before, law, factor / h, lane.r, impulse, i)
+        return work + corner.add_reaction_works(moving, over, -2.0 / (h * h), reactions, impulse, i)
+
+
+# --- As users describe them ------------------------------------------------------------------------------
+
+
+class ImplicitRule(fixed_step.SoftWalls):
+    """A method of such a rule."""
+
+    rule: ClassVar[type[RuleNumbers]]
+
+    def needs(self, scene: Scene) -> tuple[Any, ...]:
+        return *super().needs(scene), *FORCE_NEEDS, "resolve", "farthest_push"
+
+    def numbers(self, scene: Scene) -> fixed_step.SoftNumbers:
+        # h^2/(4m) of equation (I)
+        return self.record(self.rule, scene, 0.25 * self.dt * self.dt)
+
+
+@dataclass(frozen=True)
+class Midpoint(ImplicitRule):
+    """Implicit midpoint rule with a penalty contact: a baseline, not for results.
+
+    rm = (r0 + r1)/2,   r1 = r0 + h (v0 + v1)/2,   v1 = v0 + h a(rm),   a = G - V'(g) grad g/m.
+
+    Args:
+        dt: step h > 0 [s]; frames must fall on whole steps.
+        penalty: alpha > 0, the stiffness of the wall (N/m for a = 1 and a gap in m).
+        exponent: a >= 1 of the regularisation: 1 a linear spring, 1.5 Hertz's law.
+
+    Raises:
+        SceneError: an argument is out of its range; a frame time is not a whole number of steps.
+
+    Conserves: quadratic invariants only, so the energy of a linear spring that never lets go, but not that of a contact
+    that begins and ends: each changes the energy by what the force at the middle of a step misses. No stability limit.
+    Order: 2 in dt between contacts. Cost: free steps, which it takes exactly, are jumped over in one evaluation; a
+    contact step solves one scalar equation.
+    Walls may move without turning: the force is that of the walls at the middle of the step.
+    Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.1.
+
+    >>> Midpoint(dt=1e-3, penalty=-1.0)
+    Traceback (most recent call last):
+    swarm.errors.SceneError: penalty must be above 0, got -1
+    """
+
+    rule = MidpointNumbers
+
+
+@dataclass(frozen=True)
+class Trapezoidal(ImplicitRule):
+    """Trapezoidal rule (Newmark, gamma = 1/2, beta = 1/4) with a penalty contact: a baseline, not for results.
+
+    r1 = r0 + h v0 + h^2/4 (a0 + a1),   v1 = v0 + h (a0 + a1)/2,   a = G - V'(g) grad g/m.
+
+    Args:
+        dt: step h > 0 [s]; frames must fall on whole steps.
+        penalty: alpha > 0, the stiffness of the wall (N/m for a = 1 and a gap in m).
+        exponent: a >= 1 of the regularisation: 1 a linear spring, 1.5 Hertz's law.
+
+    Raises:
+        SceneError: an argument is out of its range; a frame time is not a whole number of steps.
+
+    Conserves: the energy of a linear spring that never lets go, as the midpoint rule, of which it is a conjugate, but
+    not that of a contact that begins and ends. No stability limit for linear problems. Order: 2 in dt between contacts.
+    Cost: free steps, which it takes exactly, are jumped over in one evaluation; a contact step solves one scalar
+    equation.
+    Walls may move without turning: each force is that of the walls at its time.
+    Source: Newmark 1959; Hairer, Lubich & Wanner, Geometric Numerical Integration, VI.8.
+
+    >>> Trapezoidal(dt=1e-3, penalty=-1.0)
+    Traceback (most recent call last):
+    swarm.errors.SceneError: penalty must be above 0, got -1
+    """
+
+    rule = TrapezoidalNumbers
