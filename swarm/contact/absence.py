@@ -160,10 +160,10 @@ def wall_after(walls, wall, r, near):
 
 
 def may_be_absent(openings, walls, active, path, near):
-    """Whether a wall that holds the particle may be absent where a step ends, or in an opening on its way."""
-    found, ways = False, ends_of(walls)
+    """Of the walls that hold the particle: (whether one has ended at the end of a step, whether one may be open)."""
+    ended, found, ways = False, False, ends_of(walls)
     for wall in active:
-        found = found | is_absent(ways, walls, wall, path.r1, near, BEYOND)
+        ended = ended | is_absent(ways, walls, wall, path.r1, near, BEYOND)
     for opening in openings or ():
         enters = False
         for volume in opening.volumes:
@@ -171,7 +171,7 @@ def may_be_absent(openings, walls, active, path, near):
         for wall in active:
             here = opening.is_of(wall) & enters
             found = found | (here & _may_lead_on(walls, wall, path) if opening.between else here)
-    return found
+    return ended, found
 
 
 def _may_lead_on(walls, wall, path):
@@ -180,18 +180,17 @@ def _may_lead_on(walls, wall, path):
     return leads_on(walls, wall, path.r0) | leads_on(walls, wall, middle) | leads_on(walls, wall, path.r1)
 
 
-def part_until_absent(openings, rules, walls, active, path, near, remaining):
-    """The part of a step after which a wall that holds the particle is absent; infinite where none is."""
-    first = _part_until_end(walls, active, path, near, remaining) if ends_of(walls) else math.inf
+def part_until_open(openings, rules, walls, active, path, near):
+    """The part of a step after which a wall that holds the particle lets it out; infinite where none does."""
     if openings is None:
-        return first
-    now = walls.at(remaining)
-    first = min(first, _part_until_open(openings, rules, now, active.first, path, near))
-    return min(first, _part_until_open(openings, rules, now, active.second, path, near))
+        return math.inf
+    first = _part_until_open(openings, rules, walls, active.first, path, near)
+    return min(first, _part_until_open(openings, rules, walls, active.second, path, near))
 
 
 @outlined
-def _part_until_end(walls, active, path, near, remaining):
+def part_until_end(walls, active, path, near, remaining):
+    """The part of a step after which a wall that holds the particle has ended; infinite where none has."""
     return first_true(_ends_at, (walls, active, path, near, remaining), BEFORE, BEYOND, CUT)
 
 
@@ -203,7 +202,7 @@ def _ends_at(walls, active, path, near, remaining, depth, part):
 
 @outlined
 def _part_until_open(openings, rules, walls, wall, path, near):
-    """`part_until_absent` of one wall. If its opening does not let the particle out, the rest of the step is asked."""
+    """`part_until_open` of one wall. If its opening does not let the particle out, the rest of the step is asked."""
     low = math.inf
     for opening in openings:
         if opening.is_of(wall):

@@ -13,7 +13,7 @@ from .table import STRIDE, Advanced, Rows, copy_lane, table
 from .watching.counted_lanes import BEGAN
 
 # What a step may end with.
-LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES, ABSENT = 1, 2, 4, 8, 16, 32, 64
+LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES, OPENS, ENDS = 1, 2, 4, 8, 16, 32, 64, 128
 # A lane goes on to stay.
 AGAIN = -1
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ..contact import crossing, events
-from ..contact.absence import ended_wall, ends_of, part_until_absent, wall_after
+from ..contact.absence import ended_wall, ends_of, part_until_end, part_until_open, wall_after
 from ..contact.events import ARRIVED, CAREFUL, EVENT, FLYING, HELD
 from ..contact.path import StepPath, cubic
 from ..kernel.gravity import potential
@@ -13,7 +13,7 @@ from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, square
 from ..surfaces.periodic.period import part_until
 from .escape import is_at_opening
-from .sliding import ABSENT, FAILED, LEAVES, LIFTED, MET, STOPPED, STUCK
+from .sliding import ENDS, FAILED, LEAVES, LIFTED, MET, OPENS, STOPPED, STUCK
 from .sliding_step import SHORTEST, twice_after
 from .sticking import stay
 
@@ -71,11 +71,7 @@ def decide(slide, i):
     if event & FAILED:
         return _shorten(slide, i)
     active, r, v = slide.active(lane), lane.r, lane.v
-    if (
-        ends_of(walls)
-        and event & ABSENT
-        and ended_wall(walls.at(lane.remaining), active, r, crossing.near(method, r)) >= 0.0
-    ):
+    if event & ENDS and ended_wall(walls.at(lane.remaining), active, r, crossing.near(method, r)) >= 0.0:
         return set_going(slide, i)
     path, near = StepPath(r, v, lane.r1, lane.v1, h), crossing.near(method, r)
     cut = 1.0
@@ -104,11 +100,13 @@ def decide(slide, i):
 def _until_gone(slide, event, active, path, remaining):
     """The part of a step after which a wall ends, or is open, or a cell that repeats does; infinite where none does."""
     lanes, near, found = slide.lanes, crossing.near(slide.method, path.r0), np.inf
-    if event & (LEAVES | ABSENT):
-        found = part_until(lanes.period, cubic(path))
-    if event & ABSENT:
-        absent = part_until_absent(lanes.openings, slide.method, slide.walls, active, path, near, remaining)
-        found = min(found, absent)
+    if event & ENDS:
+        found = part_until_end(slide.walls, active, path, near, remaining)
+    if event & LEAVES:
+        found = min(found, part_until(lanes.period, cubic(path)))
+    if event & OPENS:
+        now = slide.walls.at(remaining)
+        found = min(found, part_until_open(lanes.openings, slide.method, now, active, path, near))
     return found
 
 

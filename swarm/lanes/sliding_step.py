@@ -13,7 +13,7 @@ from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import select
 from ..kernel.vector import ZERO, either, square
 from ..surfaces.periodic.period import is_beyond
-from .sliding import ABSENT, FAILED, LEAVES, LIFTED, MET, STOPPED, STUCK
+from .sliding import ENDS, FAILED, LEAVES, LIFTED, MET, OPENS, STOPPED, STUCK
 
 # A step of this part of a crossing, or of the size, is the shortest.
 SHORTEST, _NO_WAY = 1e-10, 1e-15
@@ -150,10 +150,10 @@ def _end_step(slide, i):
     met = crossing.meets(start, now, active, path, crossing.near(method, r1))
     good = (ratio <= 1.0) & (lanes.event[i] == 0)
     leaves = is_beyond(lanes.period, r1)
-    absent = may_be_absent(lanes.openings, now, active, path, crossing.near(method, r1))
-    fine = good & (not lifted) & (not met) & (not leaves) & (not absent)
+    ends, opens = may_be_absent(lanes.openings, now, active, path, crossing.near(method, r1))
+    fine = good & (not lifted) & (not met) & (not leaves) & (not ends) & (not opens)
     happened = select(lifted, LIFTED, 0) | select(met, MET, 0) | select(leaves, LEAVES, 0)
-    happened |= select(absent, ABSENT, 0)
+    happened |= select(ends, ENDS, 0) | select(opens, OPENS, 0)
     lanes.event[i] |= select(good, happened, 0)
     lanes.unsolved[i] = fine
     # What the end of the frame or an event cuts says nothing of the length; and a step that is to be cut must be
