@@ -73,8 +73,8 @@ def openings_in(
     which it is open where another room is behind it; they are those of the frame, or the piece of one, that ends at a
     moment [s].
     """
-    made = _runs_of(spans, given, moment, False)
-    return made if compiled(made) <= _MOST else _runs_of(spans, given, moment, True)
+    made = _rows(spans, given, moment, False)
+    return made if compiled(made) <= _MOST else _rows(spans, given, moment, True)
 
 
 def compiled(openings: Sequence[Opened]) -> int:
@@ -83,32 +83,24 @@ def compiled(openings: Sequence[Opened]) -> int:
     return sum(1 if isinstance(one, Field) else len(one.each) for one in volumes)
 
 
-def _runs_of(
+def _rows(
     spans: Sequence[tuple[int, int]], given: Sequence[Sequence[Sequence[Surface]]], moment: float, together: bool
 ) -> tuple[Opened, ...]:
-    exits, doorways = given
-    return (
-        *_opened(spans, exits, moment, Opened, together),
-        *_opened(spans, doorways, moment, Doorway, together),
-    )
-
-
-def _opened(
-    spans: Sequence[tuple[int, int]], volumes: Sequence[Sequence[Surface]], moment: float, kind: type[Opened],
-    together: bool,
-) -> tuple[Opened, ...]:  # fmt: skip
-    """The openings of one kind, those that are open at the same times together.
+    """The openings, those of one kind that are open at the same times together.
 
     Volumes of one kind are one field if they are taken `together`.
     """
-    runs, number = [], 0
-    for given, some in itertools.groupby(spans, lambda span: volumes[span[0]]):
-        first, number = number, number + sum(walls for _piece, walls in some)
-        for times in dict.fromkeys(volume.present for volume in given):
-            last = number if was_there(times, moment) else first
-            alike = [volume for volume in given if volume.present == times]
-            runs.append(kind(_taken(alike, together), float(first), float(last)))
-    return tuple(reversed(by_kind(runs, lambda run: run.volumes)))
+    made: list[Opened] = []
+    for kind, volumes in zip((Opened, Doorway), given, strict=True):
+        rows, number = [], 0
+        for alike, some in itertools.groupby(spans, lambda span: volumes[span[0]]):  # noqa: B023
+            first, number = number, number + sum(walls for _piece, walls in some)
+            for times in dict.fromkeys(volume.present for volume in alike):
+                last = number if was_there(times, moment) else first
+                at_once = [volume for volume in alike if volume.present == times]
+                rows.append(kind(_taken(at_once, together), float(first), float(last)))
+        made += reversed(by_kind(rows, lambda row: row.volumes))
+    return tuple(made)
 
 
 def _taken(volumes: Sequence[Surface], together: bool = False) -> tuple[Any, ...]:
