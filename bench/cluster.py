@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import swarm
-from swarm.cluster import local, shards
+from swarm.fleet import local, shards
 
 from .report import Row, in_turn, show, tier, write
 

@@ -11,8 +11,8 @@ from unittest import mock
 import numpy as np
 
 import swarm
-from swarm import cluster, observables
-from swarm.cluster import joined, shards, worker
+from swarm import observables
+from swarm.fleet import jobs, joined, shard_run, sharded_run, shards
 from swarm.run.machine import RunEnd
 from swarm.run.measures import Measures
 from swarm.run.options import Task
@@ -25,8 +25,8 @@ _ARRAYS = ("impacts_per_particle", "escape_time", "absorbed_time", "birth_time",
 _OF_PARTICLES = ("position", "velocity", "mass", "radius", "spin", "image")
 
 
-def carry_out(task: Task, session: cluster.Sharded) -> RunEnd:
-    """Carry out a run that is checked, as `swarm.cluster.carry_out`.
+def carry_out(task: Task, session: sharded_run.Sharded) -> RunEnd:
+    """Carry out a run that is checked, as `sharded_run.carry_out`.
 
     Raises:
         RunError: a shard failed.
@@ -38,9 +38,9 @@ def carry_out(task: Task, session: cluster.Sharded) -> RunEnd:
         assert task.options.shards is not None
         folder, bounds = session.begin(task, task.options.shards)
         for k in range(len(bounds) - 1):
-            state, said = worker.advance(folder, k)
-            if state != "complete":
-                raise swarm.RunError(f"shard {k} {state}: {said}")
+            outcome = jobs.carried_out(shard_run.run_shard, (folder, k))
+            if outcome["state"] != "done":
+                raise swarm.RunError(f"shard {k} {outcome['state']}: {outcome.get('error')}")
         measures = Measures(task.options.observables, task.options.until)
         seen = joined.join(folder, task, bounds, session.identity, measures)
         end = shards.joined_end(folder, task, bounds)
@@ -51,7 +51,7 @@ def carry_out(task: Task, session: cluster.Sharded) -> RunEnd:
 @contextlib.contextmanager
 def here() -> Iterator[None]:
     """Within it runs on a cluster are carried out here."""
-    with mock.patch.object(cluster, "carry_out", carry_out):
+    with mock.patch.object(sharded_run, "carry_out", carry_out):
         yield
 
 

@@ -36,7 +36,7 @@ frames = "none"
 _ALONE = """
 import sys, time, pathlib, swarm
 from swarm import scene_file
-from swarm.ensemble.plan import read
+from swarm.fleet.plan import read
 plan = read(pathlib.Path(sys.argv[1]))
 texts = map(plan.text, plan.variants)
 jobs = [scene_file.job_of(scene_file.document_of(text, plan.path), text, plan.path) for text in texts]

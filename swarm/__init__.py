@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from .bodies.placing import place
     from .bodies.shapes import chain, dumbbell, rigid, tetrahedron
     from .common.frames import Frame
-    from .ensemble.report import report
-    from .ensemble.sweeping import sweep
     from .errors import CompleteError, FileError, RunError, SceneError, SwarmError, WallTimeError
     from .events.packing import pack
     from .files.impact_log import ImpactLog, load_impacts
     from .files.trajectory import Trajectory, load
+    from .fleet.report import report
+    from .fleet.sweeping import sweep
     from .history import ContactHistory, contact_history
     from .methods import AugmentedLagrangian, Impact, Midpoint, Penalty, Trapezoidal, Verlet
     from .motion import Guide, Oscillation, Path, Rotation, Translation
@@ -75,8 +75,8 @@ _HOMES = {
     "bodies.placing": ("place",),
     "bodies.shapes": ("chain", "dumbbell", "rigid", "tetrahedron"),
     "bodies.copies": ("Bodies",),
-    "ensemble.report": ("report",),
-    "ensemble.sweeping": ("sweep",),
+    "fleet.report": ("report",),
+    "fleet.sweeping": ("sweep",),
     "errors": ("FileError", "CompleteError", "RunError", "SceneError", "SwarmError", "WallTimeError"),
     "placing.filling": ("fill",),
     "common.frames": ("Frame",),

@@ -79,7 +79,7 @@ class Session:
         output, errors = self.process.communicate(timeout=RUNNING)
         _gone, alive = psutil.wait_procs(self.workers, timeout=RUNNING)
         assert not alive
-        assert "Traceback" not in errors
+        assert "Traceback" not in errors, errors
         return self.process.returncode, output, errors
 
     def killed_by(self, kind, wait):

@@ -16,7 +16,7 @@ def report(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing page.")] = False,
 ) -> None:
     """Make a page of a run or a sweep, one file for any browser: verdicts, pictures, numbers, how to reproduce it."""
-    from ..ensemble.report import checked, page_of
+    from ..fleet.report import checked, page_of
 
     target = checked(source, output, overwrite)
     written(page_of(source, target).save(target, overwrite=overwrite))

@@ -12,7 +12,7 @@ from ..errors import SwarmError
 from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
 
 if TYPE_CHECKING:
-    from ..ensemble.sweeping import Outcome
+    from ..fleet.sweeping import Outcome
 
 _FAILED = 1
 # So many failures are printed; the table has all.
@@ -40,6 +40,10 @@ def sweep(  # noqa: PLR0913  one argument an option
         str | None,
         typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with checkpoints; the exit code is 75."),
     ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="WHERE", help="Run on a cluster: local:N, N workers here, or tcp://HOST:PORT of Dask."),
+    ] = None,
     plugins: Plugins = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the outcome of the sweep as JSON, also if it fails.")
@@ -48,14 +52,23 @@ def sweep(  # noqa: PLR0913  one argument an option
     """Carry out the runs of a sweep file, and write one table of their results."""
     with interrupt.at_once():
         from ..common.checks import duration
-        from ..ensemble import sweeping
+        from ..fleet import sweeping
 
     try:
         latest = None if walltime is None else duration("--walltime", walltime)
         options = sweeping.SweepOptions(
-            output, processes, threads, resume, overwrite, not quiet, written, latest, tuple(plugins or ())
+            output,
+            processes,
+            threads,
+            resume,
+            overwrite,
+            not quiet,
+            written,
+            latest,
+            tuple(plugins or ()),
+            cluster,
         )
-        outcome = sweeping.carry_out(sweep_file, options)
+        outcome = sweeping.carry_out_sweep(sweep_file, options)
     except KeyboardInterrupt:  # the second one
         print("interrupted; with --resume, runs that were under way go on from their last checkpoints", file=sys.stderr)
         if as_json:
@@ -74,7 +87,7 @@ def sweep(  # noqa: PLR0913  one argument an option
 
 
 def _report(outcome: "Outcome", quiet: bool, as_json: bool) -> None:
-    from ..ensemble.plan import told
+    from ..fleet.plan import told
 
     results = outcome.results
     numbers = {state: len(results.of_state(state)) for state in ("done", "failed", "waiting")}

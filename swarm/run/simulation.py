@@ -160,7 +160,7 @@ def carry_out(
     if options.cluster is None:
         session = Session(options, counted_from)
     else:
-        cluster = engines.wing("cluster")  # `distributed` takes half a second to import
+        cluster = engines.wing("fleet.sharded_run")  # `distributed` takes half a second to import
         session, carried = cluster.Sharded(options, counted_from), cluster.carry_out
     task = task_of(scene, particles, method, options)
     end = carried(task, session)

@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 import swarm
-from swarm.cluster import shards
 from swarm.commands.cli import app
 from swarm.files import marks, paths
+from swarm.fleet import shards
 from swarm.serialization import plugins
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
@@ -261,7 +261,7 @@ def test_a_sweep_keeps_files_of_others_in_its_folder(sweep, tmp_path, name, how)
 
 
 def test_a_sweep_keeps_what_has_the_name_of_a_run(sweep, tmp_path):
-    from swarm.ensemble.plan import read
+    from swarm.fleet.plan import read
 
     folder = tmp_path / "folder"
     folder.mkdir()

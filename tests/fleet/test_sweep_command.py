@@ -9,7 +9,7 @@ from sweep_sessions import write
 import swarm
 from swarm.commands import sweep as module
 from swarm.commands.sweep import sweep
-from swarm.ensemble import sweeping
+from swarm.fleet import sweeping
 
 
 @pytest.fixture(scope="module")
@@ -20,12 +20,12 @@ def failed(tmp_path_factory):
     outcomes = []
 
     def kept(*arguments):
-        outcomes.append(carry_out(*arguments))
+        outcomes.append(carry_out_sweep(*arguments))
         return outcomes[0]
 
-    carry_out = sweeping.carry_out
+    carry_out_sweep = sweeping.carry_out_sweep
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sweeping, "carry_out", kept)
+        patch.setattr(sweeping, "carry_out_sweep", kept)
         with pytest.raises(typer.Exit) as end:
             sweep(path, folder / "out", processes=1, quiet=True)
     assert end.value.exit_code == 1

@@ -9,10 +9,8 @@ import dataclasses
 import functools
 import itertools
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import IO, Any, NamedTuple
 
 import numpy as np
@@ -29,8 +27,8 @@ from ..run.machine import RunEnd, birth_times
 from ..run.options import RunOptions, Task
 from ..run.tally import scales_of
 from ..scene import Scene
-from ..serialization import plugins
 from ..state import Absorbed, Multipliers
+from . import sent_modules
 
 _ARRAYS = ("position", "velocity", "mass", "image")
 _BIRTHS = ("birth_time", "birth_source")
@@ -81,12 +79,7 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     """Write what is run, and its start."""
     import cloudpickle
 
-    # Workers have what is installed, and are sent the code of other modules, those of a package included.
-    for name in plugins.not_installed():
-        cloudpickle.register_pickle_by_value(sys.modules[name])
-        for of_it, module in list(sys.modules.items()):
-            if of_it == name or of_it.startswith(f"{name}."):
-                _without_caches(of_it, module)
+    sent_modules.send_code()
     body = None if task.bodies is None else task.bodies.body
     options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None, observables=None)
     whole = Whole(task.scene, task.method, options, body, bounds, start, scales_of(task))
@@ -98,13 +91,6 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     if task.particles.births is not None:
         for name, array in zip(_BIRTHS, task.particles.births, strict=False):
             _replace(folder / f"{name}.npy", functools.partial(_save, array))
-
-
-def _without_caches(name: str, module: ModuleType) -> None:
-    """Delete what msgspec keeps in the classes of a module that it made objects of: it cannot be pickled."""
-    for kind in vars(module).values():
-        if isinstance(kind, type) and kind.__module__ == name and "__msgspec_cache__" in vars(kind):
-            del kind.__msgspec_cache__  # type: ignore[attr-defined]
 
 
 def _save(*arrays_and_file: Any) -> None:
@@ -160,8 +146,8 @@ def tidy(folder: Path, count: int) -> None:
 # --- What a worker reads and writes ---------------------------------------------------------------------
 
 
-def task_of(folder: Path, k: int) -> tuple[Task, int]:
-    """The run of shard k, and how many shards there are."""
+def task_of(folder: Path, k: int) -> Task:
+    """The run of shard k."""
     import cloudpickle
 
     with open(folder / "whole.pickle", "rb") as file:
@@ -183,7 +169,7 @@ def task_of(folder: Path, k: int) -> tuple[Task, int]:
         particles = bodies.particles()
     options = dataclasses.replace(whole.options, trajectory=file_of(folder, k))
     of_all = whole.start, whole.scales
-    return Task(whole.scene, particles, whole.method, options, bodies, first, *of_all), len(whole.bounds) - 1
+    return Task(whole.scene, particles, whole.method, options, bodies, first, *of_all)
 
 
 def write_end(path: Path, end: RunEnd) -> None:

@@ -16,8 +16,7 @@ from test_cli import command
 
 import swarm
 from swarm import scene_file
-from swarm.cluster import client as of_client
-from swarm.cluster import connection, local, shards, worker
+from swarm.fleet import connection, jobs, local, shard_run, sharded_run, shards
 from swarm.run import machine
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
@@ -44,7 +43,7 @@ def client():
 
 @pytest.fixture(autouse=True)
 def quick_looks(monkeypatch):
-    monkeypatch.setattr(of_client, "_FOLLOWS", 0.05)
+    monkeypatch.setattr(sharded_run, "_FOLLOWS", 0.05)
 
 
 def test_a_local_cluster_is_reached_from_this_machine_only(client):
@@ -323,7 +322,7 @@ def test_another_version_on_a_worker_is_named():
 
 
 def test_storage_that_is_not_shared_is_named(client, tmp_path, monkeypatch):
-    monkeypatch.setattr(connection.worker, "APPEARS", 0.1)
+    monkeypatch.setattr(connection, "APPEARS", 0.1)
 
     class Elsewhere:
         def run(self, function, folder, token):
@@ -385,10 +384,10 @@ def test_lines_of_progress_come_from_a_cluster_too(client, tmp_path, capsys):
 
 def test_what_a_worker_compiles_is_told(tmp_path, monkeypatch):
     told, path = [], tmp_path / "run.h5"
-    monkeypatch.setattr(shards, "task_of", lambda folder, k: (task_of(*cavity(), RunOptions(1.0, trajectory=path)), 1))
+    monkeypatch.setattr(shards, "task_of", lambda folder, k: task_of(*cavity(), RunOptions(1.0, trajectory=path)))
     monkeypatch.setattr(
         machine, "carry_out_task", lambda task, session: task.options.progress.compiling("compiling it")
     )
     monkeypatch.setattr(shards, "write_end", lambda path, end: None)
-    assert worker.advance(tmp_path, 0, compiling=told.append) == ("complete", "")
-    assert told == ["compiling it"]
+    assert jobs.carried_out(shard_run.run_shard, (tmp_path, 0), tell=told.append) == {"state": "done"}
+    assert told == [{"compiling": "compiling it"}]

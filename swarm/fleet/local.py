@@ -1,4 +1,4 @@
-"""A cluster on this machine: `python -m swarm.cluster.local N` runs a scheduler and N workers of one thread each.
+"""A cluster on this machine: `python -m swarm.fleet.local N` runs a scheduler and N workers of one thread each.
 
 It prints its address and ends, with all its processes, when its standard input does: also when the process that started
 it is killed. Ctrl-C in a terminal does not reach it, so that shards can save their checkpoints first. Unlike the
@@ -32,7 +32,7 @@ def started(workers: int) -> Iterator[str]:
     # Functions of the user's modules are looked up where this process finds them.
     folders = [str(_ROOT), *(os.path.abspath(folder) for folder in sys.path)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(folders)}
-    command = [sys.executable, "-P", "-m", "swarm.cluster.local", str(workers)]
+    command = [sys.executable, "-P", "-m", "swarm.fleet.local", str(workers)]
     with tempfile.TemporaryFile() as said:
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=said, env=environment,

@@ -6,7 +6,7 @@ import pytest
 
 import swarm
 from swarm import scene_file
-from swarm.ensemble.plan import read
+from swarm.fleet.plan import read
 
 BASE = """
 gravity = [0.0, 0.0, -9.81]

@@ -2,8 +2,8 @@
 
 import time
 
-from swarm.ensemble import shown
-from swarm.ensemble.pool import Progress
+from swarm.fleet import shown
+from swarm.fleet.shown import Progress
 from swarm.run import progress
 
 

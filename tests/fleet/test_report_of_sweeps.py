@@ -7,8 +7,8 @@ import pytest
 from pages import Read
 
 import swarm
-from swarm.ensemble import curves
-from swarm.ensemble.folder import found
+from swarm.fleet import curves
+from swarm.fleet.folder import found
 
 SWEEP = """
 [particles]

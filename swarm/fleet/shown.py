@@ -2,12 +2,26 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from ..run.progress import Pace, Told, told
-from .pool import Progress
 
 # Seconds whose pace gives the ETA: several runs.
 _WINDOW = 120.0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """The progress of a sweep: numbers of runs, and the sum of the shares that the running ones have done."""
+
+    all: int
+    done: int
+    failed: int
+    running: int
+    shares: float
+    sentence: str
+
+
 Show = Callable[[Progress], None]
 
 

@@ -3,7 +3,6 @@
 import itertools
 import json
 import signal
-import subprocess
 import sys
 import threading
 from types import SimpleNamespace
@@ -15,9 +14,9 @@ import pytest
 from sweep_sessions import RUNNING, assert_the_same_table, until_there_is, write
 
 import swarm
-from swarm.ensemble import results, sweeping
-from swarm.ensemble.sweeping import SweepOptions, carry_out
 from swarm.files import paths
+from swarm.fleet import results, sweeping
+from swarm.fleet.sweeping import SweepOptions, carry_out_sweep
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +89,7 @@ def test_longer_lists_run_only_what_is_new(whole, tmp_path):
     kept = folder / frame["file"][0]
     (folder / frame["file"][1]).with_suffix(".json").unlink()
     before = [(folder / name).stat().st_mtime_ns for name in frame["file"][:2]]
-    outcome = carry_out(path, SweepOptions(folder, 1, resume=True, table="parquet"))
+    outcome = carry_out_sweep(path, SweepOptions(folder, 1, resume=True, table="parquet"))
     longer = outcome.results.frame()
     assert longer["state"].tolist() == ["done"] * 4
     assert longer["file"][:2].tolist() == frame["file"][:2].tolist()
@@ -106,7 +105,7 @@ def test_longer_lists_run_only_what_is_new(whole, tmp_path):
 
 
 def results_plan(folder):
-    from swarm.ensemble.plan import read
+    from swarm.fleet.plan import read
 
     return read(write(folder / "other.toml", '"particles.seed" = [99]'))
 
@@ -122,7 +121,7 @@ def test_a_worker_that_dies_fails_its_run_alone(tmp_path):
     until_there_is(lambda: list((tmp_path / "out").glob("[!.]*.json")))
     until_there_is(lambda: len(list((tmp_path / "out").glob("[!.]*.h5"))) == 2)
     for worker in psutil.Process().children():
-        if "swarm.ensemble.worker" in " ".join(worker.cmdline()):
+        if "popen_loky" in " ".join(worker.cmdline()):
             worker.kill()
     running.join(RUNNING)
     (frame,) = frames
@@ -142,7 +141,7 @@ def test_the_wall_time_ends_a_sweep(tmp_path, monkeypatch):
     monkeypatch.setattr(sweeping, "time", SimpleNamespace(monotonic=lambda: next(clock)))
     path = write(tmp_path / "sweep.toml", '"run.until" = [1e7, 1e8]', run="frames = 1")
     path.write_text(path.read_text().replace("every = 0.5\n", ""))
-    outcome = carry_out(path, SweepOptions(tmp_path / "out", 1, walltime=3600.0))
+    outcome = carry_out_sweep(path, SweepOptions(tmp_path / "out", 1, walltime=3600.0))
     assert outcome.stopped == "walltime"
     assert [row["state"] for row in outcome.results.rows()] == ["waiting", "waiting"]
     assert (tmp_path / "out" / "results.csv").exists()
@@ -170,19 +169,6 @@ def test_a_checkpoint_is_gone_on_with(tmp_path):
     saved.write_bytes(saved.read_bytes()[:-100])
     again = swarm.sweep(path, tmp_path / "out", processes=1, resume=True)
     pd.testing.assert_frame_equal(again.drop(columns="wall_time"), whole.drop(columns="wall_time"))
-
-
-def test_what_libraries_print_does_not_come_between_the_messages():
-    script = (
-        "import os; from swarm.ensemble.worker import _Line; line = _Line(); print('stray', flush=True); "
-        "os.write(1, b'stray'); line.send(ready=True); os._exit(0)"
-    )
-    worker = subprocess.Popen(
-        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    with worker:  # the end of its input would end it
-        assert worker.stdout.read() == '{"ready": true}\n'
-        assert worker.stderr.read().count("stray") == 2
 
 
 def test_a_table_in_parquet_needs_its_packages(tmp_path, monkeypatch):

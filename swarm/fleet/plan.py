@@ -56,12 +56,13 @@ class Variant:
 
 @dataclass(frozen=True)
 class Plan:
-    """The file of a sweep, its tables but [sweep], its runs, and the modules whose code it may name."""
+    """The file of a sweep, its tables but [sweep], its runs, the modules whose code it may name, the files it names."""
 
     path: Path
     document: Document
     variants: list[Variant]
     plugins: tuple[str, ...] = ()
+    named: tuple[Path, ...] = ()
 
     def text(self, variant: Variant) -> str:
         """The scene file of a run."""
@@ -91,7 +92,8 @@ def read(path: Path, plugins: Iterable[str] = ()) -> Plan:
             )
         lists, way = _lists(document.pop(scene_file.SWEEP))
         with allowed(plugins):
-            return Plan(path, document, _checked(path, document, list(_combined(lists, way))), checked_modules(plugins))
+            variants, named = _checked(path, document, list(_combined(lists, way)))
+            return Plan(path, document, variants, checked_modules(plugins), named)
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from None
 
@@ -189,8 +191,8 @@ def _combined(lists: dict[str, list[Any]], way: str) -> Iterator[dict[str, Any]]
     return (dict(zip(lists, row, strict=True)) for row in rows)
 
 
-def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> list[Variant]:
-    """The runs, each with the scene that it has been found to describe."""
+def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> tuple[list[Variant], tuple[Path, ...]]:
+    """The runs, each with the scene that it has been found to describe, and the files that they name."""
     contents: dict[Path, str] = {}
     # A formula or a mesh takes long, and the scenes of many meshes much memory: each is made once, and the last of them
     # stands for those that are known to be right.
@@ -226,7 +228,7 @@ def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> list
                 "remove the value that comes twice or makes no difference"
             )
         variants[stem] = made
-    return list(variants.values())
+    return list(variants.values()), tuple(file.absolute() for file, content in contents.items() if content)
 
 
 def _with(document: Document, parameters: Mapping[str, Any]) -> Document:

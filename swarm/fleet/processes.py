@@ -1,0 +1,211 @@
+"""A fleet of processes of this machine, by loky.
+
+Each process is an executor of its own: loky ends all processes of an executor in which one dies. Unlike those of
+`multiprocessing` they do not import the caller's script once more: one without `if __name__ == "__main__"` and a
+notebook would not do.
+"""
+
+import contextlib
+import multiprocessing
+import os
+import re
+import signal
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Future
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from ..errors import RunError
+from . import jobs
+
+# The exit code of a worker whose parent is gone.
+_ORPHANED = 3
+# Of what a process printed before it died, a sentence has so many bytes.
+_LAST = 2000
+# With it no module of the current folder takes the place of one of Python's own.
+_SAFE = {"PYTHONSAFEPATH": "1"}
+_READY = {"ready": True}
+# What loky says of a worker that died.
+_EXIT = re.compile(r"exit codes of the workers are \{(\w+)\((-?\d+)\)\}")
+
+
+class Processes(jobs.Fleet):
+    """At most so many processes, each of which starts when a job needs it."""
+
+    def __init__(self, stop: jobs.Stop, number: int) -> None:
+        super().__init__(stop)
+        self._folder = tempfile.TemporaryDirectory(prefix="swarm-", ignore_cleanup_errors=True)
+        self._places = [_Place(Path(self._folder.name, str(k))) for k in range(number)]
+
+    def room(self) -> float:
+        """One job a process."""
+        return len(self._places)
+
+    def submit(self, job: jobs.FleetJob) -> "Future[jobs.Outcome]":
+        """Hand out a job, to a process that has started if one is free."""
+        free = [place for place in self._places if place.job not in self.shares]
+        place = next((one for one in free if one.executor is not None), free[0])
+        return place.submit(job, self.token)
+
+    def hear(self) -> None:
+        """Take the reports that have come."""
+        for place in self._places:
+            for message in place.messages():
+                self.take(place.job, message)
+
+    def ask_to_stop(self) -> None:
+        """Ask the processes to stop their jobs."""
+        for place in self._places:
+            place.tell(self.token)
+
+    def sentence_of(self, job: jobs.FleetJob, error: Exception) -> str:
+        """Why a process returned no outcome.
+
+        Raises:
+            RunError: it did not start.
+        """
+        place = next(place for place in self._places if place.job == job.number)
+        if not isinstance(error, BrokenExecutor):
+            return f"unexpected {type(error).__name__}: {error}"
+        self.hear()
+        said, ready = place.death(str(error)), place.ready
+        place.close()
+        if not ready and not self._stop.reason:
+            raise RunError(f"a worker process did not start: {said}")
+        return said
+
+    def close(self) -> None:
+        """End all processes at once: the files of a run survive an end at any moment."""
+        for place in self._places:
+            place.close()
+        self._folder.cleanup()
+
+
+class _Place:
+    """A process, or room for one; what it prints goes to a file."""
+
+    def __init__(self, printed: Path) -> None:
+        self._printed = printed
+        self.executor: Any = None
+        self.job, self.ready = -1, False
+
+    def submit(self, job: jobs.FleetJob, token: str) -> "Future[jobs.Outcome]":
+        self.job = job.number
+        if self.executor is None:
+            self._start()
+        self._printed.write_bytes(b"")
+        with _without_interrupts():
+            made: Future[jobs.Outcome] = self.executor.submit(_work, job.work, job.arguments, token)
+        return made
+
+    def _start(self) -> None:
+        """Make the executor, whose process begins with its first job."""
+        from multiprocessing import resource_tracker
+
+        import loky
+        from loky.backend import resource_tracker as tracker_of_loky
+
+        # Processes of their own, which loky would begin with the first worker, and unblock interrupts.
+        with _safe_path():
+            resource_tracker.ensure_running()
+            tracker_of_loky.ensure_running()
+        self.ready = False
+        # The end of the process stays open here: loky may replace a process that has grown much.
+        self._line, self._far_end = multiprocessing.Pipe()
+        self.executor = loky.ProcessPoolExecutor(
+            1, initializer=_begin, initargs=(self._far_end, self._printed), env=_SAFE
+        )
+
+    def messages(self) -> Iterator[dict[str, Any]]:
+        while self.executor is not None and self._line.poll():
+            message = self._line.recv()
+            self.ready = self.ready or message == _READY
+            if message != _READY:
+                yield message
+
+    def tell(self, token: str) -> None:
+        if self.executor is not None:
+            with contextlib.suppress(OSError):  # it has died, which its future says
+                self._line.send(token)
+
+    def death(self, said: str) -> str:
+        """The end of the process, in a sentence."""
+        printed = self._printed.read_bytes()[-_LAST:].decode(errors="replace").strip().splitlines()
+        last = f"; the last that it printed: {printed[-1]}" if printed else ""
+        found = _EXIT.search(said)
+        if found is None:
+            return f"its process has died{last}"
+        name, code = found[1], int(found[2])
+        if code >= 0:
+            return f"its process ended with the exit code {code}{last}"
+        why = ", as the system does where memory is short (fewer processes need less)" if name == "SIGKILL" else ""
+        return f"its process was ended by {name}{why}{last}"
+
+    def close(self) -> None:
+        if self.executor is not None:
+            self.executor.shutdown(wait=True, kill_workers=True)
+            self.executor = None
+            self._line.close()
+            self._far_end.close()
+
+
+@contextlib.contextmanager
+def _safe_path() -> Iterator[None]:
+    """Start processes that find no modules in the current folder."""
+    before = {name: os.environ.get(name) for name in _SAFE}
+    os.environ.update(_SAFE)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+@contextlib.contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Start processes that Ctrl-C in a terminal does not reach: they inherit what is blocked here."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+# --- In the process -------------------------------------------------------------------------------------
+
+_line: Any = None
+
+
+def _begin(line: "Connection[Any, Any]", printed: Path) -> None:
+    """Prepare the process: it takes requests to stop, and ends with its parent."""
+    global _line
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # What Python and libraries print; also the last words of a process that crashes.
+    out = os.open(printed, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    for stream in (1, 2):
+        os.dup2(out, stream)
+    _line = line
+    threading.Thread(target=_listen, args=(line,), daemon=True).start()
+    line.send(_READY)
+
+
+def _listen(line: "Connection[Any, Any]") -> None:
+    with contextlib.suppress(OSError, EOFError):
+        while True:
+            jobs.stop(line.recv())
+    # The parent has ended: no process waits for the outcome. The files of a run survive an end at any moment, and their
+    # locks are free for the sweep that goes on with them.
+    os._exit(_ORPHANED)
+
+
+def _work(work: Callable[..., jobs.Outcome], arguments: tuple[Any, ...], token: str) -> jobs.Outcome:
+    return jobs.carried_out(work, arguments, token, _line.send)

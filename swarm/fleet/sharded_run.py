@@ -1,0 +1,132 @@
+"""A run on a cluster, from the side of the client: it hands out shards, waits for them and joins their files.
+
+What a thousand workers do, from what 200 shards on two workers take (`python -m bench cluster`). Particles do not pass
+through the scheduler: a task is a name, a number and a folder, its answer two words, a report some 100 bytes, of which
+all shards together send 100 a second at most. A shard takes 4 ms of the scheduler's processor, reports included: a
+thousand take 4 s of a run of any length. In a frame a particle takes 56 bytes (position, velocity, impacts; 32 in
+float32) and 0.5 byte of sums, which each worker writes to a file of its own: 10^9 particles are 56 GB a frame, and the
+storage is the slowest part; `frames = k` keeps fewer. Next is the client, which makes, checks and writes the start (56
+bytes a particle), reads the end (64 bytes), and opens the file of each shard to join it. A shard begins and ends with
+about 0.05 s of its own, a worker with some seconds of imports.
+"""
+
+import dataclasses
+import time
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from ..common import interrupt
+from ..common.frames import Frame
+from ..errors import RunError, WallTimeError
+from ..run.machine import RunEnd, start_of, warn_open
+from ..run.measures import Measures
+from ..run.options import Task
+from ..run.preflight import hints
+from ..run.progress import Display, display
+from . import connection, jobs, joined, shard_run, shards
+from .sharded import Sharded
+
+__all__ = ["Sharded", "carry_out"]
+
+# Seconds between checkpoints of a shard if the options give no time; and between looks at the frames of the shards.
+_SAVED, _FOLLOWS = 60.0, 1.0
+# To read frames of many shards takes at most about this part of the time.
+_READING = 0.1
+
+
+def carry_out(task: Task, session: Sharded) -> RunEnd:
+    """Carry out a run that is checked, on the cluster of its options.
+
+    Raises:
+        SceneError: the run cannot be one on a cluster, or the cluster cannot carry it out; nothing has run.
+        RunError: a shard failed.
+        KeyboardInterrupt, WallTimeError: it was stopped; its shards have saved their checkpoints.
+    """
+    if task.scene.is_open():
+        warn_open()
+    hints.give(task)
+    target = Path(task.options.trajectory).absolute()
+    saved = task.options.checkpoint or _SAVED
+    task = dataclasses.replace(task, options=dataclasses.replace(task.options, trajectory=target, checkpoint=saved))
+    stop = jobs.Stop()
+    with session, interrupt.taken_by(stop.interrupt):
+        session.prepare_shards(task)
+        measures = Measures(task.options.observables, task.options.until)
+        measures.begin(0, 0.0, start_of(task))
+        with connection.connected(task.options.cluster, stop) as client, display(task.options.progress) as show:
+            connection.require_same_versions(client)
+            connection.require_shared(client, target.parent)
+            if stop.reason:
+                raise KeyboardInterrupt
+            folder, bounds = session.begin(task, task.options.shards or connection.threads_of(client))
+            with connection.Workers(client, stop, len(bounds) - 1) as fleet:
+                observables = _Shards(task, session, folder, bounds, fleet, show).run(measures, stop)
+        end = shards.joined_end(folder, task, bounds)
+        session.finish()
+        return end._replace(observables=observables, wall_time=session.wall_time())
+
+
+class _Shards:
+    """The shards of a run, handed out."""
+
+    def __init__(
+        self, task: Task, session: Sharded, folder: Path, bounds: list[int], fleet: jobs.Fleet, show: Display
+    ) -> None:
+        self._task, self._session, self._fleet, self._show = task, session, fleet, show
+        self._folder, self._bounds, self._count = folder, bounds, len(bounds) - 1
+        self._done, self._failed = 0, ""
+        self._seen, self._read, self._reading = 0, time.monotonic(), 0.0
+
+    def run(self, measures: Measures, stop: jobs.Stop) -> dict[str, NDArray[Any]]:
+        """The observables of all frames, when all shards have ended: they are joined also where some were stopped."""
+
+        def ended(k: int, outcome: jobs.Outcome) -> None:
+            self._done += outcome["state"] == "done"
+            if outcome["state"] == "failed":
+                stop.because("failed")
+                self._failed = self._failed or self._lost(k) * ("lost" in outcome) + outcome["error"]
+
+        def glance() -> None:
+            if time.monotonic() >= self._session.end:
+                stop.because("walltime")
+            self._look()
+
+        made = (jobs.FleetJob(k, shard_run.run_shard, (self._folder, k)) for k in range(self._count))
+        self._fleet.run(made, ended, glance)
+        seen = joined.join(self._folder, self._task, self._bounds, self._session.identity, measures)
+        self._follow()
+        if self._done == self._count:
+            return seen
+        moment = float(seen["time"][-1]) if seen else 0.0
+        self._session.keep(max(0, len(seen["time"]) - 1) if seen else 0, moment)
+        if self._failed:
+            raise RunError(self._failed)
+        if stop.reason == "interrupted":
+            raise KeyboardInterrupt
+        raise WallTimeError(f"the wall time of this run is over at {moment:g} s")
+
+    def _lost(self, k: int) -> str:
+        what = "particles" if self._task.bodies is None else "bodies"
+        return f"the shard of {what} {self._bounds[k]} to {self._bounds[k + 1] - 1} failed: "
+
+    def _look(self) -> None:
+        """Show how far the shards are on average, and now and then the frames that all of them have."""
+        until, now = self._task.options.times.until, time.monotonic()
+        for sentence in self._fleet.new_sentences():
+            self._show.compiling(f"{sentence}, on a worker")
+        if now - self._read >= max(_FOLLOWS, self._reading / _READING):
+            self._follow()
+            self._read = time.monotonic()
+            self._reading = self._read - now
+        self._show.within(until * (self._done + sum(self._fleet.shares.values())) / self._count, until)
+
+    def _follow(self) -> None:
+        """Show the frames that all shards have by now."""
+        if not self._task.options.progress:
+            return  # to read them takes time from workers of this machine
+        until = self._task.options.times.until
+        for count, seen, particles in joined.seen_of(self._folder, self._task, self._bounds, self._seen):
+            self._show.frame(Frame(self._seen, seen["time"], until, seen, count, particles))
+            self._seen += 1

@@ -1,0 +1,274 @@
+"""A sweep as a whole: its file, its folder, the fleet that carries it out, and its table."""
+
+import contextlib
+import math
+import os
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..common import checks, interrupt
+from ..common.checks import path_of
+from ..common.extras import needed_by
+from ..errors import FileError, SceneError
+from ..files.lock import only_writer
+from ..run.options import cores
+from ..serialization.plugins import checked_modules
+from . import sent_modules
+from .connection import Workers, connected, require_known, require_read, require_same_versions, require_shared
+from .jobs import Fleet, FleetJob, Stop
+from .plan import Plan, Variant, read
+from .processes import Processes
+from .results import TABLES, Results, require_written
+from .shown import Progress, Show, shown
+from .sweep_run import Order, run_variant
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# The table is written during a sweep so often at most [s], and so much longer than it takes to write.
+_TABLE_EVERY, _TABLE_SHARE = 10.0, 50.0
+
+
+@dataclass(frozen=True)
+class SweepOptions:
+    """The options of a sweep; `sweep` describes each, `walltime` as of `simulate`."""
+
+    folder: str | os.PathLike[str] | None = None
+    processes: int | None = None
+    threads: int | None = None
+    resume: bool = False
+    overwrite: bool = False
+    progress: bool = False
+    table: str = "csv"
+    walltime: float | None = None
+    plugins: tuple[str, ...] = ()
+    cluster: Any = None
+
+    def __post_init__(self) -> None:
+        for name in ("processes", "threads"):
+            if getattr(self, name) is not None:
+                checks.count(name, getattr(self, name))
+        for name in ("resume", "overwrite", "progress"):
+            checks.flag(name, getattr(self, name))
+        checks.one_of("table", self.table, TABLES)
+        if self.walltime is not None:
+            checks.positive("walltime", self.walltime)
+        if self.resume and self.overwrite:
+            raise SceneError("resume and overwrite contradict each other: leave one of them out")
+        if self.cluster is not None:
+            require_known(self.cluster)
+            if self.processes is not None:
+                raise SceneError(
+                    f"processes must be None with a cluster, got {self.processes}: the runs are carried out by its "
+                    "workers; leave one of the two out"
+                )
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The end of a sweep: its results, why it was stopped ("interrupted", "walltime") or "", and its seconds."""
+
+    results: Results
+    stopped: str
+    wall_time: float
+
+
+def sweep(  # noqa: PLR0913  the keywords are the public interface
+    path: str | os.PathLike[str],
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    processes: int | None = None,
+    threads: int | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: bool = False,
+    table: str = "csv",
+    plugins: Sequence[str] = (),
+    cluster: Any = None,
+) -> "pd.DataFrame":
+    """Carry out the runs of a sweep file, a scene file with a [sweep] table, and return the table of their results.
+
+        [sweep]
+        combine = "product"                          # every value with every other; or "zip"
+        "surface.0.restitution" = [0.5, 0.7, 0.9]    # a key of the scene file: a table or list and what is in it
+        "particles.seed" = {range = 20}              # 0 to 19; {linspace = [a, b, n]}, {geomspace = [a, b, n]}
+
+    Every run is an ordinary one, with its trajectory STEM.h5, its checkpoint, and STEM.json, which notes its end; the
+    stem is a digest of its scene, so that lists can be made longer later. A run that fails is a row with its sentence
+    and stops no other. The scripts of callers need no `if __name__ == "__main__"`.
+
+    Args:
+        path: the sweep file.
+        folder: of all files, made if it is not there; None: the name of the file without .toml, in the current folder.
+        processes: number of worker processes; None: the cores that this process may use.
+        threads: of each run whose file does not say how many; None: the cores for each process, and one on a cluster.
+            Results do not depend on it, nor on `processes`.
+        resume: go on with what the folder holds: runs that are done are not run again, others go on from their
+            checkpoint or begin anew, also those that have failed.
+        overwrite: replace the runs that the folder holds.
+        progress: True for one progress bar of all runs.
+        table: the file results.csv or results.parquet in the folder, "csv" or "parquet". It is replaced now and then
+            during the sweep, and at its end.
+        plugins: the modules whose code the file may name, as "module:Name": laws, surfaces, methods, observables.
+        cluster: where to run, as of `simulate`: None for processes of this machine; "local:N"; the address of a
+            scheduler of Dask; or a `distributed.Client`. A worker carries out a run for each of its threads. The
+            folder, and the files that the scene names, must be on storage that all workers share. The files are the
+            same as without; a run whose worker died is carried out again, from its checkpoint.
+
+    Returns:
+        The table, a row for each run in the order of the file (of a product the last key changes first): file,
+        the keys of the sweep, state ("done", "failed" or "waiting"), error, wall_time [s], and the observables of the
+        last frame, vectors as momentum_x, values of surfaces as impulse_0.
+
+    Raises:
+        SceneError: bad input: the sweep file, the scene of any run, a folder that holds runs; nothing has run.
+        FileError: a file cannot be written, or another sweep uses the folder.
+        RunError: the worker processes cannot be started.
+        KeyboardInterrupt: SIGINT or SIGTERM came; the runs have saved checkpoints, and the table is written.
+    """
+    with needed_by("the table of a sweep in Python", "table"):
+        import pandas  # noqa: F401
+    options = SweepOptions(
+        folder,
+        processes,
+        threads,
+        resume,
+        overwrite,
+        progress,
+        table,
+        plugins=checked_modules(plugins),
+        cluster=cluster,
+    )
+    outcome = carry_out_sweep(path, options)
+    if outcome.stopped:
+        raise KeyboardInterrupt
+    return outcome.results.frame()
+
+
+def carry_out_sweep(path: str | os.PathLike[str], options: SweepOptions) -> Outcome:
+    """Carry out a sweep; an interrupt or the wall time limit ends it with its table written."""
+    began = time.monotonic()
+    require_written(options.table)
+    source = path_of("path", path)
+    folder = Path(source.stem) if options.folder is None else path_of("folder", options.folder)
+    plan = read(source, options.plugins)
+    results = Results(plan, folder, options.table)
+    _require_free(results, options)
+    stop = Stop()
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(interrupt.taken_by(stop.interrupt))
+        client = None if options.cluster is None else stack.enter_context(connected(options.cluster, stop))
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileError(f"cannot make the folder {folder}: {error.strerror}") from error
+        stack.enter_context(only_writer(results.path, "table"))
+        if client is not None:
+            require_same_versions(client)
+            require_shared(client, folder.absolute())
+            require_read(client, plan.named)
+        if options.overwrite:
+            results.remove()
+        results.find()
+        results.keep_file()
+        _Runs(plan, results, options, stop, began).carry_out(client)
+        results.write()
+    stopped = stop.reason if results.of_state("waiting") else ""
+    return Outcome(results, stopped, time.monotonic() - began)
+
+
+def _require_free(results: Results, options: SweepOptions) -> None:
+    """Raise a SceneError if the folder cannot be used, or holds what may not be replaced."""
+    folder = results.folder
+    if folder.exists() and not folder.is_dir():
+        raise SceneError(f"folder: expected the name of a folder, got the file {folder}")
+    if not folder.exists():
+        return
+    if options.resume or options.overwrite:
+        results.require_own()
+        return
+    files = (file(run) for run in results.plan.variants for file in (results.trajectory, results.status_file))
+    if results.path.exists() or results.others() or any(file.exists() for file in files):
+        raise SceneError(
+            f"folder: {folder} holds the runs of a sweep; go on with them (--resume, resume=True), replace them "
+            "(--overwrite, overwrite=True), or choose another folder"
+        )
+    results.require_own()
+
+
+class _Runs:
+    """The runs of a plan that are left."""
+
+    def __init__(self, plan: Plan, results: Results, options: SweepOptions, stop: Stop, began: float) -> None:
+        self._plan, self._results, self._options, self._stop = plan, results, options, stop
+        self._left = [variant for state in ("failed", "waiting") for variant, _status in results.of_state(state)]
+        self._done, self._failed = len(results.of_state("done")), 0
+        self._end = math.inf if options.walltime is None else began + options.walltime
+        self._due = time.monotonic() + _TABLE_EVERY
+        self._sentence, self._stops = "", False
+
+    def carry_out(self, client: Any) -> None:
+        """Carry them out, by the workers of a client, or by processes of this machine."""
+        fleet: Fleet
+        if client is None:
+            mine = cores()
+            processes = min(self._options.processes or mine, max(1, len(self._left)))
+            fleet, threads, modules = Processes(self._stop, processes), max(1, mine // processes), None
+        else:
+            fleet, threads = Workers(client, self._stop), 1
+            modules = sent_modules.pickled() if self._plan.plugins else None
+        threads = self._options.threads or threads
+        orders = ((one.number, self._order(one, threads, modules)) for one in _in_order(self._left))
+        made = (FleetJob(number, run_variant, (order,)) for number, order in orders)
+        with fleet, shown(self._options.progress) as show:
+            fleet.run(made, self._note, lambda: self._look(fleet, show))
+
+    def _order(self, variant: Variant, threads: int, modules: bytes | None) -> Order:
+        impacts = self._results.impacts(variant)
+        return Order(
+            self._plan.text(variant), self._plan.path.absolute(), self._results.trajectory(variant).absolute(),
+            None if impacts is None else impacts.absolute(), threads, self._plan.plugins, modules,
+        )  # fmt: skip
+
+    def _note(self, number: int, outcome: dict[str, Any]) -> None:
+        """Note the end of a run, but for one that goes on in the next session."""
+        if outcome["state"] == "stopped" or (outcome["state"] == "failed" and self._stop.reason):
+            return
+        about = {"state": "", "error": None, "wall_time": None, "observables": {}} | outcome
+        about.pop("lost", None)
+        self._results.add(self._plan.variants[number], about)
+        self._done += outcome["state"] == "done"
+        self._failed += outcome["state"] == "failed"
+
+    def _look(self, fleet: Fleet, show: Show) -> None:
+        """Show the progress, look at the time, and write the table now and then."""
+        now = time.monotonic()
+        if now >= self._end:
+            self._stop.because("walltime")
+        sentences = fleet.new_sentences()
+        if self._stop.reason and not self._stops:
+            self._stops = True
+            sentences = ["stopping: the runs under way save checkpoints; a second Ctrl-C ends them at once"]
+        shares = fleet.shares.values()
+        show(
+            Progress(len(self._plan.variants), self._done, self._failed, len(shares), sum(shares), "\n".join(sentences))
+        )
+        if now >= self._due:
+            self._results.write()
+            self._due = time.monotonic() + max(_TABLE_EVERY, _TABLE_SHARE * (time.monotonic() - now))
+
+
+def _in_order(variants: list[Variant]) -> Iterator[Variant]:
+    """The first of each kind, then the others: workers compile the kernels of several kinds at the same time."""
+    kinds: set[str] = set()
+    rest: list[Variant] = []
+    for variant in sorted(variants, key=lambda one: one.number):
+        if variant.kind in kinds:
+            rest.append(variant)
+        else:
+            kinds.add(variant.kind)
+            yield variant
+    yield from rest
