@@ -10,6 +10,7 @@ import numpy as np
 
 from ..common.status import Status
 from ..errors import RunError
+from ..kernel.limits import SOLVED_PLACE
 from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import Particles
@@ -26,8 +27,6 @@ from .lanes.body_arrays import BodyState, StepRule
 from .lanes.contacts import MOST_CONTACTS
 from .numbers import led_points, most_contacts_of, own_surfaces, ties_of, touching_of, walls_of
 
-# Round-off of a position on a wall, as a part of the scene's size.
-_ROUND_OFF = 8.0 * np.finfo(np.float64).eps
 # Bytes of the lanes of a thread, which are on its stack, if one lane takes no more, and the most lanes.
 _STACK, _MOST_LANES = 1 << 20, 32
 # What else a stack holds; and stacks are whole pages.
@@ -78,7 +77,7 @@ class BodyRun(BaseRun):
         super().__init__(scene, method, n, threads, tier, seeding, watched, pool)
         self._size = drawn
         size, gravity = scene.finite_size(), np.array(scene.gravity or (0.0, 0.0, 0.0))
-        room = _ROUND_OFF * max(size, scene.extent())
+        room = SOLVED_PLACE * max(size, scene.extent())
         noise = room / math.sqrt(min([*(self._link_lengths() ** 2), size * size]))
         strict = getattr(method, "on_unconverged", "") == "raise"
         dt, stages = method.dt, np.array(STAGES[getattr(method, "order", 2)])  # type: ignore[attr-defined]

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common import checks
 from ..errors import SceneError
+from ..kernel.limits import EPSILON
 from ..state import Floats
 from . import room
 
@@ -98,7 +99,7 @@ def modes_unless_above(bound: float, matrix: Floats) -> tuple[Floats, Floats] | 
 def _positive_definite(name: str, matrix: Floats) -> Floats:
     # Scaled to a diagonal of ones, so that a light point beside a heavy one is no singularity.
     scale = np.sqrt(np.diagonal(matrix))
-    least = _ROUND_OFF + 8.0 * len(matrix) * np.finfo(np.float64).eps
+    least = _ROUND_OFF + 8.0 * len(matrix) * EPSILON
     modes = modes_unless_above(least, matrix / scale / scale[:, None])
     if modes is not None and modes[0][0] < _ROUND_OFF:
         first = int(np.abs(modes[1][:, 0] / scale).argmax())

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import SceneError
+from ..kernel.limits import EPSILON
 from ..motion import Led, Motion, led
 from ..state import Floats
 from ..surfaces.surface import Surface
@@ -129,7 +130,7 @@ def _dependences(given: Sequence[Tie], anchors: Mapping[int, Any]) -> Floats:
     rows = directions.reshape(len(given), 3 * len(free))
     rows /= np.maximum(np.sqrt((rows**2).sum(axis=1)), np.finfo(np.float64).tiny)[:, None]
     # All clearly independent where no eigenvalue is below this, round-off and all.
-    bound = 10.0 * _DEPENDENT + 8.0 * len(given) * np.finfo(np.float64).eps
+    bound = 10.0 * _DEPENDENT + 8.0 * len(given) * EPSILON
     modes = modes_unless_above(bound, rows @ rows.T) if given else None
     return np.zeros((len(given), 0)) if modes is None else modes[1][:, modes[0] < _DEPENDENT]
 

@@ -22,6 +22,7 @@ from ..contact.impulse import Step
 from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import select
+from ..kernel.limits import EPSILON
 from ..kernel.vector import ZERO, Vec, norm, square
 from ..scene import Scene
 from . import contract, fixed_step
@@ -33,7 +34,6 @@ _TOLERANCE = 1e-8
 # Sweeps of the vectorised solve; what needs more is solved by `reaction`.
 _SWEEPS = 10
 _CAREFUL_ITERATIONS = 200
-_EPSILON = 2.220446049250313e-16
 
 
 # --- The equation ----------------------------------------------------------------------------------------
@@ -91,7 +91,7 @@ class _AtEnd(NamedTuple):
         f_high = _residual(law, surface, r, c, high)
         kappa, found = high, f_low * f_high <= 0.0
         for _i in range(_CAREFUL_ITERATIONS):
-            if not found or f_high == 0.0 or abs(high - low) <= 2.0 * _EPSILON * abs(high):
+            if not found or f_high == 0.0 or abs(high - low) <= 2.0 * EPSILON * abs(high):
                 break
             kappa = illinois(low, f_low, high, f_high)
             low, f_low, high, f_high = narrowed(low, f_low, high, f_high, kappa, _residual(law, surface, r, c, kappa))

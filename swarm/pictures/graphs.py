@@ -10,7 +10,7 @@ from ..state import Floats
 from ..words.amounts import many, plain, prefixed
 from ..words.verdicts import ROUND_OFF
 from . import series
-from .colours import BLUE, ENERGIES, curve_colour
+from .colours import BLUE, curve_colour
 from .style import GREY, ink
 
 Curves = dict[str, tuple[Floats, Floats]]
@@ -19,7 +19,7 @@ End = tuple[float, str, str]
 # Units of what particles exert, and below which so few of molecular mass do that no gauge would show it.
 _PRESSES, _MOLECULAR = ("Pa", "N/m", "N"), 1e-12
 # Most curves with a colour each; of more these energies have one.
-_ENERGIES = ("total", *(name for name in ENERGIES if name not in ("work of", "energy of")))
+_ENERGIES = (*series.ENERGIES, "brought by")
 _MOST = 6
 # Above round-off values that span so much are on a logarithmic axis.
 _DECADES = 1e3

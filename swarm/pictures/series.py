@@ -74,7 +74,8 @@ GRAPHS = {
     "heat": Graph("heat from walls", "W", "heat from walls", "heat", is_rare=True, is_rate=True),
     "position": Graph("displacement", "m", "displacement of walls", is_rare=True),
 }
-_ENERGIES = ("total", "kinetic", "rotational", "potential", "contact", "dissipated", "elastic", "work")
+# The energies of particles, in the order of a plot.
+ENERGIES = ("total", "kinetic", "rotational", "potential", "contact", "dissipated", "elastic")
 
 
 @dataclass(frozen=True)
@@ -268,7 +269,7 @@ def says_nothing(group: str, curves: Mapping[str, tuple[Floats, Floats]]) -> boo
 def _place(path: str) -> tuple[int, ...]:
     """The order of an entity: of its plot, of an energy, and of a surface by its number."""
     group, name = group_of(path), path.rpartition("/")[2]
-    energy = _ENERGIES.index(name) if name in _ENERGIES else len(_ENERGIES)
+    energy = ENERGIES.index(name) if name in ENERGIES else len(ENERGIES)
     return list(GRAPHS).index(group), energy, *map(int, re.findall(r"\d+", name))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from ..kernel.limits import PUT_ON_SURFACE
 from ..scene import Scene
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many
@@ -28,8 +29,6 @@ _LOG = logging.getLogger("swarm")
 _BATCH, _FEW, _MOST_BATCHES = 1 << 14, 1 << 11, 250
 # The progress of the search is logged after so many batches, and after every doubling of their number.
 _TOLD = 32
-# Round-off of a point of a surface, as a part of the scene's extent.
-_ROUND_OFF = 16.0 * np.finfo(np.float64).eps
 # Steps of a point onto its surface.
 _STEPS = 3
 # Of the extent, a way out of a wall on which no other part of a union is in that place.
@@ -281,7 +280,7 @@ class PointBatches:
             # Not what another part cuts off
             points = points[:, np.abs(distances(surface, points)) <= NEAR * self._extent]
             points = self._on(surface, points)
-            points = points[:, np.abs(distances(surface, points)) <= _ROUND_OFF * self._extent]
+            points = points[:, np.abs(distances(surface, points)) <= PUT_ON_SURFACE * self._extent]
         points = points[:, self._is_wanted(points)]
         points = points[:, self._is_on_walls(points)]
         normals = self._normals(surface, points)
@@ -290,7 +289,7 @@ class PointBatches:
             points, normals = points[:, once], normals[:, once]
         if self._scene.period is not None:
             points, _image = self._scene.wrapped(points)
-        return np.concatenate([points, normals])[:, self._admits(points, _ROUND_OFF * self._extent)]
+        return np.concatenate([points, normals])[:, self._admits(points, PUT_ON_SURFACE * self._extent)]
 
     def _is_on_walls(self, points: Floats) -> NDArray[np.bool_]:
         """Which points of the surface are on one of its walls that is not open there."""
@@ -299,7 +298,7 @@ class PointBatches:
         for surface, holes in walls:
             here = np.ones(points.shape[1], np.bool_)
             if isinstance(self._place.surface, Joined):
-                here = np.abs(distances(surface, points)) <= _ROUND_OFF * self._extent
+                here = np.abs(distances(surface, points)) <= PUT_ON_SURFACE * self._extent
             for hole in holes:
                 here &= self._gap(hole, points) > 0.0
             found |= here
@@ -309,7 +308,7 @@ class PointBatches:
         """Which points of a union are on its walls, not where two parts touch, and each as often as if by one part."""
         beyond = self._gap(surface, points + _BESIDE * self._extent * normals) > 0.0
         parts = dict.fromkeys(surface.surfaces())
-        near = [np.abs(distances(part, points)) <= _ROUND_OFF * self._extent for part in parts]
+        near = [np.abs(distances(part, points)) <= PUT_ON_SURFACE * self._extent for part in parts]
         return np.asarray(beyond & (random.random(points.shape[1]) * np.sum(near, axis=0) < 1.0))
 
     def _on(self, surface: Surface, points: Floats) -> Floats:

@@ -12,6 +12,7 @@ q is then a discrete gradient of anything built on phi (the composite gradient),
 
 from ..kernel.gravity import Gravity, as_vector
 from ..kernel.jit import outlined, select
+from ..kernel.limits import IDENTITY
 from ..kernel.vector import ZERO, absolute, dot, norm, square, times, total
 from . import curvature, newton
 from .in_motion.at_rest import AtRest
@@ -21,8 +22,6 @@ from .time_of_impact.course import Fall, close, first_rise, rise_near, rise_time
 
 # Newton steps of the chord.
 _CHORD_SWEEPS = 50
-# Of the identity of a discrete gradient, relative to the terms of q: 8 units in the last place.
-_NOISE = 8.0 * 2.220446049250313e-16
 
 
 class Smooth(AtRest):
@@ -287,7 +286,7 @@ class Smooth(AtRest):
             return self.discrete_gradient(r0, r1)
         g, d = self.inner_gradient(0.5 * (r0 + r1)), r1 - r0
         d2, rest = square(d), self.difference(r0, r1) - dot(g, d)
-        noise = _NOISE * total(times(absolute(g), absolute(r0) + absolute(r1)))
+        noise = IDENTITY * total(times(absolute(g), absolute(r0) + absolute(r1)))
         # All of it from twice the noise on, without a jump.
         over = select(rest > 0.0, 1.0, -1.0) * 2.0 * (abs(rest) - noise)
         rest = select(abs(rest) < 2.0 * noise, select(abs(rest) > noise, over, 0.0), rest)

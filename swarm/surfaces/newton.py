@@ -3,9 +3,9 @@
 import math
 
 from ..kernel.jit import outlined
+from ..kernel.limits import EPSILON
 from ..kernel.vector import Vec, dot, largest
 
-_EPSILON = 2.220446049250313e-16
 # Newton steps; changes below this part of a step may be noise.
 _ITERATIONS = 50
 _NOISE = 1e-12
@@ -68,4 +68,4 @@ def _unpushed(surface, r, strength, f):
 
 def _converged(change, previous, size):
     """Whether an iteration has reached round-off: its change is below it, or is near it and shrinks no more."""
-    return change <= _EPSILON * size or (change >= previous and change <= _NOISE * size)
+    return change <= EPSILON * size or (change >= previous and change <= _NOISE * size)

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from ..common.checks import Vector, number, parts_of, shown, vector
 from ..errors import SceneError
 from ..kernel.gravity import Gravity, as_vector
+from ..kernel.limits import UNIT_LENGTH
 from ..kernel.vector import Vec, dot, vec
 from ..motion.wall import product as product
 from .frames import Framed
 
 Quaternion = tuple[float, float, float, float]
-# By this much the length of what `unit` or a table of axis and angle gives may differ from 1.
-_ROUND_OFF = 4.0 * 2.220446049250313e-16
 
 
 def quaternion(name: str, value: Any) -> Quaternion | None:
@@ -63,7 +62,7 @@ def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
     # Scaled first: the square of a part itself may not be a number.
     scaled = [part / largest for part in parts]
     length = math.hypot(*scaled)
-    if abs(math.hypot(*parts) - 1.0) <= _ROUND_OFF:
+    if abs(math.hypot(*parts) - 1.0) <= UNIT_LENGTH:
         # What was scaled before keeps its bits: a surface from its own repr or table is the same one.
         return parts
     return tuple(part / length for part in scaled)
@@ -155,7 +154,7 @@ def framed(axes: NDArray[np.float64], body: Any) -> Any:
     if np.array_equal(axes, np.eye(3)):
         return body
     right = np.rint(axes)
-    if hasattr(body, "by_right_angles") and np.abs(axes - right).max() <= _ROUND_OFF:
+    if hasattr(body, "by_right_angles") and np.abs(axes - right).max() <= UNIT_LENGTH:
         return body.by_right_angles(right)
     return Rotated(body, *map(vec, axes.tolist()))
 

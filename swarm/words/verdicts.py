@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from ..common.catalog import OBSERVABLES
+from ..kernel.limits import SUMMED
 from ..observables import books, drift
 from ..pairs import MOST_PRESSED
 from .amounts import amount, counted_in_words, listed, many, plain
 from .statements import Statement, lines_of
 
-# Of whatever should be kept: the bound of the project's tests, and how much of a number one operation may round away.
-ROUND_OFF, _OPERATION = 1e-12, 8.0 * float(np.finfo(np.float64).eps)
+# Of whatever should be kept: the bound of the project's tests.
+ROUND_OFF = 1e-12
 # Methods that keep the energy to round-off or to their tolerance: the others are said to drift.
 _CONSERVING = ("Impact", "Penalty", "AugmentedLagrangian")
 
@@ -41,7 +42,7 @@ def energy_limit(content: Any) -> float:
     seen, method = content.seen, content.method
     steps = float(seen["time"][-1] - seen["time"][0]) / step if (step := getattr(method, "dt", None)) else 0.0
     each = float(seen["impacts"][-1] + seen.get("collisions", [0.0])[-1]) / max(1, content.count)
-    limit = max(ROUND_OFF, _OPERATION * (each + steps))
+    limit = max(ROUND_OFF, SUMMED * (each + steps))
     return float(limit + _tolerated(content, each)) if method.has_multipliers() else float(limit)
 
 

@@ -5,9 +5,8 @@ The contacts with rigid walls are in persistent_contact.py, those with springs i
 
 import math
 
-import numpy as np
-
 from ...kernel.jit import outlined
+from ...kernel.limits import EPSILON
 from ...kernel.vector import Vec, column, cross, dot, norm, put
 from .constraints import Constrained
 
@@ -145,7 +144,7 @@ class BodyContacts(Constrained):
                 if found < MOST_CONTACTS and walls.distance(float(w), c) >= -NEAR * self.rule.room:
                     n = walls.unit_normal(float(w), c)
                     # A velocity towards the wall at the level of round-off does not count as an approach.
-                    if not approaching or dot(n, u) > 4.0 * np.finfo(np.float64).eps * norm(u):
+                    if not approaching or dot(n, u) > 4.0 * EPSILON * norm(u):
                         name[found, 0], name[found, 1] = k, w
                         flat = Vec(1.0, 0.0, 0.0) if abs(n.x) < 0.6 else Vec(0.0, 1.0, 0.0)
                         t = cross(n, flat)

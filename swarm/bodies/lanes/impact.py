@@ -7,6 +7,7 @@ import numpy as np
 
 from ...kernel.arrays import scratch
 from ...kernel.jit import Array, outlined
+from ...kernel.limits import ENERGY_OF_IMPACT, EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import column, dot, put, square
 from .contacts import MOST_CONTACTS, direction, missing, sweep
@@ -17,9 +18,6 @@ _BLOWS, SWEEPS = 200, (2000, 1e-17)
 _CHATTER = 12
 # A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
 SHORT = 1.0 / 16.0
-# Units of round-off by which a body may miss its energy.
-_EPS = float(np.finfo(np.float64).eps)
-ROUND_OFF = 64.0 * _EPS
 
 
 def chatters(touching, state, number):
@@ -43,10 +41,10 @@ def restore(bodies, state, i):
         for x in range(3):
             fall -= mass * bodies.rule.gravity[x] * r[3 * p + x, i]
     lost = state.energy[number] - state.dissipated[number] - (kinetic + fall + elastic)
-    if abs(lost) <= ROUND_OFF * (kinetic + abs(fall) + elastic) and kinetic > 0.0:
+    if abs(lost) <= ENERGY_OF_IMPACT * (kinetic + abs(fall) + elastic) and kinetic > 0.0:
         # To first order: a body that has come to rest has no velocity by which more could be restored.
         factor = 0.5 * lost / kinetic
-        if factor * factor <= _EPS:
+        if factor * factor <= EPSILON:
             for row in range(v.shape[0]):
                 v[row, i] += factor * v[row, i]
 

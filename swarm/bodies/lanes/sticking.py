@@ -14,9 +14,10 @@ import numpy as np
 
 from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
+from ...kernel.limits import ENERGY_OF_IMPACT
 from ...kernel.vector import column, dot, norm, square
 from .contacts import MOST_CONTACTS, direction, missing, put_direction, put_frame, sweep
-from .impact import ROUND_OFF, SHORT, SWEEPS, BodyImpact, kinetic_of
+from .impact import SHORT, SWEEPS, BodyImpact, kinetic_of
 
 
 def is_short(bodies, i):
@@ -104,5 +105,5 @@ def _sticks(bodies, i):
     for a in range(bodies.pace.active[i]):
         most = bodies.touching.friction[active.name[i, a, 1]] * active.press[i, 3 * a]
         along = math.hypot(active.press[i, 3 * a + 1], active.press[i, 3 * a + 2])
-        sticks = sticks or along < (1.0 - ROUND_OFF) * most
+        sticks = sticks or along < (1.0 - ENERGY_OF_IMPACT) * most
     return sticks

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernel.limits import EPSILON
 from ...methods import Impact
 from ...methods.verlet import Verlet
 from ...scene import Scene
@@ -123,7 +124,7 @@ def _warn_of_times(task: Task, speed: float) -> None:
             "the time between impacts is about T = %.2g s; until = %g s is kept to %.1e s, %.1e of it: the instants of "
             "a log of impacts, of doors, births, escapes and absorptions are that coarse (%s); use until <= %.1g s, or "
             "go on from the last frame in a run of its own",
-            between, until, kept, kept / between, flights, _ROUND_OFF * between / np.finfo(np.float64).eps,
+            between, until, kept, kept / between, flights, _ROUND_OFF * between / EPSILON,
         )  # fmt: skip
 
 

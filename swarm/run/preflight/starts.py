@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ...kernel.limits import START_ON_WALL
 from ...particles import Particles
 from ...scene import Scene
 from ...surfaces.fields.many import Many
@@ -13,8 +14,6 @@ from ...surfaces.instant import box_of, gaps_of, gradient_of
 from ...surfaces.shapes.plane import Plane
 from ...surfaces.surface import Surface
 
-# A particle this many times round-off of the scene's size outside a rigid wall still counts as on it at the start.
-_ON_THE_WALL = 64.0 * np.finfo(np.float64).eps
 # Steps along the gradient in which the way to a wall is found; the nudge off a point without one, of the scene's size.
 _WAYS, _NUDGE = 60, 1e-3
 # A way that ends this near to the wall, of its length, has come to it.
@@ -29,7 +28,7 @@ def require_inside(scene: Scene, particles: Particles) -> None:
     """Raise a `SceneError` where a particle is outside of a wall by more than round-off."""
     # Their magnitude sets the round-off of a position on a wall.
     magnitude = max(float(particles.position.max()), -float(particles.position.min()), scene.finite_size())
-    outside = scene.outside(particles.position, _ON_THE_WALL * magnitude)
+    outside = scene.outside(particles.position, START_ON_WALL * magnitude)
     if outside.size:
         raise error_of(scene, particles, outside, scene.distances_outside(particles.position[:, outside]))
 

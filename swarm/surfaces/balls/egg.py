@@ -7,6 +7,7 @@ signed distance. t is found from below by Newton's method for 1/|x/a| = 1, which
 import math
 
 from ...kernel.jit import kernel, outlined, select
+from ...kernel.limits import EPSILON
 from ...kernel.vector import Symmetric, Vec, column, dot, norm, square, times
 from .. import contract
 from ..time_of_impact.course import rise_time_inside
@@ -14,7 +15,6 @@ from .rounded import Rounded
 
 # Newton's steps to a foot and to a hit; near both each one doubles the digits.
 _SWEEPS, _STEPS = 60, 40
-_EPSILON = 2.220446049250313e-16
 # What is no denominator, as a part of the square semi-axis.
 _POLE = 1e-30
 # Of the room that is left to the smallest radius of curvature, where H has a bound: up to this part of it.
@@ -91,8 +91,8 @@ class EggCavity(contract.Smooth):
         # 1/(2 (R - d)) at most, where d is how far inside of the ellipsoid, and R the radius of curvature
         inside = max(-self.foot(r)[0], 0.0)
         room = self.bend - inside
-        reach = select(room > 0.0, _PART * room, _EPSILON * self.bend)
-        left = select(room > 0.0, (1.0 - _PART) * room, _EPSILON * self.bend)
+        reach = select(room > 0.0, _PART * room, EPSILON * self.bend)
+        left = select(room > 0.0, (1.0 - _PART) * room, EPSILON * self.bend)
         return 0.5 / left, 0.5 / left, reach
 
 
@@ -129,7 +129,7 @@ def _foot(egg, r):
     u = Vec(y.x * _part(t, a2.x), y.y * _part(t, a2.y), y.z * _part(t, a2.z))
     length = norm(u)
     # On the middle of the shortest axis, deep inside, x is beside it on both sides.
-    deep = (t + least <= 4.0 * _EPSILON * least) & (whole < 1.0)
+    deep = (t + least <= 4.0 * EPSILON * least) & (whole < 1.0)
     depth = -math.sqrt(t * t * square(u) + least * select(deep, 1.0 - whole, 0.0))
     return select(deep, depth, t * length), u * (1.0 / select(length > 0.0, length, 1.0))
 
@@ -154,7 +154,7 @@ def _leaving(egg, r, v):
         approach = dot(n, v)
         late = (away + egg.radius) / select(approach > 0.0, approach, math.inf)
         before = t - late
-        if not (before < t and late > _EPSILON * t):
+        if not (before < t and late > EPSILON * t):
             break
         t = before
     return select(t > 0.0, t, 0.0)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...kernel.gravity import Gravity, as_vector, displacement
 from ...kernel.jit import select
+from ...kernel.limits import PLACE
 from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, absolute, dot, norm, square, total
 from .. import contract
@@ -20,7 +21,7 @@ from ..time_of_impact.course import rise_time, under_way
 
 # The last step is shorter than this fraction of the radius plus round-off of a place. The square of the fraction is
 # below round-off.
-_CLOSE, _ROUND_OFF = 1e-8, 4.0 * 2.220446049250313e-16
+_CLOSE = 1e-8
 # Part of a distance over which the normal is differenced: the cube root of the round-off.
 _SPACING = 6e-6
 _TINY = float(np.finfo(np.float64).tiny)
@@ -140,7 +141,7 @@ class ToBody(Record):
         time = self.surface.before(self.gravity, p, w)
         # The body is no farther behind the plane than the square of the way over the radius.
         way = total(absolute(displacement(self.gravity, w, select(time < math.inf, time, 0.0))))
-        near = _CLOSE * self.surface.radius + _ROUND_OFF * total(absolute(p))
+        near = _CLOSE * self.surface.radius + PLACE * total(absolute(p))
         goes_on = under_way(t, last)
         return select(goes_on, t + time, t), select(goes_on, select(way <= near, 0.0, math.inf), last)
 

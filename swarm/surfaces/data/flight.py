@@ -8,15 +8,13 @@ these: no root is skipped.
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from ...kernel.jit import outlined, select
+from ...kernel.limits import EPSILON
 from ...kernel.vector import Vec, dot, norm, total
 from ..time_of_impact.course import rise_time
 from ..time_of_impact.march import LOOKS, SafeStep, lets_go
 from .sampled_numbers import CellNumbers, known, least_of
 
-_EPSILON = float(np.finfo(np.float64).eps)
 # A flight that is past the wall by so many times the round-off of its place is at it.
 _ROUND_OFF = 8.0
 
@@ -61,10 +59,10 @@ class SampledNumbers(CellNumbers):
         cell = self._cell_of(p)
         if not cell.inside or cell.clear >= 0.0:
             # Round-off must not leave it where it is for ever.
-            return SafeStep(t, max(self._free_time(cell, p, w, pull), _EPSILON * t), -1.0, -1.0)
+            return SafeStep(t, max(self._free_time(cell, p, w, pull), EPSILON * t), -1.0, -1.0)
         value, n = self.spline.value_and_slope(p)
         level, half = self.side * value, 0.5 * self.side * dot(n, w)
-        speed, room = norm(w), 2.0 * _EPSILON * total(self.spline.coordinates(p))
+        speed, room = norm(w), 2.0 * EPSILON * total(self.spline.coordinates(p))
         # Within round-off of the wall and not on its way off it: nothing nearer is to be found.
         noise = _ROUND_OFF * room * norm(n)
         if not is_first and half >= 0.0 and level >= -noise:

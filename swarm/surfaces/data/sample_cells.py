@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...kernel.grid import MARGIN
 from ...kernel.jit import Array
+from ...kernel.limits import COEFFICIENT
 from ...kernel.record import Record
 
 Floats = NDArray[np.float64]
@@ -19,8 +20,6 @@ Places = NDArray[np.int64]
 _BERNSTEIN = np.array([[1.0, 4.0, 1.0, 0.0], [0.0, 4.0, 2.0, 0.0], [0.0, 2.0, 4.0, 0.0], [0.0, 1.0, 4.0, 1.0]]) / 6.0
 # Cells whose coefficients are looked at together.
 _BATCH = 16_384
-# Of the largest coefficient of a cell, the round-off that a sign may have.
-_NOISE = 64.0 * np.finfo(np.float64).eps
 # The clearance is known up to this many cells: a flight through empty space takes a step for each.
 _FARTHEST = 63
 # The columns of `bends`: the entries of a matrix in the order of `Symmetric`, and how far H is from it at most.
@@ -72,7 +71,7 @@ def _near(c: Floats) -> Mask:
 
 def _holds_zero(low: Floats, high: Floats) -> Mask:
     """Whether 0 may be between these bounds in a cell or, by a slope of nine times their range at most, next to it."""
-    room = 9.0 * MARGIN * (high - low) + _NOISE * np.maximum(np.abs(low), np.abs(high))
+    room = 9.0 * MARGIN * (high - low) + COEFFICIENT * np.maximum(np.abs(low), np.abs(high))
     return np.asarray((low <= room) & (high >= -room))
 
 
@@ -113,7 +112,7 @@ def _bends(c: Floats, width: Floats, of: Mask) -> tuple[Floats, Floats]:
             # 3 (b[i+1] - b[i]) along each of two axes, or 6 (b[i+2] - 2 b[i+1] + b[i]) along one
             second = np.diff(np.diff(b, axis=1 + i), axis=1 + j).reshape(len(places), -1)
             factor = (6.0 if i == j else 9.0) * 0.5 / (width[i] * width[j])
-            noise = 8.0 * _NOISE * np.abs(b).reshape(len(places), -1).max(axis=1)
+            noise = 8.0 * COEFFICIENT * np.abs(b).reshape(len(places), -1).max(axis=1)
             index = (n, *places.T)
             low[index] = factor * (second.min(axis=1) - noise)
             high[index] = factor * (second.max(axis=1) + noise)
@@ -141,7 +140,7 @@ def _rows(low: Floats, high: Floats, places: Places) -> NDArray[np.float32]:
 def eigenvalues(cells: SampleCells) -> tuple[float, float]:
     """The least and the largest eigenvalue of H where the surface is, at least and at most."""
     bends = cells.bends.astype(np.float64)
-    values, spread = np.linalg.eigvalsh(bends[:, _MATRIX].reshape(-1, 3, 3)), bends[:, SPREAD] * (1.0 + _NOISE)
+    values, spread = np.linalg.eigvalsh(bends[:, _MATRIX].reshape(-1, 3, 3)), bends[:, SPREAD] * (1.0 + COEFFICIENT)
     return float((values[:, 0] - spread).min()), float((values[:, 2] + spread).max())
 
 

@@ -8,13 +8,13 @@ import numpy as np
 from ...kernel.arrays import index
 from ...kernel.grid import MARGIN, layer_of
 from ...kernel.jit import outlined, select
+from ...kernel.limits import EPSILON
 from ...kernel.vector import Symmetric, Vec, absolute, dot, lowest, norm, square, times, total
 from .. import contract
 from ..time_of_impact.course import rise_time
 from .sample_cells import SPREAD, SampleCells
 from .spline import Spline
 
-_EPSILON = float(np.finfo(np.float64).eps)
 # Cells without the surface that a straight flight comes through in one go.
 _MANY = 200
 
@@ -158,7 +158,7 @@ class CellNumbers(contract.Smooth):
             x = (low.x + select(w.x >= 0.0, 1.0 + MARGIN, -MARGIN) - p.x) * pace.x
             y = (low.y + select(w.y >= 0.0, 1.0 + MARGIN, -MARGIN) - p.y) * pace.y
             z = (low.z + select(w.z >= 0.0, 1.0 + MARGIN, -MARGIN) - p.z) * pace.z
-            t += max((clear - 1.0) * rate, min(x, y, z), _EPSILON * t)
+            t += max((clear - 1.0) * rate, min(x, y, z), EPSILON * t)
         return t
 
     def _free_time(self, cell, r, v, pull):

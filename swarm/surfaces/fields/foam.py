@@ -6,14 +6,14 @@ from ...kernel.arrays import index
 from ...kernel.gravity import displacement
 from ...kernel.grid import cell_of, entries_at, until_next
 from ...kernel.jit import outlined
+from ...kernel.limits import ON_FOAM
 from ...kernel.vector import absolute, total
 from ..presence.patched import Patched
 from ..time_of_impact import flights
 from .members import Members, member
 
-# Round-off of a distance, in units of the last place of coordinates; by so many times that is a flight inside of
-# another cavity where it goes on.
-_ROUND_OFF, _INSIDE = 512.0 * 2.220446049250313e-16, 4.0
+# By so many times round-off is a flight inside of another cavity where it goes on.
+_INSIDE = 4.0
 
 
 class Foam(Members, Patched):
@@ -80,7 +80,7 @@ def _is_in_other(foam, number, r, near):
 def _leaving(foam, gravity, r, v):
     """When a flight leaves the last of the cavities that hold it, or its cell, or goes on in another cavity."""
     first, stop = entries_at(foam.grid, r)
-    nearest, slack = _nearest(foam, r), _ROUND_OFF * total(absolute(r))
+    nearest, slack = _nearest(foam, r), ON_FOAM * total(absolute(r))
     last, wall = -1.0, -1.0
     for k in range(first, stop):
         m = foam.grid.entries[k]

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from ...common import checks
 from ...common.checks import Vector
 from ...errors import SceneError
+from ...kernel.limits import EPSILON
 from ...kernel.vector import Vec, vec
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, shown, side_sign
 from .numbers import Bend
 
-_EPSILON = 2.220446049250313e-16
 # Central differences lose least at the cube root of round-off, relative to the length.
-_DIFFERENCE = _EPSILON ** (1.0 / 3.0)
+_DIFFERENCE = EPSILON ** (1.0 / 3.0)
 # Where second derivatives are only sampled: how many points, by how much their range is widened, and what they miss.
 _SAMPLES = 4096
 _SAFETY = 2.0
@@ -242,8 +242,8 @@ class Form:
     def check_bend(self) -> None:
         """Raise if safe steps away from the wall may be as short as the round-off of a position."""
         largest, most = np.abs(self.value(self.points(_SAMPLES))).max(), self.bend.most
-        if _EPSILON * most * self.size**2 > largest:
-            limit = 2.0 * largest / (_EPSILON * self.size**2)
+        if EPSILON * most * self.size**2 > largest:
+            limit = 2.0 * largest / (EPSILON * self.size**2)
             raise SceneError(
                 f"phi must not bend more sharply than round-off resolves: with a size of {self.size:.3g} its second "
                 f"derivative must be below {limit:.3g}, got up to {2.0 * most:.3g}; where less is known, give curvature"

@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...kernel.jit import outlined, select
+from ...kernel.limits import EPSILON
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, dot, largest, square, total
 from .. import contract
 from ..time_of_impact.course import rise_time
 from ..time_of_impact.march import SafeStep, Search, first_met
 
-_EPSILON = 2.220446049250313e-16
 # Points this close, relative to the size, are joined by Gauss's rule, whose error is the 7th power; its outer node.
 _SHORT = 1e-2
 _NODE = 0.5 * math.sqrt(0.6)
@@ -38,7 +38,7 @@ class Bend(NamedTuple):
         middle, radius = (part[matrix].T.reshape(-1, 3, 3) for part in (0.5 * (low + high), 0.5 * (high - low)))
         # |lambda(A + E) - lambda(A)| <= |E|, the largest sum of a row; and the round-off of lambda(A)
         values = np.linalg.eigvalsh(middle)
-        room = radius.sum(axis=2).max(axis=1) + 64.0 * _EPSILON * np.abs(values).max(axis=1)
+        room = radius.sum(axis=2).max(axis=1) + 64.0 * EPSILON * np.abs(values).max(axis=1)
         least, most = float((values[:, 0] - room).min()), float((values[:, 2] + room).max())
         return cls(least, most, Symmetric(*low.min(axis=1).tolist()), Symmetric(*high.max(axis=1).tolist()))
 
@@ -139,7 +139,7 @@ class OwnNumbers(contract.Smooth):
         most = min(_quadratic(v, bend.high, bend.low), bend.most * speed2)
         least = max(_quadratic(v, bend.low, bend.high), bend.least * speed2)
         speed = math.sqrt(speed2)
-        time, wall = first_met(Straight(self, r, v, ZERO, t, end, least, most, speed, 2.0 * _EPSILON / speed))
+        time, wall = first_met(Straight(self, r, v, ZERO, t, end, least, most, speed, 2.0 * EPSILON / speed))
         return time, wall >= 0.0
 
     def _in_box(self, r, v):

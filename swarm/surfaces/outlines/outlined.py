@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...common.checks import Vector
 from ...errors import SceneError
 from ...kernel.grid import one_cell
+from ...kernel.limits import ON_OUTLINE
 from ...kernel.vector import Vec, vec
 from .. import rotation as rotations
 from ..fields.grid import grid_of
@@ -25,8 +26,8 @@ from .sides import FewSides, Side, Sides
 
 # At so few sides each lane looks on a straight flight; under gravity so few are in one cell of a grid.
 _FEW, _IN_ONE_CELL = 24, 8
-# Round-off of a place on a wall, relative to a coordinate; and entries of a matrix up to this size count as 0.
-_SLACK, _ALIGNED = 256.0 * 2.220446049250313e-16, 1e-15
+# Entries of a matrix up to this size count as 0.
+_ALIGNED = 1e-15
 # The axes x, y, z of the scene along which the plane's axes to the right, upwards and the axis across it are.
 _ALONG = {(1.0, 0.0, 0.0): (1, 2, 0), (0.0, 1.0, 0.0): (2, 0, 1), (0.0, 0.0, 1.0): (0, 1, 2)}
 
@@ -219,7 +220,7 @@ class Outlined(Many):
         with np.errstate(invalid="ignore"):
             terms = self.frame[None, :, :, None] * corners[:, None]
         placed = np.where(self.frame[None, :, :, None] == 0.0, 0.0, terms).sum(axis=2) + np.array(self.center)[:, None]
-        room = _SLACK * (self.extent() + self.boundary.extent)
+        room = ON_OUTLINE * (self.extent() + self.boundary.extent)
         return np.ascontiguousarray(placed.min(axis=0) - room), np.ascontiguousarray(placed.max(axis=0) + room)
 
     def walls(self) -> tuple[Members]:
@@ -228,7 +229,7 @@ class Outlined(Many):
     def _side(self, k: int) -> Any:
         """The numbers of wall k."""
         s, sign, n = self.boundary.sides, side_sign(self.side), len(self.boundary)
-        slack = _SLACK * (self.extent() + self.boundary.extent)
+        slack = ON_OUTLINE * (self.extent() + self.boundary.extent)
         if k >= n:
             return self._lid(1.0 if k == n else -1.0, slack)
         turns = self.boundary.wedges(sign)

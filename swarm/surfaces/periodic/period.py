@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel.jit import outlined, select
+from ...kernel.limits import EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec
 from ..fields.many import Many
@@ -44,7 +45,6 @@ from .images import Lengths, body_of, is_same_along
 
 Floats = NDArray[np.float64]
 
-_EPSILON = 2.220446049250313e-16
 # Halvings of the part of a step after which it leaves.
 _HALVINGS = 60
 # Of the period, the room that a gap leaves to the walls beside it, and the narrowest one that is worth a look; among
@@ -111,7 +111,7 @@ def cut(period, gravity, motion, remaining, hit):
     (r, v), (gx, gy, gz) = motion, pulls(gravity)
     x, y = time_to_leave(period.x, r.x, v.x, gx), time_to_leave(period.y, r.y, v.y, gy)
     z = time_to_leave(period.z, r.z, v.z, gz)
-    late = _EPSILON * remaining
+    late = EPSILON * remaining
     first, hit = over_faces(period.gaps, period, gravity, motion, (least(x, y, z), hit, 2.0 * late))
     # What is left of the frame is rounded at each face, the same way each time: 0.1 m after 1e8 faces. So the flight
     # ends a little later, after a time that leaves exactly what it is rounded to.
@@ -138,7 +138,7 @@ def on_time(period, gravity, motion, remaining, time, room):
         return time
     _r, v = motion
     # As in `cut`: cells of a grid are as many as faces.
-    late = _EPSILON * remaining
+    late = EPSILON * remaining
     exact = remaining - (remaining - (time + late))
     short = 2.0 * _fastest(gravity, v, time) * late <= least(room.x, room.y, room.z)
     return longer(period.gaps, period, gravity, motion, (select(short, exact, time), 2.0 * late))

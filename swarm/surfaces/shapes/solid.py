@@ -11,6 +11,7 @@ import numpy as np
 
 from ...kernel.gravity import displacement
 from ...kernel.jit import select
+from ...kernel.limits import EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
 from .. import contract
@@ -18,7 +19,6 @@ from ..time_of_impact.approach import place
 from ..time_of_impact.course import under_way
 from ..time_of_impact.rising import LevelStep
 
-_EPSILON = 2.220446049250313e-16
 # A step that is no hit has a length, even if it is of none.
 _TINY = float(np.finfo(np.float64).tiny)
 # Round-off of a part's level, in units of the last place of its largest terms.
@@ -160,7 +160,7 @@ class Entering(Record):
         moved = total(absolute(displacement(gravity, w, wait)))
         # The place is known to round-off of its own coordinates and of those the flight comes from.
         coordinates = total(absolute(p)) + abs(self.r.x) + abs(self.r.y) + abs(self.r.z)
-        is_in = found & (moved <= 4.0 * _EPSILON * (coordinates + body.extent))
+        is_in = found & (moved <= 4.0 * EPSILON * (coordinates + body.extent))
         goes_on = under_way(t, last)
         length = select(is_in, 0.0, select(wait > 0.0, wait, _TINY))
         return select(goes_on, t + wait, t), select(goes_on, length, last)
@@ -182,4 +182,4 @@ def noise(part, extent, r):
     """The round-off of the gap of a part."""
     gradient = total(absolute(part.gradient(r)))
     terms = part.gap_scale(r) + extent * gradient + abs(part.gap_of(0.0))
-    return _ULPS * _EPSILON * terms
+    return _ULPS * EPSILON * terms

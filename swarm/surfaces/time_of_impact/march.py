@@ -8,11 +8,11 @@ import math
 from typing import Any
 
 from ...kernel.jit import outlined, select
+from ...kernel.limits import EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, norm, square, total
 from .course import rise_time
 
-_EPSILON = 2.220446049250313e-16
 # Looks of one flight; near the wall each one doubles the digits. What is not found by then goes on in the next pass. A
 # fall may end before it meets the wall, which nothing here knows: from `hessian_bounds` it looks less far ahead.
 LOOKS, FALLING_LOOKS = 200, 16
@@ -115,7 +115,7 @@ def look(surface, r, v, pull, t, is_first):
     level, half, step, way, steepness = _safe_step(surface, p, w, pull, 0.0)
     # By round-off, or because the surface bends more than its file says.
     is_past = level > 0.0 and half > 0.0 and not is_first
-    room = 2.0 * _EPSILON * total(absolute(p))
+    room = 2.0 * EPSILON * total(absolute(p))
     slack = room * steepness
     if not is_past and lets_go(level, half, step, slack):
         _level, _half, step, _way, _steepness = _safe_step(surface, p, w, pull, slack)

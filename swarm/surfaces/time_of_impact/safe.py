@@ -7,6 +7,7 @@ from ...kernel.arrays import index
 from ...kernel.gravity import accelerated
 from ...kernel.grid import cell_of, entries_at, until_next
 from ...kernel.jit import outlined, select
+from ...kernel.limits import EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import ZERO
 from ..fields.members import member
@@ -17,7 +18,6 @@ from .flights import NEVER, Hit, hit, sooner, soonest
 from .march import SafeStep, Search, first_met
 from .rising import Flight, flight_of
 
-_EPSILON = 2.220446049250313e-16
 # A flight that is past a wall by so many times the round-off of its place is at it.
 _ROUND_OFF = 8.0
 # The bounds of a flight in the cell of a field hold for at most so many times its length, after so many trials.
@@ -99,7 +99,7 @@ def _nearer(seen, body, number, rest, longest):
     """The `ShortestStep` of one wall and the rest."""
     step = body.moving_step(seen, longest)
     is_past = (step.level > 0.0) & (step.half > 0.0)
-    speed, room = seen.bounds(0.0).speed, 2.0 * _EPSILON * seen.coordinates
+    speed, room = seen.bounds(0.0).speed, 2.0 * EPSILON * seen.coordinates
     depth, way = speed * (0.5 * step.level / select(is_past, step.half, 1.0)), speed * step.time
     sooner_one = step.time < rest.time
     return ShortestStep(

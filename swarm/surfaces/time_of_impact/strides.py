@@ -9,13 +9,13 @@ import math
 
 from ...kernel.gravity import accelerated
 from ...kernel.jit import select
+from ...kernel.limits import EPSILON
 from ...kernel.vector import ZERO
 from ..in_motion.moving import Moving
 from .flights import Hit
 from .rising import ThirdDerivativeBound, flight_of
 from .safe import closed_hit, seen_by_walls
 
-_EPSILON = 2.220446049250313e-16
 # What a lane knows of its way: the time of the flight so far, the wall that it has met or -1, and the first hit with
 # the walls that have a closed form.
 _TIME, _MET, _CLOSED, _OTHER = 0, 1, 2, 3
@@ -82,7 +82,7 @@ def _first_stride(known, within, is_first):
         sixth, level = one.third(within) * (1.0 / 6.0), one.level
         time = level.soonest(sixth, within, is_first)
         # The parabola is above f by no more than this.
-        meets = 2.0 * sixth * within * time * time <= _EPSILON * one.seen.coordinates * level.steepness
+        meets = 2.0 * sixth * within * time * time <= EPSILON * one.seen.coordinates * level.steepness
         mine = time < first
         first, wall = select(mine, time, first), select(mine, number, wall)
         meets_first = (mine & meets) | ((not mine) & meets_first)
