@@ -45,11 +45,6 @@ def checked(plane: Any) -> str | None:
     return None if plane is None else checks.one_of("plane", plane, PLANES)
 
 
-def repeats_along_all(plane: str | None, lengths: Sequence[float | None] | None) -> bool:
-    """Whether a scene repeats in every direction in which particles may move."""
-    return lengths is not None and all(length is not None for k, length in enumerate(lengths) if k != across_of(plane))
-
-
 def along(across: int) -> tuple[int, int]:
     """The axes of a plane, to the right and upwards as it is seen from the tip of the axis across it."""
     return (across + 1) % 3, (across + 2) % 3

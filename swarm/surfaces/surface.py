@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import MISSING, dataclass, field, fields, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -85,12 +85,18 @@ class Surface(Validated):
     inertia: PositiveMagnitude | None = field(default=None, kw_only=True)
     openings: Annotated[Any, _openings] = field(default=(), kw_only=True)
     present: Annotated[Spans, checked_spans] = field(default=None, kw_only=True)
+    # Arguments that a class does not take, and what takes their place.
+    refused: ClassVar[tuple[str, ...]] = ()
+    instead: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if hasattr(self, "center"):
             checks.assign(self, center=checks.vector("center", self.center))
         side_sign(getattr(self, "side", "inside"))
+        for name in self.refused:
+            if (value := getattr(self, name)) is not None:
+                raise SceneError(f"{name} must be None for {type(self).__name__}, got {value!r:.200}; {self.instead}")
         if self.temperature is None and self.accommodation != 1.0:
             raise SceneError(
                 f"accommodation must go with a temperature, got {self.accommodation:g} and none; give temperature= "

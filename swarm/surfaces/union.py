@@ -41,6 +41,8 @@ class Joined(Surface):
     parts: Any = field(metadata={"key": "part"})
     side: str = "inside"
 
+    refused: ClassVar[tuple[str, ...]] = ("rotation", "mass", "inertia")
+    instead: ClassVar[str] = "give it to each of its parts"
     # The operation of the gaps of parts.
     _of_gaps: ClassVar[Any] = None
     # In a scene, by how much its rooms overlap where they have a face in common [m]; None: they touch.
@@ -50,11 +52,6 @@ class Joined(Surface):
         super().__post_init__()
         name = type(self).__name__
         object.__setattr__(self, "parts", checked_parts(self.parts, name))
-        for what in ("rotation", "mass", "inertia"):
-            if getattr(self, what) is not None:
-                raise SceneError(
-                    f"{what} must be None for {name}, got {getattr(self, what)!r:.200}; give it to each of its parts"
-                )
         for k, part in enumerate(self.parts):
             if part.reacts():
                 raise SceneError(

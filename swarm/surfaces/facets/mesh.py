@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...common import checks
 from ...common.checks import Vector
 from ...common.extras import needed_by
+from ...common.validated import Length, Magnitude
 from ...errors import SceneError
 from ...kernel.vector import Vec
 from .. import rotation as rotations
@@ -40,7 +41,7 @@ class _Made(NamedTuple):
     triangles: Indices
     group: Indices
     names: tuple[str, ...]
-    weld: float
+    weld: Magnitude
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -85,27 +86,24 @@ class Mesh(Surface):
     triangles: Any = None
     side: str = "inside"
     center: Vector = (0.0, 0.0, 0.0)
-    scale: float = field(default=1.0, kw_only=True)
+    scale: Length = field(default=1.0, kw_only=True)
     weld: float | None = field(default=None, kw_only=True)
     groups: Any = field(default=None, kw_only=True)
     group: Any = field(default=None, kw_only=True)
     names: Any = field(default=(), kw_only=True)
-    mesh_weld: float | None = field(default=None, kw_only=True)
+    mesh_weld: Magnitude | None = field(default=None, kw_only=True)
     _made: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
+
+    refused = ("motion", "mass", "inertia")
+    instead = "its triangles are at rest: move the other surfaces"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for what in ("motion", "mass", "inertia"):
-            if getattr(self, what):
-                raise SceneError(
-                    f"{what} must be None for Mesh, whose triangles are at rest, got {getattr(self, what)!r}"
-                )
         given = self.vertices, self.triangles, self.group, self.names
         if self._made is None or any(a is not b for a, b in zip(self._made.given, given, strict=True)):
             made = self._mended()
             given = made.vertices, made.triangles, made.group, made.names
-            welded = None if self.mesh_weld is None else checks.magnitude("mesh_weld", self.mesh_weld)
-            said = {"scale": 1.0, "weld": None, "mesh_weld": made.weld or welded or None}
+            said = {"scale": 1.0, "weld": None, "mesh_weld": made.weld or self.mesh_weld or None}
             own = dict(zip(("vertices", "triangles", "group", "names"), given, strict=True))
             checks.assign(self, **own, **said, _made=made._replace(given=given))
         object.__setattr__(self, "groups", self._checked_groups())
@@ -114,17 +112,15 @@ class Mesh(Surface):
         """The triangles of the file or the arrays."""
         with needed_by("a mesh", "mesh"):
             import scipy.spatial  # noqa: F401
-        scale = checks.length("scale", self.scale)
-        weld = None if self.weld is None else checks.magnitude("weld", self.weld)
         path = Path("of these arrays")
         if isinstance(self.vertices, (str, Path)):
             if self.triangles is not None:
                 raise SceneError("triangles must be None with the path of a file, which holds them; leave them out")
             path = checks.path_of("vertices", self.vertices)
-            soup = read_soup(path, scale)
+            soup = read_soup(path, self.scale)
         else:
-            soup = given_arrays(self.vertices, self.triangles, self.group, self.names, scale)
-        mesh = sorted_by_place(closed(path, soup, weld))
+            soup = given_arrays(self.vertices, self.triangles, self.group, self.names, self.scale)
+        mesh = sorted_by_place(closed(path, soup, self.weld))
         for values in (mesh.vertices, mesh.triangles, mesh.group):
             values.flags.writeable = False
         return _Made((), mesh.vertices, mesh.triangles, mesh.group, mesh.names, mesh.weld)

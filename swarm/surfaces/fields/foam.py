@@ -19,9 +19,6 @@ _INSIDE = 4.0
 class Foam(Members, Patched):
     """Cavities, in any of which is admissible; the wall of each is there where it is in no other."""
 
-    def looked_at_all(self):
-        return self
-
     def field_hit(self, gravity, r, v):
         return _leaving(self, gravity, r, v)
 

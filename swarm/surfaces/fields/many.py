@@ -48,6 +48,8 @@ class Many(Surface):
     """Solid bodies of one kind; particles live outside of all of them. They may overlap."""
 
     centers: Any
+    refused = ("rotation", "mass", "inertia")
+    instead = "give it to a body that is a surface of the scene by itself"
     # Of one body
     kind: ClassVar[type[Surface]]
     # The corners of the cell that repeats, in a scene in which one does.
@@ -64,9 +66,6 @@ class Many(Surface):
             raise SceneError(f'side must be "outside" for {name}, which are solids, got {side!r}')
         if self.is_foam() and (self.motion is not None or self.openings):
             raise SceneError(f'motion and openings must be left out for {name} with side="inside", got {self}')
-        for what in ("rotation", "mass", "inertia"):
-            if getattr(self, what) is not None:
-                raise SceneError(f"{what} must be None for {name}, got {getattr(self, what)!r}")
         object.__setattr__(self, "centers", (balls if self.kind is Sphere else bodies)("centers", self.centers))
         for what in [field.name for field in fields(self) if field.name in _ROWS and field.name != "centers"]:
             if (value := getattr(self, what)) is not None:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...common.checks import Vector
-from ...errors import SceneError
 from ...kernel.grid import one_cell
 from ...kernel.limits import ON_OUTLINE
 from ...kernel.vector import Vec, vec
@@ -39,18 +38,13 @@ class Outlined(Many):
     center: Vector
     side: str
     height: Any = None
+    refused = ("motion", "mass", "inertia")
+    instead = "its walls end at its corners: move the other surfaces, or build it of surfaces without edges"
     # The argument that gives the outline.
     given: ClassVar[str] = "outline"
 
     def __post_init__(self) -> None:
         Surface.__post_init__(self)
-        name = type(self).__name__
-        for what in ("motion", "mass", "inertia"):
-            if getattr(self, what) is not None:
-                raise SceneError(
-                    f"{what} must be None for {name}, whose walls end at its corners, got "
-                    f"{getattr(self, what)!r:.200}; move the other surfaces, or build it of surfaces without edges"
-                )
 
     __repr__ = Surface.__repr__
 
