@@ -76,7 +76,9 @@ def show_in_lines(value: Any) -> None:
 def _line(function: FunctionType) -> None:
     """Give a function a `Lined` signature, if its own is long; checks of arguments are not part of it."""
     if "__signature__" not in vars(function):
-        function.__annotations__ = {name: bare(kind) for name, kind in function.__annotations__.items()}
+        for name, kind in function.__annotations__.items() if function.__name__ == "__init__" else ():
+            if not isinstance(kind, (type, str)):
+                function.__annotations__[name] = bare(kind)
         signature = Lined.from_callable(function)
         if len(inspect.Signature.__str__(signature)) > _COLUMNS:
             function.__signature__ = signature  # type: ignore[attr-defined]

@@ -59,12 +59,13 @@ class Validated:
 def _declared(cls: Any) -> tuple[tuple[str, Check, bool], ...]:
     """The name of each field that has a check, the check, and whether None takes its place."""
     kinds = {name: (one.type, *getattr(one.type, "__args__", ())) for name, one in cls.__dataclass_fields__.items()}
-    return tuple(
+    found = [
         (name, check, type(None) in either)
         for name, either in kinds.items()
         for kind in either
         for check in filter(callable, getattr(kind, "__metadata__", ()))
-    )
+    ]
+    return tuple(found)
 
 
 def bare(kind: Any) -> Any:
@@ -74,7 +75,8 @@ def bare(kind: Any) -> Any:
     (<class 'float'>, float | None)
     """
     if hasattr(kind, "__metadata__"):
-        return bare(kind.__origin__)
-    if any(hasattr(one, "__metadata__") for one in getattr(kind, "__args__", ())):
-        return functools.reduce(operator.or_, map(bare, kind.__args__))
+        return kind.__origin__
+    for one in getattr(kind, "__args__", ()):
+        if hasattr(one, "__metadata__"):
+            return functools.reduce(operator.or_, map(bare, kind.__args__))
     return kind
