@@ -12,7 +12,7 @@ from . import hold, sliding, touching
 from .hold import One, Two
 from .laws import NONE
 from .projection import ALLOWED
-from .reflection import Energy, exact, relative, wall_velocity
+from .reflection import energy_of, exact, relative, wall_velocity
 
 # What a particle does: it flies, slides along one wall or an edge, has arrived, or is at a wall where that is to be
 # decided; or it is left to `careful`.
@@ -73,10 +73,6 @@ def weightless(rules, gravity, p):
     return _PRESSED * (norm(accelerated(gravity, ZERO, 1.0)) + own_speed2(p) / rules.bend)
 
 
-def _energy(twice):
-    return Energy(twice, 0.5 / twice if twice > 0.0 else 0.0)
-
-
 def _loses(rules, wall):
     return 1.0 - rules.laws.restitution_of(wall) > 0.0
 
@@ -96,7 +92,7 @@ def _press(walls, wall, r, v, pull):
 
 @outlined
 def _bounce(rules, walls, gravity, wall, p):
-    return exact(rules.laws, walls, gravity, wall, p.r, p.v, _energy(p.twice))
+    return exact(rules.laws, walls, gravity, wall, p.r, p.v, energy_of(p.twice))
 
 
 # --- From flight -----------------------------------------------------------------------------------------
@@ -249,7 +245,7 @@ def careful(rules, walls, gravity, wall, p, impulse):
     shortest = 2.0 * GRAZING * rules.size / math.sqrt(own_speed2(p))
     contacts = touching.ImpactSettings(None, rules.laws, shortest, TOUCH * rules.size)
     return touching.impact(
-        contacts, walls, gravity, wall, touching.MovingParticle(p.r, p.v, p.remaining), _energy(p.twice), impulse, 0
+        contacts, walls, gravity, wall, touching.MovingParticle(p.r, p.v, p.remaining), energy_of(p.twice), impulse, 0
     )
 
 

@@ -52,7 +52,8 @@ class ReactingRun(BaseRun):
             state.position, state.velocity, state.mass, state.energy, state.impulse, state.dissipated, state.impacts,
             np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool),
             np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
-            Heap(np.zeros(n), number.copy(), number.copy()), None if tally is None else tally.of_thread(0).impacts,
+            Heap(np.zeros(n), number.copy(), number.copy()), state.heat,
+            None if tally is None else tally.of_thread(0).impacts,
         )  # fmt: skip
         self._freedoms = freedoms_of(scene, particles.velocity)
         self._clock = np.zeros(CLOCK)
@@ -143,7 +144,11 @@ class ReactingRun(BaseRun):
         return float(self._clock[NOW] / span)
 
     def _arrays(self) -> Arrays:
-        queue = {name: array for name, array in self._queue._asdict().items() if name not in ("heap", "mass", "counts")}
+        queue = {
+            name: array
+            for name, array in self._queue._asdict().items()
+            if name not in ("heap", "mass", "heat", "counts")
+        }
         return {**queue, **named("walls", self._freedoms), "key": self._queue.heap.key, "clock": self._clock}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:

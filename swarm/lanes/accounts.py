@@ -1,7 +1,5 @@
 """The accounts of a particle's energy: the shares of walls that move or are hot, and the loss."""
 
-import math
-
 from ..kernel.arrays import index
 from ..kernel.jit import select
 from ..surfaces.in_motion.moving import Carried
@@ -46,28 +44,6 @@ def book_step(walls, state, i, wall, change, given, loses):
     else:
         # What is left is round-off.
         book_work(walls, state, i, wall, after - before - given)
-
-
-def book_sent(laws, state, i, row, change, lost):
-    """Book a change (before, after) of twice the energy per mass by a law of a wall.
-
-    So much of it is `lost`, all where that has no end; the rest is heat that the wall gives, and is returned [J].
-    """
-    before, after = change
-    # What impacts have taken since the energy was written is booked when the particle leaves its lane.
-    pending = state.energy[i] - 0.5 * before
-    state.energy[i] = 0.5 * after + pending
-    given = after - before
-    if laws.dissipate_all:
-        state.dissipated[i] -= 0.5 * given * state.mass[i]
-        return 0.0
-    if laws.may_dissipate:
-        taken = select(lost == math.inf, -given, lost)
-        state.dissipated[i] += 0.5 * taken * state.mass[i]
-        given = select(lost == math.inf, 0.0, given + taken)
-    heat = 0.5 * given * state.mass[i]
-    state.heat[row, i] += heat
-    return heat
 
 
 # --- Of a lane ------------------------------------------------------------------------------------------

@@ -9,15 +9,15 @@ from ..contact.absence import hit_wall, lets_through
 from ..contact.events import CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.hold import One, Two, drift
 from ..contact.reflection import given, wall_velocity
-from ..contact.sending import Arriving, send
+from ..contact.wall_impact import Arriving, by_law
+from ..contact.wall_impact import book as book_impact
 from ..kernel.arrays import scratch
-from ..kernel.gravity import potential
-from ..kernel.jit import long_kernel, outlined, select
+from ..kernel.jit import long_kernel, outlined
 from ..kernel.random import Stream
 from ..kernel.vector import column, put, square
-from .accounts import book, book_sent, book_work
+from .accounts import book
 from .carried import is_carried
-from .escape import absorb, end_frame, let_out
+from .escape import detain, end_frame, let_out
 from .lane_arrays import speed2_scale
 from .one_by_one import one_by_one
 from .watching import log as impact_log
@@ -114,32 +114,24 @@ def _send_off(method, walls, gravity, share, i):
     state, contacts, laws = share.state, share.state.contacts, method.laws
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
     remaining = contacts.remaining[i]
-    now, before, fall = walls.at(remaining), 2.0 * state.energy[i], 2.0 * potential(gravity, r)
+    now, mass = walls.at(remaining), state.mass[i]
     random = Stream(share.seed, share.first + i, state.impacts[i], 0, laws.across)
     # What slides along another wall meets it without end: the surface's restitution and an edge are for slow impacts.
     slow = events.GRAZING * np.sqrt(max(speed2_scale(state, i), square(v)))
-    sent = send(laws, now, wall, Arriving(r, v, before - fall, slow, state.mass[i]), random)
-    if not sent.happens:
+    happens, sent = by_law(laws, now, gravity, wall, Arriving(r, v, 2.0 * state.energy[i], mass, slow), random)
+    if not happens:
         return False
     if laws.own is not None and math.isnan(sent.v.x):
         # The test of whether the particle goes on finds this NaN.
         contacts.keep[i] = math.nan
         return True
-    after = select(sent.keeps, before + sent.work, square(sent.v) + fall)
-    heat = book_sent(laws, state, i, walls.row(wall), (before, after - sent.work), sent.lost)
+    heat = book_impact(laws, state, (walls.row(wall), i, i), mass, sent)
     if share.counts is not None:
         share.counts.give(wall, heat, sent.wait)
-    book_work(walls, state, i, wall, sent.work)
-    state.energy[i] = 0.5 * after
+    state.energy[i] = 0.5 * sent.twice_energy
     put(state.velocity, 0, i, sent.v)
-    state.impacts[i] += 1
     share.note_impact(method, walls, i, impact_log.Struck(r, v, sent.v, wall, remaining, sent.impulse))
-    state.impulse[walls.row(wall), i] += sent.impulse * state.mass[i]
-    if state.absorbed is not None and not sent.wait < remaining:
-        if sent.wait == math.inf:
-            absorb(share, i, wall, remaining)
-        else:
-            state.starts[i] = share.moment - remaining + sent.wait
+    if state.absorbed is not None and not detain(share, i, wall, remaining, sent.wait):
         end_frame(share, i)
         return True
     contacts.remaining[i] = remaining - sent.wait

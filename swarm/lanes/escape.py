@@ -1,5 +1,7 @@
 """Particles that reach a wall where it is open, or that absorbs them: nothing is left of their frames."""
 
+import math
+
 import numpy as np
 
 from ..contact import crossing
@@ -28,6 +30,17 @@ def absorb(share, p, wall, remaining):
     """A wall has absorbed particle p, with so much of its frame left: it stays where and as fast as it is."""
     absorbed = share.state.absorbed
     absorbed.time[p], absorbed.wall[p] = share.moment - remaining, np.int32(wall)
+
+
+def detain(share, p, wall, remaining, wait):
+    """Whether particle p goes on in this frame after a wait at a wall; else it is absorbed, or waits longer."""
+    if wait < remaining:
+        return True
+    if wait == math.inf:
+        absorb(share, p, wall, remaining)
+    else:
+        share.state.starts[p] = share.moment - remaining + wait
+    return False
 
 
 def let_out_lanes(openings, method, walls, gravity, share, lanes, live):

@@ -9,14 +9,14 @@ import math
 
 import numpy as np
 
-from ..contact.sending import Arriving, send
+from ..contact.reflection import Bounce
+from ..contact.wall_impact import Arriving, book_energy, by_law
 from ..kernel.arrays import index
-from ..kernel.gravity import potential
 from ..kernel.jit import select
 from ..kernel.random import Stream
 from ..kernel.vector import put, square
-from .accounts import add_work, book_sent
-from .escape import absorb
+from .accounts import add_work
+from .escape import detain
 from .hit_member import of_lane
 from .lane_arrays import Flying
 from .table import LaneView, Rows, marked_lanes
@@ -29,7 +29,8 @@ class Sending(LaneView):
     """A lane that a law sends off, in rows behind those of its flight."""
 
     v, twice, impulse, work = _named.vector(), _named.number(), _named.number(), _named.number()
-    lost, wait, wall, mass = _named.number(), _named.number(), _named.number(), _named.number()
+    lost, heat, wait = _named.number(), _named.number(), _named.number()
+    wall, mass = _named.number(), _named.number()
 
     # With those of its flight.
     ROWS = _named.count
@@ -55,17 +56,16 @@ def _compute(method, walls, gravity, share, lanes, picked, i):
     here = method.walls_of(of_lane(walls, picked, i), lane.remaining)
     number = lanes.order[i] + np.int64(lane.hits)
     random = Stream(share.seed, share.first + lanes.particle[i], number, 0, laws.across)
-    r, twice, fall = lane.r, lane.twice, 2.0 * potential(gravity, lane.r)
-    found = send(laws, here, wall, Arriving(r, lane.v, twice - fall, 0.0, sent.mass), random)
+    happens, found = by_law(laws, here, gravity, wall, Arriving(lane.r, lane.v, lane.twice, sent.mass), random)
     # The contact is done, unless a wall at 0 K holds the particle, or one of its own law may.
     holds = not square(found.v) > 0.0
     if laws.own is not None:
         after = lanes.given(method, i)._replace(v=found.v)
-        holds = holds | method.is_within(after, 2.0 * found.away, 1.0)
-    sent.v, sent.twice = found.v, select(found.keeps, twice + found.work, square(found.v) + fall)
-    sent.impulse, sent.work, sent.lost, sent.wait = found.impulse, found.work, found.lost, found.wait
+        holds = holds | method.is_within(after, found.twice_away, 1.0)
+    sent.v, sent.twice, sent.impulse, sent.work = found.v, found.twice_energy, found.impulse, found.work
+    sent.lost, sent.heat, sent.wait = found.lost, found.heat, found.wait
     sent.wall = select(holds, wall, -1.0)
-    lanes.marked[i] = found.happens & (wall >= 0.0)
+    lanes.marked[i] = happens & (wall >= 0.0)
 
 
 def _book(method, walls, share, lanes, i):
@@ -76,7 +76,10 @@ def _book(method, walls, share, lanes, i):
         _leave_wrong(state, lanes, i)
         return True
     row = walls.row(wall)
-    heat = book_sent(laws, state, p, row, (lane.twice, sent.twice - sent.work), sent.lost)
+    # What impacts have taken since the energy was written is booked when the particle leaves its lane.
+    state.energy[p] = 0.5 * (sent.twice - sent.work) + (state.energy[p] - 0.5 * lane.twice)
+    bounce = Bounce(sent.v, sent.impulse, sent.twice, 0.0, sent.work, sent.lost, sent.heat)
+    heat = book_energy(state, (row, p, p), sent.mass, bounce)
     if share.counts is not None:
         share.counts.give(wall, heat, sent.wait)
     add_work(walls, lanes.impulse, i, wall, 0.5 * sent.work)
@@ -87,21 +90,10 @@ def _book(method, walls, share, lanes, i):
         watch.note(lanes, i, sent.impulse)
     lanes.wall[i] = sent.wall
     if state.absorbed is not None and sent.wait > 0.0:
-        _detain(share, lanes, i, p, wall)
+        goes_on = detain(share, p, wall, lane.remaining, sent.wait)
+        lane.remaining = lane.remaining - sent.wait if goes_on else 0.0
+        lanes.wall[i] = lanes.wall[i] if goes_on else -1.0
     return False
-
-
-def _detain(share, lanes, i, p, wall):
-    """End a lane that is absorbed, or that waits until the end of the frame; else it goes on after it has waited."""
-    lane, wait = lanes.lane(i), Sending(lanes.rows, i).wait
-    if wait < lane.remaining:
-        lane.remaining -= wait
-        return
-    if wait == math.inf:
-        absorb(share, p, wall, lane.remaining)
-    else:
-        share.state.starts[p] = share.moment - lane.remaining + wait
-    lane.remaining, lanes.wall[i] = 0.0, -1.0
 
 
 def _leave_wrong(state, lanes, i):

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 
 from ...common.status import Status
-from ...contact.reflection import Energy, exact, given, relative, wall_velocity
-from ...contact.sending import Arriving, send
+from ...contact.reflection import given, relative, wall_velocity
+from ...contact.wall_impact import Arriving, book, impact_on_wall
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, potential
-from ...kernel.jit import outlined, select
+from ...kernel.jit import outlined
 from ...kernel.random import Stream
 from ...kernel.record import Record
-from ...kernel.vector import ZERO, Vec, dot, either, norm, square, with_square
+from ...kernel.vector import ZERO, dot, either, norm, square, with_square
 from ...surfaces.presence.openings import is_open
 from .clock import moment_of
 from .journal import note_wall
@@ -46,18 +46,6 @@ class RandomSource(Record):
     first: Any  # the number of the first ball of this run
 
 
-class BouncedBall(Record):
-    """A ball after its impact; energies are twice those per mass, and `wait` is that of `Sent`."""
-
-    v: Vec
-    impulse: float  # per mass
-    lost: float
-    heat: float
-    work: float
-    wait: float
-    twice: float  # its energy then
-
-
 @outlined
 def bounce(box, flock, books, clock, i, now):
     """The impact of a ball on a wall: FLIES, GONE, or a status that ends the run."""
@@ -78,7 +66,7 @@ def bounce(box, flock, books, clock, i, now):
     ended = FLIES if box.laws.own is None else _end(box, clock, wall, i, now, after)
     v1 = either(ended == FLIES, after.v, v)
     flock.put(i, now, r, v1)
-    flock.kept.keep(i, flock.stamp(i), after.twice)
+    flock.kept.keep(i, flock.stamp(i), after.twice_energy)
     note_wall(box, books, clock, (i, now, wall), (r, v, v1), box.kinds.mass_of(i) * after.impulse)
     return ended
 
@@ -97,37 +85,18 @@ def _end(box, clock, wall, i, now, after):
 
 
 def _turned(box, flock, books, walls, wall, ball):
-    """`BouncedBall`, by the laws of a wall, of a ball: its number, the time, its position and its velocity."""
+    """The `Bounce` of a ball on a wall: its number, the time, its position and its velocity."""
     i, now, r, v = ball
-    fall = 2.0 * potential(box.pull, r)
-    twice = flock.kept.at(i, flock.stamp(i), square(v) + fall)
-    energy = Energy(twice, select(twice > 0.0, 0.5 / select(twice > 0.0, twice, 1.0), 0.0))
-    hit = exact(box.laws, walls, box.pull, wall, r, v, energy)
-    if box.loss is not None and box.loss.spares(flock, i, now):
-        hit = exact(box.laws._replace(restitution=None), walls, box.pull, wall, r, v, energy)
-    v1 = with_square(hit.v, hit.twice_energy - fall)
-    turned = BouncedBall(v1, hit.impulse, twice - (hit.twice_energy - hit.work), 0.0, hit.work, 0.0, hit.twice_energy)
-    if box.laws.send_off:
-        random = Stream(box.source.seed, box.source.first + i, books.impacts[index(i)], 0, box.laws.across)
-        sent = send(box.laws, walls, wall, Arriving(r, v, twice - fall, 0.0, box.kinds.mass_of(i)), random)
-        if sent.happens:
-            # The energy decides the speed, as of a mirror: the square of a velocity that is drawn has a bias.
-            left = select(sent.keeps, twice + sent.work, square(sent.v) + fall)
-            heat = select(sent.keeps, 0.0, left - sent.work - twice)
-            v1 = either(sent.keeps, with_square(sent.v, left - fall), sent.v)
-            turned = BouncedBall(v1, sent.impulse, *_shares(box.laws, heat, sent.lost), sent.work, sent.wait, left)
-    return _lifted(box, walls, wall, r, turned)
-
-
-def _shares(laws, heat, lost):
-    """What of the energy that a law gives is lost, negative where it gives, and what is heat."""
-    if laws.dissipate_all:
-        return -heat, 0.0
-    if not laws.may_dissipate:
-        return 0.0, heat
-    all_of_it = lost == math.inf
-    taken = select(all_of_it, -heat, lost)
-    return taken, select(all_of_it, 0.0, heat + taken)
+    fall, laws, random = 2.0 * potential(box.pull, r), box.laws, None
+    if laws.send_off:
+        random = Stream(box.source.seed, box.source.first + i, books.impacts[index(i)], 0, laws.across)
+    arriving = Arriving(r, v, flock.kept.at(i, flock.stamp(i), square(v) + fall), box.kinds.mass_of(i))
+    turned = impact_on_wall(laws, walls, box.pull, wall, arriving, random)
+    if box.loss is not None and laws.restitution is not None and box.loss.spares(flock, i, now):
+        turned = impact_on_wall(laws._replace(restitution=None), walls, box.pull, wall, arriving, random)
+    # The energy decides the speed: the square of a velocity has a bias.
+    v1 = either(turned.keeps, with_square(turned.v, turned.twice_energy - fall), turned.v)
+    return _lifted(box, walls, wall, r, turned._replace(v=v1))
 
 
 @outlined
@@ -153,25 +122,17 @@ def _lifted(box, walls, wall, r, turned):
             v, gained = with_square(v * math.sqrt(speed2 / square(v)), speed2), 0.0
         return turned._replace(
             v=v, impulse=turned.impulse + lift, lost=turned.lost - gained, work=turned.work + work,
-            twice=turned.twice + gained + work,
+            twice_energy=turned.twice_energy + gained + work,
         )  # fmt: skip
     return turned
 
 
 def _book(box, books, walls, wall, i, after):
-    m, row, k = box.kinds.mass_of(i), index(int(walls.row(wall))), index(i)
-    books.impulse[row, 0] += m * after.impulse
-    if box.laws.moving is not None:
-        books.impulse[index(walls.length()) + row, 0] += 0.5 * m * after.work
-    if books.dissipated.size > 0:
-        books.dissipated[k] += 0.5 * m * after.lost
-    if books.heat is not None:
-        books.heat[row, 0] += 0.5 * m * after.heat
-    books.impacts[k] += after.impulse > 0.0
+    heat = book(box.laws, books, (index(int(walls.row(wall))), 0, index(i)), box.kinds.mass_of(i), after)
     if books.counts is not None:
         books.counts.add(wall, after.impulse > 0.0)
         if books.heat is not None:
-            books.counts.give(wall, 0.5 * m * after.heat, 0.0)
+            books.counts.give(wall, heat, 0.0)
 
 
 @outlined

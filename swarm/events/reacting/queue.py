@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ...common.status import Status
 from ...contact.laws import Laws
-from ...contact.reflection import Energy, exact
+from ...contact.wall_impact import Arriving, book, impact_on_wall
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, displacement, potential
 from ...kernel.heap import Heap, build, change
@@ -63,6 +63,7 @@ class Queue(NamedTuple):
     listed: Array  # (N,) bool, whether it is in `close`
     close: Array  # (N,) those that are near, and some that were
     heap: Heap
+    heat: Any = None  # (walls, N) energy that walls gave, or None
     counts: Any = None  # (walls,) int64, impacts on each, where they are counted
 
 
@@ -124,15 +125,12 @@ def _fly(scenery, queue, i, t, way):
 def _bounce(scenery, queue, i, wall, remaining):
     """The impact of particle i on a wall that does not react."""
     r, v, m, twice = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i], 2.0 * queue.energy[i]
-    energy = Energy(twice, select(twice > 0.0, 0.5 / select(twice > 0.0, twice, 1.0), 0.0))
-    bounce = exact(scenery.laws, scenery.given.at(remaining), scenery.pull, wall, r, v, energy)
+    arriving = Arriving(r, v, twice, m)
+    bounce = impact_on_wall(scenery.laws, scenery.given.at(remaining), scenery.pull, wall, arriving, None)
     put(queue.velocity, 0, i, bounce.v)
     owner = index(scenery.owners[int(wall)])
-    queue.impulse[owner, i] += m * bounce.impulse
-    queue.impulse[index(queue.impulse.shape[0] // 2) + owner, i] += 0.5 * m * bounce.work
-    queue.dissipated[i] += 0.5 * m * (twice - (bounce.twice_energy - bounce.work))
+    book(scenery.laws, queue, (owner, i, i), m, bounce)
     queue.energy[i] = 0.5 * bounce.twice_energy
-    queue.impacts[i] += bounce.impulse > 0.0
     if queue.counts is not None:
         queue.counts[owner] += bounce.impulse > 0.0
 

@@ -1,0 +1,155 @@
+"""One impact of one particle on a wall: what becomes of the particle, and how that is booked.
+
+Every engine takes its impacts from here: the queues of points and of balls as a whole, and lanes in two loops, that of
+reflections and that of the laws by which a wall sends particles off, with a velocity of its temperature or by `laws`.
+"""
+
+import math
+
+from ..kernel.arrays import index
+from ..kernel.gravity import potential
+from ..kernel.jit import select
+from ..kernel.random import flux_maxwellian, uniforms
+from ..kernel.record import Record
+from ..kernel.vector import ZERO, Vec, dot, either, square
+from .laws import KEPT
+from .reflection import Bounce, energy_of, exact, from_relative, given, relative, wall_velocity
+
+# How far |v|^2 may be, in parts of it, from the energy that is kept for it.
+_NEAR = 0.1
+_NORMAL = Vec(0.0, 0.0, 1.0)
+
+
+class Arriving(Record):
+    """A particle at a wall: where, its velocity, twice its energy per mass, and its mass [kg].
+
+    Laws do not act on what comes slower along the normal than `slow`.
+    """
+
+    r: Vec
+    v: Vec
+    twice: float
+    mass: float
+    slow: float = 0.0
+
+
+def impact_on_wall(laws, walls, gravity, wall, arriving, random):
+    """The `Bounce` of a particle that is `Arriving` at a wall: by a law of the wall where one acts, else reflected.
+
+    `random` are the random numbers of the impact, which are used by such laws alone.
+    """
+    bounce = exact(laws, walls, gravity, wall, arriving.r, arriving.v, energy_of(arriving.twice))
+    if laws.send_off:
+        happens, sent = by_law(laws, walls, gravity, wall, arriving, random)
+        bounce = select(happens, sent, bounce)
+    return bounce
+
+
+def by_law(laws, walls, gravity, wall, arriving, random):
+    """Whether a law of a wall acts, and the `Bounce` then. A velocity that is not finite, or into the wall, is NaN."""
+    r, v, mass, twice = arriving.r, arriving.v, arriving.mass, arriving.twice
+    n, moving, fall = (
+        walls.unit_normal(wall, r),
+        wall_velocity(laws.moving, walls, wall, r),
+        2.0 * potential(gravity, r),
+    )
+    before = relative(moving, v)
+    b = dot(before, n)
+    happens, after, lost, keeps, wait = False, before, 0.0, False, 0.0
+    if laws.thermal is not None:
+        law, u = laws.thermal_of(wall), uniforms(random.seed, random.particle, random.number)
+        after = flux_maxwellian(n, law.energy / mass, u, laws.across)
+        happens = u.choice < law.accommodation
+        happens = (b > 0.0) & happens
+    for one in laws.own or ():
+        acts = one.has(wall) & (b > arriving.slow) & (not happens)
+        own = _own_law(laws, one, wall, (n, moving), arriving, random, acts)
+        happens = happens | acts
+        after, lost = either(acts, own.v, after), select(acts, own.lost, lost)
+        keeps, wait = (acts & own.keeps) | keeps, select(acts, own.wait, wait)
+    work = given(moving, after - before)
+    sent, away = from_relative(moving, after), -dot(after, n)
+    if laws.own is not None:
+        # A particle that is absorbed gives its normal momentum to the wall and keeps its velocity.
+        stays = wait < math.inf
+        sent = either(keeps & stays, _restored(sent, twice - fall + work), sent)
+        away = select(stays, away, 0.0)
+    left = select(keeps, twice + work, square(sent) + fall)
+    lost, heat = shares(laws, left - work - twice, lost)
+    return happens, Bounce(sent, b + away, left, 2.0 * away, work, lost, heat, wait, keeps)
+
+
+class _Own(Record):
+    """What the laws of a wall make of a particle, relative to the wall."""
+
+    v: Vec
+    lost: float
+    keeps: bool
+    wait: float
+
+
+def _own_law(laws, one, wall, at, arriving, random, acts):
+    """`_Own` by the laws `one` of a wall, with the normal and the velocity `at` it; any where they do not act."""
+    n, moving = at
+    # Where the laws do not act they get valid numbers: with NaN, a law of the user might not end.
+    n = either(acts, -1.0 * n, _NORMAL)
+    u = ZERO if moving is None else moving
+    v = either(acts, arriving.v, u - n)
+    before = v - u
+    ended = one.leave(wall, v, n, u, random, arriving.mass)
+    after = ended.v - u
+    is_right = ended.is_right if laws.across is None else ended.is_right & (laws.across.part(after) == 0.0)
+    if moving is not None:
+        # A particle that waits would have to be carried along by the wall.
+        is_right = is_right & ((ended.wait == 0.0) | (not ended.stays))
+    stays, wait = ended.stays, select(is_right & (not ended.wait < 0.0), ended.wait, 0.0)
+    speed2 = square(before)
+    keeps = abs(square(after) - speed2) <= KEPT * speed2
+    lost = math.inf if one.dissipates else select(keeps, 0.0, ended.lost)
+    after = either(is_right, after, Vec(math.nan, math.nan, math.nan))
+    if stays is not True:
+        after, keeps = either(stays, after, before), keeps | (not stays)
+        lost, wait = select(stays, lost, 0.0), select(stays, wait, math.inf)
+    return _Own(after, lost, keeps, wait)
+
+
+def _restored(v, speed2):
+    """A velocity scaled so that its square is speed2, from within round-off, by one Newton step of the square root."""
+    moving = speed2 > 0.0
+    f = (speed2 - square(v)) * select(moving, 0.5 / select(moving, speed2, 1.0), 0.0)
+    return v * (1.0 + select(abs(f) <= _NEAR, f, 0.0))
+
+
+def shares(laws, given, lost):
+    """What is dissipated, below 0 where a law gives energy, and the heat; `given` is the sum without its sign."""
+    if laws.dissipate_all:
+        return -given, 0.0
+    if not laws.may_dissipate:
+        return 0.0, given
+    all_of_it = lost == math.inf
+    taken = select(all_of_it, -given, lost)
+    return taken, select(all_of_it, 0.0, given + taken)
+
+
+# --- Books ---
+
+
+def book(laws, books, place, mass, bounce):
+    """Book an impact, and return the heat [J]; `place` is the row of the wall, its column, and the particle."""
+    row, column, i = place
+    books.impulse[row, column] += mass * bounce.impulse
+    if laws.moving is not None:
+        books.impulse[index(books.impulse.shape[0] // 2) + row, column] += 0.5 * mass * bounce.work
+    books.impacts[i] += bounce.impulse > 0.0
+    return book_energy(books, place, mass, bounce)
+
+
+def book_energy(books, place, mass, bounce):
+    """Book what an impact dissipates, and the heat, which is returned [J]."""
+    row, column, i = place
+    if books.dissipated.size > 0:
+        books.dissipated[i] += 0.5 * mass * bounce.lost
+    heat = 0.5 * mass * bounce.heat
+    if books.heat is not None:
+        books.heat[row, column] += heat
+    return heat
