@@ -13,9 +13,10 @@ from ..kernel.arrays import aligned_copy
 from ..methods.base import Method
 from ..particles import Particles
 from ..run import failures
-from ..run.base import Arrays, BaseRun
+from ..run.base import Arrays, BaseRun, named
 from ..run.doors import comers, require_free
 from ..run.impacts import ThreadLog
+from ..run.preflight.counting import counters_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -65,15 +66,19 @@ class CollidingRun(BaseRun):
         if openings is not None or laws.may_end:
             gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
         self._box = self._with_heavy(box)._replace(
-            log=None if watched.log is None else watched.log.example,
             window=None if self._windows is None else self._windows.numbers,
             gates=gates, source=RandomSource(seeding.signed(), seeding.first) if laws.send_off else None,
         )  # fmt: skip
         super().__init__(scene, method, n, threads, Tier(compile, self._box, n), seeding, watched)
-        counts = None if self._tally is None else self._tally.counts()
+        counters = counters_of(scene, watched.counters, logs=True)
+        self.state = state = with_counters(state, counters, watched.counters, scene)
+        self._box = self._box._replace(watchers=self._watchers(counters))
+        if counters is not None:
+            self._flock = self._flock._replace(followed=np.zeros(n))
         self._books = CollisionTotals(
-            self._impulse_of_books(), state.dissipated, state.impacts, balls.virial, state.image, counts, state.heat
-        )
+            state.impulse, state.dissipated, state.impacts, balls.virial, state.image, state.heat, state.mass,
+            state.crossed,
+        )  # fmt: skip
         self._ball_numbers = BallNumbers(scene, particles)
         self._told_of_rest = False
         self._frame_before = 0.0  # [s]
@@ -84,30 +89,41 @@ class CollidingRun(BaseRun):
         """What the balls are in, with walls that have a mass."""
         return box
 
-    def _impulse_of_books(self) -> Any:
-        """Where impulses on walls are booked."""
-        return self.state.impulse
-
     def _prepare(self, span: float, moment: float) -> None:
         self._frame_before = moment - span
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
-        page = None if self._impacts is None else ThreadLog(self._impacts, moment)
+        page = self._open_page(moment)
         rule = CollisionRule(moment, self._watch.passes)
         status = ball = int(Status.LEASE_ENDED)
         while status in (Status.LEASE_ENDED, Status.LOG_FULL):
-            kept = self._box if page is None else self._box._replace(log=page.log)
-            status, ball = self._call(events.take, kept, self._flock, self._books, self._clock, rule, latest=latest)
+            status, ball = self._call(
+                events.take, self._with_log(page), self._flock, self._books, self._clock, rule, latest=latest
+            )
             if page is not None and status == Status.LOG_FULL:
                 page.turn()
             elif status == Status.LEASE_ENDED and ball >= 0:
                 self._make_room()
             elif status == Status.LEASE_ENDED:
                 self._next_window()
+        if status == Status.DONE and self._box.watchers.counters is not None:
+            self._follow(moment, page)
         if page is not None:
             page.close()
         self._told_of_rest = self._told_of_rest or warn_of_rest(self._box, self._clock)
         return status, ball
+
+    def _with_log(self, page: ThreadLog | None) -> Any:
+        """What the balls are in, with the log that is filled now."""
+        return self._box if page is None else self._box._replace(watchers=page.watched_by(self._box.watchers))
+
+    def _follow(self, moment: float, page: ThreadLog | None) -> None:
+        """Tell the counters of all flights until the end of a frame."""
+        told, now = 0, self._since(moment)
+        while told < self.state.mass.size:
+            told = self._call(events.follow_all, self._with_log(page), self._flock, self._books, self._clock, now, told)
+            if page is not None and told < self.state.mass.size:
+                page.turn()
 
     def _make_room(self) -> None:
         """More room in the cells."""
@@ -177,6 +193,8 @@ class CollidingRun(BaseRun):
         yield events.order, (flock,)
         yield events.take, (box, flock, self._books, self._clock, CollisionRule(0.0, self._watch.passes))
         yield events.show, (box, flock, self.state, 0.0, *part)
+        if box.watchers.counters is not None:
+            yield events.follow_all, (box, flock, self._books, self._clock, 0.0, 0)
         if self._windows is not None:
             yield events.next_epoch, (flock, self._clock)
         yield observables.observe, self._observing()
@@ -208,12 +226,14 @@ class CollidingRun(BaseRun):
         }  # fmt: skip
         kept = flock.kept
         some = {
-            "last": flock.last, "image": state.image, "heat": state.heat, "escape_time": state.escape_time,
+            "last": flock.last, "followed": flock.followed, "image": state.image, "heat": state.heat,
+            "escape_time": state.escape_time,
             "kept": None if kept is None else kept.twice, "kept_stamp": None if kept is None else kept.stamp,
             "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
             "window": None if self._windows is None else self._windows.numbers,
         }  # fmt: skip
-        return found | {name: array for name, array in some.items() if array is not None}
+        crossed = {} if state.crossed is None else named("crossed", state.crossed)
+        return found | crossed | {name: array for name, array in some.items() if array is not None}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
@@ -224,4 +244,4 @@ class CollidingRun(BaseRun):
         if self._windows is not None:
             self._set_window()
         if self._tally is not None:
-            self._books = self._books._replace(counts=self._tally.counts())
+            self._box = self._box._replace(watchers=self._watchers(self._box.watchers.counters))

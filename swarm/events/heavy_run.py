@@ -21,33 +21,21 @@ class HeavyRun(CollidingRun):
 
     def _with_heavy(self, box: Any) -> Any:
         state, scene = self.state, self._of
-        n, rows = state.mass.size, len(scene.owners())
+        n = state.mass.size
         self._freedoms = freedoms_of(scene, state.velocity)
         scenery = scenery_of(scene, 0.0)
         ways = tuple({wall.freedom.row: wall.freedom for wall in scenery.reacting}.values())
-        self._given_rows = scenery.owners
-        self._given_impulse = np.zeros((2 * max(1, len(scenery.owners)), 1))
         self._heavy = Heavy(
             scenery.reacting, ways, self._freedoms, self._clock, np.zeros(COUNTS), np.zeros(n, bool), np.zeros(n, bool),
-            np.zeros(n, np.int64), np.zeros(rows),
+            np.zeros(n, np.int64),
         )  # fmt: skip
         self._flock = self._flock._replace(freedoms=self._freedoms)
-        return box._replace(heavy=self._heavy)
-
-    def _impulse_of_books(self) -> Any:
-        return self._given_impulse
+        return box._replace(heavy=self._heavy, owners=scenery.owners)
 
     def _begin(self) -> None:
         for freedom in self._heavy.ways:
             freedom.renew(self._freedoms, 0.0)
         super()._begin()
-
-    def _show(self, moment: float) -> None:
-        super()._show(moment)
-        impulse, given, rows = self.state.impulse, self._given_rows, len(self._owners)
-        impulse[:rows, 0] = self._heavy.impulse
-        impulse[given, 0] = self._given_impulse[: len(given), 0]
-        impulse[rows + given, 0] = self._given_impulse[len(given) : 2 * len(given), 0]
 
     def _walls_seen(self, moment: float) -> Any:
         """The walls are brought to the moment in a copy: a frame is no part of their motion."""
@@ -64,5 +52,5 @@ class HeavyRun(CollidingRun):
 
     def _arrays(self) -> Arrays:
         heavy = self._heavy._asdict()
-        own = {f"heavy.{name}": heavy[name] for name in ("counts", "near", "listed", "close", "impulse")}
-        return {**super()._arrays(), **named("walls", self._freedoms), **own, "given_impulse": self._given_impulse}
+        own = {f"heavy.{name}": heavy[name] for name in ("counts", "near", "listed", "close")}
+        return {**super()._arrays(), **named("walls", self._freedoms), **own}

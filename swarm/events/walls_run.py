@@ -14,7 +14,9 @@ from ..methods.base import Method
 from ..particles import Particles
 from ..run import failures
 from ..run.base import Arrays, BaseRun, named
+from ..run.impacts import ThreadLog
 from ..run.observed import Observed
+from ..run.preflight.counting import counters_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -27,6 +29,8 @@ from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule
 
 # Of a clock, how many events were taken where no lease is made yet: so much less for each particle that is predicted.
 _ALL_AHEAD = -1.0
+# Of a queue, what a checkpoint has under other names, or finds again.
+_NOT_KEPT = "heap", "mass", "heat", "crossed", "watchers", "image"
 
 
 class ReactingRun(BaseRun):
@@ -47,13 +51,14 @@ class ReactingRun(BaseRun):
         self._scenery = scenery_of(scene, 0.0)
         tier = Tier(compile, (self._scenery, gravity), n)
         super().__init__(scene, method, n, threads, tier, seeding, watched)
-        tally, state, number = self._tally, self.state, np.arange(n)
+        counters = counters_of(scene, watched.counters, logs=True)
+        self.state = state = with_counters(self.state, counters, watched.counters, scene)
+        number = np.arange(n)
         self._queue = Queue(
             state.position, state.velocity, state.mass, state.energy, state.impulse, state.dissipated, state.impacts,
             np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool),
             np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
-            Heap(np.zeros(n), number.copy(), number.copy()), state.heat,
-            None if tally is None else tally.of_thread(0).impacts,
+            Heap(np.zeros(n), number.copy(), number.copy()), state.heat, state.crossed, self._watchers(counters),
         )  # fmt: skip
         self._freedoms = freedoms_of(scene, particles.velocity)
         self._clock = np.zeros(CLOCK)
@@ -67,22 +72,42 @@ class ReactingRun(BaseRun):
             self._clock[TAKEN] = _ALL_AHEAD
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
-        rule = ReactionRule(span, self._watch.passes)
-        status, particle = self._take(rule, latest)
+        rule, page = ReactionRule(span, self._watch.passes, moment), self._open_page(moment)
+        status, particle = self._take(rule, page, latest)
         if status == Status.DONE:
-            self._in_parts(events.arrive, self._scenery, self._queue, rule, last=len(self.state.mass))
+            self._arrive(rule, page)
             self._tier.kernel(events.settle)(self._scenery, self._freedoms, span)
             self._freedoms.time.fill(0.0)
             self._clock[events.BEFORE] += span
             self._clock[NOW] = 0.0
+        if page is not None:
+            page.close()
         return status, particle
 
-    def _take(self, rule: ReactionRule, latest: float) -> tuple[int, int]:
+    def _arrive(self, rule: ReactionRule, page: ThreadLog | None) -> None:
+        """Bring all particles to the end of the frame; those whose rows are in one log in one thread."""
+        last, first = len(self.state.mass), 0
+        if page is None:
+            self._in_parts(events.arrive, self._scenery, self._queue, rule, last=last)
+            return
+        while (first := self._call(events.arrive, self._scenery, self._with_log(page), rule, first, last)) < last:
+            page.turn()
+
+    def _with_log(self, page: ThreadLog | None) -> Queue:
+        """The queue, with the log that is filled now."""
+        queue = self._queue
+        return queue if page is None else queue._replace(watchers=page.watched_by(queue.watchers))
+
+    def _take(self, rule: ReactionRule, page: ThreadLog | None, latest: float) -> tuple[int, int]:
         """Predict where leases have ended, and take events, to the end of the frame or a halt: (status, particle)."""
         leases = 0
         while self._predict(rule, latest) and leases < self._watch.passes[0]:
             leases += 1
-            status, particle = self._call(events.take, *self._moving(rule), latest=latest)
+            status, particle = int(Status.LOG_FULL), 0
+            while status == Status.LOG_FULL:
+                status, particle = self._call(events.take, *self._moving(rule, page), latest=latest)
+                if status == Status.LOG_FULL and page is not None:
+                    page.turn()
             if status != Status.LEASE_ENDED:
                 return status, particle
             self._fit_leases()
@@ -115,9 +140,9 @@ class ReactingRun(BaseRun):
         elif a_particle > TOO_LONG:
             width *= 0.5
 
-    def _moving(self, rule: ReactionRule) -> tuple[Any, ...]:
+    def _moving(self, rule: ReactionRule, page: ThreadLog | None = None) -> tuple[Any, ...]:
         """Arguments of the kernels that move particles and walls."""
-        return self._scenery, self._freedoms, self._queue, self._clock, rule
+        return self._scenery, self._freedoms, self._with_log(page), self._clock, rule
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         before, place = moment - span, self.state.position[:, item]
@@ -125,7 +150,7 @@ class ReactingRun(BaseRun):
         return f"{said}, between walls of which some react"
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
-        rule, part = ReactionRule(0.0, self._watch.passes), (0, 0)
+        rule, part = ReactionRule(0.0, self._watch.passes, 0.0), (0, 0)
         yield events.lease, (self._scenery, self._freedoms, self._clock)
         yield events.predict, (*self._moving(rule), *part)
         yield events.take, self._moving(rule)
@@ -144,15 +169,12 @@ class ReactingRun(BaseRun):
         return float(self._clock[NOW] / span)
 
     def _arrays(self) -> Arrays:
-        queue = {
-            name: array
-            for name, array in self._queue._asdict().items()
-            if name not in ("heap", "mass", "heat", "counts")
-        }
+        queue = {name: array for name, array in self._queue._asdict().items() if name not in _NOT_KEPT}
+        queue |= {} if self.state.crossed is None else named("crossed", self.state.crossed)
         return {**queue, **named("walls", self._freedoms), "key": self._queue.heap.key, "clock": self._clock}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
         super().restore(arrays, cut_short)
         if self._tally is not None:
-            self._queue = self._queue._replace(counts=self._tally.counts().impacts)
+            self._queue = self._queue._replace(watchers=self._watchers(self._queue.watchers.counters))

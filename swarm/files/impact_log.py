@@ -123,10 +123,12 @@ class ImpactLog(Stored):
         counts, crossings = np.zeros(self._surfaces(), np.int64), np.zeros(2 * self._counters, np.int64)
         for k in range(0, self._rows, _AT_ONCE):
             with self._reading(f"its rows from {k} on"):
-                walls = self._columns["wall"][k : min(k + _AT_ONCE, self._rows)]
+                rows = slice(k, min(k + _AT_ONCE, self._rows))
+                walls = self._columns["wall"][rows]
                 counts += np.bincount(self._surface[walls[walls >= 0]], minlength=len(counts))
                 if self._counters:
-                    crossings += np.bincount(-1 - walls[walls < 0], minlength=len(crossings))
+                    crosses = (walls < 0) & ~self._is_collision(rows)
+                    crossings += np.bincount(-1 - walls[crosses], minlength=len(crossings))
         return counts, crossings.reshape(-1, 2)
 
     @property
@@ -258,6 +260,10 @@ class ImpactLog(Stored):
                 for name, column in self._columns.items():
                     self._checked.compare_rows(f"impacts/{name}", column, k, (int(begins[k]), int(begins[k + 1])))
 
+    def _is_collision(self, rows: slice) -> Any:
+        """Which rows are of two particles that meet: their wall is -1, as that of the first counter is."""
+        return self._columns["partner"][rows] >= 0 if "partner" in self._columns else np.False_
+
     def _surfaces(self) -> int:
         return int(self._surface.max()) + 1 if len(self._surface) else 0
 
@@ -266,7 +272,7 @@ class ImpactLog(Stored):
         with self._reading(f"its rows from {rows.start} on"):
             time = finite(self._columns["time"][rows], "row")
             particle, wall = self._columns["particle"][rows], self._columns["wall"][rows]
-            lowest = -1 if "partner" in self._columns else -2 * self._counters
+            lowest = min(-2 * self._counters, -1 if "partner" in self._columns else 0)
             if len(wall) and not (wall.min() >= lowest and wall.max() < len(self._surface)):
                 raise ValueError(
                     f"expected walls from {lowest} to {len(self._surface) - 1}, got {wall.min()} to {wall.max()}"
@@ -283,8 +289,9 @@ class ImpactLog(Stored):
             table["time"], table["particle"], table["surface"] = time[k], particle[k], surface[k]
             table["member"] = np.where(is_impact[k], self._member[np.maximum(wall[k], 0)], -1)
             if self._counters:
-                table["counter"] = np.where(is_impact[k], -1, (-1 - wall[k]) // 2)
-                table["sense"] = np.where(is_impact[k], -1, (-1 - wall[k]) % 2)
+                is_event = (is_impact | self._is_collision(rows))[k]
+                table["counter"] = np.where(is_event, -1, (-1 - wall[k]) // 2)
+                table["sense"] = np.where(is_event, -1, (-1 - wall[k]) % 2)
             if len(k):
                 within = slice(rows.start + int(k[0]), rows.start + int(k[-1]) + 1)
                 for name in (name for name in table.dtype.names[4:] if name in self._columns):

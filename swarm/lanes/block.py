@@ -159,7 +159,7 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
 
 def _pass(method, walls, gravity, share, lanes, picked, live):
     """A flight and a contact of every lane: whether one reached the end of the frame, is hard, was sent off wrong."""
-    state, watches, counters = share.state, share.watches(), share.counters
+    state, watches, counters = share.state, share.watchers.of_impacts(), share.counters
     if counters is not None:
         counters.keep_before(gravity, lanes, live)
     go(method, walls, gravity, lanes, live)

@@ -20,7 +20,7 @@ from .carried import is_carried
 from .escape import detain, end_frame, let_out
 from .lane_arrays import speed2_scale
 from .one_by_one import one_by_one
-from .watching import log as impact_log
+from .watching.log import Struck
 
 # A particle that meets walls so often and does not move on is left to the careful way, and then given up.
 _OFTEN, _MOST = 64.0, 1e6
@@ -65,7 +65,8 @@ def _decide(method, walls, gravity, share, i):
     state.impulse[walls.row(wall), i] += found.impulse * state.mass[i]
     if found.impulse > events.NO_IMPACT * np.sqrt(events.own_speed2(p)):
         state.impacts[i] += 1
-        share.note_impact(method, carried, i, impact_log.Struck(r, v, found.v, wall, remaining, found.impulse))
+        struck = Struck(i, wall, share.moment - remaining, r, v, found.v, found.impulse * state.mass[i])
+        share.watchers.hit(state.image, share.watchers.with_slip(method.laws, walls, struck))
     if found.phase in (HELD, EDGE) and found.keep == 0.0:
         _spare(moving, walls, state, i, found, wall)
     u = wall_velocity(moving, walls, wall, r)
@@ -130,7 +131,8 @@ def _send_off(method, walls, gravity, share, i):
         share.counts.give(wall, heat, sent.wait)
     state.energy[i] = 0.5 * sent.twice_energy
     put(state.velocity, 0, i, sent.v)
-    share.note_impact(method, walls, i, impact_log.Struck(r, v, sent.v, wall, remaining, sent.impulse))
+    struck = Struck(i, wall, share.moment - remaining, r, v, sent.v, sent.impulse * mass)
+    share.watchers.hit(state.image, share.watchers.with_slip(laws, now, struck))
     if state.absorbed is not None and not detain(share, i, wall, remaining, sent.wait):
         end_frame(share, i)
         return True

@@ -13,8 +13,8 @@ from ..kernel.vector import norm, put
 from ..surfaces.presence.openings import is_open
 from ..surfaces.presence.rooms import leads_on
 from .table import marked_lanes
-from .watching import log as impact_log
 from .watching.crossings import ParticleMoment
+from .watching.log import Struck
 
 
 def escape(share, p, wall, r, v, remaining):
@@ -22,8 +22,7 @@ def escape(share, p, wall, r, v, remaining):
     share.state.escape_time[p] = share.moment - remaining
     if share.counters is not None:
         share.counters.settle(share, p, ParticleMoment(r, v, remaining))
-    if share.log is not None:
-        share.log.add_escape(share.state, p, impact_log.Struck(r, v, v, wall, remaining, 0.0))
+    share.watchers.hit(share.state.image, Struck(p, wall, share.moment - remaining, r, v, v, 0.0))
 
 
 def absorb(share, p, wall, remaining):

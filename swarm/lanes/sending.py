@@ -86,7 +86,7 @@ def _book(method, walls, share, lanes, i):
     lane.v, lane.twice = sent.v, sent.twice
     lane.hits += 1.0
     lanes.impulse[row, i] += sent.impulse
-    for watch in share.watches():
+    for watch in share.watchers.of_impacts():
         watch.note(lanes, i, sent.impulse)
     lanes.wall[i] = sent.wall
     if state.absorbed is not None and sent.wait > 0.0:

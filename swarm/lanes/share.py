@@ -7,6 +7,7 @@ import numpy as np
 from ..kernel.arrays import next_of
 from ..kernel.jit import Array, select
 from ..kernel.record import Record
+from .watching.watchers import Watchers
 
 
 class Draws(NamedTuple):
@@ -56,18 +57,22 @@ class Share(NamedTuple):
     seed: int  # of random numbers
     first: int  # the number of particle 0 in the whole run, for them
     moment: float  # at which the frame ends [s]
-    log: Any = None  # `log.Log` of impacts
-    counts: Any = None  # `counts.Counts` of them
-    counters: Any = None  # `counters.Counters`
+    watchers: Watchers = Watchers()
 
-    def watches(self):
-        """The log and the counts of impacts, if the run has any."""
-        return tuple(one for one in (self.log, self.counts) if one is not None)
+    @property
+    def log(self) -> Any:
+        """The log of impacts, or None."""
+        return self.watchers.log
 
-    def note_impact(self, method, walls, i, struck):
-        """Log and count an impact of particle i, a `log.Struck`."""
-        for watch in self.watches():
-            watch.add_row(method, walls, self.state, i, struck)
+    @property
+    def counts(self) -> Any:
+        """The counts of impacts, or None."""
+        return self.watchers.counts
+
+    @property
+    def counters(self) -> Any:
+        """The counters, or None."""
+        return self.watchers.counters
 
     def note_stay(self, i, time):
         """Count a time in which walls hold particle i [s]: as that of the first of them, or of the one it has met."""

@@ -15,11 +15,13 @@ from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..errors import RunError
+from ..lanes.watching.watchers import Watchers
 from ..methods.base import Method
 from ..observables import CHUNK
 from ..scene import Scene
 from ..state import State
 from . import failures
+from .impacts import ThreadLog
 from .observed import Observed, balance, gone_of, poses_of, with_walls
 from .starting_state import Seeding
 from .tally import Watched
@@ -314,6 +316,15 @@ class BaseRun:
     def _at_once(self) -> int:
         """How many particles are looked at from one look at the halt to the next."""
         return _AT_ONCE_PLAIN if self._tier.is_plain else _AT_ONCE
+
+    def _watchers(self, counters: Any) -> Watchers:
+        """The watchers of the thread that calls."""
+        log = None if self._impacts is None else self._impacts.example
+        return Watchers(log, None if self._tally is None else self._tally.counts(), counters)
+
+    def _open_page(self, end: float) -> ThreadLog | None:
+        """The log of the thread that calls, in the frame that ends at a time [s]; None in a run without one."""
+        return None if self._impacts is None else ThreadLog(self._impacts, end)
 
     def _choose_tier(self) -> None:
         """Take the tier of the next calls."""

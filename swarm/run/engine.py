@@ -26,7 +26,7 @@ from ..state import Contacts, Crossed, Multipliers, State
 from . import failures
 from .base import Arrays, BaseRun, named, result_of
 from .impacts import ThreadLog
-from .preflight.counting import counters_of, crossed_of
+from .preflight.counting import counters_of, with_counters
 from .present import Presence
 from .starting_state import UNSEEDED, Seeding, begin, have_lasted, holders_of_resting, state_of
 from .tally import UNWATCHED, Watched
@@ -65,9 +65,7 @@ class Run(BaseRun):
         self._counters = counters_of(scene, counters, self._impacts is not None)
         self._booked = lanes.booked(self._walls)
         self.state = state_of(scene, particles, method, self._booked)
-        if self._counters is not None:
-            crossed = crossed_of(self._counters, counters, scene, particles.position)
-            self.state = self.state._replace(crossed=crossed)
+        self.state = with_counters(self.state, self._counters, counters, scene)
         observables.start_energies(scene, self._law, self.state)
         self._faces = scene.open_faces()
         # Whole chunks, so that a thread observes what it has advanced.
@@ -135,7 +133,7 @@ class Run(BaseRun):
             mine = self._lanes.pop()
         except IndexError:
             mine = self._empty_lanes()
-        page = None if self._impacts is None else ThreadLog(self._impacts, self._moment)
+        page = self._open_page(self._moment)
         if not self._kinds:
             end = self._part(span, draws, mine, page)
         else:
@@ -235,8 +233,7 @@ class Run(BaseRun):
         return Share(
             self._present.flying(self.state), self._present.of(self._phase), np.zeros(PHASES, np.int64), self._halted,
             draws, self._watch.passes, span,
-            self._seed, self._first, self._moment, None if self._impacts is None else self._impacts.example,
-            None if self._tally is None else self._tally.counts(), self._counters,
+            self._seed, self._first, self._moment, self._watchers(self._counters),
         )  # fmt: skip
 
     def _flying(self, share: Share, mine: lanes.Lanes) -> tuple[Any, ...]:

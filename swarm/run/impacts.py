@@ -14,6 +14,7 @@ from ..errors import RunError
 from ..lanes.share import Share
 from ..lanes.table import LANES, STRIDE
 from ..lanes.watching.log import GOING, Log
+from ..lanes.watching.watchers import Watchers
 from ..scene import Scene
 from .options import Task
 
@@ -60,7 +61,8 @@ class Impacts:
         self._slips, self._repeats = laws is not None and laws.friction is not None, scene.period is not None
         self._real, self._meet = real, meet
         # A flight may cross many counters.
-        self._room = _ROWS // 2 if counts else LANES
+        in_order_of_time = meet or scene.reacts()
+        self._room = _ROWS // 2 if counts else 1 if in_order_of_time else LANES
         self._spare: queue.SimpleQueue[Log] = queue.SimpleQueue()
         for _ in range(2 * threads + _MORE):
             self._spare.put(self._made(_ROWS))
@@ -158,32 +160,32 @@ class ThreadLog:
     def call(self, kernel: Any, *arguments: Any) -> tuple[int, int, int]:
         """The result of a kernel; each time the log is full, it goes on with an empty one."""
         while True:
-            given = [one._replace(log=self._log) if isinstance(one, Share) else one for one in arguments]
-            status, particle, drawn = kernel(*given)
-            if self._log.filled[1]:
-                raise RunError(
-                    f"the frame at {self._end:g} s has flights that cross counters more often than the log of impacts "
-                    "has room for; use more frames (every), which cut flights, or leave impacts out"
-                )
+            status, particle, drawn = kernel(*(self._with_log(one) for one in arguments))
             if status != Status.LOG_FULL:
                 return status, particle, drawn
             going = self._log.going.copy()
-            self._impacts.hand_over(self._log)
-            self._log = self._impacts.empty(self._end)
+            self.turn()
             self._log.going[:] = going
 
-    @property
-    def log(self) -> Log:
-        """The log that is filled now."""
-        return self._log
+    def _with_log(self, one: Any) -> Any:
+        return one._replace(watchers=self.watched_by(one.watchers)) if isinstance(one, Share) else one
+
+    def watched_by(self, watchers: Watchers) -> Watchers:
+        """These watchers, with the log that is filled now."""
+        return watchers._replace(log=self._log)
 
     def turn(self) -> None:
         """Hand over what there is, and go on with an empty log."""
-        self._impacts.hand_over(self._log)
+        self.close()
         self._log = self._impacts.empty(self._end)
 
     def close(self) -> None:
         """Hand over what there is."""
+        if self._log.filled[1]:
+            raise RunError(
+                f"the frame at {self._end:g} s has flights that cross counters more often than the log of impacts "
+                "has room for; use more frames (every), which cut flights, or leave impacts out"
+            )
         self._impacts.hand_over(self._log)
 
 

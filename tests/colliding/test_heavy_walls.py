@@ -226,12 +226,6 @@ def test_discs_and_a_heavy_disc_stay_in_their_plane():
     assert result.observables["energy_error"].max() < 1e-13
 
 
-def test_impacts_of_members_are_refused():
-    scene, balls = moving(plate())
-    with pytest.raises(swarm.SceneError, match="member_impacts must be False"):
-        swarm.simulate(scene, balls, swarm.Impact(), until=0.1, member_impacts=True)
-
-
 def test_a_run_that_is_cut_off_goes_on_from_its_file(tmp_path):
     scene, balls = moving(plate(0.5), gravity=DOWN)
     path = tmp_path / "run.h5"

@@ -14,9 +14,10 @@ from ...kernel.jit import outlined
 from ...kernel.random import Stream
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, dot, either, norm, square, with_square
+from ...lanes.watching.log import Struck
 from ...surfaces.presence.openings import is_open
 from .clock import moment_of
-from .journal import note_wall
+from .followed import follow, settle
 from .rows import FLOATS, WALL
 from .window import walls_at
 
@@ -49,25 +50,33 @@ class RandomSource(Record):
 @outlined
 def bounce(box, flock, books, clock, i, now):
     """The impact of a ball on a wall: FLIES, GONE, or a status that ends the run."""
+    follow(box, flock, books, clock, i, now)
     r, v = flock.at(box.pull, i, now)
     wall, walls = flock.event[index(FLOATS * i + WALL)], walls_at(box, i, now)
     if box.gates is not None and box.gates.openings is not None:
         closed = _closed_wall(box, walls, wall, i, r, v)
         if closed < 0.0:
             box.gates.escape_time[index(i)] = moment_of(clock, now)
+            settle(box, books, clock, i, now, r, v)
             flock.put(i, now, r, v)
-            note_wall(box, books, clock, (i, now, wall), (r, v, v), 0.0)
+            box.watchers.hit(books.image, Struck(i, box.owner(wall), moment_of(clock, now), r, v, v, 0.0))
             return GONE
         wall = closed
     after = _turned(box, flock, books, walls, wall, (i, now, r, v))
-    _book(box, books, walls, wall, i, after)
+    owner = box.owner(wall)
+    row = index(int(walls.row(wall) if box.owners is None else owner))
+    heat = book(box.laws, books, (row, 0, index(i)), box.kinds.mass_of(i), after)
+    if box.watchers.counts is not None:
+        box.watchers.counts.give(owner, heat, 0.0)
     if box.repose is not None:
         box.repose.count(clock, after.impulse * after.impulse, now)
     ended = FLIES if box.laws.own is None else _end(box, clock, wall, i, now, after)
     v1 = either(ended == FLIES, after.v, v)
     flock.put(i, now, r, v1)
     flock.kept.keep(i, flock.stamp(i), after.twice_energy)
-    note_wall(box, books, clock, (i, now, wall), (r, v, v1), box.kinds.mass_of(i) * after.impulse)
+    struck = Struck(i, wall, moment_of(clock, now), r, v, v1, box.kinds.mass_of(i) * after.impulse)
+    struck = box.watchers.with_slip(box.laws, walls, struck)
+    box.watchers.hit(books.image, struck._replace(wall=box.owner(wall)))
     return ended
 
 
@@ -79,7 +88,10 @@ def _end(box, clock, wall, i, now, after):
     elif after.wait > 0.0:
         ended = Status.WAITS.value
         if box.gates is not None and box.gates.absorbed_time is not None and after.wait == math.inf:
-            box.gates.absorbed_time[index(i)], box.gates.absorbed_wall[index(i)] = moment_of(clock, now), np.int32(wall)
+            box.gates.absorbed_time[index(i)], box.gates.absorbed_wall[index(i)] = (
+                moment_of(clock, now),
+                np.int32(box.owner(wall)),
+            )
             ended = GONE
     return ended
 
@@ -125,14 +137,6 @@ def _lifted(box, walls, wall, r, turned):
             twice_energy=turned.twice_energy + gained + work,
         )  # fmt: skip
     return turned
-
-
-def _book(box, books, walls, wall, i, after):
-    heat = book(box.laws, books, (index(int(walls.row(wall))), 0, index(i)), box.kinds.mass_of(i), after)
-    if books.counts is not None:
-        books.counts.add(wall, after.impulse > 0.0)
-        if books.heat is not None:
-            books.counts.give(wall, heat, 0.0)
 
 
 @outlined

@@ -2,8 +2,10 @@
 
 from typing import Any, NamedTuple
 
+from ...kernel.arrays import index
 from ...kernel.jit import Array
 from ...kernel.record import Record
+from ...lanes.watching.watchers import Watchers
 
 
 class Domain(Record):
@@ -16,13 +18,18 @@ class Domain(Record):
     kinds: Any
     loss: Any  # None, or `Loss`
     shortest: float  # the time that a flight from a wall back to it takes at least [s]
-    log: Any = None
+    watchers: Watchers = Watchers()
     growth: Any = None  # `Growth` of balls that are packed
     window: Any = None  # of walls that move, come or go: see window.py
     gates: Any = None  # None, or `Gates` where balls may leave the walls
     heavy: Any = None  # None, or `Heavy` where walls have a mass
-    source: Any = None  # None, or `Source` where walls send them off
+    source: Any = None  # None, or `RandomSource` where walls send them off
     repose: Any = None  # None, or `Repose` where balls may come to rest
+    owners: Any = None  # the number in the scene of each wall without a mass; None where none has one
+
+    def owner(self, wall):
+        """The number of a wall in the scene."""
+        return wall if self.owners is None else float(self.owners[index(int(wall))])
 
 
 class CollisionTotals(NamedTuple):
@@ -33,8 +40,9 @@ class CollisionTotals(NamedTuple):
     impacts: Array  # (N,)
     virial: Array  # (1,)
     image: Any = None  # (3, N) where the scene repeats
-    counts: Any = None  # `Counts` of each wall, where they are counted
     heat: Any = None  # (walls, 1) that walls gave [J], or None
+    mass: Any = None  # (N,) of balls
+    crossed: Any = None  # `Crossed`, where there are counters
 
 
 class CollisionRule(NamedTuple):

@@ -13,14 +13,15 @@ from ...common.status import Status
 from ...kernel.arrays import index
 from ...kernel.jit import long_kernel, outlined, select
 from ...kernel.vector import norm, put, square
+from ...lanes.watching.log import Struck, is_full
 from .again import aim_again, queue_both
 from .ahead import fetch_next
 from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .bounce import FLIES, GONE, bounce
 from .cells import cross, mark_near, take_out, until_exit
-from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, REACH, SAME, fit
+from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, REACH, SAME, fit, moment_of
+from .followed import come_over, follow
 from .heavy import first_number
-from .journal import has_room, note_pair
 from .meet import met
 from .queue import FIRST, build, requeue
 from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NOBODY, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
@@ -44,6 +45,8 @@ def _collide(box, flock, books, clock, i, now):
     else:
         # The one with the smaller number first
         one, other = min(i, j), max(i, j)
+        follow(box, flock, books, clock, one, now)
+        follow(box, flock, books, clock, other, now)
         r, v = flock.at(box.pull, one, now)
         there, w = flock.at(box.pull, other, now)
         blow = met(box, flock, (one, r, v), (other, there, w), now)
@@ -52,9 +55,10 @@ def _collide(box, flock, books, clock, i, now):
         _book(flock, books, clock, (one, other), blow, now)
         if box.repose is not None:
             box.repose.count(clock, square((blow.other - blow.one) - (w - v)), now)
-        if box.log is not None:
+        if box.watchers.log is not None:
             impulse = box.kinds.mass_of(one) * norm(blow.one - v)
-            note_pair(box, books, clock, (one, other, now), (r, v, blow.one), impulse)
+            struck = Struck(one, -1.0, moment_of(clock, now), r, v, blow.one, impulse, partner=other)
+            box.watchers.log.hit(books.image, struck)
         flock.event[index(FLOATS * other + MEETS)] = math.inf
         aim_again(box, flock, one, now)
         queue_both(flock, one)
@@ -121,10 +125,15 @@ def _at_given_wall(box, flock, books, clock, i, now):
 
 
 @outlined
-def _enter(box, flock, books, i, now):
+def _enter(box, flock, books, clock, i, now):
     """The way of a ball into the next cell: whether there is room for it."""
+    if books.image is not None:
+        follow(box, flock, books, clock, i, now)
+    r, v = flock.at(box.pull, i, now)
     which, turns, fits = cross(box.grid, flock, i)
     if fits:
+        if turns != 0 and box.watchers.counters is not None:
+            come_over(box, flock, books, clock, (i, now, r, v))
         if books.image is not None:
             books.image[index(which), index(i)] += turns
         if turns != 0:
@@ -197,6 +206,8 @@ def _begin_epoch(flock, clock, now):
             flock.event[index(row + k)] -= shift
         if flock.last is not None:
             flock.last[index(i)] -= shift
+        if flock.followed is not None:
+            flock.followed[index(i)] -= shift
     if flock.freedoms is not None:
         shift_leases(flock.freedoms, shift)
     build(flock)
@@ -231,8 +242,8 @@ def _first(box, flock, clock, end):
 def _is_over(box, end, now):
     """The status with which no event is taken at a time; -1 where one is."""
     ended = select(now < end, -1, Status.DONE.value)
-    if box.log is not None:
-        ended = select((ended < 0) & (not has_room(box.log)), Status.LOG_FULL.value, ended)
+    if box.watchers.log is not None:
+        ended = select((ended < 0) & is_full(box.watchers.log), Status.LOG_FULL.value, ended)
     if box.window is not None:
         ended = select((box.window[END] < end) & (not now < box.window[END]), Status.LEASE_ENDED.value, ended)
     return ended
@@ -275,9 +286,20 @@ def take(box, flock, books, clock, rule):
                 status = _at_wall(box, flock, books, clock, i, now)
                 if status != FLIES:
                     return status, i
-            elif not _enter(box, flock, books, i, now):
+            elif not _enter(box, flock, books, clock, i, now):
                 clock[EVENTS] -= 1.0
                 return Status.LEASE_ENDED.value, i
+
+
+@long_kernel
+def follow_all(box, flock, books, clock, now, first):
+    """Tell counters of the flights of the balls from `first` on until now: how far, before the log is full."""
+    for i in range(first, flock.number()):
+        if is_full(box.watchers.log):
+            return i
+        if flock.event[index(FLOATS * i + WALL)] != OUT:
+            follow(box, flock, books, clock, i, now)
+    return flock.number()
 
 
 @long_kernel

@@ -32,7 +32,6 @@ class Heavy(Record):
     near: Array  # (N,) bool, whether what is known of a ball holds only until a wall is struck
     listed: Array  # (N,) bool, whether it is in `close`
     close: Array  # (N,) int64, those that are near, and some that were
-    impulse: Array  # (walls of the scene,) [N s]
 
     def grown(self, radius):
         """The walls that the centre of a ball meets."""

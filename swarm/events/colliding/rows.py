@@ -53,6 +53,7 @@ class Flock(NamedTuple):
     last: Any = None  # (N) when each met another ball last [s since the epoch]; None where nothing loses any
     kept: Any = None  # `Kept`, None where there are no walls
     freedoms: Any = None  # of walls with a mass, or None
+    followed: Any = None  # (N) until when counters know the flight of each [s since the epoch]; None without counters
 
     def number(self):
         """The number of balls."""

@@ -4,11 +4,13 @@ from ...kernel.arrays import index
 from ...kernel.gravity import potential
 from ...kernel.jit import outlined, select
 from ...kernel.vector import ZERO, square
+from ...lanes.watching.log import Struck
 from ..reacting.freedoms import TOO_LONG, TOO_SHORT, ParticleFlight
 from ..reacting.strikes import all_stay, strike, with_energy
 from .again import aim_again, queue_both
 from .aim import find_wall
-from .clock import EVENTS
+from .clock import EVENTS, moment_of
+from .followed import follow
 from .heavy import LISTED, SINCE, STRIKES, first_number
 from .queue import FIRST, requeue
 from .rows import FLOATS, WALL
@@ -20,6 +22,7 @@ def strike_heavy(box, flock, books, clock, i, now):
     """The impact of a ball on the wall with a mass that it meets now."""
     heavy, m = box.heavy, box.kinds.mass_of(i)
     wall = flock.event[index(FLOATS * i + WALL)] - first_number(box)
+    follow(box, flock, books, clock, i, now)
     r, v = flock.at(box.pull, i, now)
     walls = heavy.grown(box.kinds.radius_of(i))
     if box.loss is not None:
@@ -31,10 +34,12 @@ def strike_heavy(box, flock, books, clock, i, now):
     v1, kept = with_energy(blow.v, left, fall)
     flock.put(i, now, blow.r, v1)
     flock.kept.keep(i, flock.stamp(i), kept)
-    heavy.impulse[index(blow.owner)] += blow.impulse
+    books.impulse[index(blow.owner), 0] += blow.impulse
     if books.dissipated.size > 0:
         books.dissipated[index(i)] += blow.lost
     books.impacts[index(i)] += blow.impulse > 0.0
+    struck = Struck(i, float(blow.owner), moment_of(clock, now), blow.r, v, v1, blow.impulse, blow.slip)
+    box.watchers.hit(books.image, struck)
     if box.repose is not None:
         box.repose.count(clock, (blow.impulse / m) * (blow.impulse / m), now)
     heavy.counts[STRIKES] += 1.0

@@ -16,6 +16,9 @@ from ...kernel.gravity import accelerated, displacement, potential
 from ...kernel.heap import Heap, build, change
 from ...kernel.jit import Array, long_kernel, outlined, select
 from ...kernel.vector import ZERO, column, put
+from ...lanes.watching.crossings import Flown
+from ...lanes.watching.log import Struck, is_full
+from ...lanes.watching.watchers import Watchers
 from ...surfaces.in_motion.moving import Marched
 from ...surfaces.time_of_impact import flights, safe
 from .freedoms import ParticleFlight
@@ -64,14 +67,17 @@ class Queue(NamedTuple):
     close: Array  # (N,) those that are near, and some that were
     heap: Heap
     heat: Any = None  # (walls, N) energy that walls gave, or None
-    counts: Any = None  # (walls,) int64, impacts on each, where they are counted
+    crossed: Any = None  # `Crossed`, where there are counters
+    watchers: Watchers = Watchers()
+    image: Any = None
 
 
 class ReactionRule(NamedTuple):
-    """The end of the frame [s], and when to stop."""
+    """The end of the frame [s since its start], and when to stop."""
 
     end: float
     halt: Array  # (1,) events
+    moment: float  # the end [s]
 
 
 # --- Of one particle -------------------------------------------------------------------------------------
@@ -113,30 +119,34 @@ def _next(scenery, walls, queue, i, now, end, soon):
     return now + hit.time
 
 
-def _fly(scenery, queue, i, t, way):
+def _fly(scenery, queue, i, t, way, end):
     """Bring particle i to a time, which is so long from where it is."""
-    v, pull = column(queue.velocity, 0, i), scenery.pull
-    put(queue.position, 0, i, column(queue.position, 0, i) + displacement(pull, v, way))
+    r, v, pull = column(queue.position, 0, i), column(queue.velocity, 0, i), scenery.pull
+    there = r + displacement(pull, v, way)
+    queue.watchers.flown(pull, queue, i, Flown(r, v, way, end - queue.time[i], there, ZERO))
+    put(queue.position, 0, i, there)
     put(queue.velocity, 0, i, accelerated(pull, v, way))
     queue.time[i] = t
 
 
 @outlined
-def _bounce(scenery, queue, i, wall, remaining):
+def _bounce(scenery, queue, i, wall, rule, now):
     """The impact of particle i on a wall that does not react."""
     r, v, m, twice = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i], 2.0 * queue.energy[i]
     arriving = Arriving(r, v, twice, m)
-    bounce = impact_on_wall(scenery.laws, scenery.given.at(remaining), scenery.pull, wall, arriving, None)
+    walls = scenery.given.at(rule.end - now)
+    bounce = impact_on_wall(scenery.laws, walls, scenery.pull, wall, arriving, None)
     put(queue.velocity, 0, i, bounce.v)
     owner = index(scenery.owners[int(wall)])
     book(scenery.laws, queue, (owner, i, i), m, bounce)
     queue.energy[i] = 0.5 * bounce.twice_energy
-    if queue.counts is not None:
-        queue.counts[owner] += bounce.impulse > 0.0
+    struck = Struck(i, wall, rule.moment - (rule.end - now), r, v, bounce.v, m * bounce.impulse)
+    struck = queue.watchers.with_slip(scenery.laws, walls, struck)
+    queue.watchers.hit(None, struck._replace(wall=float(owner)))
 
 
 @outlined
-def _strike(scenery, walls, queue, i, now):
+def _strike(scenery, walls, queue, i, rule, now):
     """The impact of particle i on a wall that reacts."""
     r, v, m = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i]
     blow = strike(scenery.reacting, queue.struck[i], walls, ParticleFlight(r, v, ZERO, now, 0.0), m)
@@ -148,8 +158,8 @@ def _strike(scenery, walls, queue, i, now):
     queue.impulse[index(blow.owner), i] += blow.impulse
     queue.dissipated[i] += blow.lost
     queue.impacts[i] += blow.impulse > 0.0
-    if queue.counts is not None:
-        queue.counts[index(blow.owner)] += blow.impulse > 0.0
+    time = rule.moment - (rule.end - now)
+    queue.watchers.hit(None, Struck(i, float(blow.owner), time, blow.r, v, v1, blow.impulse, blow.slip))
 
 
 # --- Of all ----------------------------------------------------------------------------------------------
@@ -180,9 +190,12 @@ def predict(scenery, freedoms, queue, clock, rule, first, last):
 
 @long_kernel
 def arrive(scenery, queue, rule, first, last):
-    """Bring the particles from `first` to before `last` to the end of the frame."""
+    """Bring the particles from `first` to before `last` to the end of the frame: how far, before the log is full."""
     for k in range(first, last):
-        _fly(scenery, queue, index(k), rule.end, rule.end - queue.time[index(k)])
+        if is_full(queue.watchers.log):
+            return k
+        _fly(scenery, queue, index(k), rule.end, rule.end - queue.time[index(k)], rule.end)
+    return last
 
 
 @long_kernel
@@ -224,17 +237,17 @@ def _look_again(scenery, freedoms, queue, clock, rule, close):
     return kept
 
 
-def _carry_out(scenery, freedoms, queue, i, now, end):
+def _carry_out(scenery, freedoms, queue, i, now, rule):
     """The impact of particle i that is due, on whichever wall, and when it meets the next that does not react."""
     queue.hits[i] += select(now > queue.time[i], 1, AT_ONCE)
     # The time of the frame has fewer digits than the flight.
     way = select(queue.struck[i] >= 0.0, now - queue.time[i], queue.wait[i])
-    _fly(scenery, queue, i, now, way)
+    _fly(scenery, queue, i, now, way, rule.end)
     if queue.struck[i] >= 0.0:
-        _strike(scenery, freedoms, queue, i, now)
+        _strike(scenery, freedoms, queue, i, rule, now)
     elif queue.wall[i] >= 0.0:
-        _bounce(scenery, queue, i, queue.wall[i], end - now)
-    _aim(scenery, queue, i, end)
+        _bounce(scenery, queue, i, queue.wall[i], rule, now)
+    _aim(scenery, queue, i, rule.end)
     return queue.hits[i] <= MOST_HITS
 
 
@@ -251,7 +264,8 @@ def _listed(queue):
 def take(scenery, freedoms, queue, clock, rule):
     """Take event after event until the end of the frame: (status, particle).
 
-    LEASE_ENDED at the time of the clock: call `lease` and `predict`, and then this again. INTERRUPTED after so many
+    LEASE_ENDED at the time of the clock: call `lease` and `predict`, and then this again. LOG_FULL: give it an empty
+    log, and call it again. INTERRUPTED after so many
     events as the rule says; it goes on with the same bits.
     """
     heap, end, taken = queue.heap, rule.end, 0
@@ -268,10 +282,12 @@ def take(scenery, freedoms, queue, clock, rule):
             return (Status.LEASE_ENDED.value if until < end else Status.DONE.value), 0
         if taken >= rule.halt[0]:
             return Status.INTERRUPTED.value, 0
+        if is_full(queue.watchers.log):
+            return Status.LOG_FULL.value, 0
         taken += 1
         clock[NOW], clock[TAKEN] = now, clock[TAKEN] + 1.0
         wall = queue.struck[i]
-        if (wall >= 0.0 or queue.due[i] <= now) and not _carry_out(scenery, freedoms, queue, i, now, end):
+        if (wall >= 0.0 or queue.due[i] <= now) and not _carry_out(scenery, freedoms, queue, i, now, rule):
             return Status.STALLED.value, item
         if wall >= 0.0:
             clock[STRIKES] += 1.0

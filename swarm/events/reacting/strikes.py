@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from ...kernel.jit import select
 from ...kernel.record import Record
-from ...kernel.vector import Vec, dot, square, with_square
+from ...kernel.vector import ZERO, Vec, dot, square, with_square
 from ...surfaces.time_of_impact.flights import NEVER, sooner
 
 # The energy is that which is left where the square of the speed is off by no more than this part.
@@ -21,6 +21,7 @@ class WallImpact(NamedTuple):
     given: float  # energy that the wall gains [J]
     lost: float  # energy that is dissipated [J]
     owner: int
+    slip: Vec  # velocity relative to the wall along it, before [m/s]
 
 
 class Reacting(Record):
@@ -40,7 +41,8 @@ class Reacting(Record):
         r = surface.project(flight.r)
         n, arm = surface.unit_normal(r), freedom.arm(r)
         # J = (1 + e) n.(v - u)/(n^2/m + 1/M_n)
-        speed = dot(n, surface.velocity(r))
+        u = surface.velocity(r)
+        speed = dot(n, u)
         approach = dot(n, flight.v) - speed
         approach = select(approach > 0.0, approach, 0.0)
         give = freedom.mobility(n, arm)
@@ -49,7 +51,8 @@ class Reacting(Record):
         freedom.push(walls, flight.time, impulse * n, arm)
         lost = 0.5 * (1.0 - self.restitution) * (1.0 + self.restitution) * approach * approach / both
         given = impulse * (speed + 0.5 * impulse * give)
-        return WallImpact(r, flight.v - (impulse / mass) * n, impulse, given, lost, self.owner)
+        slip = flight.v - u - ((dot(n, flight.v) - speed) / square(n)) * n
+        return WallImpact(r, flight.v - (impulse / mass) * n, impulse, given, lost, self.owner, slip)
 
 
 def reach_of_all(reacting, walls, flight):
@@ -75,7 +78,7 @@ def strike(reacting, wall, walls, flight, mass):
     for k, one in enumerate(reacting):
         if wall == k:
             return one.strike(walls, flight, mass)
-    return WallImpact(flight.r, flight.v, 0.0, 0.0, 0.0, -1)
+    return WallImpact(flight.r, flight.v, 0.0, 0.0, 0.0, -1, ZERO)
 
 
 def with_energy(v, left, fall):

@@ -130,14 +130,15 @@ class Counters(Record):
         v = velocity_before(gravity, lane, began)
         flown = Flown(began.r, v, began.remaining - lane.remaining, began.remaining, lane.r, ZERO)
         if lanes.period is None:
-            self._look_at(gravity, share, p, flown)
+            self.look_at(gravity, share, p, flown)
         else:
             self._look_at_cells(lanes.period, gravity, share, p, flown)
         for c, one in enumerate(self.each):
             if not self.is_in_lanes(one):
                 lanes.began[row_of_counter(c), i] = sign_of_side(share.state, c, p)
 
-    def _look_at(self, gravity, share, p, flown):
+    def look_at(self, gravity, share, p, flown):
+        """Count what a flight within one cell crosses, of the counters that are not counted in lanes."""
         for c, one in enumerate(self.each):
             if not self.is_in_lanes(one):
                 look_at_one(one, c, gravity, share, p, flown)
@@ -158,7 +159,7 @@ class Counters(Record):
             end = r + displacement(gravity, v, time)
             if ends and is_same(images, back.images):
                 end = back.r
-            self._look_at(gravity, share, p, Flown(r, v, time, remaining, end, images))
+            self.look_at(gravity, share, p, Flown(r, v, time, remaining, end, images))
             step = ZERO
             if not ends:
                 step = Vec(step_over(x <= time, after.x), step_over(y <= time, after.y), step_over(z <= time, after.z))

@@ -65,9 +65,9 @@ class Counts(Record):
         """Count so many impacts on a wall."""
         self.impacts[index(int(wall))] += np.int64(hits)
 
-    def add_row(self, method, walls, state, particle, struck):
-        """Count an impact of a particle."""
-        self.impacts[index(int(struck.wall))] += 1
+    def hit(self, image, struck):
+        """Count an impact on a wall."""
+        self.add(max(struck.wall, 0.0), (struck.wall >= 0.0) & (struck.impulse > 0.0))
 
     def stay(self, wall, time):
         """Count a time in which a wall has held a particle [s]."""

@@ -32,14 +32,17 @@ ROWS = _named.count
 
 
 class Struck(Record):
-    """An impact: where, with the velocities before and after, on which wall, and the impulse per mass."""
+    """An impact of a particle on a wall or on another particle, or its way through an opening."""
 
+    particle: Any
+    wall: Any  # -1 where it meets a particle, below that a counter
+    time: float  # [s]
     r: Vec
-    before: Vec
+    before: Vec  # its velocities
     after: Vec
-    wall: float
-    remaining: float  # of the frame [s]
-    impulse: float
+    impulse: float  # along the normal [N s]
+    slip: Vec = ZERO  # relative to the wall, before
+    partner: Any = -1
 
 
 class Log(NamedTuple):
@@ -83,21 +86,16 @@ class Log(NamedTuple):
             n += index((lanes.lane(i).hits > BeforeContact(lanes.before, i).hits) & self.has(lanes.particle[i]))
         for k in range(n):
             i = index(order[k])
-            before = BeforeContact(lanes.before, i)
-            struck = Struck(before.r, before.v, lanes.lane(i).v, before.wall, before.remaining, before.impulse)
-            self._add(state, lanes.particle[i], struck, self._slip_of(method, walls, struck))
+            before, p = BeforeContact(lanes.before, i), lanes.particle[i]
+            impulse, time = before.impulse * state.mass[index(p)], self.end - before.remaining
+            struck = Struck(p, before.wall, time, before.r, before.v, lanes.lane(i).v, impulse)
+            self._add(state.image, self.with_slip(method.laws, walls.at(before.remaining), struck))
 
     @outlined
-    def add_row(self, method, walls, state, particle, struck):
-        """A row for an impact of a particle."""
-        if self.has(particle):
-            self._add(state, particle, struck, self._slip_of(method, walls, struck))
-
-    @outlined
-    def add_escape(self, state, particle, struck):
-        """A row, without an impulse or a slip, for a particle that passes an opening."""
-        if self.has(particle):
-            self._add(state, particle, struck, ZERO)
+    def hit(self, image, struck):
+        """A row for an impact, if one of its particles has rows."""
+        if self.has(struck.particle) or (struck.partner >= 0 and self.has(struck.partner)):
+            self._add(image, struck)
 
     def add_crossing(self, state, particle, there, number, images):
         """A row for a particle, a `Moment`, that crosses a counter: 2 counter + sense, so many cells away."""
@@ -108,7 +106,8 @@ class Log(NamedTuple):
             self.filled[1] += 1
             return
         k = index(self.filled[0])
-        self._add(state, particle, Struck(there.r, there.v, there.v, -1.0 - number, there.remaining, 0.0), ZERO)
+        time = self.end - there.remaining
+        self._add(state.image, Struck(particle, -1.0 - number, time, there.r, there.v, there.v, 0.0))
         if self.image is not None:
             for axis, images_along in enumerate(images):
                 self.image[k, axis] += np.int32(images_along)
@@ -117,29 +116,30 @@ class Log(NamedTuple):
         """Whether a particle has rows."""
         return True if self.chosen is None else self.chosen[index(particle)]
 
-    def _slip_of(self, method, walls, struck):
-        """The speed of a particle along the wall that it strikes, where the log has that."""
+    def with_slip(self, laws, now, struck):
+        """A `Struck` with the velocity along the wall, where the log has that; `now` are the walls at that time."""
         if self.slip is None:
-            return ZERO
-        now = walls.at(struck.remaining)
-        u = wall_velocity(method.laws.moving, now, struck.wall, struck.r)
-        n, before = now.unit_normal(struck.wall, struck.r), relative(u, struck.before)
-        return before - dot(before, n) * n
+            return struck
+        n, u = now.unit_normal(struck.wall, struck.r), wall_velocity(laws.moving, now, struck.wall, struck.r)
+        before = relative(u, struck.before)
+        return struck._replace(slip=before - dot(before, n) * n)
 
-    def _add(self, state, particle, struck, slip):
-        k, p = index(self.filled[0]), index(particle)
+    def _add(self, image, struck):
+        k, p = index(self.filled[0]), index(struck.particle)
         self.filled[0] += 1
-        self.time[k] = max(self.begin, self.end - struck.remaining)
-        self.particle[k], self.wall[k] = np.int32(particle), np.int32(struck.wall)
+        self.time[k] = max(self.begin, struck.time)
+        self.particle[k], self.wall[k] = np.int32(struck.particle), np.int32(struck.wall)
         _put(self.position, k, struck.r)
         _put(self.velocity_before, k, struck.before)
         _put(self.velocity_after, k, struck.after)
-        self.impulse[k] = struck.impulse * state.mass[p]
+        self.impulse[k] = struck.impulse
         if self.slip is not None:
-            _put(self.slip, k, slip)
+            _put(self.slip, k, struck.slip)
         if self.image is not None:
             for axis in range(3):
-                self.image[k, axis] = np.int32(state.image[axis, p])
+                self.image[k, axis] = np.int32(image[axis, p])
+        if self.partner is not None:
+            self.partner[k] = np.int32(struck.partner)
 
 
 def _put(rows, k, vector):

@@ -11,7 +11,7 @@ from ...kernel.vector import vec
 from ...lanes.watching.counters import Counters
 from ...particles import Particles
 from ...scene import Scene
-from ...state import CROSSED, Crossed
+from ...state import CROSSED, Crossed, State
 from ...surfaces.counted import Counted, ReversedCounter, Walled
 from ...surfaces.counter import Counter
 from ...surfaces.facets.mesh import Mesh
@@ -178,6 +178,11 @@ def _turning(wall: Any) -> Any:
 
 
 # --- Arrays ----------------------------------------------------------------------------------------------
+
+
+def with_counters(state: State, counters: Counters | None, given: tuple[Counter, ...], scene: Scene) -> State:
+    """The state at its start with arrays for these counters."""
+    return state if counters is None else state._replace(crossed=crossed_of(counters, given, scene, state.position))
 
 
 def crossed_of(counters: Counters, given: tuple[Counter, ...], scene: Scene, position: NDArray[Any]) -> Crossed:

@@ -398,18 +398,13 @@ CAPABILITIES = (
         (*_FIXED_STEPS, GRAINS, OTHER_POINTS): Refusal(
             "impacts must be None with {method}, got {got}: its contacts last for a time", "use Impact"
         ),
-        (MASSIVE, HEAVY): Refusal("impacts must be None where a wall has a mass, got {got}", _TO_MOTION),
     }),
     Capability("counter", _option("counters"), {
         _EVERY_BODY: Refusal("counters must be left out with bodies, got {count}", "use particles"),
-        _EVERY_BALL: Refusal(
-            "counters must be left out where particles have a radius, got {count}", f"{_TO_POINTS}, and Impact()"
-        ),
-        (*_FIXED_STEPS, OTHER_POINTS): Refusal(
+        (*_FIXED_STEPS, GRAINS, OTHER_POINTS): Refusal(
             "counters must be left out with {method}, got {count}: a counter follows flights, not steps", "use Impact()"
         ),
         (CHORDS,): Refusal("counters must be left out with a contact_step of {step:g}, got {count}", _NO_STEP),
-        (MASSIVE,): Refusal("counters must be left out where a wall has a mass, got {count}", _TO_MOTION),
     }),
     Capability("union", _rooms, {
         _EVERY_BODY: _of_one_room("bodies", "use particles and Impact()"),
@@ -659,10 +654,6 @@ CAPABILITIES = (
         ),
     }),
     Capability("impacts on members", _option("member_impacts"), {
-        (HEAVY,): Refusal(
-            "member_impacts must be False where particles have a radius and a wall has a mass, got True",
-            f"leave it out, or {_TO_MOTION}",
-        ),
         (GRAINS,): Refusal(
             f"member_impacts must be False with {_WITH_PENALTY}, got True", "leave it out, or use Impact"
         ),

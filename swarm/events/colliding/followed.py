@@ -1,0 +1,44 @@
+"""Counters of balls: each flight is told to them where it ends, where it leaves the cell, and at the end of a frame."""
+
+from ...kernel.arrays import index
+from ...kernel.jit import outlined
+from ...kernel.vector import ZERO
+from ...lanes.watching.crossings import Flown, ParticleMoment, come_into_cell
+from ...lanes.watching.watchers import Followed
+from .clock import moment_of
+
+
+def follow(box, flock, books, clock, i, now):
+    """Tell the counters of the flight of a ball until now, from where they know it."""
+    if box.watchers.counters is not None:
+        _tell(box, flock, books, clock, i, now)
+
+
+@outlined
+def _tell(box, flock, books, clock, i, now):
+    since = max(flock.followed[index(i)], flock.time(i))
+    (r, v), (end, _w) = flock.at(box.pull, i, since), flock.at(box.pull, i, now)
+    flock.followed[index(i)] = now
+    box.watchers.flown(box.pull, books, i, Flown(r, v, now - since, _left(box, clock, since), end, ZERO))
+
+
+def _left(box, clock, now):
+    """The rest of the frame [s], for the log."""
+    return 0.0 if box.watchers.log is None else box.watchers.log.end - moment_of(clock, now)
+
+
+@outlined
+def come_over(box, flock, books, clock, ball):
+    """Count a ball, its number, the time, its place and velocity, that has come over a face of a cell that repeats."""
+    i, now, r, v = ball
+    settle(box, books, clock, i, now, r, v)
+    r, v = flock.at(box.pull, i, now)
+    for c, one in enumerate(box.watchers.counters.each):
+        come_into_cell(one, c, books, i, r, v)
+
+
+def settle(box, books, clock, i, now, r, v):
+    """Count a ball at a counter, if it goes on from there without another look."""
+    if box.watchers.counters is not None:
+        there = ParticleMoment(r, v, _left(box, clock, now))
+        box.watchers.counters.settle(Followed(books, box.watchers.log), i, there)
