@@ -164,12 +164,10 @@ class Workers(jobs.Fleet):
         """All jobs, or some for each thread of the workers that there are now."""
         return self._count or _HANDED_OUT * threads_of(self._client)
 
-    def submit(self, job: jobs.FleetJob) -> "Future[jobs.Outcome]":
+    def submit(self, job: jobs.FleetJob) -> "Future[jobs.JobEnd]":
         """Hand out a job."""
         every = max(jobs.REPORTS, self.room() / _MOST_REPORTS)
-        made: Future[jobs.Outcome] = self._executor.submit(
-            _work, job.work, job.arguments, self.token, job.number, every
-        )
+        made: Future[jobs.JobEnd] = self._executor.submit(_work, job.work, job.arguments, self.token, job.number, every)
         return made
 
     def hear(self) -> None:
@@ -208,8 +206,8 @@ def threads_of(client: Any) -> int:
 
 
 def _work(
-    work: Callable[..., jobs.Outcome], arguments: tuple[Any, ...], token: str, number: int, every: float
-) -> jobs.Outcome:
+    work: Callable[..., jobs.JobEnd], arguments: tuple[Any, ...], token: str, number: int, every: float
+) -> jobs.JobEnd:
     from distributed import get_worker
 
     worker = get_worker()

@@ -25,7 +25,7 @@ _GLANCE, _AGAIN = 0.1, 1.0
 # Seconds between the reports of a job; until another process that wrote the same file has ended.
 REPORTS, PATIENCE = 1.0, 30.0
 # "state": "done", "stopped" or "failed"; "error" of a failure; "lost" if the worker returned no outcome.
-Outcome = dict[str, Any]
+JobEnd = dict[str, Any]
 Tell = Callable[[dict[str, Any]], None]
 
 
@@ -56,7 +56,7 @@ class FleetJob(NamedTuple):
     """A function that a worker calls with a `Reporter` and the arguments; it returns what its outcome has besides."""
 
     number: int
-    work: Callable[..., Outcome]
+    work: Callable[..., JobEnd]
     arguments: tuple[Any, ...]
 
 
@@ -68,12 +68,12 @@ _stopped: set[str] = set()
 
 
 def carried_out(
-    work: Callable[..., Outcome],
+    work: Callable[..., JobEnd],
     arguments: tuple[Any, ...],
     token: str = "",
     tell: Tell = lambda message: None,
     every: float = REPORTS,
-) -> Outcome:
+) -> JobEnd:
     """The outcome of a job, which raises only what is unexpected."""
     began = time.monotonic()
     if token in _stopped:
@@ -141,9 +141,9 @@ class Fleet(ABC):
     ) -> None:
         self.close()
 
-    def run(self, jobs: Iterable[FleetJob], ended: Callable[[int, Outcome], None], glance: Callable[[], None]) -> None:
+    def run(self, jobs: Iterable[FleetJob], ended: Callable[[int, JobEnd], None], glance: Callable[[], None]) -> None:
         """Carry out jobs; `ended` gets the outcome of each, and `glance` is called some times a second."""
-        left, under_way, asked = iter(jobs), dict[Future[Outcome], FleetJob](), -math.inf
+        left, under_way, asked = iter(jobs), dict[Future[JobEnd], FleetJob](), -math.inf
         while True:
             room = self.room()
             while not self._stop.reason and len(under_way) < room and (job := next(left, None)) is not None:
@@ -162,7 +162,7 @@ class Fleet(ABC):
                 asked = time.monotonic()
                 self.ask_to_stop()
 
-    def _outcome(self, job: FleetJob, future: "Future[Outcome]") -> Outcome:
+    def _outcome(self, job: FleetJob, future: "Future[JobEnd]") -> JobEnd:
         try:
             outcome = future.result()
         except Exception as error:  # of the job, or of the executor that has lost it
@@ -188,7 +188,7 @@ class Fleet(ABC):
         """How many jobs may be under way."""
 
     @abstractmethod
-    def submit(self, job: FleetJob) -> "Future[Outcome]":
+    def submit(self, job: FleetJob) -> "Future[JobEnd]":
         """Hand out a job."""
 
     @abstractmethod

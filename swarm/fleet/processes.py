@@ -44,7 +44,7 @@ class Processes(jobs.Fleet):
         """One job a process."""
         return len(self._places)
 
-    def submit(self, job: jobs.FleetJob) -> "Future[jobs.Outcome]":
+    def submit(self, job: jobs.FleetJob) -> "Future[jobs.JobEnd]":
         """Hand out a job, to a process that has started if one is free."""
         free = [place for place in self._places if place.job not in self.shares]
         place = next((one for one in free if one.executor is not None), free[0])
@@ -92,13 +92,13 @@ class _Place:
         self.executor: Any = None
         self.job, self.ready = -1, False
 
-    def submit(self, job: jobs.FleetJob, token: str) -> "Future[jobs.Outcome]":
+    def submit(self, job: jobs.FleetJob, token: str) -> "Future[jobs.JobEnd]":
         self.job = job.number
         if self.executor is None:
             self._start()
         self._printed.write_bytes(b"")
         with _without_interrupts():
-            made: Future[jobs.Outcome] = self.executor.submit(_work, job.work, job.arguments, token)
+            made: Future[jobs.JobEnd] = self.executor.submit(_work, job.work, job.arguments, token)
         return made
 
     def _start(self) -> None:
@@ -207,5 +207,5 @@ def _listen(line: "Connection[Any, Any]") -> None:
     os._exit(_ORPHANED)
 
 
-def _work(work: Callable[..., jobs.Outcome], arguments: tuple[Any, ...], token: str) -> jobs.Outcome:
+def _work(work: Callable[..., jobs.JobEnd], arguments: tuple[Any, ...], token: str) -> jobs.JobEnd:
     return jobs.carried_out(work, arguments, token, _line.send)

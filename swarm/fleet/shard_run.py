@@ -7,10 +7,10 @@ from ..files import paths
 from ..files.lock import only_writer
 from ..run import machine
 from . import shards
-from .jobs import PATIENCE, Outcome, Reporter, session_of
+from .jobs import PATIENCE, JobEnd, Reporter, session_of
 
 
-def run_shard(reporter: Reporter, folder: Path, k: int) -> Outcome:
+def run_shard(reporter: Reporter, folder: Path, k: int) -> JobEnd:
     """Run shard k of a folder."""
     if shards.end_of(folder, k).exists():
         return {}

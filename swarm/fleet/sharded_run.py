@@ -82,7 +82,7 @@ class _Shards:
     def run(self, measures: Measures, stop: jobs.Stop) -> dict[str, NDArray[Any]]:
         """The observables of all frames, when all shards have ended: they are joined also where some were stopped."""
 
-        def ended(k: int, outcome: jobs.Outcome) -> None:
+        def ended(k: int, outcome: jobs.JobEnd) -> None:
             self._done += outcome["state"] == "done"
             if outcome["state"] == "failed":
                 stop.because("failed")

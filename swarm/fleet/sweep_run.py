@@ -13,7 +13,7 @@ from ..run import machine
 from ..run.preflight.admission import task_of
 from ..serialization.plugins import allowed
 from . import sent_modules
-from .jobs import PATIENCE, Outcome, Reporter, session_of
+from .jobs import PATIENCE, JobEnd, Reporter, session_of
 from .results import final, of_trajectory
 
 
@@ -29,7 +29,7 @@ class Order(NamedTuple):
     modules: bytes | None = None
 
 
-def run_variant(reporter: Reporter, order: Order) -> Outcome:
+def run_variant(reporter: Reporter, order: Order) -> JobEnd:
     """Carry out a run, or go on with it: from its checkpoint if it has one, else from the start."""
     target = order.trajectory
     # A worker that ends because its parent was killed may still hold it.
@@ -51,7 +51,7 @@ def run_variant(reporter: Reporter, order: Order) -> Outcome:
     return _simulated(job, order, reporter, resumes=False)
 
 
-def _simulated(job: scene_file.Job, order: Order, reporter: Reporter, resumes: bool) -> Outcome:
+def _simulated(job: scene_file.Job, order: Order, reporter: Reporter, resumes: bool) -> JobEnd:
     options = dataclasses.replace(
         job.run,
         trajectory=order.trajectory,
