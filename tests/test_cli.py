@@ -171,7 +171,7 @@ def test_results_do_not_depend_on_threads(folder):
             "trajectory: expected a file name, got /dev/null, which is a device",
         ),
         ("radius = 0.5", "radius = -1.0", [], "surface[0].radius must be above 0, got -1"),
-        ("until = 1.0", "until = -1.0", [], "until must be after the start, 0 s, got -1"),
+        ("until = 1.0", "until = -1.0", [], "until must be above 0, got -1"),
         ("every = 0.5", "every = 2.0", [], "every must be at most until = 1, got 2"),
         ("", "", ["-o", "nowhere/out.h5"], "the folder nowhere does not exist"),
         ("", "", ["--threads", "0"], "threads must be 1 or more, got 0"),

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..common import checks
 from ..common.checks import Vector
+from ..common.validated import Count, Validated
 from ..errors import SceneError
 from ..motion import Oscillation, Rotation, Translation
 from ..motion import table_of as motion_table
@@ -34,19 +35,15 @@ _MOTIONS = {"translation": Translation, "oscillation": Oscillation, "rotation": 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Made:
+class Made(Validated):
     """Keys of every kind of [body]: how many copies there are, and how they are placed."""
 
     # The function that makes the body of the other keys.
     maker: ClassVar[Callable[..., Body]]
-    count: int | None = None
+    count: Count | None = None
     speed: float | None = None
     spin: float | None = None
     seed: int | None = None
-
-    def __post_init__(self) -> None:
-        if self.count is not None:
-            checks.count("count", self.count)
 
     def body(self) -> Body:
         """The body that is described."""

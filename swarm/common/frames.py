@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from . import checks
 from .snapshot import NOTHING, Snapshot
+from .validated import Positive, Validated
 
 _LOG = logging.getLogger("swarm")
 # A frame nearer to `until` than this fraction of `every` is the last one.
@@ -124,7 +125,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class FrameTimes:
+class FrameTimes(Validated):
     """0, every, 2 every, ..., until: an iterator over number, the time before, and the time [s].
 
     Args:
@@ -138,17 +139,15 @@ class FrameTimes:
     [0.0, 0.4, 0.8, 1.0]
     """
 
-    until: float
-    every: float | None = None
+    until: Positive
+    every: Positive | None = None
 
     def __post_init__(self) -> None:
-        end = checks.number("until", self.until)
-        if end <= 0.0:
-            raise SceneError(f"until must be after the start, 0 s, got {end:g}")
-        gap = end if self.every is None else checks.positive("every", self.every)
-        if gap > end:
-            raise SceneError(f"every must be at most until = {end:g}, got {gap:g}")
-        checks.assign(self, until=end, every=gap)
+        super().__post_init__()
+        if self.every is None:
+            checks.assign(self, every=self.until)
+        elif self.every > self.until:
+            raise SceneError(f"every must be at most until = {self.until:g}, got {self.every:g}")
 
     @property
     def count(self) -> int:

@@ -83,8 +83,8 @@ class RunOptions(Validated):
         SceneError: a value is out of its range, or two files are the same.
     """
 
-    until: float
-    every: float | None = None
+    until: Positive
+    every: Positive | None = None
     trajectory: Target = None
     recording: Target = None
     impacts: Target = None
@@ -115,7 +115,7 @@ class RunOptions(Validated):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        checks.assign(self, until=self.times.until)
+        _ = self.times  # raises where every is above until
         paths.check_distinct({**self.files(), "recording": self.recording}, {})
         if self.shards is not None and self.cluster is None:
             raise SceneError(f"shards must be None without a cluster, got {self.shards}; give cluster=")
