@@ -59,7 +59,7 @@ def test_balls_that_are_apart_are_admitted(method):
         (VESSEL, balls(), swarm.AugmentedLagrangian(1e-3, 1e4), {}, "with AugmentedLagrangian, got radii; use Impact"),
         (VESSEL, balls(), None, {"cluster": "local:2"}, "cluster must be left out where particles have a radius"),
         (VESSEL, balls(), SOFT, {"member_impacts": True}, "member_impacts must be False with particles that"),
-        (VESSEL, balls(), None, {"counters": [swarm.Plane((1.0, 0.0, 0.0), 0.0)]}, "counters must be left out where"),
+        (VESSEL, balls(), SOFT, {"counters": [swarm.Plane((1.0, 0.0, 0.0), 0.0)]}, "counters must be left out with"),
     ],
     ids=lambda value: None if not isinstance(value, str) else value[:30].replace(" ", "_"),
 )  # fmt: skip

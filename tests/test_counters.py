@@ -418,7 +418,7 @@ def test_a_volume_must_be_one():
         swarm.Counter([swarm.Sphere(0.1)])
 
 
-def test_methods_and_walls_that_know_none_are_refused():
+def test_methods_without_counters_are_refused():
     start = swarm.fill(SPHERE, 3, speed=1.0, seed=1)
     for method, sentence in (
         (Penalty(dt=1e-2, penalty=1e4), r"Penalty, got 1: a counter follows flights, not steps; use Impact\(\)"),
@@ -429,9 +429,6 @@ def test_methods_and_walls_that_know_none_are_refused():
     bodies = swarm.place(SPHERE, swarm.dumbbell(length=0.1, mass=1.0), 2, seed=1)
     with pytest.raises(swarm.SceneError, match=r"counters must be left out with bodies, got 1; use particles"):
         swarm.simulate(SPHERE, bodies, swarm.Impact(dt=1e-2), until=1.0, counters=[swarm.Sphere(0.1)])
-    heavy = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.1, side="outside", mass=1.0)])
-    with pytest.raises(swarm.SceneError, match=r"counters must be left out where a wall has a mass"):
-        swarm.simulate(heavy, swarm.fill(heavy, 2, speed=1.0, seed=1), swarm.Impact(), until=1.0, counters=SHAPES[:1])
     fast = one([0.5, 0.4, 0.3], [1e9, 0.0, 0.0])
     with pytest.raises(
         swarm.SceneError, match=r"period\[0\] must be so long that particles come through at most 1e\+07"

@@ -383,15 +383,10 @@ def test_bad_input(tmp_path, monkeypatch, keywords, message):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_bodies_and_walls_that_react_have_no_log(tmp_path):
+def test_bodies_have_no_log(tmp_path):
     body = swarm.place(SPHERE, swarm.dumbbell(0.1, 1.0), 2)
     with pytest.raises(swarm.SceneError, match=r"impacts must be None with bodies, .*; use particles"):
         swarm.simulate(SPHERE, body, swarm.Impact(dt=1e-2), until=1.0, impacts=tmp_path / "i.h5")
-    piston = swarm.Scene(
-        [swarm.Box((0.5, 0.5, 0.5)), swarm.Plane((1.0, 0.0, 0.0), 0.2, mass=5.0, motion=swarm.Guide((1.0, 0.0, 0.0)))]
-    )
-    with pytest.raises(swarm.SceneError, match="impacts must be None where a wall has a mass"):
-        run(tmp_path / "i.h5", piston)
 
 
 def test_impact_particles_without_a_log():
