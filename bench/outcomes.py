@@ -75,6 +75,8 @@ def run(draft: cells.Draft, trajectory: str | None = None) -> Ran:
             options["impacts"] = os.path.join(folder, options["impacts"])
         with contextlib.ExitStack() as stack:
             if "cluster" in options:
+                # A kernel would be compiled, and kept on disk, with the sums of `of_single_particles`.
+                assert options["compile"] == "never", options["compile"]
                 options["trajectory"] = trajectory or os.path.join(folder, "run.h5")
                 stack.enter_context(shards.here())
                 stack.enter_context(shards.of_single_particles())

@@ -3,6 +3,7 @@
     python tests/reference/golden.py           compares with golden.json, and names what differs
     python tests/reference/golden.py --write   writes golden.json
     python tests/reference/golden.py falling   compares the runs whose names have this word
+    python tests/reference/golden.py --threads compares compiled runs of one thread, of two, and golden.json
 
 golden.json was written by commit ff6ef0a, before the kernels were rebuilt in vectors. The 46 runs of "rotated
 ellipsoid" and "box" were written again when the product of their frames left BLAS, whose last bit depends on the
@@ -129,14 +130,14 @@ def runs():
     return made
 
 
-def digest(name):
+def digest(name, **options):
     """The SHA-256 of the end of a run and of its observables, or the sentence with which it fails."""
     walls, gravity, method, n, until = runs()[name]
     warnings.simplefilter("ignore")
     scene = swarm.Scene(walls, gravity)
     try:
         start = swarm.fill(scene, n, speed=1.0, seed=3)
-        result = swarm.simulate(scene, start, method, until=until, compile="never")
+        result = swarm.simulate(scene, start, method, until=until, **{"compile": "never", **options})
     except swarm.SwarmError as error:
         return f"{type(error).__name__}: {error}"
     total = hashlib.sha256(result.particles.position.tobytes() + result.particles.velocity.tobytes())
@@ -193,11 +194,13 @@ def cell_names():
     return made
 
 
-def run_cell(name):
+def run_cell(name, **options):
     """The digest of a run and its end."""
+    draft = cells.draft_of(cell_of(name))
+    draft.options.update(options)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.h5"
-        result = outcomes.run(cells.draft_of(cell_of(name)), str(path)).result
+        result = outcomes.run(draft, str(path)).result
         total = hashlib.sha256()
         for key in ("position", "velocity", "mass", "radius", "spin", "image"):
             _add(total, key, getattr(result.particles, key))
@@ -254,12 +257,35 @@ def disagreement(name, known):
     return f"{name}: {found} instead of {known}"
 
 
+# One particle a block, so that each of two threads has blocks of four particles.
+ONE_THREAD = {"compile": "always", "threads": 1, "block_size": 1}
+TWO_THREADS = ONE_THREAD | {"threads": 2}
+
+
+def is_compiled(name):
+    """Whether a run may be compiled: one in shards of single particles changes a constant of kernels."""
+    return not name.startswith("cell: ") or "cluster" not in cells.draft_of(cell_of(name)).options
+
+
+def disagreement_of_threads(name, known):
+    """How the bits of compiled runs of one thread, of two, and of golden.json differ, or ""."""
+    if name.startswith("cell: "):
+        one, two = (run_cell(name, **options)[0] for options in (ONE_THREAD, TWO_THREADS))
+        known = known["libm" if "end" in known else "exact"] if known.get("machine", libm()) == libm() else one
+    else:
+        one, two = (digest(name, **options) for options in (ONE_THREAD, TWO_THREADS))
+    differing = "" if one == two else f"{name}: {one:.80} with one thread, {two:.80} with two"
+    return differing or ("" if one == known else f"{name}: {one:.80} compiled, {known:.80} in plain Python")
+
+
 def main():
     """Write the digests, or compare with those that were written."""
-    words = [word for word in sys.argv[1:] if word != "--write"]
+    words = [word for word in sys.argv[1:] if not word.startswith("--")]
     known = json.loads(FILE.read_text())
     wanted = [name for name in [*runs(), *cell_names()] if all(word in name for word in words)]
-    job = _written if "--write" in sys.argv else _compared
+    if "--threads" in sys.argv:
+        wanted = [name for name in wanted if is_compiled(name)]
+    job = _written if "--write" in sys.argv else disagreement_of_threads if "--threads" in sys.argv else _compared
     with multiprocessing.get_context("spawn").Pool() as pool:
         found = dict(zip(wanted, pool.starmap(job, [(one, known.get(one)) for one in wanted], 1), strict=True))
     if "--write" in sys.argv:
