@@ -87,8 +87,9 @@ def pytest_collect_file(file_path):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Slow tests are marked and come first, the longest before others: no core waits for the last of them.
+    """Slow tests are marked, and the files that take longest come first: no core waits for the last of them.
 
+    The tests of a file stay together, for a fixture of a module is torn down where a test of another module follows.
     A test that is named by itself runs, however slow it is.
     """
     is_named = any("::" in argument for argument in config.args)
@@ -98,7 +99,7 @@ def pytest_collection_modifyitems(config, items):
     for item in items:
         if item.nodeid in slow:
             item.add_marker(pytest.mark.slow)
-    items.sort(key=lambda item: -seconds.get(item.nodeid, 0.0))
+    items.sort(key=durations.order(items, seconds))
     if int(numba.config.OPT) != 3:
         others = [item for item in items if any(mark.kwargs for mark in item.iter_markers("level3"))]
         config.hook.pytest_deselected(items=others)

@@ -2,6 +2,7 @@
 
 import itertools
 from pathlib import Path
+from types import SimpleNamespace
 
 import durations
 import pytest
@@ -41,6 +42,13 @@ def test_what_is_measured_is_written(tmp_path, monkeypatch):
     durations.FILE.write_text('{"a.py": null, "b.py": {"test_x": 0.9, "test_y": 2.0}, "c.py": null}')
     durations.write({"a.py::test[1]": 0.7, "b.py::test_x": 0.1})
     assert durations.known() == ({"a.py::test[1]": 0.7, "b.py::test_y": 2.0}, {"c.py"})
+
+
+def test_the_tests_of_a_file_stay_together_and_the_longest_file_comes_first():
+    seconds = {"a::one": 1.0, "a::two": 3.0, "b::one": 2.9, "b::two": 2.0}
+    items = [SimpleNamespace(nodeid=name, path=Path(name[0])) for name in ("c::one", *seconds, "c::two", "a::three")]
+    items.sort(key=durations.order(items, seconds))
+    assert [item.nodeid for item in items] == ["b::one", "b::two", "a::two", "a::one", "a::three", "c::one", "c::two"]
 
 
 def test_of_a_file_of_slow_tests_the_shortest_is_quick(monkeypatch):
