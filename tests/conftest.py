@@ -21,6 +21,7 @@ from _pytest.doctest import DoctestModule
 from hypothesis import HealthCheck, Phase, reject, settings
 from hypothesis import strategies as st
 from hypothesis.internal.conjecture import providers
+from numba.core.config import _OptLevel
 
 import swarm
 from swarm.contact import reflection
@@ -62,6 +63,12 @@ EPSILON = float(np.finfo(np.float64).eps)
 def compiled_at_once(monkeypatch):
     """Runs are compiled from the start: those that plain Python would not end before it is out of patience."""
     monkeypatch.setattr(tiers, "_PATIENCE", 0.0)
+
+
+@pytest.fixture
+def optimized(monkeypatch):
+    """Kernels that run for seconds at level 0 are compiled at level 1, where they take half of it."""
+    monkeypatch.setattr(numba.config, "OPT", max(numba.config.OPT, _OptLevel(1)))
 
 
 def pytest_ignore_collect(collection_path, config):

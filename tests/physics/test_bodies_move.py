@@ -209,7 +209,7 @@ def test_an_elastic_block_bounces_and_vibrates_with_its_energy():
     assert seen["energy_error"].max() < 1e-12
 
 
-def test_impacts_share_the_energy_of_cubes_over_their_six_freedoms():
+def test_impacts_share_the_energy_of_cubes_over_their_six_freedoms(optimized):
     spec = importlib.util.spec_from_file_location("dice", ROOT / "examples" / "dice.py")
     dice = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(dice)

@@ -12,7 +12,7 @@ import swarm
 from examples import hard_spheres
 from examples.hard_spheres import carnahan_starling, cell_of, collision_time, contact_value, kolafa, lattice
 
-pytestmark = pytest.mark.physics
+pytestmark = [pytest.mark.physics, pytest.mark.usefixtures("optimized")]
 IMPACT = swarm.Impact()
 
 
