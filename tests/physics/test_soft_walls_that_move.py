@@ -164,7 +164,7 @@ def test_late_frames_have_the_round_off_of_the_time():
         [swarm.Plane((0, 0, -1), 0.0, motion=swarm.Oscillation((0.0, 0.0, 0.4), 0.5))], (0.0, 0.0, -9.81)
     )
     start = swarm.Particles([0.0, 0.0, 0.5], [0.0, 0.0, 0.0], 1.0)
-    result = run(scene, start, swarm.Penalty(0.05, 50.0), 250.0, frames=2500)
+    result = run(scene, start, swarm.Penalty(0.05, 50.0), 250.0, frames=2500, compile="always")
     assert result.observables["impacts"][-1] > 100
     assert imbalance(result) <= 1e-12
 
