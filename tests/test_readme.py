@@ -86,7 +86,7 @@ def test_ci_runs_the_readme_test_command():
     assert 'pip install -e ".[test]"' in README
     assert "python -m pytest -n auto --dist worksteal\n" in README
     assert 'pip install --quiet --disable-pip-version-check -e ".[test]"' in ci
-    assert 'python -m pytest -n auto --dist worksteal -m "not long"`' in README
+    assert 'python -m pytest -n auto --dist worksteal -m "not long"` runs the slow ones too, and `-m long`' in README
     assert 'python -m pytest -q -n auto --dist worksteal -m "not long"\n' in ci
 
 
