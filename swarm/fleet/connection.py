@@ -211,7 +211,16 @@ def _work(
     from distributed import get_worker
 
     worker = get_worker()
-    return jobs.carried_out(work, arguments, token, lambda message: worker.log_event(token, (number, message)), every)
+    key = worker.get_current_task()
+
+    def tell(message: dict[str, Any]) -> None:
+        task = worker.state.tasks.get(key)
+        if task is None or task.state == "cancelled":
+            # The client was killed: no process waits for the outcome, and a later session needs the files.
+            jobs.stop_present(token)
+        worker.log_event(token, (number, message))
+
+    return jobs.carried_out(work, arguments, token, tell, every)
 
 
 def _answer(folder: str, token: str) -> str:

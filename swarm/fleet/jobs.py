@@ -102,6 +102,11 @@ def session_of(options: RunOptions, token: str) -> Iterator[Session]:
 def stop(token: str) -> None:
     """Let the runs of a fleet in this process save their checkpoints and end, and begin no more of them."""
     _stopped.add(token)
+    stop_present(token)
+
+
+def stop_present(token: str) -> None:
+    """Let the runs of a fleet that are under way in this process save their checkpoints and end."""
     for session in _sessions.get(token, set()).copy():
         session.stop()
 

@@ -2,14 +2,17 @@
 
 import os
 import signal
+import subprocess
+import sys
 
 import h5py
 import numpy as np
 import pandas as pd
 import pytest
-from sweep_sessions import write
+from sweep_sessions import RUNNING, until_there_is, write
 
 import swarm
+from swarm.files.lock import only_writer
 from swarm.fleet import connection, local
 from swarm.fleet.sweeping import SweepOptions, carry_out_sweep
 
@@ -171,6 +174,22 @@ def test_a_stopped_sweep_goes_on_anywhere(here, client, tmp_path):
     swarm.sweep(path, tmp_path / "out", cluster=client, resume=True)
     swarm.sweep(path, tmp_path / "out", processes=1, resume=True)
     assert_the_same(folder, tmp_path / "out")
+
+
+def test_a_sweep_whose_parent_is_killed_ends_on_the_workers(client, tmp_path):
+    """Its runs, which would never end, save checkpoints, and let go of their files for the sweep that goes on."""
+    path = write(tmp_path / "sweep.toml", '"run.until" = [1e8, 2e8]', run="frames = 1\ncheckpoint = 1e6\nthreads = 1")
+    path.write_text(path.read_text().replace("every = 0.5\n", ""))
+    out = tmp_path / "out"
+    words = ["sweep", str(path), "-o", str(out), "--cluster", client.scheduler.address]
+    parent = subprocess.Popen([sys.executable, "-m", "swarm", *words], stderr=subprocess.PIPE)
+    until_there_is(lambda: len(list(out.glob("[!.]*.h5"))) == 2 or parent.poll() is not None)
+    parent.kill()
+    parent.communicate()
+    until_there_is(lambda: len(list(out.glob("*.checkpoint"))) == 2)
+    for file in out.glob("[!.]*.h5"):
+        with only_writer(file, patience=RUNNING):
+            pass
 
 
 def test_what_cannot_be_is_refused_before_anything_is_written(here, tmp_path, monkeypatch):
