@@ -187,8 +187,8 @@ SUPPORTED = {
     "cluster": "cluster",
 }  # fmt: skip
 OF_WALLS = {"union": "union", "field": "field", "mesh": "mesh or outline", "prism": "mesh or outline"}
-# A wall with a mass has neither; the walls beside it do.
-NOT_OF_HEAVY_WALLS = ("friction", "turning")
+# A wall with a mass has none of these; the walls beside it do.
+NOT_OF_HEAVY_WALLS = ("friction", "turning", "temperature", "Lambert")
 
 
 @pytest.mark.parametrize("engine", cells.ENGINES)

@@ -5,11 +5,12 @@ reflections and that of the laws by which a wall sends particles off, with a vel
 """
 
 import math
+from typing import Any
 
 from ..kernel.arrays import index
 from ..kernel.gravity import potential
 from ..kernel.jit import select
-from ..kernel.random import flux_maxwellian, uniforms
+from ..kernel.random import Stream, flux_maxwellian, uniforms
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, either, square
 from .laws import KEPT
@@ -31,6 +32,17 @@ class Arriving(Record):
     twice: float
     mass: float
     slow: float = 0.0
+
+
+class RandomSource(Record):
+    """The random numbers of the walls that send particles off."""
+
+    seed: Any
+    first: Any  # the number of the first particle of this run
+
+    def of_impact(self, i, number, laws):
+        """Those of an impact of particle i, which has had so many before."""
+        return Stream(self.seed, self.first + i, number, 0, laws.across)
 
 
 def impact_on_wall(laws, walls, gravity, wall, arriving, random):

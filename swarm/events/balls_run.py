@@ -9,6 +9,7 @@ import numpy as np
 from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
+from ..contact.wall_impact import RandomSource
 from ..kernel.arrays import aligned_copy
 from ..methods.base import Method
 from ..particles import Particles
@@ -23,7 +24,7 @@ from ..run.tiers import Tier
 from ..scene import Scene
 from ..state import Balls, State
 from .colliding import events
-from .colliding.bounce import Gates, RandomSource
+from .colliding.bounce import Gates
 from .colliding.box import CollisionRule, CollisionTotals
 from .colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
 from .colliding.described import described, epoch_of, reach_of, with_room

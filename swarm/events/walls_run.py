@@ -7,6 +7,7 @@ import numpy as np
 
 from .. import observables
 from ..common.status import Status
+from ..contact.wall_impact import RandomSource
 from ..kernel.gravity import potential
 from ..kernel.heap import Heap
 from ..kernel.vector import vec
@@ -25,7 +26,7 @@ from ..state import State
 from .reacting import queue as events
 from .reacting.described import freedoms_of, observed, scenery_of, walls_now
 from .reacting.freedoms import TOO_LONG, TOO_SHORT
-from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule
+from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule, SceneWalls
 
 # Of a clock, how many events were taken where no lease is made yet: so much less for each particle that is predicted.
 _ALL_AHEAD = -1.0
@@ -44,11 +45,13 @@ class ReactingRun(BaseRun):
     ) -> None:  # fmt: skip
         n, walls, gravity = len(particles), len(scene.owners()), scene.pull()
         energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(gravity, vec(particles.position))
+        self._source = RandomSource(seeding.signed(), seeding.first)
+        self._scenery = self._scenery_of(scene, 0.0)
+        heat = np.zeros((walls, n)) if self._scenery.laws.give_heat else None
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.asarray(energy) + np.zeros(n), np.zeros(n),
-            np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None,
+            np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None, heat,
         )  # fmt: skip
-        self._scenery = scenery_of(scene, 0.0)
         tier = Tier(compile, (self._scenery, gravity), n)
         super().__init__(scene, method, n, threads, tier, seeding, watched)
         counters = counters_of(scene, watched.counters, logs=True)
@@ -65,8 +68,13 @@ class ReactingRun(BaseRun):
         self._show(0.0)
         self._choose_tier()
 
+    def _scenery_of(self, scene: Scene, moment: float) -> SceneWalls:
+        """The walls in the frame that ends at a moment [s], with random numbers where they send particles off."""
+        found = scenery_of(scene, moment)
+        return found._replace(source=self._source) if found.laws.send_off else found
+
     def _prepare(self, span: float, moment: float) -> None:
-        self._scenery = scenery_of(self._scene, moment)
+        self._scenery = self._scenery_of(self._scene, moment)
         if not self._cut_short:
             self._clock[NOW] = 0.0
             self._clock[TAKEN] = _ALL_AHEAD
@@ -171,6 +179,7 @@ class ReactingRun(BaseRun):
     def _arrays(self) -> Arrays:
         queue = {name: array for name, array in self._queue._asdict().items() if name not in _NOT_KEPT}
         queue |= {} if self.state.crossed is None else named("crossed", self.state.crossed)
+        queue |= {} if self.state.heat is None else {"heat": self.state.heat}
         return {**queue, **named("walls", self._freedoms), "key": self._queue.heap.key, "clock": self._clock}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:

@@ -307,11 +307,6 @@ def test_what_knows_no_laws_says_so():
         swarm.simulate(swarm.Scene([wall]), start, swarm.Penalty(dt=1e-3, penalty=1e6), until=1.0)
     with pytest.raises(swarm.SceneError, match="contact_step must be 0 where"):
         swarm.simulate(swarm.Scene([wall]), start, swarm.Impact(contact_step=1e-3), until=1.0)
-    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws must be left out where a wall has a mass"):
-        swarm.simulate(
-            swarm.Scene([wall, swarm.Sphere(0.2, side="outside", mass=1.0)]),
-            swarm.Particles((0.5, 0, 0), (1, 0, 0)), swarm.Impact(), until=1.0,
-        )  # fmt: skip
     scene = swarm.Scene([wall])
     bodies = swarm.place(scene, swarm.dumbbell(0.1, 1.0), 2, speed=1.0, seed=1)
     with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws must be left out with bodies"):

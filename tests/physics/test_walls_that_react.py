@@ -344,6 +344,30 @@ def test_halts_change_no_bit():
 # --- Bad input -------------------------------------------------------------------------------------------
 
 ONE = swarm.Particles([0.0, 0.0, 0.2], [1.0, 0.0, 0.0])
+HOT = {"temperature": {"temperature": 2.0}, "Lambert": {"laws": [swarm.Lambert()]}}
+
+
+@pytest.mark.parametrize("radius", [None, 0.05])
+@pytest.mark.parametrize("name", HOT)
+def test_walls_beside_one_with_a_mass_send_particles_off(name, radius):
+    """What the wall gives as heat is the change of the energy of all."""
+    box = swarm.Box((1.0, 0.5, 0.5), **HOT[name])
+    slab = swarm.Slab(UP, 0.1, side="outside", mass=2.0, motion=swarm.Guide(UP, speed=0.3))
+    ends = {}
+    for scene in (swarm.Scene([box, slab]), swarm.Scene([swarm.Box((1.0, 0.5, 0.5)), slab])):
+        start = swarm.fill(scene, 8, speed=1.0, seed=3, radius=radius)
+        ends[scene] = swarm.simulate(scene, start, swarm.Impact(), until=1.0, compile="never", seed=5)
+    sent, mirrored = ends.values()
+    seen = sent.observables
+    assert (sent.particles.velocity != mirrored.particles.velocity).any()
+    assert seen["wall_heat"][-1, 1] == 0.0
+    assert (seen["wall_heat"][-1, 0] != 0.0) == (name == "temperature")
+    change = seen["total_energy"][-1] - seen["total_energy"][0]
+    np.testing.assert_allclose(change, seen["wall_heat"][-1, 0], rtol=0, atol=1e-13 * seen["total_energy"][-1])
+    assert seen["energy_error"].max() < 1e-14
+    assert seen["wall_energy"][-1, 1] != seen["wall_energy"][0, 1]
+
+
 WRONG = [
     (lambda: swarm.Sphere(0.5, mass=0.0), "mass must be above 0, got 0"),
     (lambda: swarm.Sphere(0.5, mass=math.inf), "mass must be a finite number"),
@@ -359,8 +383,16 @@ WRONG = [
     (lambda: swarm.Guide(UP, speed=math.nan), "speed must be"),
     (lambda: swarm.Guide(UP) + swarm.Translation(UP), "a sum of motions must have at most 0 Guide, got 1"),
     (
-        lambda: run(swarm.Scene([SHAFT, swarm.Sphere(0.5, temperature=1.0), piston(1.0)]), ONE, 1.0),
-        r"surfaces\[1\].temperature must be None where a wall has a mass",
+        lambda: run(swarm.Scene([swarm.Sphere(0.5, temperature=1.0, mass=1.0)]), ONE, 1.0),
+        r"surfaces\[0\].temperature must be None where that wall has a mass",
+    ),
+    (
+        lambda: run(swarm.Scene([swarm.Sphere(0.5, laws=[swarm.Lambert()], mass=1.0)]), ONE, 1.0),
+        r"surfaces\[0\].laws must be left out where that wall has a mass",
+    ),
+    (
+        lambda: run(swarm.Scene([swarm.Box((2.0, 2.0, 2.0), laws=[swarm.Absorb(0.5)]), piston(1.0)]), ONE, 1.0),
+        r"surfaces\[0\].laws\[0\] must not absorb particles where a wall has a mass",
     ),
     (
         lambda: run(swarm.Scene([swarm.Sphere(0.5, friction=0.3, mass=1.0)]), ONE, 1.0),

@@ -11,7 +11,6 @@ from ...contact.wall_impact import Arriving, book, impact_on_wall
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, potential
 from ...kernel.jit import outlined
-from ...kernel.random import Stream
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, dot, either, norm, square, with_square
 from ...lanes.watching.log import Struck
@@ -38,13 +37,6 @@ class Gates(Record):
     escape_time: Any  # (N,) [s], or None
     absorbed_time: Any = None  # (N,) [s], or None
     absorbed_wall: Any = None  # (N,) int32, or None
-
-
-class RandomSource(Record):
-    """The random numbers of walls that send balls off."""
-
-    seed: Any
-    first: Any  # the number of the first ball of this run
 
 
 @outlined
@@ -101,7 +93,7 @@ def _turned(box, flock, books, walls, wall, ball):
     i, now, r, v = ball
     fall, laws, random = 2.0 * potential(box.pull, r), box.laws, None
     if laws.send_off:
-        random = Stream(box.source.seed, box.source.first + i, books.impacts[index(i)], 0, laws.across)
+        random = box.source.of_impact(i, books.impacts[index(i)], laws)
     arriving = Arriving(r, v, flock.kept.at(i, flock.stamp(i), square(v) + fall), box.kinds.mass_of(i))
     turned = impact_on_wall(laws, walls, box.pull, wall, arriving, random)
     if box.loss is not None and laws.restitution is not None and box.loss.spares(flock, i, now):

@@ -6,6 +6,7 @@ near are looked at again, and all of them only when a wall leaves its lease. So 
 heap, not a prediction for every particle.
 """
 
+import math
 from typing import Any, NamedTuple
 
 from ...common.status import Status
@@ -44,6 +45,7 @@ class SceneWalls(NamedTuple):
     owners: Array  # (given walls,)
     reacting: Any
     pull: Any  # gravity, or None
+    source: Any = None  # `RandomSource` where walls send particles off by a law
 
 
 class Queue(NamedTuple):
@@ -133,15 +135,17 @@ def _fly(scenery, queue, i, t, way, end):
 def _bounce(scenery, queue, i, wall, rule, now):
     """The impact of particle i on a wall that does not react."""
     r, v, m, twice = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i], 2.0 * queue.energy[i]
-    arriving = Arriving(r, v, twice, m)
+    arriving, laws, random = Arriving(r, v, twice, m), scenery.laws, None
+    if laws.send_off:
+        random = scenery.source.of_impact(i, queue.impacts[i], laws)
     walls = scenery.given.at(rule.end - now)
-    bounce = impact_on_wall(scenery.laws, walls, scenery.pull, wall, arriving, None)
+    bounce = impact_on_wall(laws, walls, scenery.pull, wall, arriving, random)
     put(queue.velocity, 0, i, bounce.v)
     owner = index(scenery.owners[int(wall)])
-    book(scenery.laws, queue, (owner, i, i), m, bounce)
+    book(laws, queue, (owner, i, i), m, bounce)
     queue.energy[i] = 0.5 * bounce.twice_energy
     struck = Struck(i, wall, rule.moment - (rule.end - now), r, v, bounce.v, m * bounce.impulse)
-    struck = queue.watchers.with_slip(scenery.laws, walls, struck)
+    struck = queue.watchers.with_slip(laws, walls, struck)
     queue.watchers.hit(None, struck._replace(wall=float(owner)))
 
 
@@ -238,7 +242,7 @@ def _look_again(scenery, freedoms, queue, clock, rule, close):
 
 
 def _carry_out(scenery, freedoms, queue, i, now, rule):
-    """The impact of particle i that is due, on whichever wall, and when it meets the next that does not react."""
+    """The impact of particle i that is due, and when it meets the next wall that does not react: a status."""
     queue.hits[i] += select(now > queue.time[i], 1, AT_ONCE)
     # The time of the frame has fewer digits than the flight.
     way = select(queue.struck[i] >= 0.0, now - queue.time[i], queue.wait[i])
@@ -247,8 +251,10 @@ def _carry_out(scenery, freedoms, queue, i, now, rule):
         _strike(scenery, freedoms, queue, i, rule, now)
     elif queue.wall[i] >= 0.0:
         _bounce(scenery, queue, i, queue.wall[i], rule, now)
+    if scenery.laws.own is not None and math.isnan(queue.velocity[0, i]):
+        return Status.SENT_WRONG.value
     _aim(scenery, queue, i, rule.end)
-    return queue.hits[i] <= MOST_HITS
+    return select(queue.hits[i] <= MOST_HITS, Status.DONE.value, Status.STALLED.value)
 
 
 def _listed(queue):
@@ -287,8 +293,10 @@ def take(scenery, freedoms, queue, clock, rule):
         taken += 1
         clock[NOW], clock[TAKEN] = now, clock[TAKEN] + 1.0
         wall = queue.struck[i]
-        if (wall >= 0.0 or queue.due[i] <= now) and not _carry_out(scenery, freedoms, queue, i, now, rule):
-            return Status.STALLED.value, item
+        if wall >= 0.0 or queue.due[i] <= now:
+            status = _carry_out(scenery, freedoms, queue, i, now, rule)
+            if status != Status.DONE.value:
+                return status, item
         if wall >= 0.0:
             clock[STRIKES] += 1.0
             if not all_stay(scenery.reacting, wall, freedoms):

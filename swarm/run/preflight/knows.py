@@ -21,7 +21,7 @@ from ...surfaces.laws.sticky import Sticky
 from ...surfaces.outlines.outlined import Outlined
 from ...surfaces.periodic.images import MASS_AND_PERIOD, WITHOUT_PERIOD
 from ...surfaces.surface import Surface
-from ...surfaces.wall_law import lets_wait
+from ...surfaces.wall_law import lets_wait, may_end
 from ..options import RunOptions
 
 # --- Engines ---------------------------------------------------------------------------------------------
@@ -91,6 +91,12 @@ def _of_walls(name: str, without: Any) -> Callable[[Asked], Found]:
     return found
 
 
+def _of_moved(name: str, without: Any) -> Callable[[Asked], Found]:
+    """The same of walls that have a mass."""
+    alike = _of_walls(name, without)
+    return lambda asked: (one for one in alike(asked) if asked.scene.surfaces[one["i"]].reacts())
+
+
 def _option(name: str) -> Callable[[Asked], Found]:
     def found(asked: Asked) -> Found:
         if got := getattr(asked.options, name):
@@ -137,6 +143,11 @@ def _waits(asked: Asked) -> Found:
         for k, law in enumerate(wall.laws):
             if not isinstance(law, str) and lets_wait(law):
                 yield {"i": i, "k": k, "got": law}
+
+
+def _ends(asked: Asked) -> Found:
+    for i, wall in _walls(asked):
+        yield from ({"i": i, "k": k, "got": law} for k, law in enumerate(wall.laws) if may_end(law))
 
 
 def _waits_beside_motions(asked: Asked) -> Found:
@@ -540,11 +551,13 @@ CAPABILITIES = (
         (GRAINS,): Refusal(
             f"surfaces[{{i}}].temperature must be None with {_WITH_PENALTY}, got {{got}}", "use Impact"
         ),
-        (MASSIVE, HEAVY): Refusal(
-            "surfaces[{i}].temperature must be None where a wall has a mass, got {got}",
-            "heat the particles at the start, or give the wall a motion instead of a mass",
-        ),
     }),
+    Capability("temperature of a wall with a mass", _of_moved("temperature", None), {
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].temperature must be None where that wall has a mass, got {got}",
+            f"leave it out, or {_TO_MOTION}",
+        ),
+    }, within="temperature"),
     Capability("law of a wall", _of_walls("laws", ()), {
         _EVERY_BODY: _with_bodies("laws", "left out"),
         _FIXED_STEPS: _with_method("laws", "left out"),
@@ -553,11 +566,19 @@ CAPABILITIES = (
             f"surfaces[{{i}}].laws must be left out with {_WITH_PENALTY}, got {{got}}",
             "use restitution and friction, or Impact",
         ),
-        (MASSIVE, HEAVY): Refusal(
-            "surfaces[{i}].laws must be left out where a wall has a mass, got {got}",
-            "give the wall a motion instead of a mass",
-        ),
     }),
+    Capability("law of a wall with a mass", _of_moved("laws", ()), {
+        (MASSIVE, HEAVY): Refusal(
+            "surfaces[{i}].laws must be left out where that wall has a mass, got {got}",
+            f"leave it out, or {_TO_MOTION}",
+        ),
+    }, within="law of a wall"),
+    Capability("absorption", _ends, {
+        (MASSIVE,): Refusal(
+            "surfaces[{i}].laws[{k}] must not absorb particles where a wall has a mass, got {got}",
+            f"leave that law out, or {_TO_MOTION}",
+        ),
+    }, within="law of a wall"),
     Capability("laws of groups of a mesh", _groups, {
         (GRAINS,): Refusal(
             f"surfaces[{{i}}].groups must be None with {_WITH_PENALTY}, got laws of {{got}}",
@@ -574,6 +595,10 @@ CAPABILITIES = (
         _RIGID_BALLS: Refusal(
             "surfaces[{i}].laws[{k}] must not let particles with a radius wait, got {got!r:.200}",
             "use a law without a wait, such as Lambert, or leave the radius out",
+        ),
+        (MASSIVE,): Refusal(
+            "surfaces[{i}].laws[{k}] must not let particles wait where a wall has a mass, got {got!r:.200}",
+            f"use a law without a wait, such as Lambert, or {_TO_MOTION}",
         ),
     }, within="law of a wall"),
     Capability("mass of a wall", _masses, {
