@@ -49,7 +49,7 @@ def advance_of(
     span = method.span("until", until)
 
     def measure() -> tuple[float, int]:
-        with Run(scene, particles.copy(), method, threads, None, tier()) as run:
+        with Run(scene.compiled(), particles.copy(), method, threads, None, tier()) as run:
             run.advance(0.0, 0.0)  # compiles, and touches the arrays
             start = time.perf_counter()
             run.advance(span, until)
@@ -112,7 +112,7 @@ def multipliers(n: int, until: float, repeats: int) -> list[Row]:
         )
         times, sweeps = [], 0.0
         for _ in range(repeats):
-            with Run(SPHERE, particles.copy(), method, 1, None, tier()) as run:
+            with Run(SPHERE.compiled(), particles.copy(), method, 1, None, tier()) as run:
                 run.advance(0.0, 0.0)
                 start = time.perf_counter()
                 run.advance(until, until)
@@ -187,7 +187,7 @@ def overhead(n: int, frames: int, repeats: int) -> list[Row]:
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
 
     def seconds() -> tuple[float, float]:
-        with Run(SPHERE, particles.copy(), swarm.Impact(), 1, None, tier()) as run:
+        with Run(SPHERE.compiled(), particles.copy(), swarm.Impact(), 1, None, tier()) as run:
             run.advance(every, every)
             start = time.perf_counter()
             for _ in range(frames):

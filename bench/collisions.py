@@ -65,7 +65,7 @@ def running(n: int, packing: float, repeats: bool) -> CollidingRun:
     image = np.zeros(position.shape, np.int64) if repeats else None
     start = swarm.Particles(position, velocity, image=image, radius=radius)
     scene = swarm.Scene(walls, period=period)
-    return CollidingRun(scene, start, swarm.Impact(), 1, None, tier(), Seeding(), Watched())
+    return CollidingRun(scene.compiled(), start, swarm.Impact(), 1, None, tier(), Seeding(), Watched())
 
 
 def rate_of(n: int, packing: float) -> float:

@@ -149,7 +149,7 @@ def at_rest(quick: bool) -> list[Row]:
     box = swarm.Scene([dataclasses.replace(swarm.Box((0.5, 0.5, 0.5)), restitution=0.5)], GRAVITY)
     box = _with(box, friction=FRICTION)
     count, method, frame = (_FEW if quick else 10_000), _impact(), 0.01
-    with Run(box, swarm.fill(box, count, speed=SPEED, seed=0), method, 1, None, tier()) as run:
+    with Run(box.compiled(), swarm.fill(box, count, speed=SPEED, seed=0), method, 1, None, tier()) as run:
         run.advance(0.0, 0.0)
         run.advance(method.span("until", until), until)
         moments = iter(until + frame * k for k in range(1, 1_000))
@@ -213,7 +213,7 @@ def sliding(quick: bool) -> list[Row]:
         count, steps, rounds = threads * lanes, 20 if quick else _STEPS, 2 if quick else 20
         for name, (surface, particles) in launches(count).items():
             scene = swarm.Scene([surface], GRAVITY)
-            with Run(scene, particles, method, threads, lanes, tier()) as run:
+            with Run(scene.compiled(), particles, method, threads, lanes, tier()) as run:
                 run.advance(0.0, 0.0)
 
                 def measure(run: Run = run, passes: int = steps, count: int = count) -> float:

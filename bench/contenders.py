@@ -37,7 +37,7 @@ class Ours:
     method: Method
 
     def seconds(self, particles: swarm.Particles, until: float) -> float:
-        with Run(self.scene, particles.copy(), self.method, 1, None, tier()) as run:
+        with Run(self.scene.compiled(), particles.copy(), self.method, 1, None, tier()) as run:
             run.advance(0.0, 0.0)
             start = time.process_time()
             run.advance(self.method.span("until", until), until)

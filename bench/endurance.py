@@ -22,7 +22,7 @@ def checkpoints(n: int, repeats: int, folder: Path) -> list[Row]:
     particles = swarm.fill(SPHERE, n, speed=SPEED, seed=1)
     job = checkpoint.SavedRun("", "", "", "", n, "")
     path = folder / "run.h5.checkpoint"
-    with Run(SPHERE, particles.copy(), swarm.Impact(), 1, None, tier()) as run:
+    with Run(SPHERE.compiled(), particles.copy(), swarm.Impact(), 1, None, tier()) as run:
         run.observe()
 
         def milliseconds() -> float:
@@ -31,7 +31,7 @@ def checkpoints(n: int, repeats: int, folder: Path) -> list[Row]:
             return 1e3 * (time.perf_counter() - start)
 
         best, median = repeated(milliseconds, repeats)
-        restored = Run(SPHERE, particles.copy(), swarm.Impact(), 1, None, tier())
+        restored = Run(SPHERE.compiled(), particles.copy(), swarm.Impact(), 1, None, tier())
 
         def back() -> float:
             start = time.perf_counter()

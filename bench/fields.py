@@ -140,7 +140,7 @@ def speed(quick: bool) -> list[Row]:
         places, radius = lattice(side)
         began = time.perf_counter()
         scene = swarm.Scene([swarm.Spheres(places, radius)], period=(1.0, 1.0, 1.0))
-        scene.walls()
+        scene.compiled().walls()
         built = time.perf_counter() - began
         start = swarm.fill(scene, 4 if quick else COUNT, speed=1.0, seed=2)
         until = 4.0 * radius * (2.0 if quick else _IMPACTS)

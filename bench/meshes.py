@@ -57,7 +57,7 @@ def _rings(rings: int, columns: int) -> Any:
 def scene_of(corners: Any, triangles: Any, gravity: Any = None) -> swarm.Scene:
     """A scene of a mesh, with all that a run makes of it."""
     scene = swarm.Scene([swarm.Mesh(corners, triangles)], gravity=gravity)
-    scene.walls()
+    scene.compiled().walls()
     return scene
 
 

@@ -62,7 +62,7 @@ def _mesh(quick: bool) -> list[Row]:
         ring.export(Path(folder) / "ring.stl")
         began = time.perf_counter()
         surface = swarm.from_mesh(Path(folder) / "ring.stl", 2.8 / (16 if quick else SAMPLES))
-        swarm.Scene([surface]).walls()
+        swarm.Scene([surface]).compiled().walls()
         seconds = time.perf_counter() - began
     shape = " x ".join(map(str, surface.values.shape))
     return [

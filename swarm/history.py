@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .common.status import Status
+from .compiled_scene import CompiledScene
 from .contact import corner, reflection, uzawa
 from .contact.impulse import Step
 from .contact.regularisation import regularisation
@@ -92,7 +93,7 @@ def contact_history(
     for name, value, kind in (("scene", scene, Scene), ("method", method, Method)):
         if not isinstance(value, kind):
             raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
-    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
+    for i, surface in scene.pieces.owned():
         if surface.motion is not None or surface.reacts():
             raise SceneError(
                 f"surfaces[{i}] must be at rest, without motion, mass and inertia, for a single contact step, got "
@@ -102,22 +103,22 @@ def contact_history(
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")
     require_known(Asked(scene, particle, method, RunOptions(until=1.0)))
-    scene = scene.ungrouped("contact_history")
     mass = float(particle.mass[0])
     check_surfaces(method, scene)
     method.check(scene, particle)
+    compiled = scene.compiled(apart="contact_history")
     # The functions of kernels, in plain Python; with NumPy's numbers 1/0 is an infinity as in compiled kernels.
     start = CutStep(vec(particle.position[:, 0]), vec(particle.velocity[:, 0]))
     with np.errstate(all="ignore"):
         if isinstance(method, AugmentedLagrangian):
             if method.adaptive:
-                start = _at_the_wall(scene, start, method.dt, method.contact_start)
-            return _uzawa(scene, start, mass, method)
+                start = _at_the_wall(compiled, start, method.dt, method.contact_start)
+            return _uzawa(compiled, start, mass, method)
         if isinstance(method, Penalty):
-            return _penalty(scene, start, mass, method)
+            return _penalty(compiled, start, mass, method)
         if isinstance(method, Impact):
-            start = _at_the_wall(scene, start, method.contact_step, method.contact_start)
-            return _impact(scene, start, mass, method)
+            start = _at_the_wall(compiled, start, method.contact_step, method.contact_start)
+            return _impact(compiled, start, mass, method)
     raise SceneError(f"method must be AugmentedLagrangian, Penalty or Impact, got {type(method).__name__}")
 
 
@@ -133,9 +134,9 @@ class CutStep(NamedTuple):
 class _HistoryRows:
     """The entries of a history, collected sweep by sweep."""
 
-    def __init__(self, scene: Scene, start: CutStep, mass: float, h: float) -> None:
-        self._scene, self._start, self._mass, self._h = scene, start, mass, h
-        self.step = Step(start.r, displacement(scene.pull(), start.v, h), np.float64(h * h / (2.0 * mass)))
+    def __init__(self, compiled: CompiledScene, start: CutStep, mass: float, h: float) -> None:
+        self._compiled, self._start, self._mass, self._h = compiled, start, mass, h
+        self.step = Step(start.r, displacement(compiled.scene.pull(), start.v, h), np.float64(h * h / (2.0 * mass)))
         self._rows: list[tuple[Any, ...]] = []
 
     def add(self, multiplier: Floats, mean: Floats, reactions: Floats, stored: float) -> None:
@@ -143,7 +144,7 @@ class _HistoryRows:
         reactions, constraint = reactions[:, :3], reactions[:, 3].copy()
         total = reactions.sum(axis=0)
         r1 = np.array(self.step.r) + (np.array(self.step.p) - total)
-        v1 = np.array(accelerated(self._scene.pull(), self._start.v, self._h)) - 2.0 / self._h * total
+        v1 = np.array(accelerated(self._compiled.scene.pull(), self._start.v, self._h)) - 2.0 / self._h * total
         force, strength = np.sqrt((reactions**2).sum(axis=1)) / self.step.c, multiplier + mean
         slope = np.divide(force, strength, out=np.zeros_like(force), where=strength != 0.0)
         kinetic = 0.5 * self._mass * float(v1 @ v1)
@@ -151,16 +152,16 @@ class _HistoryRows:
 
     def history(self, converged: bool) -> ContactHistory:
         columns: list[Any] = [np.array(column) for column in zip(*self._rows, strict=True)]
-        listed = np.argsort(self._scene.owners(), kind="stable")
+        listed = np.argsort(self._compiled.numbering.surfaces_of_rows, kind="stable")
         columns[:4] = [column[:, listed] for column in columns[:4]]
-        if len(self._scene.surfaces) == 1:
+        if len(self._compiled.scene.surfaces) == 1:
             columns[:4] = [column[:, 0] for column in columns[:4]]
         return ContactHistory(*columns, *[converged])
 
 
-def _at_the_wall(scene: Scene, start: CutStep, h: float, begins: str) -> CutStep:
+def _at_the_wall(compiled: CompiledScene, start: CutStep, h: float, begins: str) -> CutStep:
     """The start of the contact step at the next impact, of length h if the flight to it is long enough."""
-    walls = scene.walls()
+    walls = compiled.walls()
     hit = flights.first_hit(walls, None, start.r, start.v)
     if not np.isfinite(hit.time):
         raise SceneError(f"velocity must lead to a surface, got {tuple(start.v)}, which never does")
@@ -175,10 +176,10 @@ def _at_the_wall(scene: Scene, start: CutStep, h: float, begins: str) -> CutStep
     return CutStep(r - half * start.v, start.v, 2.0 * half, hit.wall)
 
 
-def _uzawa(scene: Scene, start: CutStep, mass: float, method: AugmentedLagrangian) -> ContactHistory:
-    numbers, walls, count = method.numbers(scene), scene.walls(), len(scene.owners())
+def _uzawa(compiled: CompiledScene, start: CutStep, mass: float, method: AugmentedLagrangian) -> ContactHistory:
+    numbers, walls, count = method.numbers(compiled.scene), compiled.walls(), len(compiled.numbering.pieces_of_rows)
     law = numbers.law
-    rows = _HistoryRows(scene, start, mass, start.h if method.adaptive else method.dt)
+    rows = _HistoryRows(compiled, start, mass, start.h if method.adaptive else method.dt)
     if method.contact_start == "centred":
         walls, law = lowered(walls, start.wall, start.r), law.stiffened((method.dt / start.h) ** 2)
     multipliers, reactions = np.zeros(count), np.zeros((count, 4))
@@ -193,9 +194,9 @@ def _uzawa(scene: Scene, start: CutStep, mass: float, method: AugmentedLagrangia
     return rows.history(False)
 
 
-def _penalty(scene: Scene, start: CutStep, mass: float, method: Penalty) -> ContactHistory:
-    numbers, walls, count = method.numbers(scene), scene.walls(), len(scene.owners())
-    rows, reactions = _HistoryRows(scene, start, mass, method.dt), np.zeros((count, 4))
+def _penalty(compiled: CompiledScene, start: CutStep, mass: float, method: Penalty) -> ContactHistory:
+    numbers, walls, count = method.numbers(compiled.scene), compiled.walls(), len(compiled.numbering.pieces_of_rows)
+    rows, reactions = _HistoryRows(compiled, start, mass, method.dt), np.zeros((count, 4))
     _require(corner.hold(numbers.form, numbers.law, None, walls, rows.step, reactions).solved, 0)
     first, last = np.zeros(count), reactions[:, 3]
     corner.constraints(walls, numbers.law, start.r, first)
@@ -204,11 +205,11 @@ def _penalty(scene: Scene, start: CutStep, mass: float, method: Penalty) -> Cont
     return rows.history(True)
 
 
-def _impact(scene: Scene, start: CutStep, mass: float, method: Impact) -> ContactHistory:
+def _impact(compiled: CompiledScene, start: CutStep, mass: float, method: Impact) -> ContactHistory:
     if method.contact_step == 0.0:
         raise SceneError("contact_step must be above 0 for a history, got 0: an exact reflection takes no step")
-    walls, count = scene.walls(), len(scene.owners())
-    rows, r0, wall = _HistoryRows(scene, start, mass, start.h), start.r, start.wall
+    walls, count = compiled.walls(), len(compiled.numbering.pieces_of_rows)
+    rows, r0, wall = _HistoryRows(compiled, start, mass, start.h), start.r, start.wall
     if method.contact_start == "centred":
         walls = lowered(walls, wall, r0)
     kappa = reflection.chord(walls, wall, r0, rows.step.p)

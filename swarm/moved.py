@@ -13,7 +13,7 @@ from types import ModuleType
 _FOLDERS = [
     ("", "common", "catalog checks columns extras frames interrupt links notebook rows signature snapshot status"),
     ("", "serialization", "law_tables=tables plugins run_tables tables"),
-    ("", "surfaces", "plane"),
+    ("", "surfaces", "pieces plane"),
     ("", "placing", "filling"),
     ("", "events", "packing colliding reacting"),
     ("", "commands", "cli summary"),

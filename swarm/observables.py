@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .compiled_scene import CompiledScene, PartsOfRows
 from .contact.energy import contact_energy
 from .kernel.arrays import scratch
 from .kernel.gravity import potential
 from .kernel.jit import kernel, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
-from .pieces import PartsOfRows
 from .scene import Scene
 from .state import CROSSED, Floats, State, is_gone
 from .surfaces.depth import penetration
@@ -54,18 +54,18 @@ def _energies(law, walls, gravity, m, r, v):
     return Energies(0.5 * square(v), potential(gravity, r), contact_energy(law, walls, 1.0 / m, r))
 
 
-def energies(scene: Scene, law: Any, mass: Floats, position: Floats, velocity: Floats) -> Energies:
+def energies(compiled: CompiledScene, law: Any, mass: Floats, position: Floats, velocity: Floats) -> Energies:
     """The energies of particles, positions and velocities (3, N), at time 0.
 
     Without a kernel: those of one particle go through NumPy.
     """
     stored = np.zeros(len(mass))
     if law is not None:
-        walls = scene.walls().at(0.0)
+        walls = compiled.walls().at(0.0)
         # Few particles are in a wall, and its law takes one number.
-        for i in np.flatnonzero((scene.gaps(position) > 0.0).any(axis=0)):
+        for i in np.flatnonzero((compiled.scene.gaps(position) > 0.0).any(axis=0)):
             stored[i] = contact_energy(law, walls, 1.0 / mass[i], column(position, 0, i))
-    return Energies(0.5 * square(vec(velocity)), potential(scene.pull(), vec(position)), stored)
+    return Energies(0.5 * square(vec(velocity)), potential(compiled.scene.pull(), vec(position)), stored)
 
 
 def energy_scale(scene: Scene, start: Energies) -> Floats:
@@ -80,12 +80,12 @@ def energy_scale(scene: Scene, start: Energies) -> Floats:
 _AT_ONCE = 32_768
 
 
-def start_energies(scene: Scene, law: Any, state: State) -> None:
+def start_energies(compiled: CompiledScene, law: Any, state: State) -> None:
     """Fill `energy` and `inverse_scale` of the state."""
     for first in range(0, state.mass.size, _AT_ONCE):
         some = slice(first, first + _AT_ONCE)
-        start = energies(scene, law, state.mass[some], state.position[:, some], state.velocity[:, some])
-        scale = energy_scale(scene, start)
+        start = energies(compiled, law, state.mass[some], state.position[:, some], state.velocity[:, some])
+        scale = energy_scale(compiled.scene, start)
         state.energy[some] = start.total()
         state.inverse_scale[some] = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)
 

@@ -1,56 +1,35 @@
-"""The scene: surfaces and gravity, checked, the volume that they enclose, and as kernels take them."""
+"""The scene as users describe it: surfaces and gravity, checked, and the volume that they enclose."""
 
-import copy
-import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import motion as motions
 from .common import checks, notebook
-from .contact.laws import NONE, Laws, Moves, owned_in
+from .compiled_scene import MOST_WALLS, CompiledScene
 from .errors import SceneError
 from .kernel.gravity import Gravity
-from .kernel.vector import Vec
 from .pairs import Pairs, checked_pairs
 from .particles import Particles
-from .pieces import (
-    NO_HEAT,
-    PartsOfRows,
-    doorways_of_pieces,
-    of_walls,
-    places_of,
-    thermal,
-    volumes_of_pieces,
-    with_reach,
-)
 from .surfaces import plane as planes
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.facets.mesh import Mesh
-from .surfaces.fields.grouped import Order, order_of, walls_in
-from .surfaces.fields.many import Many, in_straight_flights, members_of
-from .surfaces.fields.members import Members
-from .surfaces.in_motion.moving import carried
-from .surfaces.instant import box_of, gaps_of, gradient_of, has_room, planes_of
-from .surfaces.periodic.images import Lengths, cell_of, corners_of, images_of, into_cell, lengths_of
-from .surfaces.periodic.period import Period, cell_in
+from .surfaces.fields.many import Many
+from .surfaces.instant import box_of, distances_of, gaps_of, gradient_of, has_room, planes_of
+from .surfaces.periodic.images import Lengths, cell_of, into_cell, lengths_of
+from .surfaces.pieces import Images, Pieces, pieces_of
 from .surfaces.polyhedron import polyhedron_bounds
-from .surfaces.presence.doors import instants_of, was_there
-from .surfaces.presence.joined import with_rooms
-from .surfaces.presence.openings import Opened, openings_in, require_few
+from .surfaces.presence.doors import instants_of
+from .surfaces.presence.openings import require_few
 from .surfaces.surface import UNBOUNDED, Box, Surface
-from .surfaces.union import Joined, Place, surfaces_of
-from .surfaces.upright import upright
-from .surfaces.walls import Walls
+from .surfaces.union import Joined, Place
 
-# Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
-MOST_WALLS = 24
 # Points whose gaps are found at once.
 _BATCH = 4096
 # A slot thinner than this part of the scene's extent does not set the length of steps, which would be lost in the
@@ -113,15 +92,8 @@ class Scene:
     period: Lengths | None
     plane: str | None
     pairs: Pairs | None
-    # Of every surface what of it reaches into the cell: itself alone where nothing repeats.
-    _images: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
-    # The volumes in which every piece is open.
-    _volumes: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
-    _doorways: tuple[tuple[Surface, ...], ...] = field(init=False, repr=False, compare=False)
-    # The largest radius of the balls in the scene [m]; None: its particles are points.
-    _largest: ClassVar[float | None] = None
-    # Whether listed solids of one kind may be a field.
-    _together: ClassVar[bool] = True
+    # The pieces that points meet.
+    pieces: Pieces = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -137,18 +109,14 @@ class Scene:
         for i, part in enumerate(pull or ()):
             checks.magnitude(f"|gravity[{i}]|", abs(part))
         lengths, plane = lengths_of(period), planes.checked(plane)
-        named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(surfaces)]
-        images = tuple((one,) if lengths is None else tuple(images_of(one, lengths, name)) for one, name in named)
-        images = with_reach(images)
-        checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, pairs=checked_pairs(pairs), _images=images)
-        volumes = volumes_of_pieces(surfaces, images, lengths)
-        checks.assign(self, _volumes=volumes, _doorways=doorways_of_pieces(images, volumes))
-        self._require_few_walls("")
-        require_few(self.openings() or ())
-        for i in (*self.fields(), *self.unions()) if self.reacts() else ():
+        checks.assign(self, surfaces=surfaces, period=lengths, plane=plane, pairs=checked_pairs(pairs))
+        checks.assign(self, gravity=pull if pull is not None and any(pull) else None)
+        checks.assign(self, pieces=pieces_of(surfaces, lengths))
+        compiled = self.compiled()
+        require_few(compiled.openings() or ())
+        for i in (*compiled.fields(), *compiled.unions()) if self.reacts() else ():
             said = BESIDE_MASS.format(i=i, kind=type(surfaces[i]).__name__, got=surfaces[i])
             raise SceneError(f"{said}; {INSTEAD_OF_MASS}")
-        checks.assign(self, gravity=pull if pull is not None and any(pull) else None)
         if plane is not None:
             planes.require_all(plane, surfaces, pull, lengths)
         self._require_alone()
@@ -176,20 +144,8 @@ class Scene:
         return notebook.table("Scene", rows)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Copies do not keep the walls: `ungrouped` and `of_balls` have other ones, and a worker process makes its own.
-        return {name: value for name, value in self.__dict__.items() if name != "_walls"}
-
-    def _require_few_walls(self, why: str) -> None:
-        """Raise a `SceneError` where there are more walls than kernels can be compiled for."""
-        walls = self.order.compiled(self.pieces)
-        if walls > MOST_WALLS:
-            raise SceneError(
-                f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of {len(self.surfaces)} "
-                "surfaces: each wall is compiled into the kernels, which takes minutes with so many; "
-                "remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of one "
-                "kind, of which any number is one field for Impact where nothing moves, and as Spheres and the like "
-                "always"
-            )
+        # Copies make what kernels take anew.
+        return {name: value for name, value in self.__dict__.items() if name not in ("_of_points", "_pieces_by_radius")}
 
     def _require_alone(self) -> None:
         """Raise a `SceneError` where a foam is not the only surface, or has a period."""
@@ -244,13 +200,7 @@ class Scene:
         """
         if radius is not None:
             return self.distances_outside(points, time, radius)
-        rows = checks.array("points", points)
-        if self.period is not None:
-            rows, _image = into_cell(self.period, rows)
-        away = np.full(np.shape(rows)[1:], -math.inf)
-        each = zip(self.surfaces, self._images, strict=True)
-        found = [gaps_of(images, rows, time).max(axis=0) if one.is_there(time) else away for one, images in each]
-        return np.array(found).reshape(len(found), *away.shape)
+        return self._of_each(points, time, self.pieces.images, lambda images, rows: gaps_of(images, rows, time))
 
     def admits(self, points: NDArray[np.float64], radius: NDArray[np.float64] | None = None) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not.
@@ -261,7 +211,7 @@ class Scene:
             return np.asarray((self.distances_outside(points, 0.0, radius) <= 0.0).all(axis=0))
         rows = points if self.period is None else into_cell(self.period, points)[0]
         admitted = np.ones(rows.shape[1], np.bool_)
-        for image in (image for images in self._images for image in images if image.is_there(0.0)):
+        for image in (image for images in self.pieces.images for image in images if image.is_there(0.0)):
             if isinstance(image, Many):
                 admitted[admitted] = image.contain(rows[:, admitted]) == image.is_foam()
             elif isinstance(image, Mesh):
@@ -278,44 +228,37 @@ class Scene:
         That of a surface that is not there at this time [s] is minus infinity. With a radius (N,) points are the
         centres of balls: how far they reach outside.
         """
+        if radius is None:
+            return self._of_each(
+                points, time, self.pieces.images, lambda images, rows: distances_of(images, rows, time)
+            )
+        reach = lambda images, rows: [one.reaching_outside(rows, radius, time) for one in images]  # noqa: E731
+        return self._of_each(points, time, self.pieces_of_balls(float(radius.max(initial=0.0))).images, reach)
+
+    def _of_each(
+        self, points: ArrayLike, time: float, images: Images, values: Callable[[Any, Any], Any]
+    ) -> NDArray[np.float64]:
+        """The largest of the values of the images of every surface at points, (surfaces, N)."""
         rows = checks.array("points", points)
         if self.period is not None:
             rows, _image = into_cell(self.period, rows)
-        if radius is not None:
-            return self._reaching_outside(rows, time, radius)
-        found = []
-        for surface, images in zip(self.surfaces, self._images, strict=True):
-            if not surface.is_there(time):
-                found.append(np.full(np.shape(rows)[1:], -math.inf))
-                continue
-            slopes = [np.sqrt((image.gradient(rows, time) ** 2).sum(axis=0)) for image in images]
-            # At the centre of a ball the slope is 0, and a point is as far inside as can be.
-            with np.errstate(over="ignore"):
-                found.append((gaps_of(images, rows, time) / np.maximum(slopes, np.finfo(np.float64).tiny)).max(axis=0))
-        return np.array(found)
+        away, each = np.full(np.shape(rows)[1:], -math.inf), zip(self.surfaces, images, strict=True)
+        found = [np.max(values(several, rows), axis=0) if one.is_there(time) else away for one, several in each]
+        return np.array(found).reshape(len(found), *away.shape)
 
-    def _reaching_outside(
-        self, points: NDArray[np.float64], time: float, radius: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """How far balls at points (3, N), with their radii (N,), reach outside of every surface: (surfaces, N) [m]."""
-        away = np.full(points.shape[1], -math.inf)
-        images = self._images_of_balls(float(radius.max(initial=0.0)))
-        return np.array([
-            np.max([one.reaching_outside(points, radius, time) for one in several], axis=0)
-            if surface.is_there(time) else away
-            for surface, several in zip(self.surfaces, images, strict=True)
-        ]).reshape(len(self.surfaces), points.shape[1])  # fmt: skip
+    @cached_property
+    def _pieces_by_radius(self) -> dict[float, Pieces]:
+        return {}
 
-    def _images_of_balls(self, largest: float) -> tuple[tuple[Surface, ...], ...]:
-        """What of every surface balls in the cell meet, with radii up to the largest one [m]."""
+    def pieces_of_balls(self, largest: float) -> Pieces:
+        """The pieces that balls in the cell meet, with radii up to the largest one [m]."""
         if self.period is None:
-            return self._images
-        known: dict[float, tuple[tuple[Surface, ...], ...]] = self.__dict__.setdefault("_images_by_radius", {})
+            return self.pieces
+        known = self._pieces_by_radius
         # Those of larger balls are as right.
         largest = min((one for one in known if one >= largest), default=largest)
         if largest not in known:
-            named = [(surface, f"surfaces[{i}]") for i, surface in enumerate(self.surfaces)]
-            known[largest] = tuple(tuple(images_of(one, self.period, name, largest)) for one, name in named)
+            known[largest] = pieces_of(self.surfaces, self.period, largest)
         return known[largest]
 
     def outside(
@@ -365,18 +308,16 @@ class Scene:
 
         Across the plane of a scene of two dimensions it has no width.
         """
-        low, high = self._bounds(time, [surface for surface in self.surfaces if surface.is_there(time)])
+        low, high = self.bounds_of([surface for surface in self.surfaces if surface.is_there(time)], time)
         return tuple(low.tolist()), tuple(high.tolist())
-
-    def bounds_of(self, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """As `bounds`, around the volume that some of the surfaces leave, at 0 s."""
-        return self._bounds(0.0, surfaces)
 
     def _bounds_of_lasting(self, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A box around the volume that those of the surfaces leave at the start that are always there."""
-        return self._bounds(0.0, [surface for surface in surfaces if surface.present is None])
+        return self.bounds_of([surface for surface in surfaces if surface.present is None])
 
-    def _bounds(self, time: float, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def bounds_of(
+        self, surfaces: Sequence[Surface], time: float = 0.0
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A box around the volume that some of the surfaces leave, and the cell that repeats."""
         boxes = np.array([box_of(surface, time) for surface in surfaces] or [UNBOUNDED])
         low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
@@ -402,7 +343,7 @@ class Scene:
             low,
             high,
             lambda points: self.gaps(points)[there],
-            lambda i, points: gradient_of(self._images[there[i]], points),
+            lambda i, points: gradient_of(self.pieces.images[there[i]], points),
         )
 
     def extent(self) -> float:
@@ -411,96 +352,16 @@ class Scene:
         farthest = max((*(surface.extent() for surface in self.surfaces), *lengths), default=0.0)
         return farthest if farthest > _AT_ORIGIN else 1.0
 
-    # --- Pieces --------------------------------------------------------------------------------------
-
-    @cached_property
-    def pieces(self) -> tuple[Surface, ...]:
-        """The surfaces, those of which unions are made, and the images of those that reach over a face of the cell."""
-        return tuple(piece for images in self._images for image in images for piece in surfaces_of(image))
-
-    @cached_property
-    def owners_of_pieces(self) -> list[int]:
-        """The surface that each of these is an image or a part of."""
-        return [i for i, images in enumerate(self._images) for image in images for _piece in surfaces_of(image)]
-
-    @cached_property
-    def order(self) -> Order:
-        """Surfaces and images in the order of the scene."""
-        unions, first = [], 0
-        for image in (image for images in self._images for image in images):
-            if isinstance(image, Joined) and len(image.rooms) > 1:
-                ends = np.cumsum([first, *map(len, image.rooms)]).tolist()
-                unions.append(tuple(tuple(range(*ends)) for ends in itertools.pairwise(ends)))
-            first += len(surfaces_of(image))
-        return order_of(self.pieces, self._together, unions)
-
-    @cached_property
-    def _groups(self) -> list[Members]:
-        """The surfaces that kernels take as fields."""
-        repeated = None if self.period is None else corners_of(self.period)
-        groups = ([self.pieces[i] for i in group] for group in self.order.groups)
-        return [members_of(group, repeated, self._largest) for group in groups]
-
-    @cached_property
-    def volumes(self) -> tuple[tuple[Surface, ...], ...]:
-        """The volumes in which every surface is open."""
-        found: list[dict[Surface, None]] = [{} for _surface in self.surfaces]
-        for i, *given in zip(self.owners_of_pieces, self._volumes, self._doorways, strict=True):
-            found[i].update(dict.fromkeys(itertools.chain(*given)))
-        return tuple(map(tuple, found))
-
-    def laws(self) -> Laws | None:
-        """The laws of every wall of the scene as kernels take them, None where no surface has one."""
-        runs = self._runs()
-        given, owners = [surface for _i, surface, _walls in runs], [self.owners_of_pieces[i] for i, *_rest in runs]
-        spans = [(k, walls) for k, (_i, _surface, walls) in enumerate(runs)]
-        laws = Laws(
-            of_walls([surface.restitution for surface in given], spans, 1.0),
-            of_walls([surface.friction for surface in given], spans, 0.0),
-            of_walls([thermal(surface) for surface in given], spans, NO_HEAT),
-            Moves(0.0) if self.moves() else None,
-            owned_in(spans, given, owners),
-        )
-        return None if laws == NONE else laws.in_plane(self.across())
-
-    def may_absorb(self) -> bool:
-        """Whether a law of a wall may absorb particles."""
-        laws = self.laws()
-        return laws is not None and laws.may_end
-
-    def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
-        """The openings of every wall as kernels take them in the frame that ends at a moment [s]; None: none."""
-        spans = self.order.spans(self.pieces)
-        return openings_in(spans, (self._volumes, self._doorways), moment) or None
+    # --- Surfaces, parts and pieces ------------------------------------------------------------------
 
     def has_doors(self) -> bool:
         """Whether some walls are present, or some openings open, for some times only."""
-        return any(one.present is not None for one in (*self.pieces, *self.open_volumes()))
+        return any(one.present is not None for one in (*self.pieces.each, *self.pieces.open_volumes()))
 
     @cached_property
     def instants(self) -> tuple[float, ...]:
         """The instants after 0 s at which walls come or go, or openings open or shut [s], in order."""
-        return instants_of(one.present for one in (*self.pieces, *self.open_volumes()))
-
-    def open_volumes(self) -> tuple[Surface, ...]:
-        """The volumes in which any piece is open."""
-        return tuple(itertools.chain(*self._volumes, *self._doorways))
-
-    def pieces_of_walls(self) -> NDArray[np.int64]:
-        """The piece that each wall of the scene belongs to, by its number."""
-        return np.array([i for i, _member in self.order.members(self.pieces)])
-
-    def pieces_of_rows(self) -> NDArray[np.int64]:
-        """The piece that each row of `owners` belongs to."""
-        return np.array(self.order.owners(self.pieces))
-
-    def _runs(self) -> list[tuple[int, Surface, int]]:
-        """The walls in a row that have the same laws: their piece, the surface that says these, how many they are."""
-        found: list[tuple[int, Surface, int]] = []
-        for i, walls in self.order.spans(self.pieces):
-            piece = self.pieces[i]
-            found += [(i, *run) for run in (piece.runs() if isinstance(piece, Mesh) else [(piece, walls)])]
-        return found
+        return instants_of(one.present for one in (*self.pieces.each, *self.pieces.open_volumes()))
 
     @cached_property
     def parts(self) -> tuple[tuple[int, Place], ...]:
@@ -515,119 +376,25 @@ class Scene:
         joined = ((i, surface) for i, surface in enumerate(self.surfaces) if isinstance(surface, Joined))
         return tuple((i, place) for i, surface in joined for place in surface.places_of_parts())
 
-    @cached_property
-    def _parts_of_pieces(self) -> list[tuple[int, Place]]:
-        """The surface of each piece, and the place of its part in that surface."""
-        every = ((i, image) for i, images in enumerate(self._images) for image in images)
-        return [(i, place) for i, image in every for place in places_of(image)]
-
-    def parts_of_rows(self) -> PartsOfRows | None:
-        """The part that each row of the scene belongs to, None where no surface has parts."""
-        if not self.parts:
-            return None
-        number = {part: k for k, part in enumerate(self.parts)}
-        of_pieces = [number.get(part, len(number)) for part in self._parts_of_pieces]
-        return PartsOfRows(tuple(of_pieces[i] for i in self.order.owners(self.pieces)), len(number))
-
     def common_faces(self) -> list[tuple[int, Place, Place]]:
         """The parts of unions that have a face in common, which is no wall: the surface, and the place of each."""
-        unions = ((i, images[0]) for i, images in enumerate(self._images) if isinstance(images[0], Joined))
+        unions = ((i, images[0]) for i, images in enumerate(self.pieces.images) if isinstance(images[0], Joined))
         return [(i, *pair) for i, union in unions for pair in union.common_places()]
 
     def doorways_of_parts(self) -> dict[tuple[int, Place], list[Surface]]:
         """The volumes in which walls of a part are open where another room is on their other side."""
         found: dict[tuple[int, Place], list[Surface]] = {}
-        for part, volumes in zip(self._parts_of_pieces, self._doorways, strict=True):
-            found.setdefault(part, []).extend(volumes)
+        for i, place, volumes in zip(self.pieces.owners, self.pieces.places, self.pieces.doorways, strict=True):
+            found.setdefault((i, place), []).extend(volumes)
         return found
-
-    def owners(self) -> list[int]:
-        """The surface that each row of the scene belongs to, one for a field."""
-        return [self.owners_of_pieces[i] for i in self.order.owners(self.pieces)]
-
-    def members(self) -> NDArray[np.int64]:
-        """The surface of each wall, and its number in the field, or that of its part, or -1: (2, walls)."""
-        number = {part: k for k, part in enumerate(self.parts)}
-        of_pieces = [number.get(part, -1) for part in self._parts_of_pieces]
-        rows = [(i, of_pieces[i] if member < 0 else member) for i, member in self.order.members(self.pieces)]
-        return np.array([(self.owners_of_pieces[i], member) for i, member in rows], np.int64).reshape(-1, 2).T
 
     def names_laws(self) -> bool:
         """Whether a law of a wall is known by its name alone, as from a file that was read without its code."""
-        return any(isinstance(law, str) for piece in self.pieces for law in piece.laws)
-
-    def split_by_members(self, values: NDArray[Any]) -> list[NDArray[Any]]:
-        """The values of the members of each surface, from (..., members) of all surfaces one after the other."""
-        surface, member = self.members()
-        counts = np.zeros(int(surface.max()) + 1, np.int64)
-        np.maximum.at(counts, surface, member + 1)
-        return np.split(values, np.cumsum(np.maximum(counts, 1))[:-1], axis=-1)
-
-    def unions(self) -> list[int]:
-        """The surfaces that are unions of several rooms."""
-        return [self.owners_of_pieces[rooms[0][0]] for rooms in self.order.unions]
-
-    # --- As kernels take it --------------------------------------------------------------------------
-
-    def walls(self, moment: float = 0.0, own: Sequence[Surface] | None = None) -> Walls:
-        """The surfaces as kernels take them, by their kinds, in the frame, or its piece, that ends at a moment [s].
-
-        For bodies, with what is a body's `own` after them, nothing moves; None: for particles.
-        """
-        if self.moves():
-            fields, others = ([self.pieces[i] for i in some] for some in (self.order.fields, self.order.alone()))
-            rooms = [[[self.pieces[i] for i in room] for room in union] for union in self.order.unions]
-            return self._upright(with_rooms(carried(fields, others, moment, self._largest), rooms))
-        if own is not None:
-            return walls_in(self.order, self.pieces, self._groups, own, lambda members: members)
-        there = tuple(was_there(piece.present, moment) for piece in self.pieces)
-        if there not in self._walls:
-            made = walls_in(self.order, self.pieces, self._groups, (), self._taken, moment, self._largest)
-            self._walls[there] = self._upright(made)
-        return self._walls[there]
-
-    def walls_of(self, surface: Surface) -> tuple[Any, ...]:
-        """The walls of one of its surfaces that its particles meet."""
-        return surface.walls() if self._largest is None else surface.walls_of_balls(self._largest)
-
-    @cached_property
-    def _walls(self) -> dict[tuple[bool, ...], Walls]:
-        """The walls for particles where nothing moves, by which of the surfaces are there."""
-        return {}
-
-    def _taken(self, members: Members) -> Members:
-        """A field as kernels take it where nothing moves."""
-        return in_straight_flights(members, self.period is not None) if self.gravity is None else members
-
-    def _upright(self, walls: Walls) -> Walls:
-        """Walls as a scene of two dimensions takes them."""
-        across = self.across()
-        return walls if across is None else upright(walls, across)
-
-    def cell(self) -> Period | None:
-        """The cell that repeats as kernels take it."""
-        if self.period is None:
-            return None
-        pulls = self.gravity or (0.0, 0.0, 0.0)
-        falls = [0.0 if length is None else -pull * length for pull, length in zip(pulls, self.period, strict=True)]
-        fall = Vec(*falls) if any(falls) else None
-        return cell_in(self.period, self.surfaces, self._has_fields(), fall, self._largest or 0.0)
+        return any(isinstance(law, str) for piece in self.pieces.each for law in piece.laws)
 
     def pull(self) -> Gravity | None:
         """Gravity as kernels take it."""
         return None if self.gravity is None else Gravity(*self.gravity)
-
-    def walls_of_rows(self) -> NDArray[np.int64]:
-        """The number of walls of each row of `owners`: the members of a field, else one."""
-        fields = [len(self.pieces[i]) for i in self.order.fields]  # type: ignore[arg-type]
-        return np.array([*fields, *[1] * (len(self.owners()) - len(fields))], np.int64)
-
-    def fields(self) -> list[int]:
-        """The surfaces that are many bodies."""
-        return [self.owners_of_pieces[i] for i in self.order.fields]
-
-    def _has_fields(self) -> bool:
-        return bool(self.order.fields or self.order.groups)
 
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""
@@ -639,52 +406,29 @@ class Scene:
 
     @cached_property
     def _moves(self) -> bool:
-        return self._reacts or any(piece.motion is not None for piece in self.pieces)
+        return self._reacts or any(piece.motion is not None for piece in self.pieces.each)
 
     @cached_property
     def _reacts(self) -> bool:
         return any(surface.reacts() for surface in self.surfaces)
 
-    # --- Other scenes of it --------------------------------------------------------------------------
+    # --- Made of it ----------------------------------------------------------------------------------
 
-    def ungrouped(self, what: str) -> "Scene":
-        """The scene whose solids of one kind are no field, for `what`, which does not support them.
+    def compiled(self, largest: float | None = None, apart: str | None = None) -> CompiledScene:
+        """The scene as kernels take it, for points, or balls with radii up to the largest one [m].
+
+        `apart` names what does not support listed solids of one kind as a field; then each is a wall by itself.
 
         Raises:
             SceneError: it has too many walls.
         """
-        if not self.order.groups:
-            return self
-        made = copy.copy(self)
-        made.__dict__.update(_together=False, _groups=[])
-        made.__dict__.pop("order")
-        made._require_few_walls(f" with {what}")
-        return made
+        if largest is None and (apart is None or not self._of_points.order.groups):
+            return self._of_points
+        return CompiledScene(self, largest, apart)
 
-    def of_balls(self, radii: NDArray[np.float64] | None) -> "Scene":
-        """The scene whose walls are those that balls with these radii meet; itself without them.
-
-        What their centres meet are `walls().grown(radius)`.
-        """
-        if radii is None:
-            return self
-        largest, made = float(radii.max()), copy.copy(self)
-        made.__dict__.update(_largest=largest)
-        made.__dict__.pop("_groups", None)
-        if self.period is not None:
-            images = self._images_of_balls(largest)
-            volumes = volumes_of_pieces(self.surfaces, images, self.period)
-            checks.assign(made, _images=images, _volumes=volumes, _doorways=doorways_of_pieces(images, volumes))
-            for name in ("pieces", "owners_of_pieces", "order", "volumes", "instants"):
-                made.__dict__.pop(name, None)
-            made._require_few_walls(f" with balls of a radius of {largest:g} m")
-        return made
-
-    def of_some(self, surfaces: Sequence[Surface]) -> "Scene":
-        """The scene of some of its surfaces, for the same particles."""
-        if self._largest is None:
-            return Scene(surfaces, self.gravity)
-        return Scene(surfaces, self.gravity, plane=self.plane).of_balls(np.array([self._largest]))
+    @cached_property
+    def _of_points(self) -> CompiledScene:
+        return CompiledScene(self)
 
     def placed(self, positions: ArrayLike, orientations: ArrayLike) -> "Scene":
         """The scene whose walls that react stay where `wall_position` and `wall_orientation` of a frame say."""

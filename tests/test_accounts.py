@@ -25,7 +25,7 @@ MANY = [
 
 def opened(surfaces):
     """Walls and an empty account of two particles."""
-    walls = swarm.Scene(surfaces).walls()
+    walls = swarm.Scene(surfaces).compiled().walls()
     rows = walls.length()
     state = SimpleNamespace(
         mass=np.array([1.0, MASS]), energy=np.zeros(2), dissipated=np.zeros(2), impulse=np.zeros((2 * rows, 2)),

@@ -38,7 +38,7 @@ CORE = [
     ["lanes", "placing", "serialization"],
     ["ball_numbers", "methods", "observables", "sources"],
     ["scene"],
-    ["pieces"],
+    ["compiled_scene"],
     ["contact"],
     ["surfaces"],
     ["motion", "pairs", "particles", "views"],

@@ -25,7 +25,7 @@ def run(scene, particles, times, compile="never", threads=1, halts=False):
     """The state and the observables at each of these times; with `halts` each frame is halted after each pass."""
     method = swarm.Impact()
     options = RunOptions(until=times[-1], threads=threads, compile=compile, seed=1)
-    task = Task(scene, particles.copy(), method, options)
+    task = Task(scene.compiled(), particles.copy(), method, options)
     task.particles.births = particles.births
     seen = []
     with run_of(task) as one:

@@ -179,7 +179,7 @@ def test_halts_and_sessions_lose_and_repeat_none(name):
 
     def begun():
         watched = Watched(None, None, checked_counters("counters", shapes))
-        return Run(scene, start.copy(), METHOD, 1, None, "never", Seeding(), watched)
+        return Run(scene.compiled(), start.copy(), METHOD, 1, None, "never", Seeding(), watched)
 
     halts, run_of = 0, begun()
     for moment in (0.5, 1.0):

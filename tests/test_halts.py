@@ -175,7 +175,7 @@ def test_turns_without_end_are_ended(tier, every):
 def test_a_frame_that_becomes_long_frees_the_callers_thread():
     """It was short until now, so this thread computes it: 1e10 impacts. After a few passes another does."""
     scene = swarm.Scene([swarm.Sphere(0.5)])
-    with Run(scene, swarm.fill(scene, 10, speed=1.0), swarm.Impact(), 1, None, "always") as run:
+    with Run(scene.compiled(), swarm.fill(scene, 10, speed=1.0), swarm.Impact(), 1, None, "always") as run:
         for _ in range(3):
             assert run.advance(1e-3, 1e-3)
         run._pace = 0.0
@@ -188,7 +188,7 @@ def test_a_frame_in_two_threads_has_the_same_bits():
     scene = swarm.Scene([swarm.Sphere(0.5)], (0.0, 0.0, -9.81))
     start, ends = swarm.fill(scene, 30, speed=1.0, seed=1), set()
     for alone in (0, 1, 3, 10**6):
-        with Run(scene, start.copy(), swarm.Impact(), 1, None, "never") as run:
+        with Run(scene.compiled(), start.copy(), swarm.Impact(), 1, None, "never") as run:
             for moment in (0.5, 1.0, 1.5):
                 run._pace, run._watch._alone[True] = 0.0 if alone else np.inf, alone
                 assert run.advance(0.5, moment)
@@ -201,7 +201,7 @@ def test_a_frame_of_no_time_leaves_nothing_for_the_next():
     scene = swarm.Scene([swarm.Sphere(0.5)])
     start, ends = swarm.fill(scene, LANES + 44, speed=1.0, seed=1), set()
     for alone in (1, 10**6):
-        with Run(scene, start.copy(), swarm.Impact(), 1, None, "never") as run:
+        with Run(scene.compiled(), start.copy(), swarm.Impact(), 1, None, "never") as run:
             run._watch._alone[True] = alone
             assert run.advance(0.0, 0.0)
             assert run.advance(0.5, 0.5)
@@ -304,7 +304,7 @@ def test_what_rests_where_walls_move_has_the_same_bits_after_halts():
     start = swarm.Particles([0.0, 0.0, 0.0], [0.01 * np.pi, 0.0, 0.0])
     ends = []
     for passes in (None, 1, 2):
-        with Run(scene, start.copy(), swarm.Impact(), 1, None, "never") as run:
+        with Run(scene.compiled(), start.copy(), swarm.Impact(), 1, None, "never") as run:
             halts = 0
             run.halt(10**6 if passes is None else passes)
             while not run.advance(10.0, 10.0):

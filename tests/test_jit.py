@@ -18,6 +18,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import TypingError
 
 import swarm
+from swarm.compiled_scene import MOST_WALLS
 from swarm.kernel import arrays, cache
 from swarm.kernel import jit as _jit
 from swarm.kernel.arrays import kept
@@ -26,7 +27,6 @@ from swarm.kernel.gravity import Gravity, accelerated, displacement, potential
 from swarm.kernel.jit import select
 from swarm.kernel.record import Record
 from swarm.kernel.vector import Vec, absolute, cross, dot, largest, moves, norm, square, times, total
-from swarm.scene import MOST_WALLS
 from swarm.surfaces.time_of_impact import flights
 
 PACKAGE = Path(swarm.__file__).parent
@@ -127,7 +127,7 @@ def test_surfaces_are_the_same_compiled(name):
 @pytest.mark.level3
 @compiled_only
 def test_chains_are_the_same_compiled():
-    assert_the_same(every_function_of_a_chain, scene_of("sphere", "plane", "ellipsoid").walls(), *NUMBERS)
+    assert_the_same(every_function_of_a_chain, scene_of("sphere", "plane", "ellipsoid").compiled().walls(), *NUMBERS)
 
 
 @pytest.mark.level3
@@ -365,7 +365,7 @@ def limit_of_a_script():
 def test_the_deepest_fold_of_the_most_walls_compiles(limit_of_a_script, monkeypatch, tmp_path):
     """24 walls nest 1500 frames of the compiler; a script has 1000."""
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
-    walls = swarm.Scene(in_all_directions(MOST_WALLS)).walls()
+    walls = swarm.Scene(in_all_directions(MOST_WALLS)).compiled().walls()
     assert not _jit.kernel(takes_steps)(walls, Vec(0.0, 0.0, 0.0))
 
 

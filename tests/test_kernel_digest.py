@@ -182,7 +182,7 @@ logging.basicConfig(level="INFO", format="%(message)s")
 with cache.kernels_compiled(lambda sentence: None):
     from swarm.run.engine import Run
     start = swarm.Particles((0.1, 0.0, 0.0), (1.0, 0.0, 0.0))
-    run = Run(swarm.Scene([swarm.Sphere(0.5)]), start, swarm.Impact(), 1, None)
+    run = Run(swarm.Scene([swarm.Sphere(0.5)]).compiled(), start, swarm.Impact(), 1, None)
     # The block of this number, and no other kernel.
     observables.observe(*run._observing(np.zeros(1, np.int64)))
     print(float(run.seen()["kinetic_energy"]))

@@ -35,7 +35,7 @@ def observe(law, scene, state, blocks=1):
     partial = np.zeros((-(-n // observables.CHUNK), observables.ROWS))
     size = len(partial) * observables.CHUNK if blocks == 1 else observables.CHUNK
     for k in reversed(range(1 if blocks == 1 else len(partial))):
-        observables.observe(law, scene.walls(), scene.pull(), state, np.array([k]), size, partial)
+        observables.observe(law, scene.compiled().walls(), scene.pull(), state, np.array([k]), size, partial)
     return observables.summary(partial, state, list(range(len(state.impulse))), True)
 
 
@@ -44,7 +44,7 @@ def seen():
     """A scene with every term, its state, and what is seen of it."""
     scene, law = scene_of("sphere", "plane", gravity=(0.5, -1.0, 2.0)), regularisation(30.0, 1.5)
     state = state_of(N, 2)
-    observables.start_energies(scene, law, state)
+    observables.start_energies(scene.compiled(), law, state)
     return scene, law, state, observe(law, scene, state)
 
 
@@ -77,7 +77,7 @@ def test_energy_error_is_that_of_the_worst_particle(seen):
     faster[:, worst] *= 2.0
     after = observe(law, scene, state._replace(velocity=faster))
     m, kinetic = state.mass[worst], 0.5 * state.mass[worst] * (state.velocity[:, worst] ** 2).sum()
-    stored = call(observables.contact_energy, law, scene.walls(), 1.0, state.position[:, worst])
+    stored = call(observables.contact_energy, law, scene.compiled().walls(), 1.0, state.position[:, worst])
     scale = kinetic + stored + m * scene.finite_size() * np.abs(scene.gravity).sum()
     assert after["energy_error"] == pytest.approx(3.0 * kinetic / scale, rel=1e-12)
 
@@ -92,7 +92,7 @@ def test_max_penetration_is_the_largest_distance_outside(seen):
 
 def test_rigid_walls_store_nothing_and_particles_inside_do_not_penetrate():
     scene, state = scene_of("sphere"), state_of(10, 1, reach=0.2)
-    observables.start_energies(scene, None, state)
+    observables.start_energies(scene.compiled(), None, state)
     found = observe(None, scene, state)
     assert found["contact_energy"] == found["potential_energy"] == found["max_penetration"] == 0.0
     assert (state.inverse_scale > 0.0).all()
@@ -137,7 +137,7 @@ def test_drift_is_what_neither_loss_nor_heat_explains():
 def test_at_rest_the_energy_error_has_no_scale():
     scene, state = scene_of("sphere"), state_of(3, 1, reach=0.2)
     state.velocity[:] = 0.0
-    observables.start_energies(scene, None, state)
+    observables.start_energies(scene.compiled(), None, state)
     assert (state.inverse_scale == 0.0).all()
     assert observe(None, scene, state)["energy_error"] == 0.0
 
@@ -153,7 +153,7 @@ def test_penetration_is_the_depth_next_to_the_wall(name):
     surface = numbers_of(name)
     wall = wall_point(surface, np.array([0.3, 0.5, -0.4]))
     normal = np.array(call(surface.unit_normal, wall))
-    walls = swarm.Scene([swarm.Sphere(9.0), *scene_of(name).surfaces]).walls()
+    walls = swarm.Scene([swarm.Sphere(9.0), *scene_of(name).surfaces]).compiled().walls()
     assert call(observables.penetration, walls, wall + 1e-6 * normal) == pytest.approx(1e-6, rel=1e-4)
     assert call(observables.penetration, walls, wall - 1e-6 * normal) == 0.0
 

@@ -135,7 +135,7 @@ def test_what_several_walls_hold_leaves_where_one_of_them_is_open():
     corner = swarm.Box((1.0, 1.0, 1.0), openings=[swarm.Sphere(0.1, center=(1.0, 1.0, -1.0))])
     scene = swarm.Scene([corner], gravity=(0.2, 0.2, -1.0))
     start = thrown([(1.0, 1.0, -1.0), (1.0, 0.5, -1.0)], [(0.0, 0.1, 0.0), (0.0, 0.1, 0.0)])
-    with Run(scene, start, swarm.Impact(), 1, None, "never") as held:
+    with Run(scene.compiled(), start, swarm.Impact(), 1, None, "never") as held:
         held._moment = 3.0
         share = held._shared(1.0, held._drawing())
         share.phase[:] = CAREFUL
@@ -247,7 +247,7 @@ def test_of_closed_walls_at_an_opening_the_first_on_the_way_is_hit(depth, wall):
     ]
     scene, rules = swarm.Scene(walls), SimpleNamespace(size=1.0, laws=SimpleNamespace(moving=None))
     motion = Vec(0.5, 0.0, 0.0), Vec(1.0, 0.0, 0.0)
-    assert absence.hit_wall(scene.openings(), rules, scene.walls(), motion, 0.0, 1e-3) == wall
+    assert absence.hit_wall(scene.compiled().openings(), rules, scene.compiled().walls(), motion, 0.0, 1e-3) == wall
 
 
 def test_a_wall_before_an_opening_covers_it():
@@ -372,7 +372,7 @@ def test_many_openings_of_one_kind_are_as_one_of_many_bodies(times):
 def test_an_opening_of_two_parts_is_compiled_once():
     boxes = [swarm.Box((0.1, 0.1, 0.1), (x, 0.0, 1.0)) for x in (-0.8, -0.6, -0.3, 0.0, 0.3, 0.6)]
     room = swarm.Union([swarm.Box((2.0, 1.0, 1.0)), swarm.Box((1.0, 2.0, 1.0))], openings=boxes)
-    assert [len(opened.volumes) for opened in swarm.Scene([room]).openings()] == [6]
+    assert [len(opened.volumes) for opened in swarm.Scene([room]).compiled().openings()] == [6]
 
 
 def test_what_repeats_has_its_openings_in_every_cell():

@@ -23,7 +23,7 @@ def centers_of(surface, period=CELL):
 
 def test_what_is_within_the_cell_has_no_image():
     assert centers_of(BALL) == [(0.5, 0.5, 0.5)]
-    assert swarm.Scene([BALL], period=CELL).owners() == [0]
+    assert swarm.Scene([BALL], period=CELL).compiled().numbering.surfaces_of_rows == [0]
 
 
 def test_what_reaches_over_faces_is_on_their_other_sides_too():

@@ -63,7 +63,7 @@ def test_every_particle_that_is_not_done_follows_once(n, size):
 @pytest.mark.parametrize(("threads", "block_size"), [(1, None), (2, None), (3, 2 * observables.CHUNK), (2, 10**9)])
 def test_the_start_and_every_frame_are_observed_whole(n, threads, block_size):
     particles = swarm.fill(SPHERE, n, speed=1.0, seed=1)
-    with Run(SPHERE, particles, swarm.Impact(), threads, block_size) as run:
+    with Run(SPHERE.compiled(), particles, swarm.Impact(), threads, block_size) as run:
         run.observe()
         for moment in (0.0, 0.3, 0.6):
             if moment > 0.0:
@@ -77,7 +77,7 @@ def test_the_start_and_every_frame_are_observed_whole(n, threads, block_size):
 def test_a_short_frame_uses_no_thread(monkeypatch):
     """And a long one after it does: what counts is the work in it, by the pace of the last."""
     particles = swarm.fill(SPHERE, 4 * observables.CHUNK, speed=1.0, seed=1)
-    with Run(SPHERE, particles, swarm.Impact(), 2, None) as run:
+    with Run(SPHERE.compiled(), particles, swarm.Impact(), 2, None) as run:
         run.advance(0.1, 0.1)
         monkeypatch.setattr(run, "_pace", 1e-3)
         submitted, submit = [], run._pool.submit
@@ -106,7 +106,7 @@ def along_diameters(n):
 def test_a_run_halts_at_the_pass_requested(threads, halts, share):
     """At the soonest one, each thread by its own count, and that frame only: a pass is a flight to the wall."""
     n = threads * LANES
-    with Run(SPHERE, along_diameters(n), swarm.Impact(), threads, None) as run:
+    with Run(SPHERE.compiled(), along_diameters(n), swarm.Impact(), threads, None) as run:
         for passes in halts:
             run.halt(passes)
         assert not run.advance(4.0, 4.0)
@@ -118,7 +118,7 @@ def test_a_run_halts_at_the_pass_requested(threads, halts, share):
 
 def test_at_its_end_a_run_is_halted_for_good():
     """A share that runs then, or begins, is interrupted immediately; no thread waits for it."""
-    with Run(SPHERE, along_diameters(LANES), swarm.Impact(), 1, None) as run:
+    with Run(SPHERE.compiled(), along_diameters(LANES), swarm.Impact(), 1, None) as run:
         pass
     run.halt(1000)
     status, _particle, left = run._share(10.0)
@@ -128,7 +128,7 @@ def test_at_its_end_a_run_is_halted_for_good():
 
 def test_a_frame_whose_time_is_over_is_halted():
     """It would take a quarter of an hour."""
-    with Run(SPHERE, along_diameters(1), swarm.Impact(), 1, None) as run:
+    with Run(SPHERE.compiled(), along_diameters(1), swarm.Impact(), 1, None) as run:
         assert not run.advance(1e10, 1e10, latest=0.0)
         assert run.state.impacts[0] == 0
         assert run.share_done(1e10) < 1.0
@@ -141,9 +141,9 @@ def test_a_halt_and_a_hard_contact_in_one_frame(threads):
     start = swarm.fill(SPHERE, 600, speed=1.0, seed=6)
     start.position[:, 300], start.velocity[:, 300] = (0.5, 0.0, 0.0), (0.0, 1.0, 0.0)
     method = swarm.Impact(shortest_flight=1e-2)
-    with Run(SPHERE, start.copy(), method, threads, None) as whole:
+    with Run(SPHERE.compiled(), start.copy(), method, threads, None) as whole:
         assert whole.advance(3.0, 3.0)
-    with Run(SPHERE, start.copy(), method, threads, None) as run:
+    with Run(SPHERE.compiled(), start.copy(), method, threads, None) as run:
         assert not run._kinds
         run.halt()
         assert not run.advance(3.0, 3.0)

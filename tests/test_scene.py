@@ -147,7 +147,7 @@ def test_size_by_hand(surfaces, size):
 
 def test_more_walls_than_can_be_compiled_are_refused():
     around = [Plane((math.cos(a), math.sin(a), 0.0), 0.4) for a in np.linspace(0.0, 6.0, 21)]
-    assert len(Scene([Box((0.5, 0.5, 0.5)), *around]).owners()) == 24
+    assert len(Scene([Box((0.5, 0.5, 0.5)), *around]).compiled().numbering.surfaces_of_rows) == 24
     with pytest.raises(SceneError, match=r"at most 24 walls in all, got 45 of 43 surfaces: each wall is compiled"):
         Scene([Box((0.5, 0.5, 0.5)), *around, *around])
 
@@ -155,9 +155,9 @@ def test_more_walls_than_can_be_compiled_are_refused():
 def test_any_number_of_solids_of_one_kind_are_a_scene():
     balls = [Sphere(0.01, (x, y, 0.0), side="outside") for x in (-0.2, 0.0, 0.2) for y in np.linspace(-0.3, 0.3, 9)]
     scene = Scene([Box((0.5, 0.5, 0.5)), *balls])
-    assert len(scene.owners()) == 30
+    assert len(scene.compiled().numbering.surfaces_of_rows) == 30
     with pytest.raises(SceneError, match=r"at most 24 walls in all with Verlet, got 30 of 28 surfaces"):
-        scene.ungrouped("Verlet")
+        scene.compiled(apart="Verlet")
 
 
 # --- Laws of walls ---------------------------------------------------------------------------------------
@@ -165,26 +165,26 @@ def test_any_number_of_solids_of_one_kind_are_a_scene():
 
 def by_surface(scene, given):
     """What is given of each wall with the surface of each, in the order of the surfaces."""
-    return sorted(zip(scene.owners(), given, strict=True))
+    return sorted(zip(scene.compiled().numbering.surfaces_of_rows, given, strict=True))
 
 
 def test_a_scene_without_a_law_has_none():
-    assert Scene([Box((1, 1, 1)), BALL]).laws() is None
-    assert Scene([Sphere(1.0, restitution=1, friction=0, accommodation=1)]).laws() is None
+    assert Scene([Box((1, 1, 1)), BALL]).compiled().laws is None
+    assert Scene([Sphere(1.0, restitution=1, friction=0, accommodation=1)]).compiled().laws is None
 
 
 def test_every_wall_has_the_laws_of_its_surface():
     """A box has three walls; what no surface has is None, and is compiled to nothing."""
     box = {"half_widths": (1.0, 1.0, 1.0)}
     lossy = Scene([Sphere(0.5, side="outside"), Box(**box, restitution=0.5)])
-    assert by_surface(lossy, lossy.laws().restitution) == [(0, 1.0), *3 * [(1, 0.5)]]
-    assert lossy.laws()[1:] == (None, None, None, None, None)
+    assert by_surface(lossy, lossy.compiled().laws.restitution) == [(0, 1.0), *3 * [(1, 0.5)]]
+    assert lossy.compiled().laws[1:] == (None, None, None, None, None)
     rough = Scene([Box(**box, friction=0.3), Sphere(0.5, side="outside", friction=0.1)])
-    assert by_surface(rough, rough.laws().friction) == [*3 * [(0, 0.3)], (1, 0.1)]
-    assert (rough.laws().restitution, rough.laws().thermal) == (None, None)
+    assert by_surface(rough, rough.compiled().laws.friction) == [*3 * [(0, 0.3)], (1, 0.1)]
+    assert (rough.compiled().laws.restitution, rough.compiled().laws.thermal) == (None, None)
     hot = Scene([Plane((0, 0, 1), 1.0), Box(**box, temperature=300.0, accommodation=0.25), Sphere(9.0, temperature=0)])
-    assert hot.laws()[:2] == (None, None)
-    assert by_surface(hot, hot.laws().thermal) == [(0, (0.0, 0.0)), *3 * [(1, (300.0, 0.25))], (2, (0.0, 1.0))]
+    assert hot.compiled().laws[:2] == (None, None)
+    assert by_surface(hot, hot.compiled().laws.thermal) == [(0, (0.0, 0.0)), *3 * [(1, (300.0, 0.25))], (2, (0.0, 1.0))]
 
 
 # --- Far corners -----------------------------------------------------------------------------------------

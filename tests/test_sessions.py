@@ -255,7 +255,7 @@ def test_rows_of_walls_in_another_order_are_refused(tmp_path, monkeypatch):
         stopped_at(path, 2, scene=scene())
     saved = paths.checkpoint_of(path)
     files = path.read_bytes(), saved.read_bytes()
-    assert scene().owners() == [1, 0]
+    assert scene().compiled().numbering.surfaces_of_rows == [1, 0]
     with pytest.raises(swarm.SceneError, match=r"another order of walls: its rows are of surfaces 0, 1, got 1, 0; st"):
         run(path, scene=scene(), resume=True)
     job, arrays = checkpoint.read(saved)

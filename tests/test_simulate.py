@@ -341,7 +341,7 @@ def test_a_contact_that_lasts_loads_its_kernels_and_changes_no_bit(threads):
 def test_a_frame_that_begins_at_the_wall_needs_no_slow_path():
     """A flight that a frame cuts short does not graze: a cavity without grazing never needs the slow-path kernel."""
     wall = swarm.Particles((0.5 - 1e-9, 0.0, 0.0), (1.0, 0.2, 0.0))
-    with Run(SPHERE, wall, swarm.Impact(), 1, None) as one:
+    with Run(SPHERE.compiled(), wall, swarm.Impact(), 1, None) as one:
         one.advance(3.0, 3.0)
         assert one.state.impacts[0] >= 3
         assert one._hard is None

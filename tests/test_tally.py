@@ -76,8 +76,8 @@ def test_halts_and_sessions_lose_and_repeat_none(tmp_path):
     start, halts = swarm.fill(scene, 30, speed=1.0, seed=1), 0
 
     def begun():
-        tally = Tally(scene.members(), Units(2.0**-10))
-        return Run(scene, start.copy(), METHOD, 1, None, "never", Seeding(), Watched(None, tally)), tally
+        tally = Tally(scene.compiled().numbering.members, Units(2.0**-10))
+        return Run(scene.compiled(), start.copy(), METHOD, 1, None, "never", Seeding(), Watched(None, tally)), tally
 
     one, tally = begun()
     for moment in (1.0, 2.0):
@@ -95,7 +95,7 @@ def test_halts_and_sessions_lose_and_repeat_none(tmp_path):
     one.__exit__()
     assert halts > 3
     for counts, others in zip(
-        whole.member_impacts, scene.split_by_members(tally.seen()["member_impacts"]), strict=True
+        whole.member_impacts, scene.compiled().numbering.split(tally.seen()["member_impacts"]), strict=True
     ):
         assert counts.tolist() == others.tolist()
 

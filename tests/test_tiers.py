@@ -41,11 +41,11 @@ def end_of(run, span):
 def assert_same_bits(monkeypatch, scene, method):
     """In plain Python, compiled, and wherever a run changes from one to the other: after one pass, or after seven."""
     start, span = start_in(scene), method.span("until", 2.0)
-    plain = end_of(Run(scene, start.copy(), method, 1, None, "never"), span)
-    assert end_of(Run(scene, start.copy(), method, 1, None, "always"), span) == plain
+    plain = end_of(Run(scene.compiled(), start.copy(), method, 1, None, "never"), span)
+    assert end_of(Run(scene.compiled(), start.copy(), method, 1, None, "always"), span) == plain
     monkeypatch.setattr(cache, "is_compiled", lambda *call: False)
     for passes in (1, 7):
-        run = Run(scene, start.copy(), method, 1, None, "auto")
+        run = Run(scene.compiled(), start.copy(), method, 1, None, "auto")
         run.halt(passes)
         if not run.advance(span, 1.0):
             run._tier.remaining = 0.0
@@ -89,7 +89,7 @@ def test_what_is_not_done_in_time_goes_on_compiled(monkeypatch):
 )
 def test_the_tier_at_the_start(monkeypatch, compile, found, plain):
     monkeypatch.setattr(cache, "is_compiled", lambda *call: found)
-    run = Run(SPHERE, swarm.fill(SPHERE, 20, speed=1.0), swarm.Impact(), 2, None, compile)
+    run = Run(SPHERE.compiled(), swarm.fill(SPHERE, 20, speed=1.0), swarm.Impact(), 2, None, compile)
     assert run._tier.is_plain == plain
 
 
@@ -98,7 +98,8 @@ def test_bodies_are_compiled_at_once_and_have_lanes_there_alone():
     """With one lane they took four times as long."""
     bodies = swarm.place(SPHERE, swarm.dumbbell(0.2, 1.0), 40, speed=1.0, seed=1)
     task = task_of(SPHERE, bodies, swarm.Impact(dt=0.01), RunOptions(until=1.0))
-    runs = [BodyRun(SPHERE, (bodies, task.particles), task.method, 1, None, choice) for choice in ("auto", "never")]
+    given = task.compiled, (bodies, task.particles), task.method
+    runs = [BodyRun(*given, 1, None, choice) for choice in ("auto", "never")]
     assert [run._tier.is_plain for run in runs] == [False, True]
     assert runs[0]._rule.lanes > runs[1]._rule.lanes == 1
 
@@ -140,7 +141,7 @@ def slope(p, x, y, z):
 def test_functions_of_a_library_are_called_in_one_tier_only(surface, method, same):
     """Their last bit may differ, and the result must not depend on the time at which a run changes its tier."""
     scene = swarm.Scene([surface()])
-    assert tiers._same_bits((method.numbers(scene), method.law(), scene.walls())) == same
+    assert tiers._same_bits((method.numbers(scene), method.law(), scene.compiled().walls())) == same
 
 
 FOUND = """
@@ -242,10 +243,10 @@ def test_the_second_run_is_compiled_from_the_start(monkeypatch):
     """By the time that `Run` books: here any time is enough."""
     monkeypatch.setattr(tiers, "_PATIENCE", 1e-9)
     start = swarm.fill(SPHERE, 3, speed=1.0, seed=1)
-    with Run(SPHERE, start.copy(), swarm.Impact(), 1, None, "auto") as run:
+    with Run(SPHERE.compiled(), start.copy(), swarm.Impact(), 1, None, "auto") as run:
         assert run._tier.is_plain
         run.observe()
-    assert not Run(SPHERE, start.copy(), swarm.Impact(), 1, None, "auto")._tier.is_plain
+    assert not Run(SPHERE.compiled(), start.copy(), swarm.Impact(), 1, None, "auto")._tier.is_plain
 
 
 @compiled_only
@@ -253,7 +254,7 @@ def test_the_second_run_is_compiled_from_the_start(monkeypatch):
 def test_runs_of_other_sizes_are_of_the_same_kind():
     def missing(radius, method):
         scene = swarm.Scene([swarm.Sphere(radius)])
-        return set(Run(scene, swarm.Particles((0, 0, 0), (1, 0, 0)), method, 1, None, "auto")._tier._missing)
+        return set(Run(scene.compiled(), swarm.Particles((0, 0, 0), (1, 0, 0)), method, 1, None, "auto")._tier._missing)
 
     first = missing(0.5, swarm.Impact())
     assert len(first) == 2

@@ -57,9 +57,9 @@ def test_filled_ones_too(name):
 def test_the_frame_that_is_named_is_one_that_runs(caplog):
     scene, particles = swarm.Scene(DEGENERATE["slab"][0]), moving(0.1, 0.0, 0.0)
     with pytest.raises(swarm.SceneError) as caught:
-        workload.require_few_impacts(scene, particles, swarm.Impact(), 1.0, 1.0)
+        workload.require_few_impacts(scene.compiled(), particles, swarm.Impact(), 1.0, 1.0)
     every = float(str(caught.value).split("every at most ")[1].split(" s")[0])
-    workload.require_few_impacts(scene, particles, swarm.Impact(), 1.0, 0.99 * every)
+    workload.require_few_impacts(scene.compiled(), particles, swarm.Impact(), 1.0, 0.99 * every)
 
 
 SOFT = [
@@ -75,7 +75,7 @@ SOFT = [
 def test_fixed_steps_cost_what_they_cost(method):
     """Their work is in their steps, however many walls are in each."""
     surfaces, place = DEGENERATE["slab"]
-    workload.require_few_impacts(swarm.Scene(surfaces), moving(*place), method, 1.0, 1.0)
+    workload.require_few_impacts(swarm.Scene(surfaces).compiled(), moving(*place), method, 1.0, 1.0)
 
 
 WEDGE = [
@@ -110,14 +110,14 @@ HONEST = {
 def test_honest_runs_are_not_refused(name, caplog):
     surfaces, gravity, particles, until = HONEST[name]
     with caplog.at_level(logging.WARNING, "swarm"):
-        workload.require_few_impacts(swarm.Scene(surfaces, gravity), particles, swarm.Impact(), until, until)
+        workload.require_few_impacts(swarm.Scene(surfaces, gravity).compiled(), particles, swarm.Impact(), until, until)
     assert not caplog.records
 
 
 @pytest.mark.parametrize("law", [{"restitution": 0.5}, {"friction": 0.5}, {"temperature": 300.0}], ids=str)
 def test_what_loses_or_gets_energy_is_not_judged_by_its_start(law):
     scene = swarm.Scene([swarm.Slab((0.0, 0.0, 1.0), THIN, **law), BOX])
-    workload.require_few_impacts(scene, moving(0.0, 0.0, 0.0), swarm.Impact(), 1.0, 1.0)
+    workload.require_few_impacts(scene.compiled(), moving(0.0, 0.0, 0.0), swarm.Impact(), 1.0, 1.0)
 
 
 def test_a_long_run_is_counted(caplog):
@@ -125,7 +125,7 @@ def test_a_long_run_is_counted(caplog):
     scene = swarm.Scene([swarm.Sphere(0.5)])
     particles = swarm.fill(scene, 1_000_000, speed=1.0)
     with caplog.at_level(logging.WARNING, "swarm"):
-        workload.require_few_impacts(scene, particles, swarm.Impact(), 1e8, 1e3)
+        workload.require_few_impacts(scene.compiled(), particles, swarm.Impact(), 1e8, 1e3)
     (record,) = caplog.records
     assert "impacts" in record.getMessage()
     count = float(record.getMessage().split("about ")[1].split()[0])
@@ -136,5 +136,5 @@ def test_a_long_run_is_counted(caplog):
 def test_a_box_is_counted_by_its_mean_chord():
     """A walk through the volume sees what the flights of its particles see: 4 V/S, within a factor."""
     with np.errstate(all="ignore"):
-        found = workload._of_volume(swarm.Scene([BOX]), moving(0.1, 0.2, 0.3), 0.0)
+        found = workload._of_volume(swarm.Scene([BOX]).compiled(), moving(0.1, 0.2, 0.3), 0.0)
     assert 0.5 < found.between / (4.0 * 1.0 / 6.0) < 2.0

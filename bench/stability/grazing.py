@@ -38,7 +38,7 @@ def cell(angle: float, shortest: float, count: int) -> Cell:
     """Wall time and errors of one angle and one shortest flight, a part of the crossing time."""
     particles, crossing = launch(angle, count), RADIUS / SPEED
     method, until = swarm.Impact(shortest_flight=shortest * crossing), CROSSINGS * crossing
-    with Run(SCENE, particles.copy(), method, 1, None, tier()) as run:
+    with Run(SCENE.compiled(), particles.copy(), method, 1, None, tier()) as run:
         run.advance(0.0, 0.0)
         before = time.perf_counter()
         run.advance(until, until)

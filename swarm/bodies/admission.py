@@ -42,8 +42,7 @@ def task_of(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -
     Raises:
         SceneError: the arguments do not go together.
     """
-    if not isinstance(method, Impact):
-        scene = scene.ungrouped("bodies and soft walls")
+    compiled = scene.compiled(apart=None if isinstance(method, Impact) else "bodies and soft walls")
     bodies = bodies.copy()
     _require_steps(scene, bodies, method, options)
     for point, motion in bodies.body.anchors.items():
@@ -61,7 +60,7 @@ def task_of(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -
     points = bodies.particles()
     if options.keeps_float32():
         require_near(scene, points)
-    return Task(scene, points, method, options, bodies)
+    return Task(compiled, points, method, options, bodies)
 
 
 def _require_steps(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> None:

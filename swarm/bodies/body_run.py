@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..common.status import Status
+from ..compiled_scene import CompiledScene
 from ..errors import RunError
 from ..kernel.limits import SOLVED_PLACE
 from ..methods.base import Method
@@ -42,20 +43,23 @@ class BodyRun(BaseRun):
     """The run of copies of a body; with them come all their points, whose arrays become a part of its state."""
 
     def __init__(
-        self, scene: Scene, copies: tuple[Bodies, Particles], method: Method, threads: int,
+        self, compiled: CompiledScene, copies: tuple[Bodies, Particles], method: Method, threads: int,
         block_size: int | None = None, compile: str = "always", seeding: Seeding = UNSEEDED,
         watched: Watched = UNWATCHED,
     ) -> None:  # fmt: skip
-        bodies, particles = copies
+        scene, (bodies, particles) = compiled.scene, copies
         law, looped, soft = method.law(), method.has_multipliers(), walls_of(method)
         n, points, own = len(bodies), len(bodies.body), own_surfaces(bodies.body)
         self._body = bodies.body
         self._ties = ties_of(bodies.body, law.alpha if looped else None)
-        self._touching = touching_of(bodies.body, self._ties, scene)
-        self._carried = [Scene([surface]) for surface, _carrier, _point in bodies.body.cavities]
-        self._walls = scene.walls(own=()), scene.walls(own=own)
-        self._energies = BodyEnergies(scene, self._carried, bodies.body, self._ties, law)
-        rows, walls = len(self._ties.ends) + len(bodies.body.guides), len(scene.owners()) + len(own)
+        self._touching = touching_of(bodies.body, self._ties, compiled)
+        self._carried = [Scene([surface]).compiled() for surface, _carrier, _point in bodies.body.cavities]
+        self._walls = compiled.walls_of_bodies(()), compiled.walls_of_bodies(own)
+        self._energies = BodyEnergies(compiled, self._carried, bodies.body, self._ties, law)
+        rows, walls = (
+            len(self._ties.ends) + len(bodies.body.guides),
+            len(compiled.numbering.surfaces_of_rows) + len(own),
+        )
         self._bodies = _state_of(bodies, particles, rows, walls)
         none = np.zeros(0)
         # What files take of a run.
@@ -74,7 +78,7 @@ class BodyRun(BaseRun):
         # In plain Python a step takes some milliseconds: it never pays.
         tier = Tier("always" if compile == "auto" else compile, self._walls, n * points)
         pool = threads_with(threads, lanes * per_lane + at_once)
-        super().__init__(scene, method, n, threads, tier, seeding, watched, pool)
+        super().__init__(compiled, method, n, threads, tier, seeding, watched, pool)
         self._size = drawn
         size, gravity = scene.finite_size(), np.array(scene.gravity or (0.0, 0.0, 0.0))
         room = SOLVED_PLACE * max(size, scene.extent())
@@ -166,8 +170,8 @@ class BodyRun(BaseRun):
     def _out_of_own(self) -> Iterator[Floats]:
         """The distance of points outside of the cavities that others carry."""
         r = self._bodies.position
-        for scene, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
-            yield scene.distances_outside(r[:, point] - r[:, carrier])
+        for cavity, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
+            yield cavity.scene.distances_outside(r[:, point] - r[:, carrier])
 
     def observe(self) -> None:
         self._observe(0.0)

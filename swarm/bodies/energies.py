@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from ..compiled_scene import CompiledScene
 from ..contact.energy import contact_energy
 from ..kernel.vector import column
-from ..scene import Scene
 from ..state import Floats
 from .body import Body
 from .lanes.body_arrays import Ties
@@ -18,15 +18,17 @@ class BodyEnergies:
     """Energies from positions and velocities of n copies (3, P, n), each (n,) [J].
 
     Args:
-        scene: the walls.
+        compiled: the walls.
         carried: a scene for each cavity of the body.
         body, ties: the body.
         law: what walls that are springs push with; None of rigid ones.
     """
 
-    def __init__(self, scene: Scene, carried: Sequence[Scene], body: Body, ties: Ties, law: Any) -> None:
-        self._scene, self._carried, self._body, self._ties, self._law = scene, carried, body, ties, law
-        self._gravity = np.array(scene.gravity or (0.0, 0.0, 0.0))
+    def __init__(
+        self, compiled: CompiledScene, carried: Sequence[CompiledScene], body: Body, ties: Ties, law: Any
+    ) -> None:
+        self._compiled, self._carried, self._body, self._ties, self._law = compiled, carried, body, ties, law
+        self._gravity = np.array(compiled.scene.gravity or (0.0, 0.0, 0.0))
 
     def kinetic(self, v: Floats) -> Floats:
         """Of all points."""
@@ -56,12 +58,12 @@ class BodyEnergies:
     def _in_walls(self, r: Floats) -> Floats:
         total = np.zeros(r.shape[2])
         if self._law is not None:
-            places = [(self._scene, self.contact_points(r))]
-            for scene, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
-                places.append((scene, (r[:, point] - r[:, carrier])[:, None, :]))
-            for scene, points in places:
-                walls, flat = scene.walls(), points.reshape(3, -1)
-                for k in np.flatnonzero((scene.gaps(flat) > 0.0).any(axis=0)) if flat.size else ():
+            places = [(self._compiled, self.contact_points(r))]
+            for compiled, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
+                places.append((compiled, (r[:, point] - r[:, carrier])[:, None, :]))
+            for compiled, points in places:
+                walls, flat = compiled.walls(), points.reshape(3, -1)
+                for k in np.flatnonzero((compiled.scene.gaps(flat) > 0.0).any(axis=0)) if flat.size else ():
                     total[k % total.size] += contact_energy(self._law, walls, 1.0, column(flat, 0, k))
         return total
 

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
+from ..compiled_scene import CompiledScene
 from ..methods import AugmentedLagrangian
 from ..methods.base import Method
-from ..scene import Scene
 from ..state import Floats
 from ..surfaces.surface import Surface
 from .body import Body
@@ -95,16 +95,16 @@ def own_surfaces(body: Body) -> list[Surface]:
     return [surface for _point, surface in body.guides] + [surface for surface, _carrier, _point in body.cavities]
 
 
-def touching_of(body: Body, ties: Ties, scene: Scene) -> Touching:
+def touching_of(body: Body, ties: Ties, compiled: CompiledScene) -> Touching:
     """Its points that may touch the walls of a scene, or those of its own guides and cavities."""
     b = _combinations(body)
     single = ((b != 0.0).sum(axis=1) == 1) & (b.max(axis=1, initial=0.0) == 1.0)
     plain = np.where(single, b.argmax(axis=1), -1).astype(np.int64)
-    counts = scene.walls_of_rows()
-    surfaces = [scene.surfaces[i] for i in np.repeat(scene.owners(), counts)] + own_surfaces(body)
+    of_walls = compiled.numbering.members[0]
+    surfaces = [compiled.scene.surfaces[i] for i in of_walls] + own_surfaces(body)
     restitution = np.array([surface.restitution for surface in surfaces])
     friction = np.array([surface.friction for surface in surfaces])
     return Touching(
-        b, plain, b @ ties.inverse_mass, len(body.contacts), int(counts.sum()), len(body.guides),
+        b, plain, b @ ties.inverse_mass, len(body.contacts), len(of_walls), len(body.guides),
         restitution, friction, bool(((restitution < 1.0) | (friction > 0.0)).any()),
     )  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
+from ..compiled_scene import CompiledScene
 from ..contact.wall_impact import RandomSource
 from ..kernel.arrays import aligned_copy
 from ..methods.base import Method
@@ -21,7 +22,6 @@ from ..run.preflight.counting import counters_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
-from ..scene import Scene
 from ..state import Balls, State
 from .colliding import events
 from .colliding.bounce import Gates
@@ -38,17 +38,17 @@ class CollidingRun(BaseRun):
     """The run of balls that meet one another and walls at instants; the arrays of the particles become its state."""
 
     def __init__(
-        self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None, compile: str,
-        seeding: Seeding, watched: Watched,
+        self, compiled: CompiledScene, particles: Particles, method: Method, threads: int, block_size: int | None,
+        compile: str, seeding: Seeding, watched: Watched,
     ) -> None:  # fmt: skip
         assert particles.radius is not None
-        self._of, n, rows = scene, len(particles), len(scene.owners())
+        scene, n, rows = compiled.scene, len(particles), len(compiled.numbering.surfaces_of_rows)
         self._radius = float(particles.radius.max())
-        box, self._flock = described(scene, particles)
+        box, self._flock = described(compiled, particles)
         self._clock = np.zeros(CLOCK)
         self._clock[[LENGTH, REACH]] = epoch_of(scene, particles, box.grid), reach_of(box.grid)
-        self._windows = windows_of(scene, self._clock)
-        laws, openings = box.laws, scene.openings()
+        self._windows = windows_of(compiled, self._clock)
+        laws, openings = box.laws, compiled.openings()
         loses = laws.may_dissipate or laws.loses or box.loss is not None
         balls = Balls(particles.radius, np.zeros(n, np.int64), np.zeros(1))
         # The energy of each ball is not kept. An array of zeros that is never written takes one page of memory.
@@ -58,7 +58,7 @@ class CollidingRun(BaseRun):
             particles.position, particles.velocity, particles.mass, *2 * (unused,),
             np.zeros(n, np.int64), np.zeros((2 * rows if scene.moves() else rows, 1)), np.zeros(n if loses else 0),
             None, None, np.zeros((rows, 1)) if laws.give_heat else None,
-            image=particles.image, period=scene.cell(), balls=balls,
+            image=particles.image, period=compiled.cell(), balls=balls,
             escape_time=None if openings is None else np.full(n, math.nan), openings=openings,
             absorbed_time=np.full(n, math.nan) if laws.may_end else None,
             absorbed_wall=np.full(n, -1, np.int32) if laws.may_end else None,
@@ -66,11 +66,11 @@ class CollidingRun(BaseRun):
         state, self._balls, gates = self.state, balls, None
         if openings is not None or laws.may_end:
             gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
-        self._box = self._with_heavy(box)._replace(
+        self._box = self._with_heavy(compiled, box)._replace(
             window=None if self._windows is None else self._windows.numbers,
             gates=gates, source=RandomSource(seeding.signed(), seeding.first) if laws.send_off else None,
         )  # fmt: skip
-        super().__init__(scene, method, n, threads, Tier(compile, self._box, n), seeding, watched)
+        super().__init__(compiled, method, n, threads, Tier(compile, self._box, n), seeding, watched)
         counters = counters_of(scene, watched.counters, logs=True)
         self.state = state = with_counters(state, counters, watched.counters, scene)
         self._box = self._box._replace(watchers=self._watchers(counters))
@@ -86,7 +86,7 @@ class CollidingRun(BaseRun):
         self._walls = self._walls_seen(0.0)
         self._choose_tier()
 
-    def _with_heavy(self, box: Any) -> Any:
+    def _with_heavy(self, compiled: CompiledScene, box: Any) -> Any:
         """What the balls are in, with walls that have a mass."""
         return box
 
@@ -202,7 +202,7 @@ class CollidingRun(BaseRun):
 
     def _walls_seen(self, moment: float) -> Any:
         """The walls at a frame."""
-        return self._box.walls if self._windows is None else self._scene.walls(moment)
+        return self._box.walls if self._windows is None else self._compiled.walls(moment)
 
     def _begin(self) -> None:
         if self._windows is not None:

@@ -30,7 +30,9 @@ class GrowingRun(CollidingRun):
     """A part of the growth of balls whose radii are those of the end."""
 
     def __init__(self, scene: Scene, particles: Particles, growth: Growth, seeding: Seeding) -> None:
-        super().__init__(scene.of_balls(particles.radius), particles, Impact(), 1, None, "auto", seeding, Watched())
+        assert particles.radius is not None
+        compiled = scene.compiled(float(particles.radius.max()))
+        super().__init__(compiled, particles, Impact(), 1, None, "auto", seeding, Watched())
         self._box = self._box._replace(growth=growth)
         # One epoch: a scale counts from its start.
         self._clock[LENGTH] = _FOREVER

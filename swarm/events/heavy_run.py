@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from ..compiled_scene import CompiledScene
 from ..kernel.vector import ZERO
 from ..run.base import Arrays, named
 from ..run.observed import Observed
@@ -19,11 +20,11 @@ class HeavyRun(CollidingRun):
     _freedoms: Freedoms
     _observed: Observed
 
-    def _with_heavy(self, box: Any) -> Any:
-        state, scene = self.state, self._of
+    def _with_heavy(self, compiled: CompiledScene, box: Any) -> Any:
+        state = self.state
         n = state.mass.size
-        self._freedoms = freedoms_of(scene, state.velocity)
-        scenery = scenery_of(scene, 0.0)
+        self._freedoms = freedoms_of(compiled, state.velocity)
+        scenery = scenery_of(compiled, 0.0)
         ways = tuple({wall.freedom.row: wall.freedom for wall in scenery.reacting}.values())
         self._heavy = Heavy(
             scenery.reacting, ways, self._freedoms, self._clock, np.zeros(COUNTS), np.zeros(n, bool), np.zeros(n, bool),
@@ -40,12 +41,12 @@ class HeavyRun(CollidingRun):
     def _walls_seen(self, moment: float) -> Any:
         """The walls are brought to the moment in a copy: a frame is no part of their motion."""
         freedoms, since = Freedoms(*(array.copy() for array in self._freedoms)), self._since(moment)
-        scenery = scenery_of(self._of, moment)
+        scenery = scenery_of(self._compiled, moment)
         for wall in scenery.reacting:
             wall.freedom.push(freedoms, since, ZERO, ZERO)
         freedoms.time.fill(0.0)
-        self._observed = observed(self._of, freedoms, moment)
-        return walls_now(self._of, scenery, freedoms)
+        self._observed = observed(self._scene, freedoms, moment)
+        return walls_now(self._compiled, scenery, freedoms)
 
     def _scale_of(self, seen: dict[str, Any]) -> float:
         return super()._scale_of(seen) + float(self._observed.kinetic.sum())

@@ -7,6 +7,7 @@ import numpy as np
 
 from .. import observables
 from ..common.status import Status
+from ..compiled_scene import CompiledScene
 from ..contact.wall_impact import RandomSource
 from ..kernel.gravity import potential
 from ..kernel.heap import Heap
@@ -21,7 +22,6 @@ from ..run.preflight.counting import counters_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
-from ..scene import Scene
 from ..state import State
 from .reacting import queue as events
 from .reacting.described import freedoms_of, observed, scenery_of, walls_now
@@ -40,22 +40,22 @@ class ReactingRun(BaseRun):
     _observed: Observed
 
     def __init__(
-        self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
+        self, compiled: CompiledScene, particles: Particles, method: Method, threads: int, block_size: int | None,
         compile: str, seeding: Seeding, watched: Watched,
     ) -> None:  # fmt: skip
-        n, walls, gravity = len(particles), len(scene.owners()), scene.pull()
+        n, walls, gravity = len(particles), len(compiled.numbering.surfaces_of_rows), compiled.scene.pull()
         energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(gravity, vec(particles.position))
         self._source = RandomSource(seeding.signed(), seeding.first)
-        self._scenery = self._scenery_of(scene, 0.0)
+        self._scenery = self._scenery_of(compiled, 0.0)
         heat = np.zeros((walls, n)) if self._scenery.laws.give_heat else None
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.asarray(energy) + np.zeros(n), np.zeros(n),
             np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None, heat,
         )  # fmt: skip
         tier = Tier(compile, (self._scenery, gravity), n)
-        super().__init__(scene, method, n, threads, tier, seeding, watched)
-        counters = counters_of(scene, watched.counters, logs=True)
-        self.state = state = with_counters(self.state, counters, watched.counters, scene)
+        super().__init__(compiled, method, n, threads, tier, seeding, watched)
+        counters = counters_of(self._scene, watched.counters, logs=True)
+        self.state = state = with_counters(self.state, counters, watched.counters, self._scene)
         number = np.arange(n)
         self._queue = Queue(
             state.position, state.velocity, state.mass, state.energy, state.impulse, state.dissipated, state.impacts,
@@ -63,18 +63,18 @@ class ReactingRun(BaseRun):
             np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
             Heap(np.zeros(n), number.copy(), number.copy()), state.heat, state.crossed, self._watchers(counters),
         )  # fmt: skip
-        self._freedoms = freedoms_of(scene, particles.velocity)
+        self._freedoms = freedoms_of(compiled, particles.velocity)
         self._clock = np.zeros(CLOCK)
         self._show(0.0)
         self._choose_tier()
 
-    def _scenery_of(self, scene: Scene, moment: float) -> SceneWalls:
+    def _scenery_of(self, compiled: CompiledScene, moment: float) -> SceneWalls:
         """The walls in the frame that ends at a moment [s], with random numbers where they send particles off."""
-        found = scenery_of(scene, moment)
+        found = scenery_of(compiled, moment)
         return found._replace(source=self._source) if found.laws.send_off else found
 
     def _prepare(self, span: float, moment: float) -> None:
-        self._scenery = self._scenery_of(self._scene, moment)
+        self._scenery = self._scenery_of(self._compiled, moment)
         if not self._cut_short:
             self._clock[NOW] = 0.0
             self._clock[TAKEN] = _ALL_AHEAD
@@ -168,7 +168,7 @@ class ReactingRun(BaseRun):
 
     def _show(self, moment: float) -> None:
         self._observed = observed(self._scene, self._freedoms, moment)
-        self._walls = walls_now(self._scene, self._scenery, self._freedoms)
+        self._walls = walls_now(self._compiled, self._scenery, self._freedoms)
 
     def _scale_of(self, seen: dict[str, Any]) -> float:
         return float(seen["kinetic_energy"] + self._observed.kinetic.sum() + abs(seen["potential_energy"]))

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ..scene import Scene
+from ..compiled_scene import CompiledScene
 from ..state import Floats
 from .colliding.clock import EPOCHS, LENGTH
 from .colliding.window import END, MOMENT, PASSED, WINDOW
@@ -18,9 +18,9 @@ class Windows:
         numbers: of the window, as kernels take them.
     """
 
-    def __init__(self, scene: Scene, clock: Floats) -> None:
-        self._scene, self._clock = scene, clock
-        self._instants = scene.instants
+    def __init__(self, compiled: CompiledScene, clock: Floats) -> None:
+        self._compiled, self._clock = compiled, clock
+        self._instants = compiled.scene.instants
         self.numbers = np.zeros(WINDOW)
 
     def is_at_epoch(self) -> bool:
@@ -46,16 +46,18 @@ class Windows:
     def walls(self) -> Any:
         """The walls as kernels take them in this window."""
         moment = float(self.numbers[MOMENT])
-        return scenery_of(self._scene, moment).given if self._scene.reacts() else self._scene.walls(moment)
+        compiled = self._compiled
+        return scenery_of(compiled, moment).given if compiled.scene.reacts() else compiled.walls(moment)
 
     def openings(self) -> Any:
         """The openings in it."""
-        return self._scene.openings(float(self.numbers[MOMENT]))
+        return self._compiled.openings(float(self.numbers[MOMENT]))
 
 
-def windows_of(scene: Scene, clock: Floats) -> Windows | None:
+def windows_of(compiled: CompiledScene, clock: Floats) -> Windows | None:
     """The windows of a scene, None where its walls are always the same."""
+    scene = compiled.scene
     moves = scene.moves()
     if scene.reacts():
         moves = any(surface.motion is not None for surface in scene.surfaces if not surface.reacts())
-    return Windows(scene, clock) if moves or scene.has_doors() else None
+    return Windows(compiled, clock) if moves or scene.has_doors() else None

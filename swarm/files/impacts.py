@@ -16,8 +16,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled_scene import CompiledScene
 from ..methods import Method
-from ..scene import Scene
 from . import checksums
 from .appended import AppendedFile, put
 from .layout import ARRAYS
@@ -33,11 +33,15 @@ _SOME = 1 << 12
 Rows = dict[str, NDArray[Any]]
 
 
-def about(scene: Scene, method: Method, kept: str, identity: dict[str, Any]) -> dict[str, Any]:
+def about(compiled: CompiledScene, method: Method, kept: str, identity: dict[str, Any]) -> dict[str, Any]:
     """The description of a run in its log: group/name -> text, number or array."""
-    surface, member = scene.members()
+    surface, member = compiled.numbering.members
     arrays: dict[str, Any] = {}
-    texts = {name: text for name, text in descriptions(scene, method, Storage(), arrays).items() if name != "storage"}
+    texts = {
+        name: text
+        for name, text in descriptions(compiled.scene, method, Storage(), arrays).items()
+        if name != "storage"
+    }
     return {
         **{f"parameters/{name}": value for name, value in {**texts, "kept": kept, **identity}.items()},
         **{f"parameters/{ARRAYS}/{name}": values for name, values in arrays.items()},

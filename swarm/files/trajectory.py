@@ -155,7 +155,9 @@ class Trajectory(Stored):
         with self._reading("its members") as file:
             names = [name for name in file.get("observables", {}) if name.startswith("member_")]
             seen = {name: self._checked.row(f"observables/{name}/value", k) for name in names}
-        return {name.removeprefix("member_"): self.scene.split_by_members(values) for name, values in seen.items()}
+        return {
+            name.removeprefix("member_"): self.scene.compiled().numbering.split(values) for name, values in seen.items()
+        }
 
     def observed(self) -> dict[str, NDArray[Any]]:
         """The observables, checked to include those of every run."""

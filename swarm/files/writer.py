@@ -144,10 +144,11 @@ class TrajectoryWriter(AppendedFile):
         if self._bodies is not None:
             bonds = file.create_dataset("connectivity/bonds", data=self._bodies.bonds())
             bonds.attrs["particles_group"] = everything.ref
+        laws = self._scene.compiled().laws
         kept: list[tuple[str, tuple[int, ...], Any]] = [(name, (3,), self._storage.precision) for name in PARTS]
         kept += [(IMAGES, (3,), np.int64)] * (repeats is not None)
-        kept += [(COUNTS, (), np.int64), *[(ESCAPES, (), np.float64)] * any(self._scene.volumes)]
-        kept += [(ABSORBED, (), np.float64)] * self._scene.may_absorb()
+        kept += [(COUNTS, (), np.int64), *[(ESCAPES, (), np.float64)] * bool(self._scene.pieces.open_volumes())]
+        kept += [(ABSORBED, (), np.float64)] * (laws is not None and laws.may_end)
         kept += [(COLLISIONS, (), np.int64)] * (self._radius is not None)
         kept += [(SPINS, (3,), self._storage.precision)] * self._turns
         for name, width, kind in kept:

@@ -74,14 +74,14 @@ def _gathered(of_shards: list[Trajectory], task: Task, k: int, name: str) -> Any
 
 def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
     """The observables of a frame, from those of all shards."""
-    sums, owners = np.hstack([part[CHUNK_SUMS] for part in parts]), task.scene.owners()
+    sums, owners = np.hstack([part[CHUNK_SUMS] for part in parts]), task.compiled.numbering.surfaces_of_rows
     brought = {}
     if task.particles.births is not None:
         sums, brought = sums[:-1], total_of(sums)
     if task.bodies is None:
-        laws = task.scene.laws()
+        laws = task.compiled.laws
         has_heat = laws is not None and laws.give_heat
-        rows, of_parts = booked(task.scene.walls()), task.scene.parts_of_rows()
+        rows, of_parts = booked(task.compiled.walls()), task.compiled.numbering.parts_of_rows
         added = observables.summed(sums, owners, rows, has_heat, of_parts, len(task.options.counters))
     else:
         added = energies.summed(sums, owners, len(task.scene.surfaces), len(task.bodies.body.cavities))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..bodies.body import Body
 from ..bodies.copies import Bodies
+from ..compiled_scene import CompiledScene
 from ..errors import SceneError
 from ..files import marks, paths
 from ..methods.base import Method
@@ -26,7 +27,6 @@ from ..particles import Births, Particles
 from ..run.machine import RunEnd, birth_times
 from ..run.options import RunOptions, Task
 from ..run.tally import scales_of
-from ..scene import Scene
 from ..state import Absorbed, Multipliers
 from . import sent_modules
 
@@ -37,7 +37,7 @@ _BIRTHS = ("birth_time", "birth_source")
 class Whole(NamedTuple):
     """The common part of all shards of a run; the start is in files."""
 
-    scene: Scene
+    compiled: CompiledScene
     method: Method
     options: RunOptions
     body: Body | None
@@ -82,7 +82,7 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     sent_modules.send_code()
     body = None if task.bodies is None else task.bodies.body
     options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None, observables=None)
-    whole = Whole(task.scene, task.method, options, body, bounds, start, scales_of(task))
+    whole = Whole(task.compiled, task.method, options, body, bounds, start, scales_of(task))
     _replace(folder / "whole.pickle", lambda file: cloudpickle.dump(whole, file))
     for name in _ARRAYS:
         array = getattr(task.particles, name)
@@ -169,7 +169,7 @@ def task_of(folder: Path, k: int) -> Task:
         particles = bodies.particles()
     options = dataclasses.replace(whole.options, trajectory=file_of(folder, k))
     of_all = whole.start, whole.scales
-    return Task(whole.scene, particles, whole.method, options, bodies, first, *of_all)
+    return Task(whole.compiled, particles, whole.method, options, bodies, first, *of_all)
 
 
 def write_end(path: Path, end: RunEnd) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene import Scene
+from ..compiled_scene import CompiledScene
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.fields.many import Many
 from ..surfaces.upright import upright
@@ -13,33 +13,33 @@ from ..surfaces.walls import Field, Walls
 class Fields:
     """The fields of a scene for soft balls."""
 
-    def __init__(self, scene: Scene, radius: NDArray[np.float64]) -> None:
-        self._scene, self._largest = scene, float(radius.max())
+    def __init__(self, compiled: CompiledScene, radius: NDArray[np.float64]) -> None:
+        self._compiled, self._largest = compiled, float(radius.max())
         self._known = -1.0
         self._each: tuple[Field, ...] = ()
         # Of each field, of each member the number of its face, or of the body that it is.
         self.faces: tuple[NDArray[np.int32], ...] = ()
-        if scene.order.fields:
+        if compiled.order.fields:
             self._make(0.0)
 
     def _make(self, skin: float) -> None:
         """Take the fields for balls that are no farther than a skin [m] from the cell that repeats."""
-        if self._scene.period is not None:
-            self._scene = self._scene.of_balls(np.array([self._largest + 2.0 * skin]))
+        scene = self._compiled.scene
+        if scene.period is not None:
+            self._compiled = self._compiled.of_balls(self._largest + 2.0 * skin)
         made: list[Field] = []
         faces: list[NDArray[np.int32]] = []
-        for i in self._scene.order.fields:
-            surface = self._scene.pieces[i]
+        for i in self._compiled.order.fields:
+            surface = self._compiled.pieces.each[i]
             assert isinstance(surface, (Many, Mesh))
             members, face = surface.faces_of_balls(self._largest + 2.0 * skin)
-            across = self._scene.across()
-            made.append(Field(members) if across is None else upright(Field(members), across))
+            made.append(upright(Field(members), scene.across()))
             faces.append(face.astype(np.int32))
         self._known, self._each, self.faces = skin, tuple(made), tuple(faces)
 
     def reaches(self, skin: float) -> bool:
         """Whether a skin is too wide for the fields that are known; then these are made anew."""
-        if not self.faces or self._scene.period is None or skin <= self._known:
+        if not self.faces or self._compiled.scene.period is None or skin <= self._known:
             return False
         self._make(skin)
         return True
@@ -47,7 +47,7 @@ class Fields:
     def walls(self, moment: float, skin: float) -> Walls:
         """The walls in the frame, or its piece, that ends at a moment [s]."""
         if not self.faces:
-            return self._scene.walls(moment)
+            return self._compiled.walls(moment)
         self.reaches(skin)
-        walls = self._scene.walls(moment)
+        walls = self._compiled.walls(moment)
         return walls._replace(each=(*self._each, *walls.each[len(self._each) :]))

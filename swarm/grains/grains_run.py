@@ -9,6 +9,7 @@ import numpy as np
 from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
+from ..compiled_scene import CompiledScene
 from ..errors import RunError
 from ..methods import Penalty
 from ..methods.base import Method
@@ -17,7 +18,6 @@ from ..run.base import Arrays, BaseRun, named
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
-from ..scene import Scene
 from ..state import Balls, State
 from . import energy, lists, refused
 from . import grain_arrays as arrays
@@ -41,13 +41,13 @@ class GrainsRun(BaseRun):
     """The run of soft balls; the arrays of the particles become a part of its state."""
 
     def __init__(
-        self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None, compile: str,
-        seeding: Seeding, watched: Watched,
+        self, compiled: CompiledScene, particles: Particles, method: Method, threads: int, block_size: int | None,
+        compile: str, seeding: Seeding, watched: Watched,
     ) -> None:  # fmt: skip
-        n, walls = len(particles), len(scene.owners())
+        scene, n, walls = compiled.scene, len(particles), len(compiled.numbering.surfaces_of_rows)
         radius = particles.radius
         assert radius is not None
-        self._matter = matter_of(scene, method, radius)
+        self._matter = matter_of(compiled, method, radius)
         rubs, spin = self._matter.rubs, particles.spin
         if spin is None and rubs:
             spin = np.zeros((3, n))
@@ -58,11 +58,11 @@ class GrainsRun(BaseRun):
             np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None, balls=balls,
         )  # fmt: skip
         if particles.image is not None:
-            self.state = self.state._replace(image=particles.image, period=scene.cell())
+            self.state = self.state._replace(image=particles.image, period=compiled.cell())
         self._image = np.zeros((3, 0), np.int64) if particles.image is None else particles.image.copy()
-        self._fields = Fields(scene, radius)
+        self._fields = Fields(compiled, radius)
         self._walls = self._fields.walls(0.0, 0.0)
-        super().__init__(scene, method, n, 1, Tier(compile, (self._matter, self._walls), n), seeding, watched)
+        super().__init__(compiled, method, n, 1, Tier(compile, (self._matter, self._walls), n), seeding, watched)
         state = self.state
         books = ContactTotals(
             balls.collisions,
@@ -182,7 +182,7 @@ class GrainsRun(BaseRun):
         if status == Status.UNSOLVED:
             return refused.unsolved(moment, self._matter.h)
         assert isinstance(self._method, Penalty)
-        return refused.passed(self._scene, self._method, self._matter, self._world, status, moment)
+        return refused.passed(self._compiled, self._method, self._matter, self._world, status, moment)
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         world, matter = self._world, self._matter

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled_scene import CompiledScene
 from ..contact.damping import damping_of
 from ..methods.base import Method
 from ..methods.fixed_step import longest_step
@@ -20,10 +21,11 @@ from .overlaps import Limits
 MOST_DAMPED = 0.01
 
 
-def matter_of(scene: Scene, method: Method, radius: NDArray[np.float64]) -> Matter:
+def matter_of(compiled: CompiledScene, method: Method, radius: NDArray[np.float64]) -> Matter:
     """What is the same for all balls of a scene, with these radii, and all steps of a method."""
+    scene = compiled.scene
     pairs, law, dt = scene.pairs or Pairs(), method.law(), float(method.dt)  # type: ignore[attr-defined]
-    surfaces = [scene.surfaces[i] for i in scene.owners()]
+    surfaces = [scene.surfaces[i] for i in compiled.numbering.surfaces_of_rows]
     return Matter(
         law,
         scene.pull(),

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from ..common.status import Status
+from ..compiled_scene import CompiledScene
 from ..kernel.vector import dot, norm, square
 from ..methods import Penalty
 from ..pairs import MOST_PRESSED
-from ..scene import Scene
 from .contacts import apart
 from .grain_arrays import AFTER, BEFORE, LIGHTNESS, RADIUS, X, vector_at
 from .overlaps import BALL, OTHER, SIZE, WALL
@@ -36,15 +36,15 @@ def too_far(grains: Any, most: float, largest: float, dt: float) -> str:
     )
 
 
-def passed(scene: Scene, method: Penalty, matter: Any, world: Any, status: int, moment: float) -> str:
+def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, status: int, moment: float) -> str:
     """Of a ball that passes the surface of another one, or of a wall, in the step at a moment [s]."""
     grains, failed = world.grains, world.books.failed
     i, j, wall = (int(failed[k]) for k in (BALL, OTHER, WALL))
     size, where = float(failed[SIZE]), ", ".join(f"{x:.6g}" for x in grains.place[i, X : X + 3])
     met = f"particle {grains.number[j]}"
     if wall >= 0:
-        surface = scene.owners()[wall]
-        met = f"surfaces[{surface}] ({type(scene.surfaces[surface]).__name__})"
+        surface = compiled.numbering.surfaces_of_rows[wall]
+        met = f"surfaces[{surface}] ({type(compiled.scene.surfaces[surface]).__name__})"
     begin = f"the step at {moment:.9g} s failed at particle {grains.number[i]}, at ({where}) m: it "
     radii = [grains.place[k, RADIUS] for k in (i, j)[: 1 + (wall < 0)]]
     if status == Status.TOO_FAST:

@@ -35,6 +35,10 @@ class Method(Validated):
         """The record of numbers that kernels take in place of this description."""
         raise NotImplementedError
 
+    def apart(self) -> str | None:
+        """What of it does not support listed solids of one kind as a field, in words; None where it does."""
+        return type(self).__name__
+
     def time_of_impact(self) -> float | None:
         """The duration of an impact besides the flight to it [s]; None where a frame costs steps, not impacts."""
         return None
@@ -90,7 +94,7 @@ def check_surfaces(method: Method, scene: Scene) -> None:
 
 def check_bends(scene: Scene) -> None:
     """Raise a `SceneError` if a surface moves so that it is met by safe steps, and does not bound its bend."""
-    for i, surface in zip(scene.owners_of_pieces, scene.pieces, strict=True):
+    for i, surface in scene.pieces.owned():
         if lacks_bend(surface):
             raise SceneError(
                 f"surfaces[{i}] ({type(surface).__name__}) must give hessian_bounds() to move as {surface.motion} "

@@ -62,7 +62,7 @@ class SoftWalls(base.Method):
         return whole_time(moment, self.dt)
 
     def seldom_hard(self, scene: Scene) -> bool:
-        return len(scene.owners()) == 1 and not scene.surfaces[0].is_solid()
+        return len(_of_rows(scene)) == 1 and not scene.surfaces[0].is_solid()
 
     def law(self) -> Any:
         return regularisation(self.penalty, self.exponent)
@@ -112,8 +112,12 @@ def _half_widths(scene: Scene) -> tuple[float, ...] | None:
     """The half width of the solid of each wall [m], infinite for a cavity; None if no wall has another side."""
     if not any(surface.may_be_passed() for surface in scene.surfaces):
         return None
-    owned = [scene.surfaces[i] for i in scene.owners()]
-    return tuple(surface.size() if surface.is_solid() else math.inf for surface in owned)
+    return tuple(surface.size() if surface.is_solid() else math.inf for surface in _of_rows(scene))
+
+
+def _of_rows(scene: Scene) -> list[Surface]:
+    """The surface of each row, where each solid is a wall by itself."""
+    return [scene.surfaces[i] for i in scene.compiled(apart="fixed steps").numbering.surfaces_of_rows]
 
 
 def _pace(surface: Surface) -> float:

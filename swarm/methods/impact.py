@@ -125,7 +125,10 @@ class Impact(base.Method):
         if self.contact_step > 0.0:
             kind = Centred if self.contact_start == "centred" else Chord
         lasting = size, _bend(scene), pull * size, self.shortest_flight or 0.0, length, self.sliding_tolerance
-        return kind(*lasting, scene.laws() or NONE, self.contact_step or None)
+        return kind(*lasting, scene.compiled(apart=self.apart()).laws or NONE, self.contact_step or None)
+
+    def apart(self) -> str | None:
+        return "a contact_step" if self.contact_step > 0.0 else None
 
     def time_of_impact(self) -> float:
         # A centred step is a part of the flights before and after it.

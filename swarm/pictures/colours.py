@@ -99,7 +99,7 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
         SceneError: energy errors are asked for where walls dissipate or give energy.
     """
     law = method.law()
-    at_start = observables.energies(scene, law, start.mass, start.position, start.velocity)
+    at_start = observables.energies(scene.compiled(), law, start.mass, start.position, start.velocity)
     scale = observables.energy_scale(scene, at_start)
     if by == "speed":
         there = scale[~np.isnan(scale)]
@@ -107,7 +107,7 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
         # Two digits are enough on a legend.
         fastest = float(f"{fastest:.1e}")
         return Scale("speed [m/s]", 0.0, fastest), lambda _position, velocity: np.sqrt((velocity**2).sum(axis=0))
-    if scene.names_laws() or scene.laws() is not None:
+    if scene.names_laws() or scene.compiled().laws is not None:
         raise SceneError(
             "record_color must be 'speed' where a surface has a restitution below 1, friction, a temperature, a motion "
             "or a mass, got 'energy-error': energy that walls dissipate or give is not an error"
@@ -120,7 +120,7 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
     before, inverse = at_start.total(), 1.0 / np.maximum(scale, np.finfo(np.float64).tiny)
 
     def errors(position: Floats, velocity: Floats) -> Floats:
-        now = observables.energies(scene, law, start.mass, position, velocity).total()
+        now = observables.energies(scene.compiled(), law, start.mass, position, velocity).total()
         return np.asarray(np.log10(np.maximum(np.abs(now - before) * inverse, 10.0 ** _DECADES[0])))
 
     return Scale("log10 of the relative energy error", *_DECADES), errors

@@ -123,7 +123,7 @@ def lines_of(
     that turn "rotational_energy", and of soft ones "largest_overlap".
     """
     named, one = scene.names_laws(), "particle" if body is None else "body"
-    laws = None if named else scene.laws()
+    laws = None if named else scene.compiled().laws
     every = "all particles" if body is None else "all bodies"
     energies = {"total": True, "kinetic": True, "potential": scene.gravity is not None}
     energies |= {

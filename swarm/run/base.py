@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
+from ..compiled_scene import CompiledScene
 from ..errors import RunError
 from ..lanes.watching.watchers import Watchers
 from ..methods.base import Method
 from ..observables import CHUNK
-from ..scene import Scene
 from ..state import State
 from . import failures
 from .impacts import ThreadLog
@@ -76,11 +76,14 @@ class BaseRun:
     _instants: Sequence[float] | None = None
 
     def __init__(
-        self, scene: Scene, method: Method, n: int, threads: int, tier: Tier, seeding: Seeding,
+        self, compiled: CompiledScene, method: Method, n: int, threads: int, tier: Tier, seeding: Seeding,
         watched: Watched, pool: ThreadPoolExecutor | None = None,
     ) -> None:  # fmt: skip
-        self._scene, self._method, self._first, self._gravity = scene, method, seeding.first, scene.pull()
-        self._owners, self._parts, self._surfaces_of_walls = scene.owners(), scene.parts_of_rows(), scene.members()[0]
+        scene, numbering = compiled.scene, compiled.numbering
+        self._compiled, self._scene, self._gravity = compiled, scene, scene.pull()
+        self._method, self._first = method, seeding.first
+        self._owners, self._parts = numbering.surfaces_of_rows, numbering.parts_of_rows
+        self._surfaces_of_walls = numbering.members[0]
         self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
         # In a scene without walls no particle escapes: it has only balls in free space.
         self._far = _FAR * scene.extent() if scene.surfaces and scene.is_open() else math.inf

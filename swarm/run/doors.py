@@ -26,8 +26,8 @@ class DoorRun(Run):
     def _reach(self, moment: float) -> None:
         super()._reach(moment)
         if not self._scene.moves():
-            self._walls, self._faces = self._scene.walls(moment), self._scene.open_faces(moment)
-        self.state = self.state._replace(openings=self._scene.openings(moment))
+            self._walls, self._faces = self._compiled.walls(moment), self._scene.open_faces(moment)
+        self.state = self.state._replace(openings=self._compiled.openings(moment))
 
     def _arrays(self) -> Arrays:
         return {**super()._arrays(), "piece.begun": self._begun, "piece.done": self._done}
@@ -47,22 +47,23 @@ class DoorRun(Run):
         contacts = self.state.contacts
         if contacts is None or not self._kinds:
             return
-        last, pieces = _before(self._scene, instant), self._scene.pieces
+        last, pieces = _before(self._scene, instant), self._compiled.pieces.each
         gone = [one.is_there(last) and not one.is_there(instant) for one in pieces]
         if any(gone):
             self._let_go(contacts, np.array(gone))
-        if any(one.is_there(instant) and not one.is_there(last) for one in self._scene.open_volumes()):
+        if any(one.is_there(instant) and not one.is_there(last) for one in self._compiled.pieces.open_volumes()):
             _wake(contacts, contacts.phase == ARRIVED)
 
     def _let_go(self, contacts: Contacts, gone: NDArray[np.bool_]) -> None:
         """Let particles that slide or rest on the walls of the pieces in `gone` fly: these walls left the scene."""
         # Number -1 is no wall.
-        walls = np.append(gone[self._scene.pieces_of_walls()], False)
+        numbering = self._compiled.numbering
+        walls = np.append(gone[numbering.pieces_of_walls], False)
         held = walls[contacts.walls.astype(np.int64)].any(axis=0)
         rests, careful = contacts.phase == ARRIVED, contacts.phase == CAREFUL
         held &= np.isin(contacts.phase, (HELD, EDGE, ARRIVED))
         held |= careful & walls[contacts.met.astype(np.int64)]
-        held |= rests & (contacts.load[gone[self._scene.pieces_of_rows()]] != 0.0).any(axis=0)
+        held |= rests & (contacts.load[gone[numbering.pieces_of_rows]] != 0.0).any(axis=0)
         contacts.phase[held] = FLYING
         contacts.walls[:, held] = -1.0
         contacts.step[held] = contacts.keep[held] = 0.0
@@ -72,7 +73,7 @@ class DoorRun(Run):
 def comers(scene: Scene, instant: float) -> NDArray[np.bool_]:
     """Which surfaces have walls that come at an instant [s]."""
     last, came = _before(scene, instant), np.zeros(len(scene.surfaces), np.bool_)
-    for i, piece in zip(scene.owners_of_pieces, scene.pieces, strict=True):
+    for i, piece in scene.pieces.owned():
         came[i] |= piece.is_there(instant) and not piece.is_there(last)
     return came
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .. import observables
 from ..common.status import Status
+from ..compiled_scene import CompiledScene
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, HELD, PHASES
 from ..contact.hold import One, Two
 from ..lanes import block as blocks
@@ -21,7 +22,6 @@ from ..lanes.share import Draws, Share, take
 from ..lanes.watching import log as impact_log
 from ..methods.base import Method
 from ..particles import Particles
-from ..scene import Scene
 from ..state import Contacts, Crossed, Multipliers, State
 from . import failures
 from .base import Arrays, BaseRun, named, result_of
@@ -54,19 +54,19 @@ class Run(BaseRun):
     _pace = math.inf
 
     def __init__(
-        self, scene: Scene, particles: Particles, method: Method, threads: int, block_size: int | None,
+        self, compiled: CompiledScene, particles: Particles, method: Method, threads: int, block_size: int | None,
         compile: str = "always", seeding: Seeding = UNSEEDED, watched: Watched = UNWATCHED,
     ) -> None:  # fmt: skip
-        n = len(particles)
+        n, scene = len(particles), compiled.scene
         self._numbers, self._law = method.numbers(scene), method.law()
-        self._walls = scene.walls()
+        self._walls = compiled.walls()
         tier, counters = Tier(compile, (self._numbers, self._law, self._walls), n), watched.counters
-        super().__init__(scene, method, n, threads, tier, seeding, watched)
+        super().__init__(compiled, method, n, threads, tier, seeding, watched)
         self._counters = counters_of(scene, counters, self._impacts is not None)
         self._booked = lanes.booked(self._walls)
-        self.state = state_of(scene, particles, method, self._booked)
+        self.state = state_of(compiled, particles, method, self._booked)
         self.state = with_counters(self.state, self._counters, counters, scene)
-        observables.start_energies(scene, self._law, self.state)
+        observables.start_energies(compiled, self._law, self.state)
         self._faces = scene.open_faces()
         # Whole chunks, so that a thread observes what it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
@@ -123,7 +123,7 @@ class Run(BaseRun):
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         seeding = Seeding(self._seed, self._first)
-        return failures.of_frame(self._scene, self._method, self.state, (status, item), moment, seeding)
+        return failures.of_frame(self._compiled, self._method, self.state, (status, item), moment, seeding)
 
     def _share(self, span: float) -> End:
         """Advance and observe what one thread draws."""
@@ -196,7 +196,7 @@ class Run(BaseRun):
         """The walls and the particles of the frame that ends at a moment [s]."""
         self._present.reach(moment)
         if self._scene.moves():
-            self._walls, self._faces = self._scene.walls(self._moment), self._scene.open_faces(self._moment)
+            self._walls, self._faces = self._compiled.walls(self._moment), self._scene.open_faces(self._moment)
 
     def _share_done(self, span: float) -> float:
         remaining = self._halted.time_left()

@@ -39,5 +39,5 @@ def run_of(task: Task, watched: Watched = UNWATCHED) -> BaseRun:
     elif particles.radius is not None:
         kind = wing("events.heavy_run").HeavyRun if scene.reacts() else wing("events.balls_run").CollidingRun
     how = options.thread_count(), options.block_size, options.compile, Seeding(options.seed, task.first), watched
-    run: BaseRun = kind(scene, what, method, *how)
+    run: BaseRun = kind(task.compiled, what, method, *how)
     return run

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..common.status import Status
+from ..compiled_scene import CompiledScene
 from ..errors import RunError
 from ..kernel.random import Stream
 from ..kernel.vector import ZERO, column
@@ -18,10 +19,10 @@ from .starting_state import Seeding
 
 
 def of_frame(
-    scene: Scene, method: Method, state: State, end: tuple[Status, int], moment: float, seeding: Seeding
+    compiled: CompiledScene, method: Method, state: State, end: tuple[Status, int], moment: float, seeding: Seeding
 ) -> str:
     """The sentence about a frame that ended with this status and particle."""
-    (status, particle), first = end, seeding.first
+    (status, particle), first, scene = end, seeding.first, compiled.scene
     sentence = f"{_failed(moment)} {first + particle}: {status.sentence}"
     if status in (Status.STALLED, Status.TIMELESS):
         sentence += _place(scene, state, particle, moment)
@@ -32,7 +33,7 @@ def of_frame(
     if status == Status.TOO_DEEP:
         sentence = f"{_failed(moment)} {first + particle}{softness.of_passing(scene, method, state, particle, moment)}"
     if status == Status.SENT_WRONG:
-        sentence += _of_law(scene, state, particle, moment, seeding)
+        sentence += _of_law(compiled, state, particle, moment, seeding)
     multipliers = state.multipliers
     if status == Status.UNCONVERGED and multipliers is not None:
         remaining, stored = multipliers.remaining[particle], multipliers.stored_energy[particle]
@@ -92,12 +93,12 @@ def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
     return f"; it is at {where}" + (f" at {found:.9g} s" if remaining > 0.0 else "")
 
 
-def _of_law(scene: Scene, state: State, particle: int, moment: float, seeding: Seeding) -> str:
+def _of_law(compiled: CompiledScene, state: State, particle: int, moment: float, seeding: Seeding) -> str:
     """The text on the law that failed and on its arguments, which the kernel left in the state."""
-    contacts, laws = state.contacts, scene.laws()
+    scene, contacts, laws = compiled.scene, state.contacts, compiled.laws
     assert contacts is not None
     assert laws is not None
-    wall, walls = contacts.met[particle], scene.walls(moment).at(contacts.remaining[particle])
+    wall, walls = contacts.met[particle], compiled.walls(moment).at(contacts.remaining[particle])
     r, v = column(state.position, 0, particle), column(state.velocity, 0, particle)
     n = -1.0 * walls.unit_normal(wall, r)
     u = walls.velocity(wall, r) if scene.moves() else ZERO
@@ -107,7 +108,7 @@ def _of_law(scene: Scene, state: State, particle: int, moment: float, seeding: S
             for k, law in enumerate(one.laws_of(wall)):
                 given = law.leave(v, n, u, random.of_law(k), state.mass[particle])
                 if wrong := why_wrong(given, v, n, u, scene.moves()):
-                    name = f"surfaces[{scene.members()[0, int(wall)]}].laws[{k}]"
+                    name = f"surfaces[{compiled.numbering.members[0, int(wall)]}].laws[{k}]"
                     return f"; {name} {wrong}; {said_of(law, given, v, n, u)}"
                 v = mirrored(leave_of(given).v, n, u)
     return ""

@@ -10,12 +10,12 @@ import tomli_w
 from numpy.typing import NDArray
 
 from ..common.status import Status
+from ..compiled_scene import CompiledScene
 from ..errors import RunError
 from ..lanes.share import Share
 from ..lanes.table import LANES, STRIDE
 from ..lanes.watching.log import GOING, Log
 from ..lanes.watching.watchers import Watchers
-from ..scene import Scene
 from .options import Task
 
 # Rows of one log, and how many logs there are besides the two of each thread: one is written while others are filled.
@@ -33,7 +33,7 @@ class Impacts:
     """The logs that the threads of a run fill; a log that is full is written while they fill others.
 
     Args:
-        scene: what is run.
+        compiled: what is run.
         n: how many particles.
         particles: "all", k for every k-th one, or the numbers of those whose impacts are logged.
         precision: of positions, velocities and impulses; times are float64.
@@ -52,16 +52,16 @@ class Impacts:
     """
 
     def __init__(
-        self, scene: Scene, n: int, particles: Any, precision: str, threads: int, counts: bool = False,
+        self, compiled: CompiledScene, n: int, particles: Any, precision: str, threads: int, counts: bool = False,
         meet: bool = False,
     ) -> None:  # fmt: skip
-        laws, real = scene.laws(), np.dtype(precision)
+        laws, real = compiled.laws, np.dtype(precision)
         self.kept = tomli_w.dumps({"particles": particles, "precision": precision})
         self._chosen = chosen(particles, n)
-        self._slips, self._repeats = laws is not None and laws.friction is not None, scene.period is not None
+        self._slips, self._repeats = laws is not None and laws.friction is not None, compiled.scene.period is not None
         self._real, self._meet = real, meet
         # A flight may cross many counters.
-        in_order_of_time = meet or scene.reacts()
+        in_order_of_time = meet or compiled.scene.reacts()
         self._room = _ROWS // 2 if counts else 1 if in_order_of_time else LANES
         self._spare: queue.SimpleQueue[Log] = queue.SimpleQueue()
         for _ in range(2 * threads + _MORE):
@@ -145,8 +145,8 @@ def log_of(task: Task) -> Impacts | None:
         return None
     threads = options.thread_count()
     return Impacts(
-        task.scene, len(task.particles), options.impact_particles, options.precision, threads, bool(options.counters),
-        task.particles.radius is not None,
+        task.compiled, len(task.particles), options.impact_particles, options.precision, threads,
+        bool(options.counters), task.particles.radius is not None,
     )  # fmt: skip
 
 

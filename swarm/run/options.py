@@ -12,6 +12,7 @@ from ..common import checks
 from ..common.catalog import COLOURINGS
 from ..common.frames import FrameTimes
 from ..common.validated import Count, Flag, Positive, Validated, choice
+from ..compiled_scene import CompiledScene
 from ..errors import SceneError
 from ..files import paths
 from ..files.storage import Compression, KeptParticles, Precision, Storage
@@ -162,7 +163,7 @@ class Task:
     body, of the shard, and `scales` those of the whole run (`tally.scales_of`).
     """
 
-    scene: Scene
+    compiled: CompiledScene
     particles: Particles
     method: Method
     options: RunOptions
@@ -170,6 +171,11 @@ class Task:
     first: int = 0
     start: str = ""
     scales: tuple[float, float] | None = None
+
+    @property
+    def scene(self) -> Scene:
+        """The scene as described."""
+        return self.compiled.scene
 
     @property
     def is_shard(self) -> bool:

@@ -145,7 +145,7 @@ class Result:
     def _of_members(self, name: str) -> list[NDArray[Any]] | None:
         if name not in self.observables or self.scene is None:
             return None
-        return self.scene.split_by_members(self.observables[name][-1])
+        return self.scene.compiled().numbering.split(self.observables[name][-1])
 
     @property
     def frames(self) -> "Frames":

@@ -101,7 +101,7 @@ class Session:
         from ..files.writer import descriptions
 
         overwrite, impacts = task.options.overwrite, task.options.impacts
-        self._owners = task.scene.members()
+        self._owners = task.compiled.numbering.members
         body = "" if task.bodies is None else tomli_w.dumps(view("bodies").table_of(task.bodies.body))
         self.identity = {"start": task.start or checkpoint.digest_of(task.particles, body), "seed": task.options.seed}
         self.identity |= {"first": task.first} if task.is_shard else {}

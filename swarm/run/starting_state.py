@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled_scene import CompiledScene
 from ..contact.events import ARRIVED, FLYING
 from ..methods.base import Method
 from ..particles import Particles
-from ..scene import Scene
 from ..state import Contacts, Floats, Multipliers, State
 
 
@@ -30,10 +30,10 @@ class Seeding(NamedTuple):
 UNSEEDED = Seeding()
 
 
-def state_of(scene: Scene, particles: Particles, method: Method, booked: int) -> State:
+def state_of(compiled: CompiledScene, particles: Particles, method: Method, booked: int) -> State:
     """The state with the arrays of the particles and so many rows of what walls give; energies are still to be set."""
-    n, laws, surfaces = len(particles), scene.laws(), len(scene.owners())
-    period, openings, ends = scene.cell(), scene.openings(), laws is not None and laws.may_end
+    n, laws, rows = len(particles), compiled.laws, len(compiled.numbering.surfaces_of_rows)
+    period, openings, ends = compiled.cell(), compiled.openings(), laws is not None and laws.may_end
     return State(
         particles.position,
         particles.velocity,
@@ -44,8 +44,8 @@ def state_of(scene: Scene, particles: Particles, method: Method, booked: int) ->
         np.zeros((booked, n)),
         np.zeros(0 if laws is None else n),
         _no_sweeps(n) if method.has_multipliers() else None,
-        _no_contacts(surfaces, n) if method.may_slide() else None,
-        None if laws is None or not laws.give_heat else np.zeros((surfaces, n)),
+        _no_contacts(rows, n) if method.may_slide() else None,
+        None if laws is None or not laws.give_heat else np.zeros((rows, n)),
         particles.image,
         None if period is None or period.fall is None else np.zeros(n),
         period,

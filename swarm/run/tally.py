@@ -128,12 +128,12 @@ UNWATCHED = Watched()
 
 def tally_of(task: Task) -> Tally | None:
     """The tally of a run, if it has one."""
-    return Tally(task.scene.members(), units_of(task)) if task.options.member_impacts else None
+    return Tally(task.compiled.numbering.members, units_of(task)) if task.options.member_impacts else None
 
 
 def units_of(task: Task) -> Units:
     """The units of the sums of a run."""
-    laws, (time, heat) = task.scene.laws(), task.scales or scales_of(task)
+    laws, (time, heat) = task.compiled.laws, task.scales or scales_of(task)
     are_alone = task.bodies is None and not task.scene.reacts()
     return Units(
         time if are_alone and task.method.may_slide() else None,
@@ -152,7 +152,7 @@ def scales_of(task: Task) -> tuple[float, float]:
     fall = float(mass.mean()) * math.hypot(*gravity) * size
     hot = [
         float(value)
-        for piece in task.scene.pieces
+        for piece in task.scene.pieces.each
         for one in (piece, *piece.laws)
         if (value := getattr(one, "temperature", None)) is not None
     ]

@@ -31,6 +31,14 @@ def gaps_of(images: Sequence[Surface], points: NDArray[np.float64], time: float)
     return np.array([side_of(image) * image.phi(points, time) for image in images])
 
 
+def distances_of(images: Sequence[Surface], points: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    """The gap over its gradient of every image of a surface, (images, N) [m]."""
+    slopes = [np.sqrt((image.gradient(points, time) ** 2).sum(axis=0)) for image in images]
+    # At the centre of a ball the slope is 0, and a point is as far inside as can be.
+    with np.errstate(over="ignore"):
+        return np.asarray(gaps_of(images, points, time) / np.maximum(slopes, np.finfo(np.float64).tiny))
+
+
 def gradient_of(images: Sequence[Surface], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Gradient of the gap of the image that has the largest one, (3, N)."""
     gradients = np.array([side_of(image) * image.gradient(points) for image in images])

@@ -43,8 +43,10 @@ class UprightZ(Upright):
 _KINDS = Upright, UprightY, UprightZ
 
 
-def upright(wall: Any, across: int) -> Any:
-    """A wall, or what it is made of, in a scene whose plane is across the axis of this number."""
+def upright(wall: Any, across: int | None) -> Any:
+    """A wall, or what it is made of, in a scene whose plane is across an axis; None: without a plane."""
+    if across is None:
+        return wall
     if isinstance(wall, Rotated):
         return _KINDS[across](*wall)
     if not isinstance(wall, tuple) or isinstance(wall, Vec):

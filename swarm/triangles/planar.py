@@ -150,13 +150,13 @@ class PlaneWalls:
 
     def _of(self, i: int, curves: list[Floats]) -> list[Floats]:
         """The parts of curves that are of surface i, without its openings."""
-        found = []
+        found, pieces = [], self._scene.pieces
         for curve in curves:
             with np.errstate(all="ignore"):
                 gaps = self._scene.gaps(curve.T, self._time)
             owner = np.asarray(np.nan_to_num(gaps, nan=-np.inf).argmax(axis=0))
-            for k, volumes in enumerate(self._scene.volumes):
-                owner[(owner == k) & are_open(volumes, curve.T, self._time)] = -1
+            for k, *volumes in zip(pieces.owners, pieces.volumes, pieces.doorways, strict=True):
+                owner[(owner == k) & are_open((*volumes[0], *volumes[1]), curve.T, self._time)] = -1
             ends = np.flatnonzero(np.diff(np.concatenate([[False], owner == i, [False]]).astype(np.int8)))
             found += [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]
         return found

@@ -41,7 +41,7 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
         return _shapes_in_plane(scene, positions, time, most)
     box = box_around(scene, positions, time)
     # Each of the many bodies of a scene has a grid of its own.
-    grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
+    grouped = _grouped(scene)
     found = list[Shape]()
     sharp_ones = _sharp(scene, box, time)
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
@@ -80,6 +80,12 @@ def bodies_of(surface: Surface) -> int:
     return len(surface) if isinstance(surface, Many) and not isinstance(surface, Outlined) else 0
 
 
+def _grouped(scene: Scene) -> set[int]:
+    """The listed solids that are fields."""
+    compiled = scene.compiled()
+    return {compiled.pieces.owners[k] for group in compiled.order.groups for k in group}
+
+
 def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
     """The shapes of every surface but those of many bodies, of unions those of each part."""
     found: dict[int, list[Shape]] = {}
@@ -100,7 +106,7 @@ def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) 
     if not scene.surfaces:
         return []
     walls, shapes = PlaneWalls(scene, positions, time), []
-    grouped = {scene.owners_of_pieces[k] for group in scene.order.groups for k in group}
+    grouped = _grouped(scene)
     parts = parts_of(scene, time) if any(isinstance(surface, Joined) for surface in scene.surfaces) else []
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
         bodies = bodies_of(surface) or int(i in grouped)

@@ -239,4 +239,4 @@ def at_start(content: Any) -> int:
 
 
 def _has_openings(scene: Any) -> bool:
-    return any(piece.openings or piece.present is not None for piece in scene.pieces)
+    return any(piece.openings or piece.present is not None for piece in scene.pieces.each)

@@ -13,7 +13,9 @@ BOX = swarm.Box((1.0, 1.0, 1.0))
 
 
 def run_of(scene, particles, threads=1, compile="never"):
-    return CollidingRun(scene, particles.copy(), swarm.Impact(), threads, None, compile, Seeding(), Watched())
+    return CollidingRun(
+        scene.compiled(), particles.copy(), swarm.Impact(), threads, None, compile, Seeding(), Watched()
+    )
 
 
 def gas(n=40, radius=0.17, seed=1, period=None, gravity=None, **pairs):

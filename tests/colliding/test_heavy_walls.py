@@ -20,9 +20,8 @@ BOX = swarm.Box((1.0, 1.0, 1.0))
 
 
 def run_of(scene, particles, threads=1, compile="never"):
-    return HeavyRun(
-        scene.of_balls(particles.radius), particles.copy(), swarm.Impact(), threads, None, compile, Seeding(), Watched()
-    )
+    compiled, balls = scene.compiled(float(particles.radius.max())), particles.copy()
+    return HeavyRun(compiled, balls, swarm.Impact(), threads, None, compile, Seeding(), Watched())
 
 
 def plate(mass=5.0, **given):

@@ -15,19 +15,20 @@ NAMES = ("sphere", "egg", "plane")
 @given(point=directions)
 def test_energy_is_the_sum_over_walls(law, point):
     parts = [call(law.stored_energy, gap(numbers_of(name), point)) for name in NAMES]
-    assert call(contact_energy, law, scene_of(*NAMES).walls(), 1.0, point) == pytest.approx(sum(parts), rel=1e-15)
+    stored = call(contact_energy, law, scene_of(*NAMES).compiled().walls(), 1.0, point)
+    assert stored == pytest.approx(sum(parts), rel=1e-15)
 
 
 @given(point=directions)
 def test_rigid_walls_store_none(point):
-    assert call(contact_energy, None, scene_of(*NAMES).walls(), 1.0, point) == 0.0
+    assert call(contact_energy, None, scene_of(*NAMES).compiled().walls(), 1.0, point) == 0.0
 
 
 @every_law
 @given(point=directions, shift=st.tuples(*[st.floats(-1e-7, 1e-7)] * 3).map(np.array))
 def test_uncertainty_bounds_the_change_of_the_energy(law, point, shift):
     """Up to (a + 1)/2, for the shift of a point, at the centre of a sphere too."""
-    walls, size = scene_of(*NAMES).walls(), np.abs(shift) + 1e-12
+    walls, size = scene_of(*NAMES).compiled().walls(), np.abs(shift) + 1e-12
     for place in (point, np.array([0.2, -0.3, 0.1])):
         change = call(contact_energy, law, walls, 2.0, place + shift) - call(contact_energy, law, walls, 2.0, place)
         uncertainty = call(energy_uncertainty, walls, law, 2.0, place, size)

@@ -14,7 +14,7 @@ PLACE = np.array([0.3, -0.2, -0.4])
 def held(motion):
     """The walls of a ball around the origin through PLACE, its velocity there, and a tangent."""
     ball = swarm.Sphere(float(np.linalg.norm(PLACE)), motion=motion, friction=MU)
-    walls = swarm.Scene([ball]).walls().at(0.0)
+    walls = swarm.Scene([ball]).compiled().walls().at(0.0)
     tangent = np.cross(PLACE, [0.5, 1.0, -0.3])
     return walls, vec(tangent / np.linalg.norm(tangent))
 

@@ -20,7 +20,7 @@ SCENE = swarm.Scene([BOX], gravity=(0.0, 0.0, -2.0), pairs=swarm.Pairs(**LAWS))
 def started(scene=SCENE, method=METHOD):
     start = cloud(18)
     start.spin = np.zeros((3, len(start)))
-    run = GrainsRun(scene, start, method, 1, None, "never", Seeding(), Watched())
+    run = GrainsRun(scene.compiled(), start, method, 1, None, "never", Seeding(), Watched())
     run.observe()
     return run
 

@@ -69,7 +69,7 @@ def first_of_all(field, r, v):
 def test_no_first_hit_is_missed(capsys):
     """Of flights from cell to cell, against a look at all balls."""
     field, count, random = packing(), 100_000, np.random.default_rng(5)
-    members, points = swarm.Scene([field]).walls(), np.empty((3, 0))
+    members, points = swarm.Scene([field]).compiled().walls(), np.empty((3, 0))
     while points.shape[1] < count:
         some = random.uniform(-0.6, 0.6, (3, count))
         points = np.concatenate([points, some[:, field.phi(some) > 0.0]], axis=1)

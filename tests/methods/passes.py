@@ -32,7 +32,8 @@ class Pass(NamedTuple):
 def energy_of(method, scene, position, velocity, mass=1.0):
     """Kinetic, potential and stored energy of one particle."""
     fall = mass * call(potential, scene.pull(), position)
-    return 0.5 * mass * velocity @ velocity + fall + call(contact_energy, method.law(), scene.walls(), 1.0, position)
+    stored = call(contact_energy, method.law(), scene.compiled().walls(), 1.0, position)
+    return 0.5 * mass * velocity @ velocity + fall + stored
 
 
 def one_pass(method, scene, position, velocity, remaining, mass=1.0, energy=None):
@@ -42,7 +43,7 @@ def one_pass(method, scene, position, velocity, remaining, mass=1.0, energy=None
     """
     position, velocity = np.asarray(position, float), np.asarray(velocity, float)
     energy = energy_of(method, scene, position, velocity, mass) if energy is None else energy
-    numbers, walls, gravity = method.numbers(scene), scene.walls(), scene.pull()
+    numbers, walls, gravity = method.numbers(scene), scene.compiled().walls(), scene.pull()
     # Twice the energy scale per mass, as `observables.energy_scale` has it
     scale2 = velocity @ velocity + 2.0 * np.abs(scene.gravity or 0.0).sum() * scene.finite_size()
     constants = call(numbers.constants, mass, energy / mass, scale2)

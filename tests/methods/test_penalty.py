@@ -19,7 +19,7 @@ def slack(method, scene, mass, *steps):
     """Round-off of the energy: of its terms, and of the stored energy for positions rounded in their last place."""
     terms = 0.0
     for step in steps:
-        stored = call(contact_energy, method.law(), scene.walls(), 1.0, step.position)
+        stored = call(contact_energy, method.law(), scene.compiled().walls(), 1.0, step.position)
         depth = scene.gaps(step.position[:, None]).max()
         # V' = (a + 1) V/g; no gap of the table is steeper than 5.
         force = 5.0 * (method.exponent + 1.0) * stored / depth if depth > 0.0 else 0.0
@@ -111,7 +111,8 @@ def test_a_step_is_the_papers(name, point, velocity, pull):
     assert after.position - start == pytest.approx(0.5 * h * (velocity + after.velocity), abs=256 * EPSILON)
     gravity = np.zeros(3) if pull is None else np.array(scene.gravity)
     q0, q1 = (call(numbers.inner, r) for r in (start, after.position))
-    rise = np.subtract(*(call(contact_energy, method.law(), scene.walls(), 1.0, r) for r in (after.position, start)))
+    walls = scene.compiled().walls()
+    rise = np.subtract(*(call(contact_energy, method.law(), walls, 1.0, r) for r in (after.position, start)))
     discrete = np.array(call(numbers.discrete_gradient, start, after.position))
     force = -rise / (q1 - q0) * discrete
     given_ = mass * (after.velocity - velocity - h * gravity)
@@ -172,7 +173,7 @@ def test_impacts_count_entries():
     scene = swarm.Scene([swarm.Plane((1, 0, 0)), swarm.Sphere(5.0)])
     passes = run(swarm.Penalty(dt=1e-3, penalty=1e4), scene, [-0.1, 0.0, 0.0], [1.0, 0.0, 0.0], 200.0)
     assert sum(step.hits for step in passes) == 1.0
-    row = scene.owners().index(0)  # of the plane
+    row = scene.compiled().numbering.surfaces_of_rows.index(0)  # of the plane
     assert sum(step.impulse[row] for step in passes[1:]) == pytest.approx(2.0, rel=1e-12)
     assert passes[-1].velocity == pytest.approx([-1.0, 0.0, 0.0], rel=1e-12)
 

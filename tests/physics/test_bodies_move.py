@@ -247,7 +247,7 @@ def test_a_frame_that_is_halted_again_and_again_has_the_same_bits(make):
     scene, start, order = make()
     method, ends = swarm.Impact(dt=STEP, order=order), []
     for first, threads, size in ((None, 2, 16), (3, 1, 40), (50, 2, 7)):
-        with BodyRun(scene, (start, start.particles()), method, threads, size) as one:
+        with BodyRun(scene.compiled(), (start, start.particles()), method, threads, size) as one:
             for k in range(3):
                 passes = first
                 while True:

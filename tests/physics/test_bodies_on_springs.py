@@ -93,7 +93,7 @@ def test_bits_are_the_same_for_threads_blocks_neighbours_and_halts(method):
     scene, start = some("tetrahedron", BOX, 16)
     span, ends = (140.0, []) if isinstance(method, swarm.Penalty) else (1.4, [])
     for first, threads, size in ((None, 2, 6), (3, 1, 16), (50, 2, 5)):
-        with BodyRun(scene, (start, start.particles()), method, threads, size) as one:
+        with BodyRun(scene.compiled(), (start, start.particles()), method, threads, size) as one:
             for k in range(3):
                 passes = first
                 while True:

@@ -269,13 +269,13 @@ def test_of_a_field_each_member_is_known():
     from swarm.run.options import RunOptions, Task
 
     start = swarm.fill(scene, 500, speed=1.0, seed=1)
-    run = run_of(Task(scene, start, swarm.Impact(), RunOptions(until=5.0)))
+    run = run_of(Task(scene.compiled(), start, swarm.Impact(), RunOptions(until=5.0)))
     with run:
         run.observe()
         run.advance(5.0, 5.0)
         absorbed = run.state.absorbed
         gone = absorbed.wall >= 0
-        surface, member = scene.members()[:, absorbed.wall[gone]]
+        surface, member = scene.compiled().numbering.members[:, absorbed.wall[gone]]
         assert gone.sum() == run.seen()["absorbed"][1] > 30
         assert (surface == 1).all()
         away = run.state.position[:, gone] - np.array(centers)[member].T

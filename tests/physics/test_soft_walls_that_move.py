@@ -283,7 +283,7 @@ def test_free_steps_are_free(name, motion, gravity):
     """What is jumped over is inside at the end of every step."""
     scene, rng = swarm.Scene(CAVITIES[name](MOTIONS[motion]), gravity), np.random.default_rng(4)
     pull, start, span, some = np.array(gravity or (0.0, 0.0, 0.0)), 0.4, 2.0, 0
-    walls, still = scene.walls(start + span), swarm.Scene(CAVITIES[name](None))
+    walls, still = scene.compiled().walls(start + span), swarm.Scene(CAVITIES[name](None))
     for _ in range(40):
         r, v = rng.uniform(-0.5, 0.5, 3), rng.standard_normal(3)
         if not (scene.gaps(r[:, None], start) < 0.0).all():

@@ -163,7 +163,7 @@ def test_the_first_hit_is_found(name, motion, pull):
     made, still = ((CAVITIES | SOLIDS)[name](one) for one in (MOTIONS[motion], None))
     scene, rest = swarm.Scene([made]), swarm.Scene([still])
     rng, found, start, span = np.random.default_rng(5), 0, 0.6, 2.5
-    walls, times = scene.walls(start + span), moments(span)
+    walls, times = scene.compiled().walls(start + span), moments(span)
     poses, gravity = poses_of(motion, start, span), swarm.Scene([made], pull).pull()
     for _ in range(60):
         r, v = rng.uniform(-0.6, 0.6, 3), rng.standard_normal(3)
@@ -193,7 +193,7 @@ def test_a_hit_of_a_wall_that_comes_and_goes():
     amplitude, rest = 0.25, Vec(0.0, 0.0, 0.0)
     for gap, hits in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
         floor = swarm.Plane((0, 0, -1), offset=gap * amplitude, motion=swarm.Oscillation((0, 0, amplitude), 1.0))
-        walls = swarm.Scene([floor]).walls(0.6)
+        walls = swarm.Scene([floor]).compiled().walls(0.6)
         with np.errstate(all="ignore"):
             found = safe.first_hit_moving(walls, None, rest, ZERO, 0.6)
         assert (found.time < 0.6) == hits
@@ -435,7 +435,7 @@ def test_threads_and_blocks_change_no_bit():
 
 def test_the_walls_of_a_chain_at_an_instant():
     scene = swarm.Scene([CAVITIES["sphere"](None)])
-    assert scene.walls().at(0.3) == scene.walls()
+    assert scene.compiled().walls().at(0.3) == scene.compiled().walls()
 
 
 # --- Bad input, and walls that close ---------------------------------------------------------------------
@@ -548,7 +548,7 @@ def test_a_hit_of_a_wall_at_rest_at_once_is_none_of_one_that_moves():
     """A particle at a wall at rest, and a floor that shakes far below it."""
     floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, motion=swarm.Oscillation((0.0, 0.0, 0.05), 2.0))
     scene = swarm.Scene([swarm.Slab((0.0, 1.0, 0.0), 0.5), floor], DOWN)
-    walls = scene.walls(1.0)
+    walls = scene.compiled().walls(1.0)
     gravity = swarm.Scene([floor], DOWN).pull()
     for left in (0.0, 0.5):
         with np.errstate(all="ignore"):
@@ -556,4 +556,4 @@ def test_a_hit_of_a_wall_at_rest_at_once_is_none_of_one_that_moves():
                 walls, gravity, *map(vec, np.array([(0.1, -0.5, 1.6), (0.2, -0.1, -0.4)])), left
             )
         assert hit.time == 0.0
-        assert scene.owners()[int(hit.wall)] == 0
+        assert scene.compiled().numbering.surfaces_of_rows[int(hit.wall)] == 0

@@ -78,7 +78,7 @@ def test_a_ball_over_faces_is_the_lattice(where):
     """Eight, four or two images, against the exact billiard among balls in endless space."""
     center = {"corner": (0.02, -0.03, 0.01), "edge": (1.0, 0.02, 0.5), "face": (0.5, 0.4, 0.98)}[where]
     scene = swarm.Scene([swarm.Sphere(0.3, center, "outside")], period=(1.0, 1.0, 1.0))
-    assert len(scene.owners()) == {"corner": 8, "edge": 4, "face": 2}[where]
+    assert len(scene.compiled().numbering.surfaces_of_rows) == {"corner": 8, "edge": 4, "face": 2}[where]
     start = swarm.fill(scene, 30, speed=1.0, seed=4)
     end = swarm.simulate(scene, start, swarm.Impact(), until=6.0, every=1.0, compile="never")
     found, most = scene.unwrapped(end.particles), 0

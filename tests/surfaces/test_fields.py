@@ -64,7 +64,7 @@ def solids_of(field):
 def first_through_cells(scene, gravity, r, v):
     """The first hit as a particle finds it: from cell to cell."""
     pull = np.zeros(3) if gravity is None else np.array(gravity)
-    walls, passed = scene.walls(), 0.0
+    walls, passed = scene.compiled().walls(), 0.0
     for _cell in range(10_000):
         time, wall = flights.first_hit(walls, gravity, vec(r), vec(v))
         if not passed + time < LAST:
@@ -165,10 +165,10 @@ def test_more_than_a_few_of_one_kind_are_one_field():
     few, some, two = (
         swarm.Scene([*balls(n), box, *more]) for n, more in ((6, ()), (7, ()), (7, balls(7, friction=0.3)))
     )
-    assert [len(scene.order.groups) for scene in (few, some, two)] == [0, 1, 2]
+    assert [len(scene.compiled().order.groups) for scene in (few, some, two)] == [0, 1, 2]
     # One row for each surface, in the order of the chain.
-    assert some.owners() == [*range(7), 7, 7, 7]
-    assert two.owners() == [*range(7), *range(8, 15), 7, 7, 7]
+    assert some.compiled().numbering.surfaces_of_rows == [*range(7), 7, 7, 7]
+    assert two.compiled().numbering.surfaces_of_rows == [*range(7), *range(8, 15), 7, 7, 7]
 
 
 @pytest.mark.parametrize(

@@ -136,7 +136,9 @@ def test_flights_over_faces_are_those_from_face_to_face(case, monkeypatch):
     start.velocity[1, 10:30] = 0.0
     start.velocity[2, 25:35] = 0.0
     found = swarm.simulate(scene, start, swarm.Impact(), until=4.0, compile="never")
-    monkeypatch.setattr("swarm.scene.cell_in", lambda period, surfaces, fields, fall, wide: Period(*period, fall))
+    monkeypatch.setattr(
+        "swarm.compiled_scene.cell_in", lambda period, surfaces, fields, fall, wide: Period(*period, fall)
+    )
     other = swarm.simulate(scene, start, swarm.Impact(), until=4.0, compile="never")
     assert (found.impacts_per_particle == other.impacts_per_particle).all()
     few = found.impacts_per_particle <= 4
@@ -148,7 +150,7 @@ def test_flights_over_faces_are_those_from_face_to_face(case, monkeypatch):
 
 def test_where_nothing_is_in_the_way():
     def cell(walls, period=CELL):
-        return swarm.Scene(walls, period=period).cell()
+        return swarm.Scene(walls, period=period).compiled().cell()
 
     assert cell(CHANNEL, (1.0, 0.5, None))[:5] == (Free(1.0), Free(0.5), None, None, None)
     assert cell([ROD]).x == Free(1.0)

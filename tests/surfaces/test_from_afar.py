@@ -80,7 +80,7 @@ def test_a_flight_at_a_solid_meets_it(name, fall, size):
     for _flight in range(10):
         target = core(name, size, random) + 0.2 * size * random.uniform(-1.0, 1.0, 3)
         start, velocity, there = aimed(target, gravity, random)
-        hit, time = follow(scene.walls(), gravity, start, velocity, 2.0 * there)
+        hit, time = follow(scene.compiled().walls(), gravity, start, velocity, 2.0 * there)
         assert hit is not None
         assert time <= there * (1.0 + 4.0 * EPSILON)
         assert abs(scene.distances_outside(hit)).max() <= 4.0 * EPSILON * np.linalg.norm(start)
@@ -94,5 +94,5 @@ def test_a_flight_past_a_ball_does_not_meet_it(fall, size):
         start, velocity, there = aimed(CENTER, gravity, random)
         across = np.cross(accelerated(gravity, vec(velocity), there), random.standard_normal(3))
         past = (1.0 + 1e-3) * size * across / np.linalg.norm(across)
-        hit, _time = follow(scene.walls(), gravity, start + past, velocity, 2.0 * there)
+        hit, _time = follow(scene.compiled().walls(), gravity, start + past, velocity, 2.0 * there)
         assert hit is None

@@ -231,9 +231,9 @@ def test_balls_of_any_radius_are_known_to_the_scene():
 
 def test_a_ball_meets_a_solid_across_a_face_of_the_cell():
     scene = swarm.Scene([swarm.Sphere(0.2, (0.25, 0.5, 0.5), "outside")], period=(1.0, 1.0, 1.0))
-    assert len(scene.pieces) == 1
-    assert len(scene.of_balls(np.array([0.04])).pieces) == 1
-    assert len(scene.of_balls(np.array([0.1])).pieces) == 2
+    assert len(scene.pieces.each) == 1
+    assert len(scene.compiled(0.04).pieces.each) == 1
+    assert len(scene.compiled(0.1).pieces.each) == 2
     assert scene.distances_outside([[0.98], [0.5], [0.5]], 0.0, np.array([0.1])) == pytest.approx(0.03)
 
 
@@ -280,7 +280,7 @@ def test_the_cells_of_a_field_hold_what_balls_touch(kind):
 def test_the_foot_of_a_contact_is_on_the_wall():
     scene = swarm.Scene([swarm.Sphere(1.0), swarm.Box((0.2, 0.2, 0.2), side="outside")])
     radius = np.float64(0.1)
-    walls = scene.of_balls(np.array([radius])).walls().grown(radius)
+    walls = scene.compiled(radius).walls().grown(radius)
     for number, wall in walls.numbered():
         r = Vec(*(np.float64(x) for x in ((0.9, 0.0, 0.0) if wall.side > 0.0 else (0.0, -0.3, 0.1))))
         foot = np.array(walls.foot(number, r, radius))
@@ -295,7 +295,7 @@ def test_discs_stay_in_their_plane(name):
         surface = replace(surface, rotation={"axis": (0.0, 0.0, 1.0), "angle": 0.7})
     scene = swarm.Scene([surface], plane="z")
     rng = np.random.default_rng(13)
-    for wall in scene.of_balls(np.array([0.1])).walls().each:
+    for wall in scene.compiled(0.1).walls().each:
         members = getattr(wall, "members", None)
         each = [wall] if members is None else [members.wall(float(m)) for m in range(int(members.count()))]
         for one in each:

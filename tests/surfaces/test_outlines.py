@@ -155,7 +155,7 @@ def test_every_flight_ends_where_brute_force_says(name):
     rows = OUTLINES.get(name) or spiky(*((1, 9) if name == "star" else (2, 40)))
     scene = scene_of(rows)
     start = swarm.fill(scene, 100, speed=1.0, seed=4)
-    outline, walls = scene.surfaces[0].boundary, scene.walls()
+    outline, walls = scene.surfaces[0].boundary, scene.compiled().walls()
     for r, v in zip(start.position.T, start.velocity.T, strict=True):
         place, time, wall = vec(r), 0.0, -1.0
         while wall < 0.0:
@@ -168,7 +168,7 @@ def test_every_flight_ends_where_brute_force_says(name):
 def test_a_fall_ends_where_small_steps_say(name):
     scene = scene_of(OUTLINES[name], gravity=(0.3, -1.0, 0.0))
     start = swarm.fill(scene, 40, speed=1.0, seed=4)
-    surface, walls, pull = scene.surfaces[0], scene.walls(), Gravity(0.3, -1.0, 0.0)
+    surface, walls, pull = scene.surfaces[0], scene.compiled().walls(), Gravity(0.3, -1.0, 0.0)
     for r, v in zip(start.position.T, start.velocity.T, strict=True):
         hit = first_hit(walls, pull, vec(r), vec(v))
         assert hit.wall >= 0.0

@@ -230,7 +230,7 @@ def test_with_an_opening_of_a_part_a_flight_ends_in_its_cell():
 
 def test_balls_are_packed_within_the_openings_of_parts():
     scene = packing._at_rest(swarm.Scene([OPEN_ROOM]))
-    assert scene.openings() is None
+    assert scene.compiled().openings() is None
 
 
 def test_an_opening_of_a_nested_part_opens_that_part_alone():
@@ -239,7 +239,7 @@ def test_an_opening_of_a_nested_part_opens_that_part_alone():
         [swarm.Union([OPEN_ROOM, swarm.Sphere(0.2, (0.0, 0.0, -0.5))]), swarm.Sphere(0.3, (0.6, 0.0, 0.0))]
     )
     scene = swarm.Scene([room])
-    assert [bool(volumes) for volumes in scene._volumes] == [True, False, False]
+    assert [bool(volumes) for volumes in scene.pieces.volumes] == [True, False, False]
     inner = swarm.Union(
         [swarm.Sphere(0.5), swarm.Sphere(0.3, (0.5, 0.0, 0.0))], openings=[swarm.Sphere(0.1, (3.0, 0.0, 0.0))]
     )

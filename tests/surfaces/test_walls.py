@@ -123,7 +123,7 @@ def test_who_is_outside_and_who_is_touched(names, point, free):
 def test_a_wall_in_uniform_translation_is_asked_in_its_frame(pull, point, velocity):
     """Its hits are those of the wall at rest, bit for bit, and not found by safe steps."""
     moved = swarm.Sphere(1.0, motion=swarm.Translation((0.2, -0.1, 0.3)))
-    (wall,) = swarm.Scene([moved], pull).walls(1.0).at(0.25).each
+    (wall,) = swarm.Scene([moved], pull).compiled().walls(1.0).at(0.25).each
     shift, speed = np.array(wall.pose.shift), np.array(wall.pose.velocity)
     (body,) = swarm.Sphere(1.0).walls()
     ask, more = ("first_hit", ()) if pull is None else ("falling_hit", (np.array(pull),))

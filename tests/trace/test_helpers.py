@@ -247,7 +247,7 @@ def trace_kernels(made):
 def test_no_helper_of_a_method_is_left_to_numba(method, left):
     scene = scene_of("sphere", "plane")
     start = swarm.Particles(np.zeros(3), np.zeros(3))
-    assert trace_kernels(Run(scene, start, method, 1, None, "never")) > 0
+    assert trace_kernels(Run(scene.compiled(), start, method, 1, None, "never")) > 0
     assert left == {}
 
 
@@ -255,7 +255,7 @@ def test_no_helper_of_a_method_is_left_to_numba(method, left):
 def test_no_helper_of_a_surface_is_left_to_numba(name, left):
     scene = scene_of(name, gravity=(0.1, 0.2, -9.81))
     start = swarm.Particles(np.zeros(3), np.zeros(3))
-    assert trace_kernels(Run(scene, start, swarm.Impact(), 1, None, "never")) > 0
+    assert trace_kernels(Run(scene.compiled(), start, swarm.Impact(), 1, None, "never")) > 0
     assert left == {}
 
 

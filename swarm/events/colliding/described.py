@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiled_scene import CompiledScene
 from ...contact.laws import NONE
 from ...kernel.arrays import aligned, aligned_copy
 from ...pairs import Pairs
@@ -81,11 +82,12 @@ def with_room(flock: Flock, grid: BallGrid) -> tuple[Flock, BallGrid]:
     return flock._replace(room=aligned_copy(room.ravel())), grid._replace(stride=stride)
 
 
-def described(scene: Scene, particles: Particles) -> tuple[Domain, Flock]:
+def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Flock]:
     """What the balls are in, and these at the start."""
     assert particles.radius is not None
-    scenery = scenery_of(scene, 0.0) if scene.reacts() else None
-    laws = scene.laws() or NONE if scenery is None else scenery.laws
+    scene = compiled.scene
+    scenery = scenery_of(compiled, 0.0) if scene.reacts() else None
+    laws = compiled.laws or NONE if scenery is None else scenery.laws
     pairs = scene.pairs or Pairs()
     loss = None
     heavy_loses = any(surface.reacts() and surface.restitution < 1.0 for surface in scene.surfaces)
@@ -94,7 +96,7 @@ def described(scene: Scene, particles: Particles) -> tuple[Domain, Flock]:
     grid = grid_of(scene, particles)
     flock, grid = with_room(flock_of(particles, grid, loss is not None, bool(scene.surfaces)), grid)
     shortest = max(_SHORTEST * epoch_of(scene, particles, grid), 0.0 if loss is None else loss.duration)
-    walls = scene.walls(0.0) if scenery is None else scenery.given
+    walls = compiled.walls(0.0) if scenery is None else scenery.given
     made = Domain(walls, laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest)
     if scene.gravity is not None:
         # Also where nothing is lost: balls may start at rest on a floor.

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiled_scene import CompiledScene
 from ...contact.laws import NONE
 from ...kernel.vector import Vec, vec
 from ...motion import Guide, Rotation, Translation, pose, unit_axis
 from ...run.observed import Observed
 from ...scene import Scene
+from ...surfaces.presence.doors import walls_then
 from ...surfaces.surface import Surface
 from ...surfaces.walls import Walls
 from .freedoms import WIDTH, Freedoms, Shifted
@@ -21,28 +23,32 @@ from .strikes import Reacting
 Floats = NDArray[np.float64]
 
 
-def scenery_of(scene: Scene, moment: float) -> SceneWalls:
+def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:
     """The walls of a scene in the frame that ends at a moment [s]."""
-    owners = np.array(scene.owners())
-    rest = [surface for surface in scene.surfaces if not surface.reacts()]
-    given = scene.of_some(rest).ungrouped("walls that react") if rest else None
-    reacts = np.array([surface.reacts() for surface in scene.surfaces])[owners]
+    scene, largest = compiled.scene, compiled.largest
+    rest, given = [surface for surface in scene.surfaces if not surface.reacts()], None
+    if rest:
+        plane = None if largest is None else scene.plane
+        given = Scene(rest, scene.gravity, plane=plane).compiled(largest, "walls that react")
+    reacts = np.array([surface.reacts() for surface in scene.surfaces])
+    reacts = reacts[compiled.numbering.surfaces_of_rows]
     return SceneWalls(
         Walls(()) if given is None else given.walls(moment),
-        (given.laws() if given else None) or NONE,
+        (given.laws if given else None) or NONE,
         np.flatnonzero(~reacts),
-        _reacting(scene),
+        _reacting(compiled),
         scene.pull(),
     )
 
 
-def _reacting(scene: Scene) -> tuple[Reacting, ...]:
+def _reacting(compiled: CompiledScene) -> tuple[Reacting, ...]:
     """The walls that react, in the order of the scene's walls; rows of freedoms are in that of its surfaces."""
+    scene = compiled.scene
     rows = [i for i, surface in enumerate(scene.surfaces) if surface.reacts()]
     made, number = [], 0
-    for i in dict.fromkeys(scene.owners()):
+    for i in dict.fromkeys(compiled.numbering.surfaces_of_rows):
         surface = scene.surfaces[i]
-        walls = scene.walls_of(surface)
+        walls = walls_then(surface, 0.0, compiled.largest)
         if surface.reacts():
             freedom = _freedom(surface, rows.index(i), scene.gravity or (0.0, 0.0, 0.0))
             made += [Reacting(wall, freedom, number + k, surface.restitution) for k, wall in enumerate(walls)]
@@ -83,9 +89,10 @@ def _vector(values: Floats) -> Vec:
     return vec(values.tolist())
 
 
-def freedoms_of(scene: Scene, velocity: Floats) -> Freedoms:
+def freedoms_of(compiled: CompiledScene, velocity: Floats) -> Freedoms:
     """The walls that react at the start, with leases for particles of these velocities (3, N) [m/s]."""
     width = WIDTH * math.sqrt(float((velocity**2).sum(axis=0).mean())) or WIDTH
+    scene = compiled.scene
     surfaces = [surface for surface in scene.surfaces if surface.reacts()]
     count = len(surfaces)
     shift, velocity, rest, middle = np.zeros((4, 3, count))
@@ -102,7 +109,7 @@ def freedoms_of(scene: Scene, velocity: Floats) -> Freedoms:
         widths[k] = width if surface.inertia is None else width / size
     series = np.zeros((3 * TERMS, count))
     made = Freedoms(shift, velocity, rest, angle, rate, rate_rest, series, time, middle, turning, widths, until)
-    for wall in _reacting(scene):
+    for wall in _reacting(compiled):
         if isinstance(wall.freedom, Pendulum):
             wall.freedom.expand(made)
     return made
@@ -139,8 +146,9 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
     return found
 
 
-def walls_now(scene: Scene, scenery: SceneWalls, freedoms: Freedoms) -> Walls:
+def walls_now(compiled: CompiledScene, scenery: SceneWalls, freedoms: Freedoms) -> Walls:
     """All walls of a scene, in its order, at the end of the frame of `scenery`."""
     given = iter(scenery.given.at(0.0).each)
     reacting = (wall.freedom.posed(wall.body, freedoms, 0.0) for wall in scenery.reacting)
-    return Walls(tuple(next(reacting if scene.surfaces[i].reacts() else given) for i in scene.owners()))
+    owned = [compiled.scene.surfaces[i] for i in compiled.numbering.surfaces_of_rows]
+    return Walls(tuple(next(reacting if surface.reacts() else given) for surface in owned))

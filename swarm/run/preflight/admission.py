@@ -4,7 +4,6 @@ import numpy as np
 
 from ...errors import SceneError
 from ...files.origin import require_near
-from ...methods import Impact
 from ...methods.base import Method, check_surfaces
 from ...motion import Path, parts_of
 from ...motion.given import require_angles
@@ -49,17 +48,16 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
     if isinstance(particles, TiedParticles):
         task: Task = engines.wing("bodies.admission").task_of(scene, particles, method, options)
         return task
-    if not isinstance(method, Impact) or method.contact_step > 0.0:
-        scene = scene.ungrouped(type(method).__name__ if not isinstance(method, Impact) else "a contact_step")
     # The arrays of Particles may have been changed since it checked them.
     start = None if particles is None else _in_the_cell(scene, particles.copy(), options.times.until)
     check_surfaces(method, scene)
     if start is not None and start.radius is not None:
         engines.wing("events.balls").require_balls(scene, start, method)
-    scene = scene.of_balls(None if start is None else start.radius)
+    radius = None if start is None else start.radius
+    compiled = scene.compiled(None if radius is None else float(radius.max()), method.apart())
     if options.compile != "never":
         counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
-        walls = [*scene.surfaces, *scene.open_volumes()]
+        walls = [*scene.surfaces, *scene.pieces.open_volumes()]
         for surface in [*walls, *counters]:
             surface.require_compiled()
     times = options.times
@@ -77,8 +75,8 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
     # Particles from sources are born later, inside the walls of that time.
     if start is not None:
         _require_place(scene, start, method)
-    workload.require_few_impacts(scene, particles, method, times.until, times.every)
-    return Task(scene, particles, method, options)
+    workload.require_few_impacts(compiled, particles, method, times.until, times.every)
+    return Task(compiled, particles, method, options)
 
 
 def _require_place(scene: Scene, start: Particles, method: Method) -> None:

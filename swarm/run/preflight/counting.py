@@ -98,7 +98,7 @@ def _counted(scene: Scene, name: str, counter: Counter) -> Counted:
         other = other_side(surface)
     except SceneError:
         raise SceneError(f"{name} must be a surface with two sides, got {surface!r:.200}; count on another") from None
-    inner, outer = (_alone(scene, name, one).walls() for one in (surface, other))
+    inner, outer = (_alone(scene, name, one).compiled().walls() for one in (surface, other))
     return Walled(inner, outer, near, volumes, _ball_around(surface, other, near))
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiled_scene import CompiledScene
 from ...kernel.limits import EPSILON
 from ...methods import Impact
 from ...methods.verlet import Verlet
@@ -35,7 +36,7 @@ def give(task: Task) -> None:
     """Warn of what the run will do that may not be meant. Nothing of it is wrong."""
     warn_of_overlap(task.scene)
     _warn_of_faces(task.scene)
-    _warn_of_fall(task.scene)
+    _warn_of_fall(task.compiled)
     softness.warn_of_depths(task)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
         # About the fastest: of some.
@@ -54,17 +55,18 @@ def _some(count: int) -> slice:
     return slice(0, None, max(1, count // _LOOKED_AT))
 
 
-def _takes_energy(scene: Scene) -> bool:
+def _takes_energy(compiled: CompiledScene) -> bool:
     """Whether an impact may change the energy of a particle."""
-    pairs = scene.pairs is not None and scene.pairs.restitution < 1.0
-    return pairs or scene.laws() is not None
+    pairs = compiled.scene.pairs
+    return (pairs is not None and pairs.restitution < 1.0) or compiled.laws is not None
 
 
-def _warn_of_fall(scene: Scene) -> None:
+def _warn_of_fall(compiled: CompiledScene) -> None:
     """Warn where gravity pulls along a period, and nothing ends the fall."""
+    scene = compiled.scene
     pulls = scene.gravity or (0.0, 0.0, 0.0)
     for k, (length, pull) in enumerate(zip(scene.period or (), pulls, strict=False)):
-        if length is not None and pull and not _takes_energy(scene):
+        if length is not None and pull and not _takes_energy(compiled):
             _LOG.warning(
                 "gravity[%d] = %g m/s^2 pulls along period[%d] = %g m, and no impact takes energy: each cell gives "
                 "%.3g J for a kg, and particles get faster without end; give walls a restitution, a friction or a "
@@ -115,7 +117,7 @@ def _warn_of_times(task: Task, speed: float) -> None:
     kept = float(np.spacing(until))
     if scene.moves() or kept < _SURELY * _ROUND_OFF * _crossing(scene, speed):
         return
-    between = workload.time_between(scene, task.particles)
+    between = workload.time_between(task.compiled, task.particles)
     if kept > _ROUND_OFF * between:
         # Within a frame times are counted from its end.
         inside = float(np.spacing(every)) > _ROUND_OFF * between
@@ -138,7 +140,7 @@ def _warn_of_steps(task: Task, speed: float) -> None:
     contact, depth = (0.0, 0.0) if law is None or method.is_rigid() else _contact(task, speed)
     if max(step / _STEP, contact / _CONTACT) < _SURELY * _crossing(scene, speed):
         return
-    between = workload.time_between(scene, particles)
+    between = workload.time_between(task.compiled, particles)
     said = f"the time between impacts is about T = {between:.2g} s; "
     if step > _STEP * between:
         _LOG.warning(

@@ -8,12 +8,13 @@ every other pair is. `require_known` raises the first one that applies, before a
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
+from ...compiled_scene import MOST_WALLS
 from ...errors import SceneError
 from ...methods import AugmentedLagrangian, Impact, Penalty
 from ...methods.base import Method
 from ...methods.fixed_step import SoftWalls
 from ...particles import Particles, TiedParticles
-from ...scene import BESIDE_MASS, INSTEAD_OF_MASS, MOST_WALLS, Scene
+from ...scene import BESIDE_MASS, INSTEAD_OF_MASS, Scene
 from ...surfaces.facets.mesh import Mesh
 from ...surfaces.fields.many import Many
 from ...surfaces.in_motion.drive import drive_of
@@ -76,7 +77,7 @@ Found = Iterator[dict[str, Any]]
 
 def _walls(asked: Asked) -> Iterator[tuple[int, Surface]]:
     """The simple surfaces of a scene, each with the number of the surface that it is a part of."""
-    return zip(asked.scene.owners_of_pieces, asked.scene.pieces, strict=True)
+    return asked.scene.pieces.owned()
 
 
 def _of_walls(name: str, without: Any) -> Callable[[Asked], Found]:
@@ -177,18 +178,18 @@ def _losses_that_fall(asked: Asked) -> Found:
 def _rooms(asked: Asked) -> Found:
     """Unions of several rooms, and foams."""
     for i, surface in enumerate(asked.scene.surfaces):
-        if i in asked.scene.unions() or (isinstance(surface, Many) and surface.is_foam()):
+        if i in asked.scene.compiled().unions() or (isinstance(surface, Many) and surface.is_foam()):
             yield {"i": i, "got": surface}
 
 
 def _fields(asked: Asked) -> Found:
-    yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.fields())
+    yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().fields())
 
 
 def _fields_that_rest(asked: Asked) -> Found:
     scene = asked.scene
-    for i in scene.order.fields if scene.moves() else ():
-        yield {"i": scene.owners_of_pieces[i], "got": scene.pieces[i]}
+    for i in scene.compiled().order.fields if scene.moves() else ():
+        yield {"i": scene.pieces.owners[i], "got": scene.pieces.each[i]}
 
 
 def _faces(asked: Asked) -> Found:

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiled_scene import CompiledScene
 from ...errors import SceneError
 from ...kernel.gravity import Gravity
 from ...kernel.vector import vec
 from ...methods.base import Method
 from ...particles import Particles
-from ...scene import Scene
 from ...surfaces.time_of_impact import flights
 
 _LOG = logging.getLogger("swarm")
@@ -32,25 +32,27 @@ class Flights(NamedTuple):
     wall: int
 
 
-def require_few_impacts(scene: Scene, particles: Particles, method: Method, until: float, every: float) -> None:
+def require_few_impacts(
+    compiled: CompiledScene, particles: Particles, method: Method, until: float, every: float
+) -> None:
     """Raise a `SceneError` where a frame would take more impacts of one particle than it can; warn of a long run."""
     impact = method.time_of_impact()
     # Where energy is lost or given, by heat or by work, the first flights say nothing of the later ones.
-    if impact is None or scene.laws() is not None:
+    if impact is None or compiled.laws is not None:
         return
     with np.errstate(all="ignore"):
-        found = _of_particles(scene, particles, impact)
+        found = _of_particles(compiled, particles, impact)
         if not _is_much(found, particles, until, every):
             return
         # They may start in a narrow corner and leave it: then the volume around decides.
-        found = max(found, _of_volume(scene, particles, impact))
+        found = max(found, _of_volume(compiled, particles, impact))
     if every > _MOST_A_FRAME * found.between:
-        i = int(scene.members()[0, found.wall])
+        i = int(compiled.numbering.members[0, found.wall])
         raise SceneError(
             f"a particle must take at most {_MOST_A_FRAME:g} impacts a frame, got about {every / found.between:.2g}: "
             f"at its speed it flies {found.between:.2g} s from impact to impact, mostly at surfaces[{i}] "
-            f"({type(scene.surfaces[i]).__name__}), and a frame lasts {every:g} s; make that surface wider, the "
-            f"particles slower, or every at most {_MOST_A_FRAME * found.between:.2g} s"
+            f"({type(compiled.scene.surfaces[i]).__name__}), and a frame lasts {every:g} s; make that surface wider, "
+            f"the particles slower, or every at most {_MOST_A_FRAME * found.between:.2g} s"
         )
     impacts = len(particles) * (until / found.between)
     if impacts > _MANY:
@@ -60,19 +62,19 @@ def require_few_impacts(scene: Scene, particles: Particles, method: Method, unti
         )  # fmt: skip
 
 
-def time_between(scene: Scene, particles: Particles) -> float:
+def time_between(compiled: CompiledScene, particles: Particles) -> float:
     """The typical time of a flight from impact to impact at the start [s]."""
     with np.errstate(all="ignore"):
-        return _of_particles(scene, particles, 0.0).between
+        return _of_particles(compiled, particles, 0.0).between
 
 
 def _is_much(found: Flights, particles: Particles, until: float, every: float) -> bool:
     return every > _MOST_A_FRAME * found.between or len(particles) * until > _MANY * found.between
 
 
-def _of_particles(scene: Scene, particles: Particles, impact: float) -> Flights:
+def _of_particles(compiled: CompiledScene, particles: Particles, impact: float) -> Flights:
     """From the flights of some particles at the start, from the impact before it to the one after it."""
-    walls, pull, seen = scene.walls(), scene.pull(), []
+    walls, pull, seen = compiled.walls(), compiled.scene.pull(), []
     for i in _chosen(particles):
         position, velocity = particles.position[:, i], particles.velocity[:, i]
         until, wall = _hit(walls, pull, position, velocity)
@@ -83,18 +85,18 @@ def _of_particles(scene: Scene, particles: Particles, impact: float) -> Flights:
     return _typical(seen)
 
 
-def _of_volume(scene: Scene, particles: Particles, impact: float) -> Flights:
+def _of_volume(compiled: CompiledScene, particles: Particles, impact: float) -> Flights:
     """From the chords of the volume around some particles: a random walk from chord to chord.
 
     Between two chords it moves along the wall, which leads out of a narrow corner, but not out of a narrow slit.
     """
-    walls, random, seen = scene.walls(), np.random.default_rng(0), []
-    pull = math.hypot(*(scene.gravity or (0.0,)))
+    walls, random, seen = compiled.walls(), np.random.default_rng(0), []
+    axes, pull = compiled.scene.axes(), math.hypot(*(compiled.scene.gravity or (0.0,)))
     for i in _chosen(particles):
         point, velocity = particles.position[:, i], particles.velocity[:, i]
         for k in range(_CHORDS):
             way = np.zeros(3)
-            way[scene.axes()] = random.standard_normal(len(scene.axes()))
+            way[axes] = random.standard_normal(len(axes))
             way = way / math.sqrt(way @ way)
             length, ahead, wall = _chord(walls, point, way)
             if not length < math.inf:

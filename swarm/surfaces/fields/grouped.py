@@ -8,12 +8,9 @@ from typing import Any, NamedTuple, TypeVar
 from ...motion import Placed
 from ..facets.mesh import Mesh
 from ..in_motion.moving import walls_of
-from ..presence.doors import walls_then
-from ..presence.joined import with_rooms
 from ..surface import Surface
-from ..walls import Field, Listed, Walls, all_walls
 from .many import Many
-from .members import Members, alike, can_be_member, kind_of
+from .members import alike, can_be_member, kind_of
 
 # So many surfaces of one kind stay walls of their own, whose numbers are not looked up: an impact in a sphere with 6
 # balls takes 24 ns, and 31 as a field of a few. From 8 on LLVM no longer vectorises them: 112 and 38 ns.
@@ -66,30 +63,25 @@ class Order(NamedTuple):
     # Of each union its rooms, of each room its surfaces, of which the walls come last.
     unions: tuple[tuple[tuple[int, ...], ...], ...] = ()
 
+    def joined(self) -> tuple[int, ...]:
+        """The surfaces of unions of several rooms."""
+        return tuple(i for rooms in self.unions for room in rooms for i in room)
+
     def alone(self) -> tuple[int, ...]:
         """The surfaces of which each wall is one of the scene, in the order of these."""
-        return (*self.others, *(i for rooms in self.unions for room in rooms for i in room))
+        return *self.others, *self.joined()
 
-    def owners(self, surfaces: Sequence[Surface]) -> list[int]:
-        """The surface that each row of the scene belongs to: one for a field, else one for each wall."""
-        walls = [i for i in self.alone() for _wall in surfaces[i].walls()]
-        return [*self.fields, *(i for group in self.groups for i in group), *walls]
+    def rows(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
+        """Of each row of the scene its surface, and the number of its walls: the members of a field, else one."""
+        return self._listed(surfaces, [(i, 1) for group in self.groups for i in group])
 
     def spans(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
-        """The same as (surface, how many walls in a row have its laws), several where one takes the place of many."""
-        walls = [(i, 1) for i in self.alone() for _wall in surfaces[i].walls()]
-        many = [(i, len(surface)) for i in self.fields if isinstance(surface := surfaces[i], _FIELDS)]
-        return [*many, *((group[0], len(group)) for group in self.groups), *walls]
+        """Walls in a row that have the same laws: their surface, the first one of a group, and their number."""
+        return self._listed(surfaces, [(group[0], len(group)) for group in self.groups])
 
-    def members(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
-        """The surface that each wall of the scene belongs to, and its number in the field that this is, or -1."""
-        walls = [(i, -1) for i in self.alone() for _wall in surfaces[i].walls()]
-        many = [(i, m) for i in self.fields if isinstance(field := surfaces[i], _FIELDS) for m in field.numbers()]
-        return [*many, *((i, -1) for group in self.groups for i in group), *walls]
-
-    def compiled(self, surfaces: Sequence[Surface]) -> int:
-        """The number of walls that kernels are compiled for."""
-        return len(self.fields) + len(self.groups) + sum(len(surfaces[i].walls()) for i in self.alone())
+    def _listed(self, surfaces: Sequence[Surface], groups: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        fields = [(i, len(surfaces[i])) for i in self.fields]  # type: ignore[arg-type]
+        return [*fields, *groups, *((i, 1) for i in self.alone() for _wall in surfaces[i].walls())]
 
 
 def order_of(
@@ -132,28 +124,6 @@ def order_of(
     groups.sort(key=len)
     fields, others = (by_kind(by_kind(some, volumes), walls) for some in (fields, others))
     return Order(tuple(fields), tuple(by_kind(groups, body)), tuple(others), tuple(unions))
-
-
-def walls_in(
-    order: Order, surfaces: Sequence[Surface], groups: Sequence[Members], own: Sequence[Surface],
-    taken: Callable[[Members], Members], moment: float = 0.0, largest: float | None = None,
-) -> Walls:  # fmt: skip
-    """The walls of a scene in which nothing moves, and of a body's own surfaces, in the frame that ends at a moment.
-
-    `groups` are the order's fields, and `taken` says how kernels take a field that is always there. They are those of
-    points, or of balls whose radii are the `largest` at most [m].
-    """
-    fields = (Field(_field(surfaces[i], taken, moment, largest)) for i in order.fields)
-    listed = (Listed(taken(group)) for group in groups)
-    others = (wall for i in order.others for wall in walls_then(surfaces[i], moment, largest))
-    joined = (wall for i in order.alone()[len(order.others) :] for wall in walls_then(surfaces[i], moment, largest))
-    rooms = [[[surfaces[i] for i in room] for room in union] for union in order.unions]
-    return with_rooms(Walls((*fields, *listed, *others, *all_walls(own).each, *joined)), rooms)
-
-
-def _field(surface: Surface, taken: Callable[[Members], Members], moment: float, largest: float | None) -> Members:
-    (members,) = walls_then(surface, moment, largest)
-    return taken(members) if surface.present is None else members
 
 
 def _laws(surface: Surface) -> tuple[Any, ...]:

@@ -1,51 +1,88 @@
-"""What every piece of a scene has, of its surfaces, those of which its unions are made, and images."""
+"""The pieces of a scene: simple surfaces, in the order of its surfaces, with the openings of each."""
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
-from .contact.laws import Span, Thermal
-from .errors import SceneError
-from .surfaces.periodic.images import Lengths
-from .surfaces.presence.openings import reaches, volumes_of
-from .surfaces.surface import Surface, volume_of
-from .surfaces.union import Joined, Place, nodes_of
+from ..errors import SceneError
+from .periodic.images import Lengths, images_of
+from .presence.openings import reaches, volumes_of
+from .surface import Surface, volume_of
+from .union import Joined, Place, nodes_of, surfaces_of
 
 # Of the extent of what kernels take as unions, how far rooms with a face in common overlap: more than what counts as
 # touching a wall.
 _REACH = 1e-9
-# The law of a wall without temperature.
-NO_HEAT = Thermal(0.0, 0.0)
+
+Images = tuple[tuple[Surface, ...], ...]
 
 
-class PartsOfRows(NamedTuple):
-    """The part that each row of a scene belongs to, `number` where its surface has none; how many parts there are."""
+@dataclass(frozen=True)
+class Pieces:
+    """The simple surfaces of a scene: its surfaces without parts, the parts of others, and the images of both.
 
-    rows: tuple[int, ...]
-    number: int
+    Attributes:
+        images: of every surface what of it reaches into the cell; itself alone where nothing repeats.
+        each: the pieces, of one image after the other.
+        owners: the number of the surface that each piece is, or is a part or an image of.
+        places: the place of each piece in that surface, () where it has no parts.
+        volumes: the volumes in which each piece is open.
+        doorways: the volumes in which each piece is open where another room of its union is on its other side.
+    """
+
+    images: Images
+    each: tuple[Surface, ...]
+    owners: tuple[int, ...]
+    places: tuple[Place, ...]
+    volumes: Images
+    doorways: Images
+
+    def owned(self) -> Iterator[tuple[int, Surface]]:
+        """The pieces, each with the number of its surface."""
+        return zip(self.owners, self.each, strict=True)
+
+    def rooms(self) -> list[tuple[tuple[int, ...], ...]]:
+        """Of each union of several rooms the numbers of the pieces of every room."""
+        found, first = [], 0
+        for image in itertools.chain(*self.images):
+            if isinstance(image, Joined) and len(image.rooms) > 1:
+                ends = list(itertools.accumulate(map(len, image.rooms), initial=first))
+                found.append(tuple(tuple(range(*ends)) for ends in itertools.pairwise(ends)))
+            first += len(surfaces_of(image))
+        return found
+
+    def open_volumes(self) -> tuple[Surface, ...]:
+        """The volumes in which any piece is open."""
+        return tuple(itertools.chain(*self.volumes, *self.doorways))
 
 
-def places_of(image: Surface) -> tuple[Place, ...]:
-    """The places of the pieces of a surface in it."""
+def pieces_of(surfaces: Sequence[Surface], period: Lengths | None, largest: float = 0.0) -> Pieces:
+    """The pieces that particles in the cell meet; they are points, or balls with radii up to the largest one [m].
+
+    Raises:
+        SceneError: a surface does not go with the period, or an opening does not reach the wall that it opens.
+    """
+    named = [(one, f"surfaces[{i}]") for i, one in enumerate(surfaces)]
+    images = _with_reach(tuple(
+        (one,) if period is None else tuple(images_of(one, period, name, largest)) for one, name in named
+    ))  # fmt: skip
+    owned = [(i, image) for i, several in enumerate(images) for image in several]
+    volumes = _volumes_of_pieces(surfaces, images, period)
+    return Pieces(
+        images,
+        tuple(piece for _i, image in owned for piece in surfaces_of(image)),
+        tuple(i for i, image in owned for _piece in surfaces_of(image)),
+        tuple(place for _i, image in owned for place in _places_of(image)),
+        volumes,
+        _doorways_of_pieces(images, volumes),
+    )
+
+
+def _places_of(image: Surface) -> tuple[Place, ...]:
     return image.places() if isinstance(image, Joined) else ((),)
 
 
-def of_walls(values: list[Any], spans: list[tuple[int, int]], neutral: Any) -> tuple[Any, ...] | None:
-    """The value of every wall, of which so many in a row have one of these; None where all are neutral."""
-    if all(value == neutral for value in values):
-        return None
-    return tuple(values[k] if walls == 1 else Span(values[k], float(walls)) for k, walls in spans)
-
-
-def thermal(surface: Surface) -> Thermal:
-    """The temperature and the accommodation of a surface as kernels take them."""
-    if surface.temperature is None:
-        return NO_HEAT
-    return Thermal(surface.temperature, surface.accommodation)
-
-
-def with_reach(images: Sequence[tuple[Surface, ...]]) -> tuple[tuple[Surface, ...], ...]:
+def _with_reach(images: Images) -> Images:
     """The surfaces of a scene with their images, whose rooms overlap where they have a face in common."""
     several = [one for some in images for one in some if isinstance(one, Joined) and len(one.rooms) > 1]
     reach = _REACH * max((piece.extent() for one in several for piece in one.surfaces()), default=0.0)
@@ -54,7 +91,7 @@ def with_reach(images: Sequence[tuple[Surface, ...]]) -> tuple[tuple[Surface, ..
     )  # fmt: skip
 
 
-def volumes_of_pieces(
+def _volumes_of_pieces(
     surfaces: Sequence[Surface], images: Sequence[Sequence[Surface]], period: Lengths | None
 ) -> tuple[tuple[Surface, ...], ...]:
     """The volumes in which every piece is open, of surfaces and the images of each."""
@@ -63,7 +100,7 @@ def volumes_of_pieces(
         name = f"surfaces[{i}]"
         if isinstance(surface, Joined):
             of_parts = _volumes_of_parts(surface, period, name)
-            found += [of_parts[place] for image in some for place in places_of(image)]
+            found += [of_parts[place] for image in some for place in _places_of(image)]
         else:
             found += [volumes_of(surface, period, name)] * len(some)
     return tuple(found)
@@ -90,7 +127,7 @@ def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> dict[
     return found
 
 
-def doorways_of_pieces(
+def _doorways_of_pieces(
     images: Sequence[Sequence[Surface]], volumes: Sequence[Sequence[Surface]]
 ) -> tuple[tuple[Surface, ...], ...]:
     """The volumes in which every piece is open where another room of its union is on its other side.

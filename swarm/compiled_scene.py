@@ -1,0 +1,247 @@
+"""The scene as kernels take it: its walls by their kinds, with their laws and openings, and all numberings of walls."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .contact.laws import NONE, Laws, Moves, Span, Thermal, owned_in
+from .errors import SceneError
+from .kernel.vector import Vec
+from .surfaces.facets.mesh import Mesh
+from .surfaces.fields.grouped import Order, order_of
+from .surfaces.fields.many import in_straight_flights, members_of
+from .surfaces.fields.members import Members
+from .surfaces.in_motion.moving import carried
+from .surfaces.periodic.images import corners_of
+from .surfaces.periodic.period import Period, cell_in
+from .surfaces.pieces import Pieces
+from .surfaces.presence.doors import walls_then, was_there
+from .surfaces.presence.joined import with_rooms
+from .surfaces.presence.openings import Opened, openings_in
+from .surfaces.surface import Surface
+from .surfaces.union import Place
+from .surfaces.upright import upright
+from .surfaces.walls import Field, Listed, Walls, all_walls
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+# Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
+MOST_WALLS = 24
+# The law of a wall without temperature.
+_NO_HEAT = Thermal(0.0, 0.0)
+
+
+class PartsOfRows(NamedTuple):
+    """The part that each row of a scene belongs to, `number` where its surface has none; how many parts there are."""
+
+    rows: tuple[int, ...]
+    number: int
+
+
+class Numbering:
+    """The numberings of walls, and all translations among them.
+
+    | number | what is counted | in the order of |
+    | --- | --- | --- |
+    | surface | what the user listed in `Scene.surfaces` | the user |
+    | part | the simple parts of unions and intersections, `Scene.parts` | surfaces |
+    | piece | simple surfaces, `Pieces.each`: a surface or a part, or an image of one | surfaces, images, parts |
+    | row | what impulses and heat are summed for: a wall, or a field with all its members | walls |
+    | wall | what a flight meets; of a field each of its members | kinds: fields, groups, others, unions |
+
+    A wall belongs to one row, a row to one piece, and a piece to one surface and at most one part.
+
+    Attributes:
+        pieces_of_rows: the piece of each row, (rows,).
+        surfaces_of_rows: the surface of each row.
+        parts_of_rows: the part of each row; None where no surface has parts.
+        pieces_of_walls: the piece of each wall, (walls,).
+        members: the surface of each wall, and its number in a field, else its part, else -1: (2, walls).
+    """
+
+    def __init__(self, pieces: Pieces, order: Order, parts: Sequence[tuple[int, Place]]) -> None:
+        rows = np.array(order.rows(pieces.each), np.int64).reshape(-1, 2)
+        number = {part: k for k, part in enumerate(parts)}
+        part_of = np.array([number.get(part, -1) for part in zip(pieces.owners, pieces.places, strict=True)], np.int64)
+        self.pieces_of_rows = rows[:, 0]
+        self.surfaces_of_rows = [pieces.owners[i] for i in rows[:, 0]]
+        self.parts_of_rows: PartsOfRows | None = None
+        if parts:
+            known = part_of[self.pieces_of_rows]
+            self.parts_of_rows = PartsOfRows(tuple(np.where(known < 0, len(parts), known).tolist()), len(parts))
+        self.pieces_of_walls = np.repeat(rows[:, 0], rows[:, 1])
+        self.members = np.array(
+            [np.array(pieces.owners, np.int64)[self.pieces_of_walls], part_of[self.pieces_of_walls]]
+        )
+        # The walls of fields come first.
+        of_fields = [member for i in order.fields for member in pieces.each[i].numbers()]  # type: ignore[attr-defined]
+        self.members[1, : len(of_fields)] = of_fields
+
+    def split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
+        """The values of the members of each surface, from (..., members) of all surfaces one after the other."""
+        surface, member = self.members
+        counts = np.zeros(int(surface.max()) + 1, np.int64)
+        np.maximum.at(counts, surface, member + 1)
+        return np.split(values, np.cumsum(np.maximum(counts, 1))[:-1], axis=-1)
+
+
+class CompiledScene:
+    """A scene as kernels and engines take it, made from its description.
+
+    Args:
+        scene: the description.
+        largest: the largest radius of the balls in the scene [m]; None: its particles are points.
+        apart: what does not support listed solids of one kind as a field, in words; None: more than a few are one.
+
+    Attributes:
+        scene, largest: as the arguments.
+        pieces: the pieces that the particles meet.
+        order: their numbers in the order of the walls.
+
+    Raises:
+        SceneError: there are more walls than kernels can be compiled for.
+    """
+
+    def __init__(self, scene: "Scene", largest: float | None = None, apart: str | None = None) -> None:
+        self.scene, self.largest, self._apart = scene, largest, apart
+        self.pieces = scene.pieces if largest is None else scene.pieces_of_balls(largest)
+        self.order = order_of(self.pieces.each, apart is None, self.pieces.rooms())
+        walls = len(self._spans)
+        if walls > MOST_WALLS:
+            why = "" if largest is None else f" with balls of a radius of {largest:g} m"
+            why = why if apart is None else f" with {apart}"
+            raise SceneError(
+                f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of "
+                f"{len(self.scene.surfaces)} surfaces: each wall is compiled into the kernels, which takes minutes "
+                "with so many; remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of "
+                "one kind, of which any number is one field for Impact where nothing moves, and as Spheres and the "
+                "like always"
+            )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Copies make the walls anew.
+        return CompiledScene, (self.scene, self.largest, self._apart)
+
+    def of_balls(self, largest: float) -> "CompiledScene":
+        """The same for balls with radii up to the largest one [m]."""
+        return CompiledScene(self.scene, largest, self._apart)
+
+    @cached_property
+    def numbering(self) -> Numbering:
+        """The numberings of walls."""
+        return Numbering(self.pieces, self.order, self.scene.parts)
+
+    @cached_property
+    def _spans(self) -> list[tuple[int, int]]:
+        return self.order.spans(self.pieces.each)
+
+    @cached_property
+    def laws(self) -> Laws | None:
+        """The laws of every wall, None where no surface has one."""
+        runs: list[tuple[int, Surface, int]] = []
+        for i, walls in self._spans:
+            piece = self.pieces.each[i]
+            runs += [(i, *run) for run in (piece.runs() if isinstance(piece, Mesh) else [(piece, walls)])]
+        given, owners = [surface for _i, surface, _walls in runs], [self.pieces.owners[i] for i, *_rest in runs]
+        spans = [(k, walls) for k, (_i, _surface, walls) in enumerate(runs)]
+        laws = Laws(
+            _of_walls([surface.restitution for surface in given], spans, 1.0),
+            _of_walls([surface.friction for surface in given], spans, 0.0),
+            _of_walls([_thermal(surface) for surface in given], spans, _NO_HEAT),
+            Moves(0.0) if self.scene.moves() else None,
+            owned_in(spans, given, owners),
+        )
+        return None if laws == NONE else laws.in_plane(self.scene.across())
+
+    def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
+        """The openings of every wall in the frame that ends at a moment [s], or None."""
+        return openings_in(self._spans, (self.pieces.volumes, self.pieces.doorways), moment) or None
+
+    def walls(self, moment: float = 0.0) -> Walls:
+        """The walls by their kinds, in the frame, or its piece, that ends at a moment [s]."""
+        if self.scene.moves():
+            return self._made(moment)
+        there = tuple(was_there(piece.present, moment) for piece in self.pieces.each)
+        if there not in self._known:
+            self._known[there] = self._made(moment)
+        return self._known[there]
+
+    def walls_of_bodies(self, own: Sequence[Surface]) -> Walls:
+        """The walls for bodies, and those of a body's own surfaces after them, where nothing moves."""
+        return self._made(0.0, own)
+
+    def cell(self) -> Period | None:
+        """The cell that repeats."""
+        period, gravity = self.scene.period, self.scene.gravity
+        if period is None:
+            return None
+        pulls = gravity or (0.0, 0.0, 0.0)
+        falls = [0.0 if length is None else -pull * length for pull, length in zip(pulls, period, strict=True)]
+        fall, has_fields = Vec(*falls) if any(falls) else None, bool(self.order.fields or self.order.groups)
+        return cell_in(period, self.scene.surfaces, has_fields, fall, self.largest or 0.0)
+
+    def fields(self) -> list[int]:
+        """The surfaces that are many bodies."""
+        return [self.pieces.owners[i] for i in self.order.fields]
+
+    def unions(self) -> list[int]:
+        """The surfaces that are unions of several rooms."""
+        return [self.pieces.owners[rooms[0][0]] for rooms in self.order.unions]
+
+    # --- Walls ---------------------------------------------------------------------------------------
+
+    @cached_property
+    def _known(self) -> dict[tuple[bool, ...], Walls]:
+        """The walls where nothing moves, by which of the pieces are there."""
+        return {}
+
+    @cached_property
+    def _groups(self) -> list[Members]:
+        """The listed solids that are fields."""
+        repeated = None if self.scene.period is None else corners_of(self.scene.period)
+        return [members_of(self._pieces_at(group), repeated, self.largest) for group in self.order.groups]
+
+    def _pieces_at(self, numbers: Sequence[int]) -> list[Surface]:
+        return [self.pieces.each[i] for i in numbers]
+
+    def _made(self, moment: float, own: Sequence[Surface] | None = None) -> Walls:
+        """The walls for particles; with surfaces of their own for bodies."""
+        scene, order, fields = self.scene, self.order, self._pieces_at(self.order.fields)
+        straight = scene.gravity is None and own is None
+
+        def taken(members: Members) -> Members:
+            return in_straight_flights(members, scene.period is not None) if straight else members
+
+        def listed(numbers: Sequence[int]) -> list[Any]:
+            return [wall for one in self._pieces_at(numbers) for wall in walls_then(one, moment, self.largest)]
+
+        if scene.moves():
+            walls = carried(fields, self._pieces_at(order.alone()), moment, self.largest)
+        else:
+            many = [(one.present is None, *walls_then(one, moment, self.largest)) for one in fields]
+            walls = Walls((
+                *(Field(taken(members) if lasts else members) for lasts, members in many),
+                *(Listed(taken(group)) for group in self._groups),
+                *listed(order.others), *all_walls(own or ()).each, *listed(order.joined()),
+            ))  # fmt: skip
+        rooms = [[self._pieces_at(room) for room in union] for union in order.unions]
+        made: Walls = upright(with_rooms(walls, rooms), scene.across())
+        return made
+
+
+def _of_walls(values: list[Any], spans: list[tuple[int, int]], neutral: Any) -> tuple[Any, ...] | None:
+    """The value of every wall, of which so many in a row have one of these; None where all are neutral."""
+    if all(value == neutral for value in values):
+        return None
+    return tuple(values[k] if walls == 1 else Span(values[k], float(walls)) for k, walls in spans)
+
+
+def _thermal(surface: Surface) -> Thermal:
+    """The temperature and the accommodation of a surface as kernels take them."""
+    if surface.temperature is None:
+        return _NO_HEAT
+    return Thermal(surface.temperature, surface.accommodation)
