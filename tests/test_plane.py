@@ -120,6 +120,14 @@ def test_a_thermal_wall_sends_particles_off_along_the_plane_by_the_cosine_law(ax
     assert np.abs(sine - uniform).max() < 2.0 * 1.63 / math.sqrt(len(sine))
 
 
+def test_a_hot_wall_beside_one_with_a_mass_sends_particles_along_the_plane():
+    scene = swarm.Scene([swarm.Cylinder(0.5, temperature=2.0), swarm.Plane((1, 0, 0), 0.3, mass=10.0)], plane="z")
+    start = swarm.fill(scene, 3, speed=1.0, seed=1)
+    end = swarm.simulate(scene, start, swarm.Impact(), until=2.0, compile="never").particles
+    assert (end.position[2] == 0.0).all() and (end.velocity[2] == 0.0).all()
+    assert (end.velocity != start.velocity)[:2].all()
+
+
 def test_a_gas_between_warm_walls_of_the_plane_takes_their_temperature():
     scene = swarm.Scene([swarm.Sphere(0.5, temperature=2.0)], plane="z")
     start = swarm.fill(scene, 400, speed=0.5, seed=1)

@@ -28,8 +28,7 @@ def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:
     scene, largest = compiled.scene, compiled.largest
     rest, given = [surface for surface in scene.surfaces if not surface.reacts()], None
     if rest:
-        plane = None if largest is None else scene.plane
-        given = Scene(rest, scene.gravity, plane=plane).compiled(largest, "walls that react")
+        given = Scene(rest, scene.gravity, plane=scene.plane).compiled(largest, "walls that react")
     reacts = np.array([surface.reacts() for surface in scene.surfaces])
     reacts = reacts[compiled.numbering.surfaces_of_rows]
     return SceneWalls(
