@@ -536,4 +536,4 @@ def test_the_smallest_rim_and_a_flat_volume_reach_the_wall():
         swarm.Torus(0.3, 0.1, center=(0.0, 0.0, 0.5)),
         swarm.Spheres([(0.0, 0.0, 0.5), (0.0, 0.0, 0.0)], [0.1, 0.1]),
     ):
-        assert swarm.Scene([swarm.Sphere(0.5, openings=[volume])]).volumes == ((volume,),)
+        assert swarm.Scene([swarm.Sphere(0.5, openings=[volume])]).pieces.volumes == ((volume,),)
