@@ -64,7 +64,7 @@ def frames_of(run, method, every, halted=False, between=lambda run, cut_short: r
 def require_resumed_is_whole(tmp_path, scene, method, n=700, every=4.0, threads=(2, 1, 3), kind=Run):
     """A run that is halted repeatedly, saved and resumed each time, ends like one that is never halted."""
     start = swarm.fill(scene, n, speed=1.0, mass=np.linspace(0.5, 2.0, n), seed=5)
-    with kind(scene, start.copy(), method, 1, None) as whole:
+    with kind(scene.compiled(), start.copy(), method, 1, None) as whole:
         expected, expected_seen = frames_of(whole, method, every)
     halts, next_threads = [], itertools.cycle(threads)
     job = checkpoint.SavedRun("", "", "", "", n, "")
@@ -73,11 +73,11 @@ def require_resumed_is_whole(tmp_path, scene, method, n=700, every=4.0, threads=
         halts.append(cut_short)
         checkpoint.save(tmp_path / "a.checkpoint", job, run.arrays())
         run.__exit__()
-        other = kind(scene, start.copy(), method, next(next_threads), None)
+        other = kind(scene.compiled(), start.copy(), method, next(next_threads), None)
         other.restore(checkpoint.read(tmp_path / "a.checkpoint")[1], cut_short)
         return other
 
-    run = kind(scene, start.copy(), method, next(next_threads), None)
+    run = kind(scene.compiled(), start.copy(), method, next(next_threads), None)
     found, found_seen = frames_of(run, method, every, True, begin_again)
     assert found.keys() == expected.keys()
     for name, array in expected.items():
