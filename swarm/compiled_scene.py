@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from .contact.laws import NONE, Laws, Moves, Span, Thermal, owned_in
 from .errors import SceneError
 from .kernel.vector import Vec
-from .surfaces.facets.mesh import Mesh
 from .surfaces.fields.grouped import Order, order_of
 from .surfaces.fields.many import in_straight_flights, members_of
 from .surfaces.fields.members import Members
@@ -145,7 +144,7 @@ class CompiledScene:
         runs: list[tuple[int, Surface, int]] = []
         for i, walls in self._spans:
             piece = self.pieces.each[i]
-            runs += [(i, *run) for run in (piece.runs() if isinstance(piece, Mesh) else [(piece, walls)])]
+            runs += [(i, *run) for run in piece.runs(walls)]
         given, owners = [surface for _i, surface, _walls in runs], [self.pieces.owners[i] for i, *_rest in runs]
         spans = [(k, walls) for k, (_i, _surface, walls) in enumerate(runs)]
         laws = Laws(

@@ -26,6 +26,7 @@ _FOLDERS = [
     ("cluster", "fleet", "client=sharded_run worker=shard_run"),
     ("ensemble", "fleet", "*"),
     ("ensemble", "fleet", "hand=processes pool=sweeping worker=sweep_run"),
+    ("sources", "surfaces", "pieces=area_samples"),
     ("colliding", "events.colliding", "*"),
     ("reacting", "events.reacting", "*"),
     ("contact", "contact", "doorways=absence passing=absence"),

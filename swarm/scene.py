@@ -19,8 +19,6 @@ from .particles import Particles
 from .surfaces import plane as planes
 from .surfaces import required
 from .surfaces import rotation as rotations
-from .surfaces.facets.mesh import Mesh
-from .surfaces.fields.many import Many
 from .surfaces.instant import box_of, distances_of, gaps_of, gradient_of, has_room, planes_of
 from .surfaces.periodic.images import Lengths, cell_of, into_cell, lengths_of
 from .surfaces.pieces import Images, Pieces, pieces_of
@@ -28,7 +26,7 @@ from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.presence.doors import instants_of
 from .surfaces.presence.openings import require_few
 from .surfaces.surface import UNBOUNDED, Box, Surface
-from .surfaces.union import Joined, Place
+from .surfaces.union import Place
 
 # Points whose gaps are found at once.
 _BATCH = 4096
@@ -149,7 +147,7 @@ class Scene:
 
     def _require_alone(self) -> None:
         """Raise a `SceneError` where a foam is not the only surface, or has a period."""
-        foams = [i for i, one in enumerate(self.surfaces) if isinstance(one, Many) and one.is_foam()]
+        foams = [i for i, one in enumerate(self.surfaces) if one.is_foam()]
         if foams and (len(self.surfaces) > 1 or self.period is not None):
             raise SceneError(
                 f'surfaces[{foams[0]}] must be the only surface of a scene without a period, for its side is "inside", '
@@ -212,12 +210,7 @@ class Scene:
         rows = points if self.period is None else into_cell(self.period, points)[0]
         admitted = np.ones(rows.shape[1], np.bool_)
         for image in (image for images in self.pieces.images for image in images if image.is_there(0.0)):
-            if isinstance(image, Many):
-                admitted[admitted] = image.contain(rows[:, admitted]) == image.is_foam()
-            elif isinstance(image, Mesh):
-                admitted[admitted] = image.contain(rows[:, admitted])
-            else:
-                admitted &= gaps_of((image,), rows, 0.0)[0] <= 0.0
+            admitted[admitted] = image.admits(rows[:, admitted])
         return admitted
 
     def distances_outside(
@@ -373,13 +366,11 @@ class Scene:
         >>> swarm.Scene([swarm.Union([ball, tube])]).parts
         ((0, (0,)), (0, (1, 0)), (0, (1, 1)))
         """
-        joined = ((i, surface) for i, surface in enumerate(self.surfaces) if isinstance(surface, Joined))
-        return tuple((i, place) for i, surface in joined for place in surface.places_of_parts())
+        return tuple((i, place) for i, surface in enumerate(self.surfaces) for place in surface.places_of_parts())
 
     def common_faces(self) -> list[tuple[int, Place, Place]]:
         """The parts of unions that have a face in common, which is no wall: the surface, and the place of each."""
-        unions = ((i, images[0]) for i, images in enumerate(self.pieces.images) if isinstance(images[0], Joined))
-        return [(i, *pair) for i, union in unions for pair in union.common_places()]
+        return [(i, *pair) for i, images in enumerate(self.pieces.images) for pair in images[0].common_places()]
 
     def doorways_of_parts(self) -> dict[tuple[int, Place], list[Surface]]:
         """The volumes in which walls of a part are open where another room is on their other side."""

@@ -147,3 +147,27 @@ def test_every_earlier_name_has_a_module():
             with row(name):
                 assert importlib.util.find_spec(present) is not None
                 assert importlib.util.find_spec(name) is not None
+
+
+def classes(folder):
+    """The classes at the top of the modules in a folder, and the names of the bases of each."""
+    trees = (ast.parse(path.read_text()) for path in sorted((PACKAGE / folder).rglob("*.py")))
+    found = (node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef))
+    return {node.name: {ast.unparse(base) for base in node.bases} for node in found}
+
+
+def test_a_surface_is_asked_by_its_contract():
+    """What is asked of a surface is a method of it, so that a new one needs no line elsewhere."""
+    bases = classes("surfaces")
+    shapes = {"Surface", *classes("surfaces/shapes")}
+    while more := {name for name, given in bases.items() if given & shapes} - shapes:
+        shapes |= more
+    found, named = [], re.compile(rf"(isinstance|issubclass|case)\b[^:]*\b({'|'.join(sorted(shapes))})\b")
+    for parts, path in modules().items():
+        text = path.read_text() if parts[0] != "surfaces" else ""
+        for node in ast.walk(ast.parse(text)) if named.search(text) else ():
+            asks = isinstance(node, ast.Call) and ast.unparse(node.func) in ("isinstance", "issubclass")
+            kinds = [node.args[1]] if asks else [node.cls] if isinstance(node, ast.MatchClass) else []
+            if shapes & {name for kind in kinds for name in re.findall(r"\w+", ast.unparse(kind))}:
+                found.append(f"{'.'.join(parts)}: {ast.unparse(node)}")
+    assert len(found) <= 20, found

@@ -105,3 +105,9 @@ def test_cavities_that_are_apart_are_named():
         swarm.Scene([BALL, swarm.Sphere(0.1, side="outside"), apart])
     with pytest.raises(swarm.SceneError, match="check their `side`"):
         swarm.Scene([BALL, swarm.Sphere(0.6, side="outside")])
+
+
+def test_a_polygon_that_holds_particles_keeps_none_out():
+    table = swarm.Polygon([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    message, _particle = started([table], [[1.5], [0.5], [0.0]])
+    assert "0.5 m outside surfaces[0] (Polygon): admissible is its inside, where phi is 0 or less" in message

@@ -14,11 +14,6 @@ from ..particles import Particles
 from ..run.options import RunOptions, Task
 from ..run.preflight.starts import require_inside
 from ..scene import Scene
-from ..surfaces.fields.bodies import Boxes, Cylinders
-from ..surfaces.fields.many import Many
-from ..surfaces.shapes.box import Box
-from ..surfaces.shapes.cone import Cone
-from ..surfaces.shapes.cylinder import Cylinder
 from ..surfaces.shapes.slab import Slab
 from ..surfaces.surface import Surface
 from . import covering
@@ -105,7 +100,7 @@ def warn_of_passing(scene: Scene, body: Body) -> None:
     if depth <= allowed:
         return
     # The gap at which it would enter by what is allowed.
-    wanted = allowed if _has_corners(surface) else math.sqrt(allowed * (2.0 * size - allowed))
+    wanted = allowed if surface.has_edges else math.sqrt(allowed * (2.0 * size - allowed))
     what = "pass through the body" if gap >= size else f"enter the body by {depth:.2g} m"
     _LOG.warning(
         "surfaces[%d] (%s) can %s without an impact: only contact points touch walls, and a face of the body has "
@@ -116,13 +111,7 @@ def warn_of_passing(scene: Scene, body: Body) -> None:
 
 def _is_solid(surface: Surface) -> bool:
     # Between two parallel planes a body has all of its contact points on one side.
-    return (surface.is_solid() or isinstance(surface, Many)) and not isinstance(surface, Slab)
-
-
-def _has_corners(surface: Surface) -> bool:
-    return isinstance(surface, (Box, Boxes, Cone, Cylinders)) or (
-        isinstance(surface, Cylinder) and surface.length is not None
-    )
+    return surface.is_solid() and not isinstance(surface, Slab)
 
 
 def _depth(surface: Surface, gap: float) -> float:
@@ -130,7 +119,7 @@ def _depth(surface: Surface, gap: float) -> float:
     size = surface.size()
     if gap >= size:
         return math.inf
-    return gap if _has_corners(surface) else size - math.sqrt(size * size - gap * gap) if size < math.inf else 0.0
+    return gap if surface.has_edges else size - math.sqrt(size * size - gap * gap) if size < math.inf else 0.0
 
 
 def _rounded(value: float) -> float:

@@ -9,7 +9,6 @@ from ..common import checks
 from ..errors import SceneError
 from ..motion import Motion
 from ..state import Floats
-from ..surfaces.fields.many import Many
 from ..surfaces.surface import SIDES, Surface
 from .checked import each, point
 
@@ -97,8 +96,10 @@ def cavities(rows: Iterable[Any], places: Floats) -> tuple[tuple[Surface, int, i
 def _smooth(name: str, surface: Any) -> Surface:
     if not isinstance(surface, Surface):
         raise SceneError(f"{name} must be a surface such as swarm.Sphere, got {checks.shown(surface)}")
-    if isinstance(surface, Many):
-        raise SceneError(f"{name} must be one surface, got a field of {len(surface)}; give one of them by itself")
+    if surface.is_field:
+        raise SceneError(
+            f"{name} must be one surface, got a field of {len(surface.numbers())}; give one of them by itself"
+        )
     walls = len(surface.walls())
     if walls > 1:
         raise SceneError(

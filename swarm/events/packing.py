@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +18,6 @@ from ..placing.sequential import VolumeBox, place_balls, require_size, told
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces.surface import Surface
-from ..surfaces.union import Joined, surfaces_of
 from .growing_run import grow
 
 # The largest packings that are grown, of random balls, of discs; and those that are known to end it.
@@ -169,7 +169,7 @@ def _at_rest(scene: Scene) -> Scene:
     """The scene without gravity, whose walls are smooth and stay as they are at 0 s."""
     surfaces = []
     for i, one in enumerate(scene.surfaces):
-        for piece in surfaces_of(one):
+        for piece in one.surfaces():
             if piece.motion is not None and not _stays(piece):
                 raise SceneError(
                     f"surfaces[{i}].motion must leave the wall at 0 s where it is given, got {piece.motion!r:.200}; "
@@ -182,8 +182,8 @@ def _at_rest(scene: Scene) -> Scene:
 
 def _smooth(surface: Surface) -> Surface:
     """A surface as a wall without laws that stays, and so its parts."""
-    parts = {}
-    if isinstance(surface, Joined):
+    parts: dict[str, Any] = {}
+    if surface.parts:
         parts["parts"] = tuple(replace(_smooth(part), present=part.present) for part in surface.parts)
     return replace(
         surface, motion=None, mass=None, inertia=None, restitution=1.0, friction=0.0, temperature=None,

@@ -18,7 +18,7 @@ from ..scene import Scene
 from ..state import Floats
 from ..surfaces.instant import side_of
 from ..triangles.shape import Shape
-from ..triangles.shapes import bodies_of, shapes_of, since_start
+from ..triangles.shapes import shapes_of, since_start
 
 # Bodies of one surface that are drawn: each has some 200 vertices.
 _MOST = 20_000
@@ -40,7 +40,7 @@ def write_objects(trajectory: Any, number: int, path: Path, materials: Path) -> 
         file.write(f"# swarm: walls at frame {number}, {time!r} s, in m\nmtllib {materials.name}\n".encode())
         first = 1
         for shape in walls_at(trajectory, number, time):
-            count = bodies_of(scene.surfaces[shape.surface])
+            count = scene.surfaces[shape.surface].body_count()
             if not len(shape.triangles):
                 if count > _MOST:
                     file.write(f"# {shape.name}: {count} bodies, more than {_MOST}, are left out\n".encode())

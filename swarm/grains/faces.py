@@ -4,8 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled_scene import CompiledScene
-from ..surfaces.facets.mesh import Mesh
-from ..surfaces.fields.many import Many
 from ..surfaces.upright import upright
 from ..surfaces.walls import Field, Walls
 
@@ -31,7 +29,6 @@ class Fields:
         faces: list[NDArray[np.int32]] = []
         for i in self._compiled.order.fields:
             surface = self._compiled.pieces.each[i]
-            assert isinstance(surface, (Many, Mesh))
             members, face = surface.faces_of_balls(self._largest + 2.0 * skin)
             made.append(upright(Field(members), scene.across()))
             faces.append(face.astype(np.int32))

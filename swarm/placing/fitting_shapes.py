@@ -3,15 +3,9 @@
 import math
 
 from ..errors import SceneError
-from ..kernel.vector import Vec
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces.fields.many import Many
-from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.surface import Surface
-
-# The component along an axis of a unit vector that is along it.
-_PARALLEL = 0.5
 
 
 def _nearest_lid(scene: Scene, surface: Surface) -> float:
@@ -19,12 +13,7 @@ def _nearest_lid(scene: Scene, surface: Surface) -> float:
     across = scene.across()
     if across is None:
         return math.inf
-    lids = [0.5 * surface.height] if isinstance(surface, Outlined) and surface.height is not None else []
-    for wall in () if isinstance(surface, Many) else surface.walls_of_balls(0.0):
-        normal = wall.flat_normal()
-        if normal is not None and abs(normal[across]) > _PARALLEL:
-            lids.append(-wall.distance(Vec(0.0, 0.0, 0.0)))
-    return min(lids, default=math.inf)
+    return min(surface.lids(across), default=math.inf)
 
 
 def require_shapes(scene: Scene, radius: Floats) -> None:

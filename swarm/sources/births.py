@@ -11,9 +11,9 @@ from ..common import checks
 from ..errors import SceneError
 from ..particles import Births, Particles
 from ..scene import Scene
+from ..surfaces.area_samples import Floats, Random, distances
 from ..surfaces.instant import side_of
 from ..surfaces.plane import along
-from .pieces import Floats, Random, distances
 from .places import PointBatches, changes, place_of
 from .source import Source
 

@@ -2,7 +2,6 @@
 
 import itertools
 import logging
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,15 +10,12 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..kernel.limits import PUT_ON_SURFACE
 from ..scene import Scene
+from ..surfaces.area_samples import NEAR, AreaSample, Floats, Random, Region, distances, points_of
 from ..surfaces.facets.mesh import Mesh
-from ..surfaces.fields.many import Many
 from ..surfaces.instant import gaps_of, side_of
-from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.presence.doors import Opening
 from ..surfaces.shapes.plane import Plane
-from ..surfaces.surface import Surface, volume_of
-from ..surfaces.union import Joined, surfaces_of
-from .pieces import NEAR, Bounds, Floats, Piece, Random, distances, pieces_of, points_of
+from ..surfaces.surface import Box, Surface, volume_of
 from .source import Source
 
 _LOG = logging.getLogger("swarm")
@@ -75,7 +71,7 @@ def place_of(scene: Scene, source: Source, name: str) -> SourcePlace:
         if source.volume:
             continue
         # What is given to a whole, or to a part of it, its surfaces have too.
-        opened = [one for one in surfaces_of(surface) if any(_is_opening(opening, where) for opening in one.openings)]
+        opened = [one for one in surface.surfaces() if any(_is_opening(opening, where) for opening in one.openings)]
         if opened:
             found = _of_wall(scene, i, False, (*only, _volume(where)), name)
             return found._replace(walls=tuple((one, ()) for one in opened))
@@ -107,7 +103,7 @@ def _is_opening(opening: Surface | Opening, where: Any) -> bool:
 def _of_wall(scene: Scene, i: int, volume: bool, only: tuple[Surface, ...], name: str) -> SourcePlace:
     surface = scene.surfaces[i]
     _require_at_rest(surface, f"{name}.where = surfaces[{i}]")
-    walls = tuple((one, _holes(one)) for one in surfaces_of(surface))
+    walls = tuple((one, _holes(one)) for one in surface.surfaces())
     return SourcePlace(surface, i, volume, only, () if volume or not any(holes for _one, holes in walls) else walls)
 
 
@@ -118,7 +114,7 @@ def _holes(surface: Surface) -> tuple[Surface, ...]:
 
 def changes(surface: Surface) -> bool:
     """Whether a surface, or a part of it, moves, or comes and goes."""
-    parts = surface.surfaces() if isinstance(surface, Joined) else ()
+    parts = surface.surfaces() if surface.parts else ()
     return surface.motion is not None or surface.reacts() or surface.present is not None or any(map(changes, parts))
 
 
@@ -130,26 +126,17 @@ def _require_at_rest(surface: Surface, name: str) -> None:
         )
 
 
-def _box_of(surface: Surface) -> Bounds:
-    """The corners of a box that a surface is in, a solid as well as a cavity; infinite if no box is known."""
-    if isinstance(surface, Mesh):
-        vertices = np.asarray(surface.vertices)
-        return vertices.min(axis=0), vertices.max(axis=0)
-    if isinstance(surface, Many) and not isinstance(surface, Outlined):
-        low, high = surface.corners()
-        return low.min(axis=1), high.max(axis=1)
-    if isinstance(surface, Joined) and surface.is_solid():
-        return np.full(3, -np.inf), np.full(3, np.inf)
-    return _bounds_of(replace(surface, side="inside") if surface.is_solid() else surface)  # type: ignore[call-arg]
-
-
-def _bounds_of(surface: Surface) -> Bounds:
+def _bounds_of(surface: Surface) -> Region:
     """The corners of a box that the admissible side of a surface is in."""
-    low, high = (np.array(corner, np.float64) for corner in surface.bounds())
+    return _arrays(surface.bounds())
+
+
+def _arrays(box: Box) -> Region:
+    low, high = (np.array(corner, np.float64) for corner in box)
     return low, high
 
 
-def _common(one: Bounds, other: Bounds) -> Bounds:
+def _common(one: Region, other: Region) -> Region:
     return np.maximum(one[0], other[0]), np.minimum(one[1], other[1])
 
 
@@ -169,13 +156,13 @@ class PointBatches:
         self._require_common_bounds()
         if place.volume:
             self._low, self._high = _common((self._low, self._high), _bounds_of(place.surface))
-        self._pieces: list[Piece] = []
+        self._samples: list[AreaSample] = []
         meshes = any(isinstance(one, Mesh) for one in (place.surface, *scene.surfaces))
         self._batch = _FEW if meshes else _BATCH
         # Walls that move, or come and go, are looked at when a particle is born.
         self._lasting = [i for i, one in enumerate(scene.surfaces) if not changes(one)]
         if not place.volume:
-            self._pieces = self._of_surface()
+            self._samples = self._of_surface()
 
     def draw(self, random: Random, n: int) -> tuple[Floats, Floats]:
         """So many points (3, n), and there the unit normals (3, n) out of the admissible side; in a volume they are 0.
@@ -212,7 +199,7 @@ class PointBatches:
             raise SceneError(
                 f"{self._beginning()}: along {'xyz'[int(np.argmax(apart))]} these two have nothing in common; move one"
             )
-        least, most = _bounds_of(surface) if self._place.volume else _box_of(surface)
+        least, most = _bounds_of(surface) if self._place.volume else _arrays(surface.enclosing_box())
         for axis in axes:
             if max(low[axis], least[axis]) - min(high[axis], most[axis]) > slack:
                 raise SceneError(
@@ -243,19 +230,19 @@ class PointBatches:
             low[across] = high[across] = 0.0
         return low, high
 
-    def _of_surface(self) -> list[Piece]:
+    def _of_surface(self) -> list[AreaSample]:
         scene, surface = self._scene, self._place.surface
         bounds = self._low, self._high
         if scene.period is not None and surface.is_solid():
             # It may reach over the faces.
             bounds = np.full(3, -2.0 * self._extent), np.full(3, 2.0 * self._extent)
         try:
-            pieces = pieces_of(surface, bounds, scene.across())
+            samples = surface.area_samples(bounds, scene.across())
         except SceneError as error:
             raise SceneError(f"{self._name}.{error}") from None
-        if not sum(piece.area for piece in pieces) > 0.0:
+        if not sum(one.area for one in samples) > 0.0:
             raise SceneError(self._sentence(0, 0))
-        return pieces
+        return samples
 
     # --- Batches ---
 
@@ -274,7 +261,7 @@ class PointBatches:
         return np.concatenate([points, np.zeros_like(points)])
 
     def _surface(self, random: Random) -> Floats:
-        surface, points = self._place.surface, points_of(self._pieces, random, self._batch)
+        surface, points = self._place.surface, points_of(self._samples, random, self._batch)
         # Triangles are where they are drawn, and to look for the nearest of many is dear.
         if not isinstance(surface, Mesh):
             # Not what another part cuts off
@@ -284,7 +271,7 @@ class PointBatches:
         points = points[:, self._is_wanted(points)]
         points = points[:, self._is_on_walls(points)]
         normals = self._normals(surface, points)
-        if isinstance(surface, Joined):
+        if surface.parts:
             once = self._is_wall_once(surface, points, normals, random)
             points, normals = points[:, once], normals[:, once]
         if self._scene.period is not None:
@@ -297,14 +284,14 @@ class PointBatches:
         found = np.full(points.shape[1], not walls)
         for surface, holes in walls:
             here = np.ones(points.shape[1], np.bool_)
-            if isinstance(self._place.surface, Joined):
+            if self._place.surface.parts:
                 here = np.abs(distances(surface, points)) <= PUT_ON_SURFACE * self._extent
             for hole in holes:
                 here &= self._gap(hole, points) > 0.0
             found |= here
         return found
 
-    def _is_wall_once(self, surface: Joined, points: Floats, normals: Floats, random: Random) -> NDArray[np.bool_]:
+    def _is_wall_once(self, surface: Surface, points: Floats, normals: Floats, random: Random) -> NDArray[np.bool_]:
         """Which points of a union are on its walls, not where two parts touch, and each as often as if by one part."""
         beyond = self._gap(surface, points + _BESIDE * self._extent * normals) > 0.0
         parts = dict.fromkeys(surface.surfaces())

@@ -120,6 +120,23 @@ class Smooth(AtRest):
         n = self.gradient(r)
         return r - (self.phi(r) / square(n)) * n
 
+    # --- Of sources and counters, in Python ---
+
+    # The degree of a polynomial that is 0 on the wall alone; 0 where none is known.
+    degree = 0
+
+    def polynomial(self, r):
+        """That polynomial at points."""
+        return self.phi(r)
+
+    def smooth_parts(self):
+        """The walls between the edges of a solid."""
+        return (self,)
+
+    def reversible(self):
+        """The wall without what holds on its admissible side alone; None where its other side is another wall."""
+        return self if self.gives("reversible") else None
+
     # --- Of balls ---
 
     def grown(self, radius):

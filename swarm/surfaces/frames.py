@@ -16,6 +16,7 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("level_of", (None,), None),
     ("gap_slope", (None, None), None),
     ("phi", ("place",), None),
+    ("polynomial", ("place",), None),
     ("inner", ("place",), None),
     ("distance", ("place",), None),
     ("gap_scale", ("place",), None),
@@ -60,6 +61,7 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
 )
 _CONSTANTS = (
     "side",
+    "degree",
     "flat",
     "is_quartic",
     "may_be_far",
@@ -81,6 +83,10 @@ class Framed(Smooth):
 
     def grown(self, radius):
         return self._replace(body=self.body.grown(radius))
+
+    def reversible(self):
+        body = self.body.reversible()
+        return None if body is None else self._replace(body=body)
 
     def seen_in(self, seen):
         """A particle as the wall sees it, in the frame of the body."""

@@ -8,7 +8,7 @@ from ..errors import SceneError
 from .periodic.images import Lengths, images_of
 from .presence.openings import reaches, volumes_of
 from .surface import Surface, volume_of
-from .union import Joined, Place, nodes_of, surfaces_of
+from .union import Place, nodes_of
 
 # Of the extent of what kernels take as unions, how far rooms with a face in common overlap: more than what counts as
 # touching a wall.
@@ -45,10 +45,10 @@ class Pieces:
         """Of each union of several rooms the numbers of the pieces of every room."""
         found, first = [], 0
         for image in itertools.chain(*self.images):
-            if isinstance(image, Joined) and len(image.rooms) > 1:
+            if len(image.rooms) > 1:
                 ends = list(itertools.accumulate(map(len, image.rooms), initial=first))
                 found.append(tuple(tuple(range(*ends)) for ends in itertools.pairwise(ends)))
-            first += len(surfaces_of(image))
+            first += len(image.surfaces())
         return found
 
     def open_volumes(self) -> tuple[Surface, ...]:
@@ -70,25 +70,19 @@ def pieces_of(surfaces: Sequence[Surface], period: Lengths | None, largest: floa
     volumes = _volumes_of_pieces(surfaces, images, period)
     return Pieces(
         images,
-        tuple(piece for _i, image in owned for piece in surfaces_of(image)),
-        tuple(i for i, image in owned for _piece in surfaces_of(image)),
-        tuple(place for _i, image in owned for place in _places_of(image)),
+        tuple(piece for _i, image in owned for piece in image.surfaces()),
+        tuple(i for i, image in owned for _piece in image.surfaces()),
+        tuple(place for _i, image in owned for place in image.places()),
         volumes,
         _doorways_of_pieces(images, volumes),
     )
 
 
-def _places_of(image: Surface) -> tuple[Place, ...]:
-    return image.places() if isinstance(image, Joined) else ((),)
-
-
 def _with_reach(images: Images) -> Images:
     """The surfaces of a scene with their images, whose rooms overlap where they have a face in common."""
-    several = [one for some in images for one in some if isinstance(one, Joined) and len(one.rooms) > 1]
+    several = [one for some in images for one in some if len(one.rooms) > 1]
     reach = _REACH * max((piece.extent() for one in several for piece in one.surfaces()), default=0.0)
-    return tuple(
-        tuple(one.reaching(reach) if isinstance(one, Joined) else one for one in some) for some in images
-    )  # fmt: skip
+    return tuple(tuple(one.reaching(reach) for one in some) for some in images)
 
 
 def _volumes_of_pieces(
@@ -98,15 +92,15 @@ def _volumes_of_pieces(
     found: list[tuple[Surface, ...]] = []
     for i, (surface, some) in enumerate(zip(surfaces, images, strict=True)):
         name = f"surfaces[{i}]"
-        if isinstance(surface, Joined):
+        if surface.parts:
             of_parts = _volumes_of_parts(surface, period, name)
-            found += [of_parts[place] for image in some for place in _places_of(image)]
+            found += [of_parts[place] for image in some for place in image.places()]
         else:
             found += [volumes_of(surface, period, name)] * len(some)
     return tuple(found)
 
 
-def _volumes_of_parts(union: Joined, period: Lengths | None, name: str) -> dict[Place, tuple[Surface, ...]]:
+def _volumes_of_parts(union: Surface, period: Lengths | None, name: str) -> dict[Place, tuple[Surface, ...]]:
     """Those of the parts of a union: what is open of the whole is open where it reaches each of them."""
     pieces, places = union.surfaces(), union.places()
     for place, part in nodes_of(union):
@@ -136,14 +130,13 @@ def _doorways_of_pieces(
     """
     found: list[tuple[Surface, ...]] = []
     for image in (image for some in images for image in some):
-        rooms = image.rooms if isinstance(image, Joined) else ((image,),)
         given, first = [], len(found)
-        for room in rooms:
+        for room in image.rooms:
             given.append([one for some in volumes[first : first + len(room)] for one in some])
             first += len(room)
-        for k, room in enumerate(rooms):
+        for k, room in enumerate(image.rooms):
             others = [one for j, some in enumerate(given) if j != k for one in some]
-            between = [one for piece in itertools.chain(*rooms) for one in piece.open_volumes(True)]
+            between = [one for piece in image.surfaces() for one in piece.open_volumes(True)]
             for piece in room:
                 mine = volumes[len(found)]
                 found.append(tuple(one for one in dict.fromkeys([*others, *between])

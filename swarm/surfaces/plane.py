@@ -21,7 +21,6 @@ from .fields.many import Many
 from .outlines.outlined import Outlined
 from .shapes.slab import AXES
 from .surface import Surface
-from .union import surfaces_of
 from .upright import upright
 from .wall_law import leave_of, tries_of
 
@@ -103,7 +102,7 @@ def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> Non
     """
     across = PLANES[plane]
     for i, surface in enumerate(surfaces):
-        for piece in surfaces_of(surface):
+        for piece in surface.surfaces():
             _require_motion(plane, f"surfaces[{i}].motion", piece)
             _require_laws(plane, f"surfaces[{i}].laws", piece)
         if isinstance(surface, Mesh):

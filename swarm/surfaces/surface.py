@@ -1,6 +1,7 @@
 """A surface as users describe it, checked. As kernels take it, it is a record: see contract.py."""
 
 import math
+from collections.abc import Callable
 from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Annotated, Any, ClassVar
 
@@ -14,9 +15,12 @@ from ..common.validated import Magnitude, Part, PositiveMagnitude, Validated
 from ..errors import SceneError
 from ..kernel.vector import Vec, vec
 from . import rotation as rotations
+from .area_samples import AreaSample, Region, by_lines
 from .presence.doors import Opening, Spans, checked_spans, is_there
 from .wall_law import checked_laws
 
+# The component along an axis of a unit vector that is along it.
+_PARALLEL = 0.5
 # A tilt of an axis this small is the round-off of a rotation.
 TILT = 1e-15
 SIDES = {"inside": 1.0, "outside": -1.0}
@@ -24,6 +28,10 @@ SIDES = {"inside": 1.0, "outside": -1.0}
 Box = tuple[Vector, Vector]
 HalfSpace = tuple[Vector, float]
 UNBOUNDED: Box = ((-math.inf,) * 3, (math.inf,) * 3)
+# The number of a part, and of a part of this.
+Place = tuple[int, ...]
+# phi and its gradient (N, 3), functions of points (N, 3).
+LevelSet = tuple[Callable[[Any], Any], Callable[[Any], Any]]
 
 
 def _openings(name: str, value: Any) -> "tuple[Surface | Opening, ...]":
@@ -201,6 +209,154 @@ class Surface(Validated):
 
     # Whether the inner side is convex: then nothing of it is on the other side of its wall.
     is_convex = False
+    # Whether it is many bodies, or sides, of one kind, which kernels take as one field.
+    is_field = False
+    # Of walls that are faces between edges, what one of them is called.
+    face_noun: ClassVar[str] = ""
+    # Whether a solid of it has edges, and whether its wall may have a point without a normal.
+    has_edges = False
+    may_have_tip = False
+    # What is called so: a cavity of it, a solid of it, and either of them in a plane. None: what its class is called.
+    nouns: ClassVar[tuple[str, str, str, str] | None] = None
+    # Of a union or an intersection, its parts; of a mesh, the laws of its groups.
+    parts = tuple["Surface", ...]()
+    groups = None
+
+    # --- What it is made of: itself, where it has no parts and is not many bodies ---
+
+    @property
+    def rooms(self) -> tuple[tuple["Surface", ...], ...]:
+        """The admissible side as a union of rooms: intersections of surfaces without parts."""
+        return ((self,),)
+
+    def surfaces(self) -> tuple["Surface", ...]:
+        """The surfaces of all rooms, one after the other, with what is given to the whole."""
+        return (self,)
+
+    def places(self) -> tuple[Place, ...]:
+        """Of each of the `surfaces` the part that it is: its number, and of a part of a part both."""
+        return ((),)
+
+    def places_of_parts(self) -> tuple[Place, ...]:
+        """The same of every part, in their order."""
+        return ()
+
+    def moving_apart(self) -> list[tuple["Surface", "Surface"]]:
+        """The surfaces of its rooms that have a face in common at the start, of which each has a motion of its own."""
+        return []
+
+    def common_places(self) -> list[tuple[Place, Place]]:
+        """The places of the parts that have a face in common, two by two."""
+        return []
+
+    def reaching(self, reach: float) -> "Surface":
+        """The same whose rooms overlap by so much [m] where they have a face in common; itself where none have."""
+        return self
+
+    def runs(self, walls: int) -> list[tuple["Surface", int]]:
+        """Walls in a row that have the same laws, of all of its walls: (what says them, how many)."""
+        return [(self, walls)]
+
+    def solids(self) -> list["Surface"]:
+        """Every body as a surface of its own."""
+        return [self]
+
+    def body_count(self) -> int:
+        """The number of bodies of a field, else 0."""
+        return 0
+
+    def faces_of_balls(self, largest: float) -> tuple[Any, NDArray[Any]]:
+        """What soft balls with radii up to the largest one [m] meet, and of each member the number of its face.
+
+        Of a field or a mesh. A face is what a ball touches at one place only: a body, or what joins without a corner
+        around the balls.
+        """
+        raise NotImplementedError
+
+    def is_foam(self) -> bool:
+        """Whether particles live in any of many bodies, not outside of all."""
+        return False
+
+    # --- How it is drawn, and how points are drawn from it ---
+
+    def enclosing_box(self) -> Box:
+        """A box (lower, upper) that holds the surface, a solid as well as a cavity; infinite where none is known."""
+        return (replace(self, side="inside") if self.is_solid() else self).bounds()  # type: ignore[call-arg]
+
+    def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
+        """What points uniform in its area are drawn from, as far as it is within the bounds (lower, upper).
+
+        With an axis `across` a plane, uniform in its length in that plane.
+
+        Raises:
+            SceneError: points of this kind of surface cannot be drawn, or the surface is not bounded.
+        """
+        return list(by_lines(self, bounds, across))
+
+    def filled(self) -> "Surface":
+        """What a solid fills, as a cavity; a cavity itself."""
+        try:
+            return replace(self, side="inside") if self.is_solid() else self  # type: ignore[call-arg]
+        except SceneError:
+            return self
+
+    def level_sets(self) -> list[LevelSet]:
+        """The level set of every smooth wall, in order; of a solid with edges those of what it fills."""
+        whole = self.filled()
+        if type(whole).phi is not Surface.phi:
+            still = replace(whole, motion=None)
+            return [(lambda points: still.phi(points.T), lambda points: still.gradient(points.T).T)]
+        return [_level_set(wall) for wall in whole.walls()]
+
+    def own_frame(self) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        """The axes along which it is given, columns of a matrix, and its arguments other than places in that frame."""
+        return rotations.matrix(self.rotation), {}
+
+    def triangulated(
+        self, low: NDArray[np.float64], high: NDArray[np.float64], frame: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+        """Its last wall as points (V, 3) and triangles (T, 3), in a box along the columns of a frame.
+
+        None where a grid of phi does as well.
+        """
+        return None
+
+    def upright(self, low: float, high: float) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+        """The walls that stand on an outline as triangles, between two heights along its axis; None without one."""
+        return None
+
+    def corner_lines(self, low: float, high: float) -> list[NDArray[np.float64]]:
+        """The lines (k, 3) that stand on the corners of an outline between two heights."""
+        return []
+
+    def plane_curves(self, across: int) -> list[NDArray[np.float64]] | None:
+        """Its curves (k, 3) in the plane across an axis; None where these are found on a grid."""
+        return None
+
+    def halves(self) -> NDArray[np.float64] | None:
+        """Half of the extent (n, 3) [m] of each of many bodies along its own axes; None where it has others."""
+        return None
+
+    # --- In words ---
+
+    def beyond(self) -> str:
+        """Where a point is that is not on the admissible side."""
+        return "inside" if self.is_solid() else "outside"
+
+    def admissible(self, phi: float) -> str:
+        """Which side is admissible, and that a point with this phi is not on it."""
+        if self.is_solid():
+            return f"admissible is its outside, where phi is 0 or more, and phi = {phi:.6g} there"
+        return f"admissible is its inside, where phi is 0 or less, and phi = {phi:.6g} there"
+
+    def lids(self, across: int) -> list[float]:
+        """How far walls across an axis are from the origin [m]: along this axis balls in a plane must fit."""
+        walls = ((wall, wall.flat_normal()) for wall in self.walls_of_balls(0.0))
+        return [
+            -wall.distance(Vec(0.0, 0.0, 0.0))
+            for wall, normal in walls
+            if normal is not None and abs(normal[across]) > _PARALLEL
+        ]
 
     def may_be_passed(self) -> bool:
         """Whether its wall has two sides that particles may be on, as a solid, or a cavity with a bay, has."""
@@ -213,6 +369,10 @@ class Surface(Validated):
     def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
         """Whether a rotation about the unit vector `axis` through a point leaves the surface where it is."""
         return False
+
+    def admits(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not."""
+        return np.asarray(side_sign(getattr(self, "side", "inside")) * self.phi(points, 0.0) <= 0.0)
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """The implicit function at points (3, N): below 0 inside, 0 on the surface, above 0 outside; shape (N,).
@@ -252,6 +412,16 @@ class Surface(Validated):
             return rows
         flat = np.array(rows).reshape(3, -1)
         return vec(motions.pose(self.motion, time).given(flat).reshape(np.shape(rows)))
+
+
+def _level_set(wall: Any) -> LevelSet:
+    """The level set of a wall as kernels take it."""
+
+    def gradient(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows = vec(points.T)
+        return np.stack(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3], axis=1)
+
+    return (lambda points: np.broadcast_to(wall.phi(vec(points.T)), len(points)), gradient)
 
 
 def is_on_axis(point: Vector, axis: Vector, center: Vector) -> bool:

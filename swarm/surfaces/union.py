@@ -19,16 +19,13 @@ from numpy.typing import ArrayLike
 from .. import motion as motions
 from ..common.checks import Vector
 from ..errors import SceneError
-from .facets.mesh import Mesh
-from .fields.many import Many
+from .area_samples import NEAR, AreaSample, Random, Region, distances
 from .instant import side_of
 from .part import checked_parts, handed_down, other_side
 from .presence.seams import Seam, joined, seams_of
 from .room import Floats, Room, has_volume, lasting, may_have_volume, room_bounds
 from .surface import UNBOUNDED, Box, Surface
-
-# The number of a part, and of a part of this.
-Place = tuple[int, ...]
+from .surface import Place as Place
 
 # Most rooms: each is compiled into the kernels.
 _MOST_ROOMS = 64
@@ -43,8 +40,9 @@ class Joined(Surface):
 
     refused: ClassVar[tuple[str, ...]] = ("rotation", "mass", "inertia")
     instead: ClassVar[str] = "give it to each of its parts"
-    # The operation of the gaps of parts.
+    # The operation of the gaps of parts, and where the wall of one is: inside of the others (1), or outside (-1).
     _of_gaps: ClassVar[Any] = None
+    wall_in_others: ClassVar[float] = 1.0
     # In a scene, by how much its rooms overlap where they have a face in common [m]; None: they touch.
     reach: ClassVar[float | None] = None
 
@@ -74,18 +72,15 @@ class Joined(Surface):
 
     @cached_property
     def rooms(self) -> tuple[Room, ...]:
-        """The admissible side as a union of rooms: intersections of surfaces without parts, with their laws."""
         return tuple(map(tuple, self._places_in_rooms))
 
     def places(self) -> tuple[Place, ...]:
-        """Of each of the `surfaces` the part that it is: its number, and of a part of a part both."""
         return tuple(place for room in self._places_in_rooms for place in room.values())
 
     def places_of_parts(self) -> tuple[Place, ...]:
-        """The same of every part, in their order."""
         return tuple(
             (k, *place) for k, part in enumerate(self.parts)
-            for place in (part.places_of_parts() if isinstance(part, Joined) else ((),))
+            for place in (part.places_of_parts() or ((),))
         )  # fmt: skip
 
     @cached_property
@@ -110,12 +105,10 @@ class Joined(Surface):
         return seams_of(self.rooms)
 
     def moving_apart(self) -> list[tuple[Surface, Surface]]:
-        """The surfaces of its rooms that have a face in common at the start, of which each has a motion of its own."""
         ends = [zip(seam.rooms, seam.surfaces, strict=True) for seam in self._touching if not seam.together]
         return [(self.rooms[i][a], self.rooms[k][b]) for (i, a), (k, b) in ends]
 
     def common_places(self) -> list[tuple[Place, Place]]:
-        """The places of the parts that have a face in common, two by two."""
         if self.reach is None:
             return []
         places = [tuple(room.values()) for room in self._places_in_rooms]
@@ -123,7 +116,6 @@ class Joined(Surface):
         return [(places[i][a], places[k][b]) for (i, a), (k, b) in pairs]
 
     def reaching(self, reach: float) -> "Joined":
-        """The same whose rooms overlap by so much [m] where they have a face in common; itself where none have."""
         if len(self.rooms) < 2 or not self.seams:
             return self
         made = copy.copy(self)
@@ -151,7 +143,6 @@ class Joined(Surface):
         return [tuple(itertools.chain(*rooms)) for rooms in itertools.product(*given)]
 
     def surfaces(self) -> tuple[Surface, ...]:
-        """The surfaces of all rooms, one after the other."""
         return tuple(itertools.chain(*self.rooms))
 
     def walls(self) -> tuple[Any, ...]:
@@ -188,6 +179,14 @@ class Joined(Surface):
         boxes = [room_bounds(lasting(room)) for room in still]
         low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
         return tuple(low.tolist()), tuple(high.tolist())
+
+    def enclosing_box(self) -> Box:
+        return self.bounds()
+
+    def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
+        # One that several rooms have is drawn once.
+        parts = dict.fromkeys(self.surfaces())
+        return [_of_part(part, one) for part in parts for one in part.area_samples(bounds, across)]
 
     def shifted(self, shift: Vector) -> "Surface":
         return replace(self, parts=tuple(part.shifted(shift) for part in self.parts))
@@ -248,6 +247,8 @@ class Union(Joined):
     """
 
     _of_gaps: ClassVar[Any] = np.minimum
+    wall_in_others: ClassVar[float] = -1.0
+    nouns = ("vessel", "compound solid") * 2
 
 
 @dataclass(frozen=True, repr=False)
@@ -273,32 +274,41 @@ class Intersection(Joined):
     """
 
     _of_gaps: ClassVar[Any] = np.maximum
+    nouns = ("intersection", "intersection") * 2
 
 
 # --- Their parts -----------------------------------------------------------------------------------------
 
 
+def _of_part(part: Surface, sample: AreaSample) -> AreaSample:
+    """A sample of a part as far as it is on that part: what goes on beyond it may be a wall of another."""
+
+    def draw(random: Random, n: int) -> Floats:
+        points = sample.draw(random, n)
+        known = np.isfinite(points).all(axis=0)
+        off = np.abs(distances(part, points[:, known])) > NEAR * part.extent()
+        points[:, np.flatnonzero(known)[off]] = np.nan
+        return points
+
+    return sample._replace(draw=draw)
+
+
 def _moves(part: Surface) -> bool:
-    return part.motion is not None or (isinstance(part, Joined) and any(map(_moves, part.parts)))
+    return part.motion is not None or any(map(_moves, part.parts))
 
 
 def nodes_of(surface: Surface) -> Iterator[tuple[Place, Surface]]:
     """A surface, at no place, and all parts of it and of its parts, each as given, with its place."""
     yield (), surface
-    for k, part in enumerate(surface.parts if isinstance(surface, Joined) else ()):
+    for k, part in enumerate(surface.parts):
         for place, one in nodes_of(part):
             yield (k, *place), one
-
-
-def surfaces_of(surface: Surface) -> tuple[Surface, ...]:
-    """The surfaces of which a surface is made, with what is given to the whole; itself alone where it has no parts."""
-    return surface.surfaces() if isinstance(surface, Joined) else (surface,)
 
 
 def part_at(surface: Surface, place: Place) -> Surface:
     """The part at a place of a surface, with what is given to the whole; at no place the surface itself."""
     for k in place:
-        surface = handed_down(surface, surface.parts[k])  # type: ignore[attr-defined]
+        surface = handed_down(surface, surface.parts[k])
     return surface
 
 
@@ -308,15 +318,15 @@ def part_at(surface: Surface, place: Place) -> Surface:
 def _require_alone(whole: Joined) -> None:
     """Raise a `SceneError` for a surface that is known only where its own walls keep particles, or is many bodies."""
     for surface in whole.surfaces():
-        if isinstance(surface, Many):
+        if surface.is_field:
             raise SceneError(
                 f"parts must not be {type(surface).__name__} in a {type(whole).__name__} of several rooms, got "
                 f"{surface}; list them as a surface of the scene, or their bodies one by one"
             )
-        if isinstance(surface, Mesh):
+        if surface.face_noun:
             raise SceneError(
-                f"parts must not be Mesh in a {type(whole).__name__} of several rooms, got {surface}; make one mesh of "
-                "what belongs together, or list it as a surface of the scene"
+                f"parts must not be {type(surface).__name__} in a {type(whole).__name__} of several rooms, got "
+                f"{surface}; make one mesh of what belongs together, or list it as a surface of the scene"
             )
         if surface.known_in() is not None:
             raise SceneError(
@@ -328,7 +338,7 @@ def _require_alone(whole: Joined) -> None:
 def _require_room(whole: Joined) -> None:
     """Raise a `SceneError` where a part, or the whole, has no volume."""
     for k, part in enumerate(whole.parts):
-        if not isinstance(part, Joined) and not has_volume((part,)):
+        if not part.parts and not has_volume((part,)):
             raise SceneError(f"parts[{k}] must have a volume, got {part!r:.200}, of which no point is admissible")
     if not any(map(has_volume, whole.rooms)):
         came = ", ".join(f"{part!r:.80}" for part in whole.parts)

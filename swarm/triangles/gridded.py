@@ -11,7 +11,6 @@ from ..motion import Pose
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces import Spheres
-from ..surfaces.fields.many import Many
 from ..surfaces.surface import Surface
 from .cut import SmoothSurface, cut
 
@@ -91,7 +90,7 @@ def balls(spheres: Spheres, count: int = _COARSE) -> tuple[Triangles, list[Float
 
 def each_body(surface: Surface, box: Corners) -> tuple[Triangles, list[Floats]]:
     """Bodies of another kind, each on a grid of its own."""
-    solids = surface.solids() if isinstance(surface, Many) else [surface]
+    solids = surface.solids()
     meshes: list[Triangles] = [NOTHING]
     first = 0
     for solid in solids[:: max(1, len(solids) // _MOST_BODIES)]:

@@ -2,18 +2,17 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces.fields.many import Many
 from ..surfaces.instant import box_of, side_of
 from ..surfaces.part import handed_down
 from ..surfaces.presence.openings import sign_of
 from ..surfaces.surface import Surface
-from ..surfaces.union import Joined, Place, Union
+from ..surfaces.union import Place
 
 # Parts of the size of the drawing: a distance that counts as 0, and the distance from a wall at which a level is
 # evaluated to choose between two walls in one place.
@@ -137,7 +136,7 @@ class _Found(NamedTuple):
     def beside(self, surfaces: Sequence[Surface], k: int, sign: float, opened: Sequence[int] = ()) -> tuple[Cover, ...]:
         """The covers of one of several surfaces, by the others, of which some have a face in common with it."""
         return tuple(
-            Cover(one, sign, side_of(one), self.time, first=j < k and not isinstance(one, Many), is_room=sign < 0.0,
+            Cover(one, sign, side_of(one), self.time, first=j < k and not one.is_field, is_room=sign < 0.0,
                   opens=sign < 0.0 and j in opened)
             for j, one in enumerate(surfaces) if j != k and (sign < 0.0 or one.is_there(self.time))
         )  # fmt: skip
@@ -148,8 +147,9 @@ class _Found(NamedTuple):
 
     def add(self, part: Part) -> None:
         """Add a part, or what it consists of."""
-        whole, solid = part.surface, part.solid ^ part.surface.is_solid()
-        if not isinstance(whole, Joined):
+        whole: Any = part.surface
+        solid = part.solid ^ whole.is_solid()
+        if not whole.parts:
             doorways = self.open(self.doorways.get((part.owner, part.place), ()))
             covers = (*part.covers, *self.open(whole.open_volumes()))
             self.parts.append(replace(part, solid=solid, covers=covers, doorways=doorways))
@@ -159,5 +159,5 @@ class _Found(NamedTuple):
         for k, one in enumerate(parts):
             place = (*part.place, k)
             opened = [j for j in range(len(parts)) if self._have_a_face(part.owner, place, (*part.place, j))]
-            covers = (*turned, *self.beside(parts, k, -1.0 if isinstance(whole, Union) else 1.0, opened))
+            covers = (*turned, *self.beside(parts, k, whole.wall_in_others, opened))
             self.add(Part(part.owner, place, one, solid, covers))

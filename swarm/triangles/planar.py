@@ -7,20 +7,16 @@ from numpy.typing import NDArray
 from ..motion import Pose, pose
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces import Spheres
-from ..surfaces.fields.many import Many
 from ..surfaces.instant import box_of
-from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.plane import along
 from ..surfaces.presence.openings import are_open
 from ..surfaces.surface import Surface
 from .curves import runs
 from .cut import Level, SmoothSurface
 from .parts import Part
-from .sharp import filled, smooth_walls
 
-# Points along each side of the grid on which curves are found, and of a small body on a grid of its own; of a circle.
-_POINTS, _BODY, _CIRCLE = 500, 60, 97
+# Points along each side of the grid on which curves are found, and of a small body on a grid of its own.
+_POINTS, _BODY = 500, 60
 # Bisections of a piece of a curve at the end of a wall.
 _BISECTIONS = 20
 # Cells of the grid beyond the walls, so that these are closed.
@@ -52,19 +48,15 @@ class PlaneWalls:
     def curves(self, i: int, pose: Pose, bodies: int) -> list[Floats]:
         """The curves (k, 3) [m] of surface i."""
         surface = self._scene.surfaces[i]
-        if isinstance(surface, Outlined):
-            return self._of(i, surface.curves())
-        if isinstance(surface, Spheres):
-            angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE)
-            circle = self._placed(np.stack([np.cos(angle), np.sin(angle)], axis=1))
-            found = [c + r * circle for c, r in zip(surface.centers, surface.radii, strict=True)]
+        known = surface.plane_curves(self._across)
+        if known is not None and not bodies:
+            return self._of(i, known)
+        if known is not None or bodies:
+            found = known or [curve for solid in surface.solids() for curve in self._around(solid)]
             if surface.is_foam():
                 nothing = 1e-9 * float((self._box[1] - self._box[0]).max())
                 found = [run for curve in found for run in runs(curve, surface.phi(curve.T) >= -nothing)]
             return [pose.placed(curve.T).T for curve in found]
-        if bodies:
-            solids = surface.solids() if isinstance(surface, Many) else [surface]
-            return [pose.placed(curve.T).T for solid in solids for curve in self._around(solid)]
         found = self._of(i, self._coarse)
         if not found:
             return []
@@ -79,10 +71,11 @@ class PlaneWalls:
     def of_part(self, part: Part) -> list[Floats]:
         """The curves of a part of a surface where it is a wall, each end where it meets another one."""
         surface, at = part.surface, pose(part.surface.motion, self._time)
-        walls = smooth_walls(surface)
-        if isinstance(surface, Outlined):
-            return self._cut(part, walls[0], [], [at.placed(curve.T).T for curve in surface.curves()], at)
-        low, high = (np.array(corner)[list(self._axes)] for corner in box_of(filled(surface), self._time))
+        walls = [SmoothSurface(*one) for one in surface.level_sets()]
+        known = None if surface.body_count() else surface.plane_curves(self._across)
+        if known is not None:
+            return self._cut(part, walls[0], [], [at.placed(curve.T).T for curve in known], at)
+        low, high = (np.array(corner)[list(self._axes)] for corner in box_of(surface.filled(), self._time))
         low, high = np.maximum(low, self._box[0]), np.minimum(high, self._box[1])
         margin = _MARGIN * (high - low) / (_POINTS - 1.0)
         sides = [np.linspace(a, b, _POINTS) for a, b in zip(low - margin, high + margin, strict=True)]

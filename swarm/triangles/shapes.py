@@ -9,18 +9,13 @@ from ..motion import pose
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces import Spheres
-from ..surfaces.fields.many import Many
-from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
-from ..surfaces.surface import Surface
-from ..surfaces.union import Joined
 from ..words.named import name_of
 from . import sharp
 from .gridded import NOTHING, Corners, balls, box_around, each_body, foam, given_box, placed
 from .parts import parts_of
 from .planar import PlaneWalls
 from .shape import Shape, levelled
-from .solids import is_of_solids
 
 
 def those_there(positions: Floats) -> Floats:
@@ -45,12 +40,12 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
     found = list[Shape]()
     sharp_ones = _sharp(scene, box, time)
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
-        bodies = bodies_of(surface) or int(i in grouped)
+        bodies = surface.body_count() or int(i in grouped)
         if not bodies:
             found += sharp_ones[i]
             continue
         mesh, edges = NOTHING, list[Floats]()
-        if not surface.is_there(time) or (bodies > most and is_of_solids(surface)):
+        if not surface.is_there(time) or (bodies > most and surface.halves() is not None):
             pass
         elif isinstance(surface, Spheres):
             mesh, edges = placed(at, *(foam(surface) if surface.is_foam() else balls(surface)))
@@ -75,11 +70,6 @@ def cell_of(scene: Scene) -> list[Shape]:
     return [Shape("cell", False, *NOTHING, edges)]
 
 
-def bodies_of(surface: Surface) -> int:
-    """The number of bodies of a surface of many, else 0."""
-    return len(surface) if isinstance(surface, Many) and not isinstance(surface, Outlined) else 0
-
-
 def _grouped(scene: Scene) -> set[int]:
     """The listed solids that are fields."""
     compiled = scene.compiled()
@@ -91,7 +81,7 @@ def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
     found: dict[int, list[Shape]] = {}
     for part in parts_of(scene, time):
         whole = scene.surfaces[part.owner]
-        if not bodies_of(whole):
+        if not whole.body_count():
             there = part.surface.is_there(time)
             mesh, edges = sharp.drawn(part, box, time) if there else (NOTHING, [])
             motion = part.surface.motion if part.place else None
@@ -107,9 +97,9 @@ def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) 
         return []
     walls, shapes = PlaneWalls(scene, positions, time), []
     grouped = _grouped(scene)
-    parts = parts_of(scene, time) if any(isinstance(surface, Joined) for surface in scene.surfaces) else []
+    parts = parts_of(scene, time) if any(surface.parts for surface in scene.surfaces) else []
     for i, (surface, at) in enumerate(zip(scene.surfaces, scene.poses(time), strict=True)):
-        bodies = bodies_of(surface) or int(i in grouped)
+        bodies = surface.body_count() or int(i in grouped)
         name, solid = name_of(scene, i), surface.is_solid() or i in grouped
         if parts and not bodies:
             for part in (one for one in parts if one.owner == i):
@@ -118,7 +108,7 @@ def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) 
                 name, motion = name_of(scene, i, part.place), part.surface.motion if part.place else None
                 shapes.append(Shape(name, part.solid, *drawn, i, part.place, motion))
             continue
-        left_out = not surface.is_there(time) or (bodies > most and is_of_solids(surface))
+        left_out = not surface.is_there(time) or (bodies > most and surface.halves() is not None)
         wires = [] if left_out else walls.curves(i, at, bodies)
         shapes.append(Shape(name, solid, *walls.strip(wires), wires, walls.height, i))
     return shapes

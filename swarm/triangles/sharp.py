@@ -8,14 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
-from ..kernel.vector import vec
 from ..motion import Pose, pose
 from ..state import Floats
-from ..surfaces import Cone, Torus
+from ..surfaces import Cone
 from ..surfaces.facets.mesh import Mesh
-from ..surfaces.fields.many import Many
-from ..surfaces.outlines.outlined import Outlined
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
 from . import curves, given
@@ -64,7 +60,7 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
         return _facets(part, part.surface, box)
     surface, at = part.surface, pose(part.surface.motion, time)
     frame, own = _frame(surface)
-    low, high = (np.array(corner) for corner in filled(own).bounds())
+    low, high = (np.array(corner) for corner in own.filled().bounds())
     corners = frame.T @ at.given(np.array(list(itertools.product(*zip(*box, strict=True)))).T)
     low, high = np.maximum(low, corners.min(axis=1)), np.minimum(high, corners.max(axis=1))
     placed = _Placed(part, at, frame, low, high, float((box[1] - box[0]).max()))
@@ -84,9 +80,9 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
         edges += curves.joined(found.points, found.rims)
         first += len(found.points)
     vertices, cells = np.concatenate(points), np.concatenate(triangles)
-    if isinstance(surface, Outlined) and len(cells):
-        level = placed.level(given.sides(surface), list(part.covers), [])
-        for line in given.corners(surface, float(low[2]), float(high[2])):
+    if len(cells):
+        level = placed.level(SmoothSurface(*surface.level_sets()[0]), list(part.covers), [])
+        for line in surface.corner_lines(float(low[2]), float(high[2])):
             edges += curves.runs(line, level(line) <= 0.0)
     here = at.placed(vertices.T).T, cells, at.turned(np.concatenate(normals).T).T
     return here, [at.placed(edge.T).T for edge in edges]
@@ -113,23 +109,24 @@ def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
 def _pieces(placed: _Placed) -> Iterator[tuple[Any, SmoothSurface]]:
     """The triangles of every smooth wall, cut, and the wall."""
     surface: Any = placed.part.surface
-    walls, upright = smooth_walls(surface), isinstance(surface, Outlined)
+    walls = [SmoothSurface(*one) for one in surface.level_sets()]
+    upright = surface.upright(float(placed.low[2]), float(placed.high[2]))
     if isinstance(surface, Cone):
         # Of the plane through the apex only that point is a wall.
         walls = walls[-1:]
-    if upright:
-        points, triangles = given.upright(surface, float(placed.low[2]), float(placed.high[2]))
+    if upright is not None:
+        points, triangles = upright
         # Moved onto themselves, they would stay where they are.
         wall = SmoothSurface(lambda points: np.zeros(len(points)), walls[0].gradient)
         level = placed.level(wall, _near(placed, points), [])
         yield cut(wall, points, triangles, level), wall
-    for wall in walls[upright:]:
-        others = [other for other in walls if other is not wall][: 1 if upright else None]
+    for wall in walls[1:] if upright is not None else walls:
+        others = [other for other in walls if other is not wall][: 1 if upright is not None else None]
         low, high = placed.low, placed.high
         for _ in range(_AGAIN):
             points, triangles = _triangles(placed, wall, low, high)
             covers = _near(placed, points)
-            bodies = sum(len(one.surface) for one in covers if isinstance(one.surface, Many))
+            bodies = sum(one.surface.body_count() for one in covers)
             found = cut(wall, points, triangles, placed.level(wall, covers, others), min(bodies, MOST_BODIES))
             if not len(found.points):
                 break
@@ -153,50 +150,11 @@ def _near(placed: _Placed, points: Floats) -> list[Cover]:
     return [one for one in placed.part.covers if one.may_cover(here.min(axis=1) - room, here.max(axis=1) + room)]
 
 
-def smooth_walls(surface: Surface) -> list[SmoothSurface]:
-    """Every smooth wall of a surface; of a solid with edges those of what it fills."""
-    if isinstance(surface, Outlined):
-        return [given.sides(surface), *given.lids(surface)]
-    whole = filled(surface)
-    walls = whole.walls() if type(whole).phi is Surface.phi else (whole,)
-    return [_smooth(wall) for wall in walls]
-
-
-def filled(surface: Surface) -> Surface:
-    """What a solid fills, as a cavity; a cavity itself."""
-    if not surface.is_solid():
-        return surface
-    try:
-        return replace(surface, side="inside")  # type: ignore[call-arg]
-    except SceneError:
-        return surface
-
-
-def _smooth(wall: Any) -> SmoothSurface:
-    if isinstance(wall, Surface):
-        still = replace(wall, motion=None)
-        return SmoothSurface(lambda points: still.phi(points.T), lambda points: still.gradient(points.T).T)
-
-    def gradient(points: Floats) -> Floats:
-        rows = vec(points.T)
-        return np.stack(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3], axis=1)
-
-    return SmoothSurface(lambda points: np.broadcast_to(wall.phi(vec(points.T)), len(points)), gradient)
-
-
 def _frame(surface: Surface) -> tuple[Floats, Surface]:
     """A frame along the axes of a surface, the columns of a matrix, and the surface in that."""
     whole: Any = surface
-    own: dict[str, Any] = {"motion": None, "mass": None, "inertia": None}
-    frame = np.eye(3)
-    if isinstance(whole, Outlined):
-        frame = whole.frame
-        own |= {"axis": (0.0, 0.0, 1.0)}
-    elif hasattr(whole, "turn"):
-        frame = matrix(whole.turn())
-        own |= {"axis": (0.0, 0.0, 1.0)}
-    elif whole.rotation is not None:
-        frame = matrix(whole.rotation)
+    frame, own = whole.own_frame()
+    own |= {"motion": None, "mass": None, "inertia": None}
     if hasattr(whole, "center"):
         own |= {"rotation": None, "center": _in(frame, whole.center)}
     elif whole.rotation is not None:
@@ -210,12 +168,8 @@ def _in(frame: Floats, point: Any) -> Any:
 
 def _triangles(placed: _Placed, wall: SmoothSurface, low: Floats, high: Floats) -> tuple[Floats, Indices]:
     """Triangles on a smooth wall in a box."""
-    surface, frame = placed.part.surface, placed.frame
-    if isinstance(surface, Torus):
-        return given.torus(surface)
-    if isinstance(surface, Cone):
-        return given.cone(surface, low, high, frame)
-    return found_in(wall, low, high, frame, any(isinstance(one.surface, Many) for one in placed.part.covers))
+    made = placed.part.surface.triangulated(low, high, placed.frame)
+    return made or found_in(wall, low, high, placed.frame, any(one.surface.is_field for one in placed.part.covers))
 
 
 def _turned_to(points: Floats, triangles: Indices, normals: Floats) -> NDArray[np.int64]:

@@ -11,7 +11,6 @@ import numpy as np
 from ..motion import Pose
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces import Boxes, Capsules, Cylinders, Ellipsoids, Spheres
 from ..surfaces.rotation import after, onto
 from ..surfaces.surface import Surface
 
@@ -45,38 +44,25 @@ def solids_of(scene: Scene, time: float) -> list[Solids]:
     return [_placed(i, surface, at) for i, (surface, at) in each if is_many(surface) and surface.is_there(time)]
 
 
-def is_of_solids(surface: Surface) -> bool:
-    """Whether each of the bodies of a surface is shown as it is: those of a foam are not, nor what has no end."""
-    if not isinstance(surface, Spheres | Boxes | Capsules | Cylinders | Ellipsoids):
-        return False
-    return not surface.is_foam() and not (isinstance(surface, Cylinders) and surface.lengths is None)
-
-
 def is_many(surface: Surface) -> bool:
     """Whether a surface is a field of so many solids that it is shown as what each is."""
-    return is_of_solids(surface) and len(surface) > MANY  # type: ignore[arg-type]
+    return surface.body_count() > MANY and surface.halves() is not None
 
 
 def _placed(i: int, surface: Any, at: Pose) -> Solids:
     """The solids of surface i, in its pose."""
     n, still = len(surface), np.array([1.0, 0.0, 0.0, 0.0])
     turns: Any = np.broadcast_to(still, (n, 4))
-    if isinstance(surface, Spheres):
-        halves = np.repeat(surface.radii[:, None], 3, axis=1)
-    elif isinstance(surface, Boxes | Ellipsoids):
-        halves = surface.half_widths if isinstance(surface, Boxes) else surface.semi_axes
-        if surface.rotations is not None:
-            turns = _unit(surface.rotations)
-    else:
-        ends = surface.radii if isinstance(surface, Capsules) else 0.0
-        halves = np.stack([surface.radii, surface.radii, 0.5 * surface.lengths + ends], axis=1)
+    if getattr(surface, "rotations", None) is not None:
+        turns = _unit(surface.rotations)
+    elif hasattr(surface, "axes"):
         axes, which = np.unique(_unit(surface.axes), axis=0, return_inverse=True)
         turns = np.array([onto(tuple(axis)) or still for axis in axes.tolist()])[which.ravel()]
     if not np.array_equal(at.turn, np.eye(3)):
         several, which = np.unique(turns, axis=0, return_inverse=True)
         turns = np.array([after(at.quaternion, tuple(turn)) or still for turn in several.tolist()])[which.ravel()]
     kind = type(surface).__name__.lower()
-    return Solids(i, kind, at.placed(surface.centers.T).T, np.asarray(halves), np.asarray(turns))
+    return Solids(i, kind, at.placed(surface.centers.T).T, surface.halves(), np.asarray(turns))
 
 
 def _unit(rows: Floats) -> Floats:

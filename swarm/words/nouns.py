@@ -9,40 +9,11 @@ import numpy as np
 from .. import motion as motions
 from ..scene import Scene
 from ..surfaces.facets.mesh import Mesh
-from ..surfaces.fields.many import Many
 from ..surfaces.presence.doors import Opening
 from ..surfaces.surface import Surface
 from ..surfaces.union import Place, part_at
 from .amounts import amount, amounts, counted_in_words, direction, listed, many, one, place, plain, plural_of
 
-# Kind -> what a cavity of it is called, what a solid of it is called, and what either is called in a plane.
-_NOUNS = {
-    "Sphere": ("sphere", "ball", "circle", "disc"),
-    "Ellipsoid": ("ellipsoid", "egg", "ellipse", "oval"),
-    "Torus": ("torus", "ring", "torus", "ring"),
-    "Capsule": ("capsule", "rod", "stadium", "rod"),
-    "Plane": ("plane", "plane", "line", "line"),
-    "Slab": ("pair of planes", "slab", "strip", "bar"),
-    "Box": ("box", "block", "rectangle", "block"),
-    "Cylinder": ("cylinder", "cylinder", "circle", "disc"),
-    "Cone": ("cone", "cone", "wedge", "wedge"),
-    "Paraboloid": ("bowl", "paraboloid", "parabola", "parabola"),
-    "Quadric": ("quadric", "quadric", "conic", "conic"),
-    "Formula": ("cavity of a formula", "solid of a formula", "curve of a formula", "solid of a formula"),
-    "OwnSurface": ("cavity of its own kind", "solid of its own kind") * 2,
-    "Sampled": ("sampled cavity", "sampled solid") * 2,
-    "Mesh": ("mesh", "solid mesh") * 2,
-    "Spheres": ("bubble", "ball", "bubble", "disc"),
-    "Cylinders": ("cylinder", "peg", "cylinder", "peg"),
-    "Capsules": ("capsule", "rod", "capsule", "rod"),
-    "Boxes": ("box", "block", "rectangle", "block"),
-    "Ellipsoids": ("ellipsoid", "egg", "ellipse", "oval"),
-    "Polygon": ("polygon", "polygonal column", "polygon", "polygon"),
-    "Stadium": ("stadium", "stadium column", "stadium", "stadium"),
-    "Prism": ("prism", "prism", "prism", "prism"),
-    "Union": ("vessel", "compound solid") * 2,
-    "Intersection": ("intersection", "intersection") * 2,
-}
 # Within this angle of straight down or up a plane is a floor or a lid [cosine].
 _LEVEL = 1.0 - 1e-6
 # What of a description is a length or lengths, and how it is said.
@@ -61,22 +32,15 @@ def noun_of(surface: Surface, scene: Scene | None = None) -> str:
         normal, pull = np.array(surface.normal), np.array(scene.gravity)  # type: ignore[attr-defined]
         down = float(normal @ pull / (np.linalg.norm(normal) * np.linalg.norm(pull)))
         return "floor" if down > _LEVEL else "lid" if down < -_LEVEL else "slope" if down > 1e-9 else "wall"
-    if solid is False and isinstance(surface, Many) and not hasattr(surface, "side"):
-        solid = True
-    if kind in _NOUNS:
-        return _NOUNS[kind][2 * flat + solid]
+    if surface.nouns is not None:
+        return surface.nouns[2 * flat + solid]
     # A kind of a plugin.
     return "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in kind).strip()
 
 
-def is_outlined(surface: Surface) -> bool:
-    """Whether a surface of many sides is one thing all the same."""
-    return hasattr(surface, "given")
-
-
 def number_of(surface: Surface) -> int:
     """The number of bodies in a surface, as its noun counts them."""
-    return len(surface) if isinstance(surface, Many) and not is_outlined(surface) else 1
+    return surface.body_count() or 1
 
 
 def labels(scene: Scene) -> dict[tuple[int, Place], str]:
@@ -118,8 +82,8 @@ def size_of(surface: Surface) -> str:
         value = getattr(surface, name, None)
         if value is None or (name == "length" and type(surface).__name__ in ("Formula", "OwnSurface")):
             continue
-        numbers = np.unique(np.asarray(value, np.float64).ravel()) if isinstance(surface, Many) else np.ravel(value)
-        if len(numbers) > 3 or (isinstance(surface, Many) and not is_outlined(surface) and len(numbers) > 1):
+        numbers = np.unique(np.asarray(value, np.float64).ravel()) if surface.is_field else np.ravel(value)
+        if len(numbers) > 3 or (surface.body_count() and len(numbers) > 1):
             told.append(f"{noun} from {amounts([numbers.min(), numbers.max()], 'm').replace(' and ', ' to ')}")
         elif name != "offset" or numbers[0]:
             told.append(f"{noun} {amounts(numbers.tolist(), 'm')}")
@@ -127,11 +91,11 @@ def size_of(surface: Surface) -> str:
         told.append(f"half angle {math.degrees(surface.half_angle):.4g}°")
     if isinstance(surface, Mesh):
         told.append(f"{many(len(surface))} triangles, volume {amount(surface.volume(), 'm³')}")
-    if is_outlined(surface):
-        told.append(f"{many(len(surface))} sides")  # type: ignore[arg-type]
+    elif surface.face_noun:
+        told.append(f"{many(len(surface))} {surface.face_noun}s")  # type: ignore[arg-type]
     if hasattr(surface, "formula"):
         told.append(f"{surface.formula} = 0".replace("**", "^"))
-    if hasattr(surface, "parts"):
+    if surface.parts:
         told.append(f"of {listed([in_full(part) for part in surface.parts])}")
     return ", ".join(told)
 

@@ -34,8 +34,8 @@ def of_scene(scene: Scene) -> str:
 
 def _brief(scene: Scene, brief: int) -> str:
     """The same, with less the larger `brief` is."""
-    solids = [one for one in scene.surfaces if noun_is_solid(one)]
-    around = [one for one in scene.surfaces if not noun_is_solid(one)]
+    solids = [one for one in scene.surfaces if one.is_solid()]
+    around = [one for one in scene.surfaces if not one.is_solid()]
     flat = scene.plane is not None
     told = _around(scene, around, brief)
     if solids:
@@ -48,13 +48,6 @@ def _brief(scene: Scene, brief: int) -> str:
     if scene.gravity is not None and brief < 6 and not (brief == 3 and leans):
         told += ", under gravity"
     return (told + _laws(scene) if brief < 1 else told).strip()
-
-
-def noun_is_solid(surface: Surface) -> bool:
-    """Whether a surface is in the way of particles, rather than around them."""
-    return surface.is_solid() or (
-        hasattr(surface, "is_foam") and not surface.is_foam() and not hasattr(surface, "side")
-    )
 
 
 def _around(scene: Scene, around: list[Surface], brief: int) -> str:
@@ -81,7 +74,7 @@ def _several(scene: Scene, surfaces: list[Surface], brief: int) -> str:
         moves = nouns.moves_how(surface) if brief < 4 else ""
         found[nouns.noun_of(surface, scene), moves] += nouns.number_of(surface)
     if brief >= 4 and len(found) > 1 and (brief >= 5 or len(found) > _FEW):
-        return counted_in_words(sum(found.values()), "solid" if noun_is_solid(surfaces[0]) else "wall")
+        return counted_in_words(sum(found.values()), "solid" if surfaces[0].is_solid() else "wall")
     told = []
     for (noun, moves), count in found.items():
         named = counted_in_words(count, noun)
@@ -95,7 +88,7 @@ def _several(scene: Scene, surfaces: list[Surface], brief: int) -> str:
 def _compound(scene: Scene, surfaces: list[Surface], noun: str) -> str:
     """A union or an intersection by the names of its parts."""
     whole: Any = next(one for one in surfaces if nouns.noun_of(one, scene) == noun)
-    if any(hasattr(part, "parts") for part in whole.parts):
+    if any(part.parts for part in whole.parts):
         return f"{one(noun)} of {len(whole.parts)} parts"
     parts = Counter(nouns.noun_of(part, scene) for part in whole.parts)
     return f"{one(noun)} of {listed([counted_in_words(count, kind) for kind, count in parts.items()])}"

@@ -8,7 +8,7 @@ from scipy import stats
 
 import swarm
 from swarm.sources.births import times_of, with_births
-from swarm.sources.pieces import pieces_of, points_of
+from swarm.surfaces.area_samples import points_of
 
 N = 20_000
 RANDOM = np.random.default_rng
@@ -310,12 +310,23 @@ def test_each_source_has_streams_of_its_own_and_the_seed_decides():
     assert (np.diff(two.births.time) >= 0.0).all()
 
 
-def test_pieces_of_two_kinds_in_proportion():
+def test_samples_of_two_kinds_in_proportion():
     """A prism's sides and lids, drawn as they are, and a plane by lines, in one list."""
     bounds = np.full(3, -0.5), np.full(3, 0.5)
-    flat = pieces_of(swarm.Plane((0, 0, 1), 0.0), bounds, None)
-    ball = pieces_of(swarm.Sphere(0.25, (0, 0, 0.3)), bounds, None)
+    flat = swarm.Plane((0, 0, 1), 0.0).area_samples(bounds, None)
+    ball = swarm.Sphere(0.25, (0, 0, 0.3)).area_samples(bounds, None)
     points = points_of([*flat, *ball], RANDOM(1), 100_000)
     on_plane = (np.abs(points[2]) < 1e-12) & (np.abs(points[:2]) < 0.3).all(axis=0)
     on_ball = np.abs(np.sqrt((points[:2] ** 2).sum(axis=0) + (points[2] - 0.3) ** 2) - 0.25) < 1e-12
     assert as_likely([on_plane.sum(), on_ball.sum()], [0.36, math.pi / 4.0]) > 1e-3
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_on_a_mesh_where_it_is_in_the_scene(side):
+    """Not where its file has it."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    turn = {"axis": (1.0, 2.0, 3.0), "angle": 1.0}
+    mesh = swarm.Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], side, (3.0, -4.0, 5.0), rotation=turn)
+    scene = swarm.Scene([mesh, swarm.Sphere(20.0)])
+    r = births(scene, swarm.Source(0, count=200, stop=1.0, speed=1.0)).position
+    assert np.abs(mesh.phi(r)).max() < 1e-13

@@ -12,8 +12,6 @@ from ...scene import Scene
 from ...sources.births import with_births
 from ...surfaces.instant import gaps_of, gradient_of
 from ...surfaces.plane import require_start
-from ...surfaces.shapes.cone import Cone
-from ...surfaces.shapes.quadric import Quadric
 from .. import engines
 from ..options import RunOptions, Task
 from . import workload
@@ -150,7 +148,7 @@ def _require_normals(scene: Scene, particles: Particles) -> None:
     """Raise a `SceneError` for a flight out of the tip of a cone, where no normal says how it is reflected."""
     step = _NEAR * scene.finite_size()
     for i, surface in enumerate(scene.surfaces):
-        if not isinstance(surface, (Cone, Quadric)) or surface.motion is not None:
+        if not surface.may_have_tip or surface.motion is not None:
             continue
         on_wall = np.flatnonzero(surface.phi(particles.position) == 0.0)
         r, v = particles.position[:, on_wall], particles.velocity[:, on_wall]

@@ -15,19 +15,13 @@ from ...state import CROSSED, Crossed, State
 from ...surfaces.counted import Counted, ReversedCounter, Walled
 from ...surfaces.counter import Counter
 from ...surfaces.facets.mesh import Mesh
-from ...surfaces.fields.many import Many
-from ...surfaces.frames import Framed
 from ...surfaces.instant import side_of
-from ...surfaces.outlines.outlined import Outlined
 from ...surfaces.part import other_side
 from ...surfaces.periodic.images import images_of
 from ...surfaces.presence.openings import volumes_in, volumes_of_counter
-from ...surfaces.shapes.ellipsoid import EllipsoidNumbers
-from ...surfaces.shapes.plane import PlaneNumbers
-from ...surfaces.shapes.quadratic import QuadricNumbers
-from ...surfaces.shapes.sphere import SphereNumbers, ball
+from ...surfaces.shapes.sphere import ball
 from ...surfaces.surface import Surface
-from ...surfaces.union import Joined, Union
+from ...surfaces.union import Union
 from ..options import RunOptions
 
 # Of the size of a scene and of a counter, a distance that is round-off: rooms that touch are three times 1e-13 apart.
@@ -72,7 +66,7 @@ def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) ->
     """
     if not given:
         return None
-    walls = sum(len(one.surface.walls()) for one in given if not isinstance(one.surface, Many))
+    walls = sum(len(one.surface.walls()) for one in given if not one.surface.is_field)
     if walls > _MOST:
         raise SceneError(
             f"counters must have at most {_MOST} walls in all, got {walls}: each is compiled into the kernels; of many "
@@ -106,24 +100,16 @@ def _ball_around(*given: Any) -> Any:
     """A solid ball around the side of a surface that has bounds, or None."""
     *sides, near = given
     for one in sides:
-        low, high = (np.array(corner) for corner in _box_around(one))
+        low, high = (np.array(corner) for corner in one.enclosing_box())
         if np.isfinite([low, high]).all():
             radius = (1.0 + _ROOM) * float(np.linalg.norm(high - low)) / 2.0 + near
             return ball(vec(((low + high) / 2.0).tolist()), radius)
     return None
 
 
-def _box_around(surface: Surface) -> Any:
-    if isinstance(surface, Many):
-        low, high = surface.corners()
-        return low.min(axis=1), high.max(axis=1)
-    return surface.bounds()
-
-
 def _require_no_mesh(name: str, surface: Surface, verb: str) -> None:
     """Raise a `SceneError` for exact triangles: a kernel does not know how far a place is from these."""
-    parts = surface.surfaces() if isinstance(surface, Joined) else (surface,)
-    if any(isinstance(one, Mesh) for one in parts):
+    if any(isinstance(one, Mesh) for one in surface.surfaces()):
         raise SceneError(
             f"{name} must not be of a Mesh, which is known at its triangles only, got {surface!r:.200}; {verb} "
             "swarm.from_mesh(path, spacing) instead"
@@ -145,7 +131,7 @@ def _finite(length: float) -> float:
 def _whole(scene: Scene, name: str, surface: Surface) -> Surface:
     """The surface with its images, as far as they reach into the cell where the scene repeats."""
     period, side = scene.period, getattr(surface, "side", None)
-    if period is None or side is None or isinstance(surface, Outlined):
+    if period is None or side is None or surface.face_noun:
         return surface
     solid = surface if side == "outside" else other_side(surface)
     try:
@@ -162,19 +148,8 @@ def _whole(scene: Scene, name: str, surface: Surface) -> Surface:
 
 def _one_wall(surface: Surface) -> Any:
     """The wall of a surface that is the same from its other side with the sign changed; None of any other."""
-    walls = () if isinstance(surface, (Many, Outlined)) else surface.walls()
-    return _turning(walls[0]) if len(walls) == 1 else None
-
-
-def _turning(wall: Any) -> Any:
-    if isinstance(wall, Framed):
-        body = _turning(wall.body)  # type: ignore[attr-defined]
-        return None if body is None else wall._replace(body=body)
-    if isinstance(wall, PlaneNumbers):
-        return wall if type(wall) is PlaneNumbers else None
-    # Cavities that are convex have hits of their own, which are not those of the other side.
-    kind = next((kind for kind in (SphereNumbers, EllipsoidNumbers, QuadricNumbers) if isinstance(wall, kind)), None)
-    return None if kind is None else kind(*wall)
+    walls = () if surface.is_field else surface.walls()
+    return walls[0].reversible() if len(walls) == 1 else None
 
 
 # --- Arrays ----------------------------------------------------------------------------------------------

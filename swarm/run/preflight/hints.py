@@ -14,7 +14,6 @@ from ...methods.verlet import Verlet
 from ...scene import Scene
 from ...surfaces.instant import box_of, gaps_of
 from ...surfaces.surface import Surface
-from ...surfaces.union import Joined
 from ..options import Task
 from . import softness, workload
 
@@ -79,7 +78,7 @@ def _warn_of_fall(compiled: CompiledScene) -> None:
 def _warn_of_faces(scene: Scene) -> None:
     """Warn where parts of a union touch at the start and do not move as one: a face is open where both have it."""
     for i, surface in enumerate(scene.surfaces):
-        for one, other in surface.moving_apart() if isinstance(surface, Joined) and len(surface.rooms) > 1 else ():
+        for one, other in surface.moving_apart() if len(surface.rooms) > 1 else ():
             _LOG.warning(
                 "surfaces[%d] has parts with a face in common at the start that do not move as one, %.100r and %.100r: "
                 "there is a wall between them while they only touch; let them overlap where they are to be one room",

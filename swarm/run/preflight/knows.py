@@ -15,11 +15,8 @@ from ...methods.base import Method
 from ...methods.fixed_step import SoftWalls
 from ...particles import Particles, TiedParticles
 from ...scene import BESIDE_MASS, INSTEAD_OF_MASS, Scene
-from ...surfaces.facets.mesh import Mesh
-from ...surfaces.fields.many import Many
 from ...surfaces.in_motion.drive import drive_of
 from ...surfaces.laws.sticky import Sticky
-from ...surfaces.outlines.outlined import Outlined
 from ...surfaces.periodic.images import MASS_AND_PERIOD, WITHOUT_PERIOD
 from ...surfaces.surface import Surface
 from ...surfaces.wall_law import lets_wait, may_end
@@ -178,7 +175,7 @@ def _losses_that_fall(asked: Asked) -> Found:
 def _rooms(asked: Asked) -> Found:
     """Unions of several rooms, and foams."""
     for i, surface in enumerate(asked.scene.surfaces):
-        if i in asked.scene.compiled().unions() or (isinstance(surface, Many) and surface.is_foam()):
+        if i in asked.scene.compiled().unions() or surface.is_foam():
             yield {"i": i, "got": surface}
 
 
@@ -193,12 +190,12 @@ def _fields_that_rest(asked: Asked) -> Found:
 
 
 def _faces(asked: Asked) -> Found:
-    yield from ({"i": i, "got": one} for i, one in _walls(asked) if isinstance(one, (Mesh, Outlined)))
+    yield from ({"i": i, "got": one} for i, one in _walls(asked) if one.face_noun)
 
 
 def _groups(asked: Asked) -> Found:
     for i, one in enumerate(asked.scene.surfaces):
-        if isinstance(one, Mesh) and one.groups is not None:
+        if one.groups is not None:
             yield {"i": i, "got": ", ".join(one.groups)}
 
 

@@ -9,7 +9,6 @@ from ...errors import SceneError
 from ...kernel.limits import START_ON_WALL
 from ...particles import Particles
 from ...scene import Scene
-from ...surfaces.fields.many import Many
 from ...surfaces.instant import box_of, gaps_of, gradient_of
 from ...surfaces.shapes.plane import Plane
 from ...surfaces.surface import Surface
@@ -71,15 +70,10 @@ def _named(scene: Scene, wall: int) -> str:
     return f"surfaces[{wall}] ({type(surface).__name__})" + ("" if surface.motion is None else ", as it is at 0 s")
 
 
-def _is_kept_out(surface: Surface) -> bool:
-    """Whether particles are kept out of a surface."""
-    return surface.is_solid() or (isinstance(surface, Many) and not surface.is_foam())
-
-
 def _how_far(scene: Scene, wall: int, place: Places) -> str:
     """How far a point is on the wrong side, in words."""
     surface = scene.surfaces[wall]
-    side = "beyond" if isinstance(surface, Plane) else "inside" if _is_kept_out(surface) else "outside"
+    side = surface.beyond()
     distance = _distance(scene, wall, place)
     return f"{side}" if math.isnan(distance) else f"{distance:.3g} m {side}"
 
@@ -110,13 +104,7 @@ def _admissible(surface: Surface, place: Places) -> str:
     phi = float(surface.phi(place)[0])
     if math.isnan(phi):
         return "its phi is not a number there"
-    if isinstance(surface, Plane):
-        told = "admissible is normal.r <= offset"
-        here = f", and normal.r = {phi + surface.offset:.6g} m there is more than {surface.offset:.6g} m"
-        return told + (here if surface.motion is None else "")
-    if _is_kept_out(surface):
-        return f"admissible is its outside, where phi is 0 or more, and phi = {phi:.6g} there"
-    return f"admissible is its inside, where phi is 0 or less, and phi = {phi:.6g} there"
+    return surface.admissible(phi)
 
 
 def _mend(scene: Scene, wall: int, position: Places, outside: int) -> str:
@@ -133,7 +121,7 @@ def _mend(scene: Scene, wall: int, position: Places, outside: int) -> str:
 
 def _center_around(surface: Surface, position: Places) -> tuple[float, ...] | None:
     """The centre with which a cavity holds all particles; None if no shift of it does, or it cannot be shifted."""
-    if _is_kept_out(surface) or not hasattr(surface, "center") or surface.motion is not None:
+    if surface.is_solid() or not hasattr(surface, "center") or surface.motion is not None:
         return None
     box = np.array(box_of(surface, 0.0))
     if not np.isfinite(box).all():
@@ -152,7 +140,7 @@ def _other_side(scene: Scene, wall: int) -> str | None:
     if isinstance(surface, Plane):
         normal = tuple(0.0 - x for x in surface.normal)
         return f"the reversed normal, normal = {normal} and offset = {0.0 - surface.offset:g}"
-    if isinstance(surface, Many) or not hasattr(surface, "side"):
+    if surface.is_field or not hasattr(surface, "side"):
         return None
     if surface.is_solid():
         return 'side = "inside"'

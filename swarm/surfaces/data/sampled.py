@@ -73,6 +73,7 @@ class Sampled(Surface):
     array([0.])
     """
 
+    nouns = ("sampled cavity", "sampled solid") * 2
     values: Any
     spacing: Annotated[Any, _spacing]
     origin: Point

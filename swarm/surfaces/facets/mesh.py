@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ from ...common.validated import Length, Magnitude
 from ...errors import SceneError
 from ...kernel.vector import Vec
 from .. import rotation as rotations
+from ..area_samples import AreaSample, Region, of_triangles
 from ..fields.members import Members
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
@@ -82,6 +83,8 @@ class Mesh(Surface):
     array([-0.1,  1. ])
     """
 
+    face_noun: ClassVar[str] = "triangle"
+    nouns = ("mesh", "solid mesh") * 2
     vertices: Any
     triangles: Any = None
     side: str = "inside"
@@ -196,8 +199,7 @@ class Mesh(Surface):
         """The number of every triangle."""
         return list(range(len(self)))
 
-    def runs(self) -> list[tuple[Surface, int]]:
-        """Triangles in a row that have the same laws: (what says them, how many)."""
+    def runs(self, walls: int = 0) -> list[tuple[Surface, int]]:
         counts = np.bincount(self.group, minlength=len(self.names))
         given = self.groups or {}
         return [
@@ -211,10 +213,15 @@ class Mesh(Surface):
         return float(0.5 * np.ptp(self.vertices, axis=0).min())
 
     def bounds(self) -> Box:
-        if self.is_solid():
-            return UNBOUNDED
-        low, high = self.corners.min(axis=0), self.corners.max(axis=0)
-        return tuple(low.tolist()), tuple(high.tolist())
+        return UNBOUNDED if self.is_solid() else self.enclosing_box()
+
+    def enclosing_box(self) -> Box:
+        return tuple(self.corners.min(axis=0).tolist()), tuple(self.corners.max(axis=0).tolist())
+
+    def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
+        if across is not None:
+            return super().area_samples(bounds, across)
+        return [of_triangles(self.corners, np.asarray(self.triangles))]
 
     def extent(self) -> float:
         return float(np.linalg.norm(self.corners, axis=1).max())
@@ -229,6 +236,8 @@ class Mesh(Surface):
         found = np.empty(points.shape[1], np.bool_)
         within(self.members, self._tree, np.ascontiguousarray(points), found)
         return found
+
+    admits = contain
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """The signed distance at points (3, N): below 0 inside, above 0 outside; shape (N,)."""

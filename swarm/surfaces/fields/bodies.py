@@ -19,6 +19,9 @@ from .foam import Foam
 from .many import Many, field_of
 from .members import Members
 
+# Points of a circle in a plane.
+_CIRCLE = 97
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Spheres(Many):
@@ -43,6 +46,7 @@ class Spheres(Many):
     array([0.  , 0.15])
     """
 
+    nouns = ("bubble", "ball", "bubble", "disc")
     kind: ClassVar[type[Surface]] = Sphere
     may_be_foam: ClassVar[bool] = True
     centers: Any
@@ -63,6 +67,15 @@ class Spheres(Many):
         """The field as kernels take it."""
         field = self._field(None)
         return field if self.is_solid() else Foam(*field)
+
+    def halves(self) -> Floats | None:
+        return None if self.is_foam() else np.repeat(self.radii[:, None], 3, axis=1)
+
+    def plane_curves(self, across: int) -> list[Floats]:
+        angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE)
+        circle = np.zeros((_CIRCLE, 3))
+        circle[:, (across + 1) % 3], circle[:, (across + 2) % 3] = np.cos(angle), np.sin(angle)
+        return [center + radius * circle for center, radius in zip(self.centers, self.radii, strict=True)]
 
     def _members_of_balls(self, largest: float) -> Members:
         return self._field(largest)
@@ -98,12 +111,20 @@ class Cylinders(Many):
     array([0.])
     """
 
+    nouns = ("cylinder", "peg", "cylinder", "peg")
     kind: ClassVar[type[Surface]] = Cylinder
     centers: Any
     radii: Any
     axes: Any = (0.0, 0.0, 1.0)
     lengths: Any = None
     side: str = "outside"
+
+    @property
+    def has_edges(self) -> bool:  # type: ignore[override]
+        return self.lengths is not None
+
+    def halves(self) -> Floats | None:
+        return None if self.lengths is None else np.stack([self.radii, self.radii, 0.5 * self.lengths], axis=1)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -131,12 +152,16 @@ class Capsules(Many):
     array([0.])
     """
 
+    nouns = ("capsule", "rod", "capsule", "rod")
     kind: ClassVar[type[Surface]] = Capsule
     centers: Any
     radii: Any
     lengths: Any
     axes: Any = (0.0, 0.0, 1.0)
     side: str = "outside"
+
+    def halves(self) -> Floats:
+        return np.stack([self.radii, self.radii, 0.5 * self.lengths + self.radii], axis=1)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -163,11 +188,17 @@ class Boxes(Many):
     array([0.  , 0.25])
     """
 
+    nouns = ("box", "block", "rectangle", "block")
     kind: ClassVar[type[Surface]] = Box
     centers: Any
     half_widths: Any
     rotations: Any = None
     side: str = "outside"
+
+    has_edges = True
+
+    def halves(self) -> Floats:
+        return np.asarray(self.half_widths)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -194,8 +225,12 @@ class Ellipsoids(Many):
     array([0., 0.])
     """
 
+    nouns = ("ellipsoid", "egg", "ellipse", "oval")
     kind: ClassVar[type[Surface]] = Ellipsoid
     centers: Any
     semi_axes: Any
     rotations: Any = None
     side: str = "outside"
+
+    def halves(self) -> Floats:
+        return np.asarray(self.semi_axes)

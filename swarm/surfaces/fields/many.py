@@ -12,6 +12,7 @@ from ... import motion as motions
 from ...common.rows import balls, bodies, directions, lengths, quaternions, widths
 from ...errors import SceneError
 from ...kernel.grid import Floats, one_cell
+from ..area_samples import AreaSample, Region
 from ..presence.patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
@@ -47,6 +48,7 @@ _ROWS = {
 class Many(Surface):
     """Solid bodies of one kind; particles live outside of all of them. They may overlap."""
 
+    is_field = True
     centers: Any
     refused = ("rotation", "mass", "inertia")
     instead = "give it to a body that is a surface of the scene by itself"
@@ -72,7 +74,6 @@ class Many(Surface):
                 object.__setattr__(self, what, _ROWS[what].checked(what, value, len(self)))
 
     def is_foam(self) -> bool:
-        """Whether particles live in any of the bodies, not outside of all."""
         return self.may_be_foam and getattr(self, "side", "outside") == "inside"
 
     def __len__(self) -> int:
@@ -100,7 +101,6 @@ class Many(Surface):
     # --- For kernels -------------------------------------------------------------------------------------
 
     def solids(self) -> list[Surface]:
-        """Every body as a surface of its own."""
         given = {_ROWS[name].of_one: getattr(self, name) for name in self.columns() if getattr(self, name) is not None}
         rows = zip(*(values.tolist() for values in given.values()), strict=True)
         return [self.kind(**dict(zip(given, row, strict=True)), side="outside") for row in rows]  # type: ignore[call-arg]
@@ -108,6 +108,19 @@ class Many(Surface):
     def corners(self) -> tuple[Floats, Floats]:
         """The bounds of every body, its lowest and its highest corner (3, n), infinite where it has no end."""
         return _corners_of(self.solids())
+
+    def body_count(self) -> int:
+        return len(self)
+
+    def enclosing_box(self) -> Box:
+        low, high = self.corners()
+        return tuple(low.min(axis=1).tolist()), tuple(high.max(axis=1).tolist())
+
+    def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
+        return [one for solid in self.solids() for one in solid.area_samples(bounds, across)]
+
+    def lids(self, across: int) -> list[float]:
+        return []
 
     def images(self, which: NDArray[np.int64], centers: Floats, repeated: tuple[Floats, Floats]) -> "Many":
         """A field of these bodies, at other places, for a cell with these corners that repeats."""
@@ -142,10 +155,6 @@ class Many(Surface):
         return members_of(self.solids(), self.repeated, largest)
 
     def faces_of_balls(self, largest: float) -> tuple[Members, NDArray[np.int64]]:
-        """What soft balls with radii up to the largest one [m] meet, and of each member the number of its face.
-
-        A face is what a ball touches at one place only: a body, or what joins without a corner around the balls.
-        """
         (members,) = self.walls_of_balls(largest)
         return members, np.arange(len(members.table))
 
@@ -161,6 +170,9 @@ class Many(Surface):
             within(self.members, np.ascontiguousarray(points), found)
         return found
 
+    def admits(self, points: Floats) -> NDArray[np.bool_]:
+        return np.asarray(self.contain(points) == self.is_foam())
+
     def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
         rows = self._own_rows(points, time)
         found = np.empty(points.shape[1])
@@ -172,10 +184,7 @@ class Many(Surface):
     # --- For users ---------------------------------------------------------------------------------------
 
     def bounds(self) -> Box:
-        if not self.is_foam():
-            return UNBOUNDED
-        low, high = self.corners()
-        return tuple(low.min(axis=1).tolist()), tuple(high.max(axis=1).tolist())
+        return self.enclosing_box() if self.is_foam() else UNBOUNDED
 
     def size(self) -> float:
         return min(solid.size() for solid in self.solids())

@@ -47,6 +47,7 @@ class Formula(FormSurface):
     array([3.])
     """
 
+    nouns = ("cavity of a formula", "solid of a formula", "curve of a formula", "solid of a formula")
     formula: str = field(metadata={"key": "phi"})
     parameters: dict[str, float] | None = None
     box: tuple[Vector, Vector] | None = field(default=None, metadata={"key": "bounds"})

@@ -51,6 +51,7 @@ class OwnSurface(FormSurface):
     array([0.])
     """
 
+    nouns = ("cavity of its own kind", "solid of its own kind") * 2
     parameters: Any
     phi_function: Callable[..., Any]
     gradient_function: Callable[..., Any]

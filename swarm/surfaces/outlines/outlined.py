@@ -1,6 +1,7 @@
 """Walls that stand on an outline, as users describe them: what all such surfaces have in common."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -13,12 +14,14 @@ from ...kernel.grid import one_cell
 from ...kernel.limits import ON_OUTLINE
 from ...kernel.vector import Vec, vec
 from .. import rotation as rotations
+from ..area_samples import AreaSample, Draw, Region
 from ..fields.grid import grid_of
 from ..fields.many import Many, field_of
 from ..fields.members import Members, table_of
+from ..parametrised import Triangles, halved
 from ..rotation import Rotated
 from ..shapes.quadratic import QuadricNumbers
-from ..surface import UNBOUNDED, Box, HalfSpace, Surface, side_sign
+from ..surface import UNBOUNDED, Box, HalfSpace, LevelSet, Surface, side_sign
 from .outline import Floats, Outline
 from .round_side import round_side
 from .sides import FewSides, Side, Sides
@@ -27,8 +30,13 @@ from .sides import FewSides, Side, Sides
 _FEW, _IN_ONE_CELL = 24, 8
 # Entries of a matrix up to this size count as 0.
 _ALIGNED = 1e-15
+# Parts of the height of triangles on it, and points of a line along it.
+_HIGH, _FINE = 8, 201
 # The axes x, y, z of the scene along which the plane's axes to the right, upwards and the axis across it are.
 _ALONG = {(1.0, 0.0, 0.0): (1, 2, 0), (0.0, 1.0, 0.0): (2, 0, 1), (0.0, 0.0, 1.0): (0, 1, 2)}
+
+
+Placed = Callable[[Floats, Floats], Floats]
 
 
 class Outlined(Many):
@@ -40,6 +48,7 @@ class Outlined(Many):
     height: Any = None
     refused = ("motion", "mass", "inertia")
     instead = "its walls end at its corners: move the other surfaces, or build it of surfaces without edges"
+    face_noun: ClassVar[str] = "side"
     # The argument that gives the outline.
     given: ClassVar[str] = "outline"
 
@@ -94,6 +103,9 @@ class Outlined(Many):
         """Points of the plane (2, N) in the scene (3, N)."""
         return np.asarray(self.frame[:, :2] @ points + np.array(self.center)[:, None])
 
+    def plane_curves(self, across: int) -> list[Floats]:
+        return self.curves()
+
     def curves(self) -> list[Floats]:
         """A curve (k, 3) along every side, for pictures."""
         return [self.placed(curve.T).T for curve in self.boundary.curves()]
@@ -119,9 +131,8 @@ class Outlined(Many):
             slope, level = np.where(above > level, lid, slope), np.maximum(above, level)
         return level.reshape(rows.shape[1:]), slope.reshape(rows.shape)
 
-    def contain(self, points: Floats) -> NDArray[np.bool_]:
-        """Whether each of the points (3, N) is not admissible."""
-        return np.asarray(side_sign(self.side) * self.phi(points) > 0.0)
+    def admits(self, points: Floats) -> NDArray[np.bool_]:
+        return Surface.admits(self, points)
 
     def corners(self) -> tuple[Floats, Floats]:
         low, high = replace(self, side="inside").bounds()  # type: ignore[call-arg]
@@ -162,6 +173,83 @@ class Outlined(Many):
         return float(
             max(map(abs, self.center)) + math.hypot(2.0**0.5 * self.boundary.extent, 0.5 * (self.height or 0.0))
         )
+
+    # --- How it is drawn ---
+
+    def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
+        """Its sides and, of a prism, its lids."""
+        frame = self.frame
+        corners = np.array([[bounds[i >> k & 1][k] for k in range(3)] for i in range(8)]).T
+        heights = frame[:, 2] @ corners
+        low, high = (0.0, 0.0) if across is not None else (float(heights.min()), float(heights.max()))
+        middle = float(frame[:, 2] @ np.array(self.center))
+        if self.height is not None:
+            low, high = max(low, middle - 0.5 * self.height), min(high, middle + 0.5 * self.height)
+        rows = np.array(self.boundary.rows, np.float64)
+        width = 1.0 if across is not None else high - low
+
+        def placed(flat: Floats, height: Floats) -> Floats:
+            at = self.placed(flat)
+            return np.asarray(at + np.outer(frame[:, 2], height - frame[:, 2] @ at))
+
+        found = []
+        for begin, end in zip(rows, np.roll(rows, -1, axis=0), strict=True):
+            length, path = _side(begin, end)
+            found.append(AreaSample(length * width, _on_side(path, placed, low, high)))
+        if self.height is not None and across is None:
+            lows, highs = self.boundary.corners()
+            least, most = lows.min(axis=1), highs.max(axis=1)
+            area = float(np.prod(most - least))
+            heights = middle - 0.5 * self.height, middle + 0.5 * self.height
+            found += [AreaSample(area, _on_lid(least[:, None], most[:, None], placed, height)) for height in heights]
+        return found
+
+    def enclosing_box(self) -> Box:
+        return Surface.enclosing_box(self)
+
+    def body_count(self) -> int:
+        return 0
+
+    def lids(self, across: int) -> list[float]:
+        return [] if self.height is None else [0.5 * self.height]
+
+    def own_frame(self) -> tuple[Floats, dict[str, Any]]:
+        return self.frame, {"axis": (0.0, 0.0, 1.0)}
+
+    def level_sets(self) -> list[LevelSet]:
+        """The sides, and the lids as planes."""
+
+        def phi(points: Floats) -> Floats:
+            return self.boundary.nearest(self.in_plane(points.T)[:2])[0]
+
+        def gradient(points: Floats) -> Floats:
+            return np.asarray((self.frame[:, :2] @ self.boundary.nearest(self.in_plane(points.T)[:2])[1]).T)
+
+        return [(phi, gradient), *([] if self.height is None else map(self._level_of_lid, (-1.0, 1.0)))]
+
+    def _level_of_lid(self, side: float) -> LevelSet:
+        normal = side * self.frame[:, 2]
+        offset = float(normal @ np.array(self.center)) + 0.5 * self.height
+        return lambda points: points @ normal - offset, lambda points: np.broadcast_to(normal, points.shape)
+
+    def upright(self, low: float, high: float) -> Triangles:
+        middle = float(self.frame[:, 2] @ np.array(self.center))
+        heights = np.linspace(low, high, _HIGH + 1) - middle
+        points, triangles, first = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
+        for curve in self.boundary.curves():
+            n = len(curve)
+            own = np.concatenate([np.repeat(curve, len(heights), axis=0), np.tile(heights, n)[:, None]], axis=1)
+            points.append(own @ self.frame.T + np.array(self.center))
+            place = first + np.arange(n * len(heights)).reshape(n, len(heights))
+            triangles.append(halved(place[:-1, :-1], place[1:, :-1], place[1:, 1:], place[:-1, 1:]))
+            first += len(own)
+        return np.concatenate(points), np.concatenate(triangles)
+
+    def corner_lines(self, low: float, high: float) -> list[Floats]:
+        outline, height = self.boundary, np.linspace(low, high, _FINE)[:, None] * self.frame[:, 2]
+        at = self.placed(outline.sides.end[outline.turns != 0].T).T
+        along = self.frame[:, 2]
+        return [point - (point @ along) * along + height for point in at]
 
     # --- For kernels ---
 
@@ -251,6 +339,31 @@ class Outlined(Many):
         body = QuadricNumbers(_vec(center + 0.5 * self.height * normal), none, _vec(normal), 0.0, self.height, 1.0)
         side = Side(body, none, none, none, slack, self.extent(), 0.0, 0.0, self.extent(), -1.0, -1.0)
         return Rotated(side, *(_vec(row) for row in frame)) if own else side
+
+
+def _on_side(path: Callable[[Floats], Floats], placed: Placed, low: float, high: float) -> Draw:
+    return lambda random, n: placed(path(random.random(n)), low + (high - low) * random.random(n))
+
+
+def _on_lid(least: Floats, most: Floats, placed: Placed, height: float) -> Draw:
+    return lambda random, n: placed(least + (most - least) * random.random((2, n)), np.full(n, height))
+
+
+def _side(begin: Floats, end: Floats) -> tuple[float, Callable[[Floats], Floats]]:
+    """The length of a side of an outline, a line or an arc, and its points at parts of it."""
+    a, b, bulge = begin[:2], end[:2], float(begin[2])
+    chord = float(np.hypot(*(b - a)))
+    if bulge == 0.0:
+        return chord, lambda part: a[:, None] + (b - a)[:, None] * part
+    angle = 4.0 * math.atan(bulge)
+    radius = chord / (2.0 * abs(math.sin(0.5 * angle)))
+    # To the left of the chord where the arc turns to the left by less than a half turn.
+    left = np.array([a[1] - b[1], b[0] - a[0]])
+    center = 0.5 * (a + b) + left * (0.5 / math.tan(0.5 * angle))
+    first = math.atan2(*(a - center)[::-1])
+    return radius * abs(
+        angle
+    ), lambda part: center[:, None] + radius * np.array([np.cos(first + angle * part), np.sin(first + angle * part)])
 
 
 def _vec(values: Any) -> Vec:

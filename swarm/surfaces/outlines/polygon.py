@@ -40,6 +40,7 @@ class Polygon(Outlined):
     array([-0.5,  0.5])
     """
 
+    nouns = ("polygon", "polygonal column", "polygon", "polygon")
     vertices: Annotated[Any, _rows]
     axis: Direction = (0.0, 0.0, 1.0)
     center: Vector = (0.0, 0.0, 0.0)
@@ -66,6 +67,7 @@ class Stadium(Outlined):
     array([-1.,  1.])
     """
 
+    nouns = ("stadium", "stadium column", "stadium", "stadium")
     radius: Length
     length: NotNegative
     axis: Direction = (0.0, 0.0, 1.0)
@@ -97,6 +99,7 @@ class Prism(Outlined):
     array([0.5])
     """
 
+    nouns = ("prism", "prism", "prism", "prism")
     outline: Annotated[Any, _rows]
     height: Length = field()
     axis: Direction = (0.0, 0.0, 1.0)

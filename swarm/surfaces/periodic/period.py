@@ -24,7 +24,6 @@ from ...kernel.vector import ZERO, Vec
 from ..fields.many import Many
 from ..surface import Surface
 from ..time_of_impact.flights import Hit
-from ..union import surfaces_of
 from .axes import (
     Free,
     excess,
@@ -183,7 +182,7 @@ def cell_in(
         largest: the largest radius of a ball [m], 0 of points.
     """
     # The places of openings are known in the cell alone.
-    if any(piece.openings for one in surfaces for piece in surfaces_of(one)):
+    if any(piece.openings for one in surfaces for piece in one.surfaces()):
         return Period(*period, fall)
     free = [not fields and length is not None and _are_same(surfaces, [k], period) for k, length in enumerate(period)]
     x, y, z = (Free(length) if is_free and length else length for length, is_free in zip(period, free, strict=True))

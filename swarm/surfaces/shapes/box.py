@@ -51,11 +51,13 @@ class Box(Surface):
     array([-1. ,  0.5])
     """
 
+    nouns = ("box", "block", "rectangle", "block")
     half_widths: Lengths
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     is_convex = True
+    has_edges = True
     open: Annotated[tuple[str, ...], _faces] = ()
 
     def __post_init__(self) -> None:

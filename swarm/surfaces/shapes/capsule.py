@@ -2,14 +2,17 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...common.checks import Vector
 from ...common.validated import Length, NotNegative
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
+from ..area_samples import AreaSample, Region, directions
 from ..rotation import Direction
 from ..surface import Box, box_around, farthest, side_sign
 from ..time_of_impact.approach import Border, LevelBound
@@ -39,6 +42,7 @@ class Capsule(Revolved):
     array([0.])
     """
 
+    nouns = ("capsule", "rod", "stadium", "rod")
     radius: Length
     length: NotNegative
     axis: Direction = (0.0, 0.0, 1.0)
@@ -63,6 +67,27 @@ class Capsule(Revolved):
 
     def extent(self) -> float:
         return farthest(self.center) + self.radius + 0.5 * self.length
+
+    def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
+        if across is not None:
+            return super().area_samples(bounds, across)
+        axis = np.array(self.direction())[:, None]
+        center, radius, length = np.array(self.center)[:, None], self.radius, self.length
+        first = np.cross(axis[:, 0], np.eye(3)[np.abs(axis[:, 0]).argmin()])
+        first /= np.sqrt((first**2).sum())
+        frame = np.array([first, np.cross(axis[:, 0], first), axis[:, 0]]).T
+
+        def ends(random: Any, n: int) -> NDArray[np.float64]:
+            out = directions(random, n)
+            return np.asarray(center + radius * out + 0.5 * length * axis * np.sign((out * axis).sum(axis=0)))
+
+        def around(random: Any, n: int) -> NDArray[np.float64]:
+            angle, along_it = 2.0 * math.pi * random.random(n), length * (random.random(n) - 0.5)
+            return np.asarray(center + frame @ np.array([radius * np.cos(angle), radius * np.sin(angle), along_it]))
+
+        return [
+            AreaSample(4.0 * math.pi * radius**2, ends), AreaSample(2.0 * math.pi * radius * length, around)
+        ]  # fmt: skip
 
 
 class CapsuleNumbers(Distance):

@@ -5,18 +5,24 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+import numpy as np
+
 from ...common.checks import Vector, number
 from ...errors import SceneError
 from ...kernel.vector import Vec, vec
 from .. import rotation as rotations
+from ..area_samples import Floats
 from ..balls.rounded import RoundCone
 from ..balls.tip import Nappes, TipPlane
+from ..parametrised import Triangles, halved
 from ..surface import UNBOUNDED, Box, HalfSpace, farthest
 from .plane import PlaneNumbers
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
 from .solid import body
 
+# Points around it, and parts of its height, of triangles.
+_ALONG, _RINGS = 96, 32
 # A cone nearer to its tangent plane than this [rad] leaves it by round-off only.
 _FLATTEST = 1e-12
 
@@ -42,12 +48,15 @@ class Cone(Revolved):
     array([-2.,  1.])
     """
 
+    nouns = ("cone", "cone", "wedge", "wedge")
     half_angle: Annotated[float, functools.partial(number, expected="a finite number of radians")]
     axis: rotations.Direction = (0.0, 0.0, 1.0)
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
 
     is_convex = True
+    has_edges = True
+    may_have_tip = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -104,3 +113,25 @@ class Cone(Revolved):
 
     def extent(self) -> float:
         return farthest(self.center)
+
+    def triangulated(self, low: Floats, high: Floats, frame: Floats) -> Triangles:
+        # A grid of the level would lose the apex. The axis is z of the frame.
+        apex = np.array(self.center) @ frame
+        slope = math.tan(self.half_angle)
+        widest = math.hypot(*np.maximum(np.abs(high - apex), np.abs(low - apex))[:2])
+        top, bottom = min(float(high[2] - apex[2]), widest / slope), max(float(low[2] - apex[2]), 0.0)
+        if not bottom < top:
+            return np.empty((0, 3)), np.empty((0, 3), np.int64)
+        around = np.linspace(0.0, 2.0 * math.pi, _ALONG, endpoint=False)
+        along = np.linspace(bottom, top, _RINGS + 1)
+        heights, angles = np.meshgrid(along, around, indexing="ij")
+        own = np.stack([slope * heights * np.cos(angles), slope * heights * np.sin(angles), heights], axis=-1)
+        a = np.arange(own.size // 3).reshape(heights.shape)
+        b = np.roll(a, -1, axis=1)
+        quadrilaterals = a[:-1], b[:-1], b[1:], a[1:]
+        if bottom == 0.0:
+            # All points of the first ring are the apex: one of them stands for it, in one triangle of each pair.
+            a[0] = b[0] = a[0, 0]
+        triangles = halved(*quadrilaterals)
+        kept = (triangles[:, 0] != triangles[:, 1]) & (triangles[:, 1] != triangles[:, 2])
+        return (own.reshape(-1, 3) + apex) @ frame.T, triangles[kept]

@@ -35,6 +35,7 @@ class Cylinder(Revolved):
     array([0.  , 0.25])
     """
 
+    nouns = ("cylinder", "cylinder", "circle", "disc")
     radius: Length
     axis: rotations.Direction = (0.0, 0.0, 1.0)
     length: Length | None = None
@@ -42,6 +43,10 @@ class Cylinder(Revolved):
     side: str = "inside"
 
     is_convex = True
+
+    @property
+    def has_edges(self) -> bool:  # type: ignore[override]
+        return self.length is not None
 
     def numbers(self) -> QuadricNumbers:
         """The numbers of the endless cylinder in the frame in which its axis is z."""

@@ -37,6 +37,7 @@ class Ellipsoid(Surface):
     array([0.])
     """
 
+    nouns = ("ellipsoid", "egg", "ellipse", "oval")
     semi_axes: Lengths
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
@@ -82,6 +83,9 @@ class Ellipsoid(Surface):
 
 class EllipsoidNumbers(QuadricNumbers):
     """A quadric without a linear term, of level 1."""
+
+    def reversible(self):
+        return EllipsoidNumbers(*self)
 
     def discriminant(self, d, v, c, b, a):
         """b^2 - a c"""

@@ -31,6 +31,7 @@ class Paraboloid(Revolved):
     array([-1.,  0.])
     """
 
+    nouns = ("bowl", "paraboloid", "parabola", "parabola")
     focal_length: Length
     axis: Direction = (0.0, 0.0, 1.0)
     center: Vector = (0.0, 0.0, 0.0)

@@ -30,6 +30,7 @@ class Plane(Surface):
     array([-0.25])
     """
 
+    nouns = ("plane", "plane", "line", "line")
     normal: Direction
     offset: Number = 0.0
 
@@ -50,6 +51,13 @@ class Plane(Surface):
 
     def half_spaces(self) -> list[HalfSpace]:
         return [(turned(self.rotation, self.normal), self.offset)]
+
+    def beyond(self) -> str:
+        return "beyond"
+
+    def admissible(self, phi: float) -> str:
+        here = f", and normal.r = {phi + self.offset:.6g} m there is more than {self.offset:.6g} m"
+        return "admissible is normal.r <= offset" + (here if self.motion is None else "")
 
     def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
         return is_along(turned(self.rotation, self.normal), axis)
@@ -130,6 +138,10 @@ class PlaneNumbers(Flat):
     offset: float
 
     leaves_once = True
+    degree = 1
+
+    def reversible(self):
+        return self if type(self) is PlaneNumbers else None
 
     def grown(self, radius):
         return self._replace(offset=self.offset - radius)

@@ -92,6 +92,11 @@ class QuadricNumbers(contract.Smooth):
         g, w = self.gradient(r0), widths(self.a, kappa)
         return times(g + times(self.a, p), w), times(p - kappa * g, w), w
 
+    degree = 2
+
+    def reversible(self):
+        return QuadricNumbers(*self)
+
     def phi(self, r):
         return self.inner(r) - self.level
 

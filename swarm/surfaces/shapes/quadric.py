@@ -120,6 +120,8 @@ class Quadric(Surface):
     array([0.])
     """
 
+    nouns = ("quadric", "quadric", "conic", "conic")
+    may_have_tip = True
     matrix: Annotated[Matrix, _symmetric]
     vector: Point = (0.0, 0.0, 0.0)
     constant: Number = 0.0

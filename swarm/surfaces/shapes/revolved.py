@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...common.checks import Vector
 from .. import rotation as rotations
@@ -26,6 +27,9 @@ class Revolved(Surface):
     def direction(self) -> Vector:
         """The axis in the scene."""
         return rotations.turned(self.rotation, self.axis)
+
+    def own_frame(self) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        return rotations.matrix(self.turn()), {"axis": (0.0, 0.0, 1.0)}
 
     def own_center(self) -> Vector:
         return rotations.turned_back(self.turn(), self.center)

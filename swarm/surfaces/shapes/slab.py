@@ -36,6 +36,7 @@ class Slab(Surface):
     array([0.25])
     """
 
+    nouns = ("pair of planes", "slab", "strip", "bar")
     normal: Direction
     half_width: Length
     center: Vector = (0.0, 0.0, 0.0)
@@ -136,6 +137,11 @@ class SlabNumbers(Distance, ExactChord):
     radius: float  # the half width
     radius2: float
     side: float
+
+    degree = 2
+
+    def polynomial(self, r):
+        return self.inner(r) - self.radius2
 
     def along(self, a):
         """n.a"""

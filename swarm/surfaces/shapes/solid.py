@@ -34,6 +34,9 @@ class SolidNumbers(contract.Smooth):
     side: float
     extent: float
 
+    def smooth_parts(self):
+        return self.parts
+
     def phi(self, r):
         return _largest(self.parts, r)[0]
 

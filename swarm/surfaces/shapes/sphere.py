@@ -3,10 +3,13 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...common.checks import Vector
 from ...common.validated import Length
 from ...kernel.jit import select
 from ...kernel.vector import ZERO, Vec, absolute, dot, highest, norm, square, total, vec
+from ..area_samples import AreaSample, Region, directions
 from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
 from ..time_of_impact.course import Quartic, ball_rise_time, level_and_window, rise_time, rise_time_inside
 from ..time_of_impact.rising import Bounds, Level
@@ -32,6 +35,7 @@ class Sphere(Surface):
     array([0.])
     """
 
+    nouns = ("sphere", "ball", "circle", "disc")
     radius: Length
     center: Vector = (0.0, 0.0, 0.0)
     side: str = "inside"
@@ -61,6 +65,12 @@ class Sphere(Surface):
     def extent(self) -> float:
         return farthest(self.center) + self.radius
 
+    def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
+        if across is not None:
+            return super().area_samples(bounds, across)
+        center, radius = np.array(self.center)[:, None], self.radius
+        return [AreaSample(4.0 * math.pi * radius**2, lambda random, n: center + radius * directions(random, n))]
+
 
 def _risen(d, p):
     """2 d.p, and |d + p|^2 - |d|^2."""
@@ -76,6 +86,14 @@ class SphereNumbers(Distance, ExactChord):
     radius2: float
     curvature: float  # side/R
     side: float
+
+    degree = 2
+
+    def polynomial(self, r):
+        return self.inner(r) - self.radius2
+
+    def reversible(self):
+        return SphereNumbers(*self)
 
     def grown(self, radius):
         width = self.radius - self.side * radius

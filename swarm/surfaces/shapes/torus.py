@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +12,15 @@ from ...errors import SceneError
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
-from ..rotation import turned
+from ..area_samples import AreaSample, Floats, Region
+from ..parametrised import Triangles, halved
+from ..rotation import matrix, turned
 from ..surface import Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign
 from ..time_of_impact.approach import LevelBound
 from .common import Distance
 
+# Points around the tube and along it, of triangles.
+_AROUND, _ALONG = 32, 96
 # The last step leaves this part of 4 R^2 a^2, what F is in the middle of the tube.
 _CLOSE = 4e-16
 # From farther than the root of this many times its size a flight to the ball around it first goes so much nearer.
@@ -41,6 +46,7 @@ class Torus(Surface):
     array([0.])
     """
 
+    nouns = ("torus", "ring", "torus", "ring")
     major_radius: Length
     minor_radius: Length
     center: Vector = (0.0, 0.0, 0.0)
@@ -73,6 +79,35 @@ class Torus(Surface):
 
     def extent(self) -> float:
         return farthest(self.center) + self.major_radius + self.minor_radius
+
+    def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
+        if across is not None:
+            return super().area_samples(bounds, across)
+        return [AreaSample(4.0 * math.pi**2 * self.major_radius * self.minor_radius, self._points)]
+
+    def _points(self, random: Any, n: int) -> Floats:
+        """Points uniform in its area: the nearer to its axis, the less area."""
+        large, small = self.major_radius, self.minor_radius
+        tube = np.empty(0)
+        while len(tube) < n:
+            trial = 2.0 * math.pi * random.random(2 * n + 16)
+            tube = np.append(tube, trial[random.random(len(trial)) * (large + small) < large + small * np.cos(trial)])
+        tube, around = tube[:n], 2.0 * math.pi * random.random(n)
+        rho = large + small * np.cos(tube)
+        points = np.array([rho * np.cos(around), rho * np.sin(around), small * np.sin(tube)])
+        turn = matrix(self.rotation)
+        return np.asarray(np.array(self.center)[:, None] + turn @ points)
+
+    def triangulated(self, low: Floats, high: Floats, frame: Floats) -> Triangles:
+        # A thin tube would be lost between the points of a grid.
+        u, v = (np.linspace(0.0, 2.0 * math.pi, count, endpoint=False) for count in (_ALONG, _AROUND))
+        along, around = np.meshgrid(u, v, indexing="ij")
+        rho = self.major_radius + self.minor_radius * np.cos(around)
+        own = np.stack([rho * np.cos(along), rho * np.sin(along), self.minor_radius * np.sin(around)], axis=-1)
+        points = own.reshape(-1, 3) @ matrix(self.rotation).T + np.array(self.center)
+        place = np.arange(_ALONG * _AROUND).reshape(_ALONG, _AROUND)
+        a, b = place, np.roll(place, -1, axis=0)
+        return points, halved(a, b, np.roll(b, -1, axis=1), np.roll(place, -1, axis=1))
 
 
 class TorusNumbers(Distance):
