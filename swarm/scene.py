@@ -113,8 +113,8 @@ class Scene:
         compiled = self.compiled()
         require_few(compiled.openings() or ())
         for i in (*compiled.fields(), *compiled.unions()) if self.reacts() else ():
-            said = BESIDE_MASS.format(i=i, kind=type(surfaces[i]).__name__, got=surfaces[i])
-            raise SceneError(f"{said}; {INSTEAD_OF_MASS}")
+            message = BESIDE_MASS.format(i=i, kind=type(surfaces[i]).__name__, got=surfaces[i])
+            raise SceneError(f"{message}; {INSTEAD_OF_MASS}")
         if plane is not None:
             planes.require_all(plane, surfaces, pull, lengths)
         self._require_alone()

@@ -134,9 +134,9 @@ def test_the_page_has_the_folders_the_files_and_the_engines_that_there_are():
 
 @pytest.mark.parametrize("name", ["swarm.output.style", "swarm.packing", "swarm.colliding.cells", "swarm.run.cluster"])
 def test_a_module_is_found_by_its_earlier_name(name):
-    with warnings.catch_warnings(record=True, action="always") as said:
+    with warnings.catch_warnings(record=True, action="always") as caught:
         found = importlib.import_module(name)
-    assert f"the module {name} is now {moved.present_name(name)}" in [str(one.message) for one in said]
+    assert f"the module {name} is now {moved.present_name(name)}" in [str(one.message) for one in caught]
     assert found is importlib.import_module(moved.present_name(name))
     assert found.__spec__.name == found.__name__ == moved.present_name(name)
 

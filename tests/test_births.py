@@ -74,7 +74,7 @@ def test_only_those_that_are_there_are_observed():
     np.testing.assert_array_equal(seen[0]["impacts"], 0)
 
 
-def test_who_starts_at_the_end_of_a_frame_has_not_moved():
+def test_a_birth_at_the_end_of_a_frame_has_not_moved():
     particles = started(SPHERE, [0.5, 0.5, 0.75])
     state, _seen = run(SPHERE, particles, [0.25, 0.5])
     np.testing.assert_array_equal(state.position, particles.position)

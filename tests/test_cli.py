@@ -48,8 +48,8 @@ def command(*args, cwd):
         # `main` leaves a SIGINT to end the process.
         signal.signal(signal.SIGINT, handler)
     lines = err.getvalue().splitlines(keepends=True)
-    told = "".join(line for line in lines if not line.startswith("compiling"))
-    return subprocess.CompletedProcess(args, end.value.code or 0, out.getvalue(), told)
+    errors = "".join(line for line in lines if not line.startswith("compiling"))
+    return subprocess.CompletedProcess(args, end.value.code or 0, out.getvalue(), errors)
 
 
 @pytest.fixture
@@ -65,10 +65,10 @@ def test_run_and_info(folder):
         assert word in done.stdout
     with swarm.load(folder / "scene.h5") as trajectory:
         assert trajectory.scene_text == GOOD
-    told = command("info", "scene.h5", cwd=folder)
-    assert told.returncode == 0
+    info = command("info", "scene.h5", cwd=folder)
+    assert info.returncode == 0
     for word in ("3, 0 s to 1 s", "10", "a sphere of radius 0.5 m", "Impact"):
-        assert word in told.stdout
+        assert word in info.stdout
 
 
 def test_quiet_prints_nothing(folder):
@@ -79,7 +79,7 @@ def test_quiet_prints_nothing(folder):
 
 def test_record_view_plot_and_info(folder):
     assert command("run", "scene.toml", "--quiet", "--record", "run.rrd", cwd=folder).returncode == 0
-    for words, told in (
+    for words, line in (
         (["record", "scene.h5", "-o", "again.rrd"], "written to again.rrd"),
         (["info", "again.rrd"], "3, 0 s to 1 s"),
         (["info", "run.rrd"], "speed [m/s]"),
@@ -88,7 +88,7 @@ def test_record_view_plot_and_info(folder):
     ):
         done = command(*words, cwd=folder)
         assert (done.returncode, done.stderr) == (0, "")
-        assert told in done.stdout
+        assert line in done.stdout
     for picture in ("sheet.png", "scene.png"):
         assert (folder / picture).read_bytes().startswith(b"\x89PNG")
     refused = command("record", "scene.h5", "-o", "scene.h5", "--overwrite", cwd=folder)
@@ -103,7 +103,7 @@ def test_what_cannot_be_read_is_one_line_and_exit_code_2(folder):
     whole = (folder / "scene.h5").read_bytes()
     (folder / "damaged.h5").write_bytes(whole[:100] + bytes(900) + whole[1000:])
     (folder / "empty.rrd").touch()
-    for words, told in (
+    for words, message in (
         (["info", "damaged.h5"], "damaged.h5 is damaged: its structure: "),
         (["plot", "damaged.h5"], "damaged.h5 is damaged: its structure: "),
         (["record", "damaged.h5"], "damaged.h5 is damaged: its structure: "),
@@ -118,7 +118,7 @@ def test_what_cannot_be_read_is_one_line_and_exit_code_2(folder):
     ):
         done = command(*words, cwd=folder)
         assert (done.returncode, done.stdout) == (2, "")
-        assert done.stderr.startswith(f"error: {told}")
+        assert done.stderr.startswith(f"error: {message}")
         assert len(done.stderr.splitlines()) == 1
 
 
@@ -202,24 +202,24 @@ def test_a_scene_file_with_a_byte_order_mark(folder):
 
 
 def test_json_is_printed_at_every_end(folder):
-    def told(*words, **more):
+    def run_again(*words, **more):
         run = process if more else command
         done = run("run", "scene.toml", "--json", *words, cwd=folder, **more)
         return done.returncode, json.loads(done.stdout)
 
-    code, first = told()
+    code, first = run_again()
     assert (code, first["status"], first["frames"], first["particles"]) == (0, "complete", 3, 10)
-    code, again = told("--resume")
+    code, again = run_again("--resume")
     assert 0.0 <= first["compile_time"] < first["wall_time"]
     del first["wall_time"], first["compile_time"]
     assert (code, again) == (0, first)
-    code, refused = told()
+    code, refused = run_again()
     assert (code, refused["status"], "--overwrite" in refused["error"]) == (2, "failed", True)
     (folder / "other.toml").write_text(GOOD.replace("[run]", "[run"))
     done = command("run", "other.toml", "--json", cwd=folder)
     assert (done.returncode, json.loads(done.stdout)["status"]) == (2, "failed")
     # A limit of the size of files stands in for a full disk.
-    code, failed = told("-o", "failed.h5", file_size=20_000)
+    code, failed = run_again("-o", "failed.h5", file_size=20_000)
     assert (code, failed["status"]) == (1, "failed")
     assert failed["error"].startswith("cannot write the trajectory failed.h5: ")
 
@@ -238,11 +238,11 @@ def test_json_of_a_run_that_is_interrupted(folder, options):
 
     with mock.patch.object(machine, "Frame", frame):
         done = command("run", "scene.toml", "--json", *options, cwd=folder)
-    told = json.loads(done.stdout)
-    assert (done.returncode, told["status"], told["frames"]) == (130, "interrupted", 2)
-    assert told["resume"] == "swarm run scene.toml --json --resume"
+    summary = json.loads(done.stdout)
+    assert (done.returncode, summary["status"], summary["frames"]) == (130, "interrupted", 2)
+    assert summary["resume"] == "swarm run scene.toml --json --resume"
     assert "resume with\n  swarm run scene.toml --json --resume" in done.stderr
-    done = command(*told["resume"].split()[1:], cwd=folder)
+    done = command(*summary["resume"].split()[1:], cwd=folder)
     assert (done.returncode, json.loads(done.stdout)["frames"]) == (0, 3)
 
 
@@ -309,7 +309,7 @@ from swarm.__main__""",
 
 
 @compiled_only
-def test_what_compiles_is_said(folder):
+def test_what_compiles_is_reported(folder):
     """A short run compiles nothing; of those that compile the first says so, and the second finds its kernels."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
     for words, expected in (([], False), (["--compile", "always"], True), (["--compile", "always"], False)):
@@ -342,9 +342,9 @@ def test_existing_output_asks_for_overwrite(folder):
 
 def test_version_and_help(folder):
     assert command("--version", cwd=folder).stdout == f"swarm {swarm.__version__}\n"
-    told = command("--help", cwd=folder)
-    assert told.returncode == 0
-    assert "swarm run examples/scenes/cavity.toml" in told.stdout
+    done = command("--help", cwd=folder)
+    assert done.returncode == 0
+    assert "swarm run examples/scenes/cavity.toml" in done.stdout
     for name in ("run", "info", "record", "view", "plot"):
         assert "Example:" in command(name, "--help", cwd=folder).stdout
 
@@ -357,8 +357,8 @@ def test_help_does_not_import_the_engine(folder):
         "except SystemExit: pass\n"
         "print([name for name in ('numba', 'numpy', 'h5py', 'rich', 'msgspec') if name in sys.modules])"
     )
-    told = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
-    assert told.stdout.splitlines()[-1] == "[]"
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_interrupt_keeps_finished_frames(folder, request):
@@ -382,9 +382,9 @@ def test_interrupt_keeps_finished_frames(folder, request):
             except swarm.SceneError:
                 continue  # the very first moment, before the first flush
     process.send_signal(signal.SIGINT)
-    _, told = process.communicate(timeout=600)
+    _, errors = process.communicate(timeout=600)
     assert process.returncode == 130
-    assert b"interrupted" in told
+    assert b"interrupted" in errors
     with swarm.load(folder / "scene.h5") as trajectory:
         assert len(trajectory) >= frames >= 5
         assert len(trajectory.frame(-1)) == 10
@@ -399,19 +399,19 @@ def test_wall_time_and_resume(folder):
     first = command("run", "scene.toml", "--walltime", limit, "--json", cwd=folder)
     assert first.returncode == 75
     assert "the wall time limit is reached" in first.stderr
-    told = json.loads(first.stdout)
-    assert told["status"] == "walltime"
-    assert told["resume"] == f"swarm run scene.toml --walltime {limit} --json --resume"
+    summary = json.loads(first.stdout)
+    assert summary["status"] == "walltime"
+    assert summary["resume"] == f"swarm run scene.toml --walltime {limit} --json --resume"
     with swarm.load(folder / "scene.h5") as begun:
         assert begun.times.tolist() == [0.0]
     assert (folder / "scene.h5.checkpoint").exists()
     assert command("run", "scene.toml", cwd=folder).returncode == 2
     second = command("run", "scene.toml", "--resume", "--json", cwd=folder)
-    told = json.loads(second.stdout)
+    summary = json.loads(second.stdout)
     assert (second.returncode, second.stderr) == (0, "")
-    assert (told["status"], told["frames"], told["time"], told["particles"]) == ("complete", 5, 800.0, 10)
-    assert told["impacts"] > 5e3
-    assert told["energy_error"] < 1e-14
+    assert (summary["status"], summary["frames"], summary["time"], summary["particles"]) == ("complete", 5, 800.0, 10)
+    assert summary["impacts"] > 5e3
+    assert summary["energy_error"] < 1e-14
     assert sorted(path.name for path in folder.iterdir()) == ["scene.h5", "scene.toml"]
     third = command("run", "scene.toml", "--resume", cwd=folder)
     assert (third.returncode, third.stdout) == (0, "")

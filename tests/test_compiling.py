@@ -18,13 +18,13 @@ def test_it_says_what_and_how_far(monkeypatch):
     monkeypatch.setattr(cache, "is_compiled", lambda kernel, arguments: kernel.__name__ in done)
     compilations, needed = Compilations(), ["advance_block", "observe"]
     compilations.calls = lambda: [(named(name), ()) for name in needed]
-    said = []
+    sentences = []
     for name in ("advance_block", "observe", "slide_block", "careful_block", "mine"):
         if name == "slide_block":
             needed += ["slide_block", "careful_block"]
-        said.append(compilations.sentence(named(name)))
+        sentences.append(compilations.sentence(named(name)))
         done.add(name)
-    assert [sentence.removesuffix(" for this kind of scene, once") for sentence in said] == [
+    assert [sentence.removesuffix(" for this kind of scene, once") for sentence in sentences] == [
         "compiling the kernel of flights and impacts (1 of 2)",
         "compiling the kernel of energies and momenta (2 of 2)",
         "compiling the kernel of sliding (3 of 4)",

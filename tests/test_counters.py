@@ -79,7 +79,7 @@ def require_same(result, other):
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES if name != "restless and open"])
-def test_they_change_no_bit_and_count_who_is_outside(name):
+def test_they_change_no_bit_and_count_particles_outside(name):
     start, result = run_of(name)
     _start, alone = run(SCENES[name], ())
     for key, values in alone.observables.items():
@@ -245,7 +245,7 @@ def test_on_a_wall_it_counts_nobody(gravity):
     assert result.observables["crossings"][-1].tolist() == [[0, 0]] * 3
 
 
-def test_who_starts_on_it_is_on_its_admissible_side():
+def test_a_particle_that_starts_on_it_is_on_its_admissible_side():
     plane = swarm.Plane((1.0, 0.0, 0.0), 0.1)
     for v, expected in ((1.0, [1, 0]), (-1.0, [0, 0])):
         assert counted(SPHERE, [plane], one([0.1, 0.0, 0.0], [v, 0.0, 0.0]), 0.2) == [expected]
@@ -268,7 +268,7 @@ def test_frames_that_end_on_it_count_once():
     assert result.observables["crossings"][:, 0, 0].tolist() == [0, 0, 0, 1, 1]
 
 
-def test_at_the_mouth_of_an_opening_it_counts_who_escapes():
+def test_at_the_mouth_of_an_opening_it_counts_escapes():
     mouth = swarm.Cylinder(0.4, axis=(1.0, 0.0, 0.0), length=0.1, center=(0.5, 0.0, 0.0))
     box = swarm.Box((0.5, 0.5, 0.5), openings=[swarm.Opening(mouth, times=[(0.5, 10.0)])])
     counters = [swarm.Plane((1.0, 0.0, 0.0), 0.5), swarm.Counter(swarm.Plane((-1.0, 0.0, 0.0), -0.5), inside=mouth)]

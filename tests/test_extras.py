@@ -152,8 +152,8 @@ def test_what_is_imported_without_an_extra_is_a_dependency():
 
 
 def test_the_sentence():
-    said = r"^a page needs the package 'nothing', which is not installed: pip install jinja2 markupsafe "
-    with pytest.raises(swarm.SceneError, match=said), needed_by("a page", "report"):
+    message = r"^a page needs the package 'nothing', which is not installed: pip install jinja2 markupsafe "
+    with pytest.raises(swarm.SceneError, match=message), needed_by("a page", "report"):
         importlib.import_module("nothing.within")
     with pytest.raises(ModuleNotFoundError), needed_by("a page", "report"):
         importlib.import_module("swarm.nothing")

@@ -73,9 +73,9 @@ def test_a_cell_is_as_it_was(name):
 def test_a_cell_has_the_same_digest_in_another_process():
     """Nothing of a digest is the order of a set or the time."""
     names = [name for name in CELLS if "balls, Impact" in name and not any(word in name for word in DEAR)][:3]
-    told = "import golden; print([golden.run_cell(name)[0] for name in {names}])"
+    code = "import golden; print([golden.run_cell(name)[0] for name in {names}])"
     done = subprocess.run(
-        [sys.executable, "-c", told.format(names=names)], env={**os.environ, "PYTHONHASHSEED": "12345"},
+        [sys.executable, "-c", code.format(names=names)], env={**os.environ, "PYTHONHASHSEED": "12345"},
         cwd=Path(golden.__file__).parent, capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert ast.literal_eval(done.stdout) == [golden.run_cell(name)[0] for name in names]
@@ -99,7 +99,7 @@ def test_a_cell_is_compiled_with_the_same_bits_for_one_thread_and_two(name):
     assert golden.disagreement_of_threads(name, CELLS[name]) == ""
 
 
-def test_bits_that_depend_on_the_number_of_threads_are_told(monkeypatch):
+def test_bits_that_depend_on_the_number_of_threads_are_reported(monkeypatch):
     run_cell = golden.run_cell
 
     def with_a_fault(name, **options):

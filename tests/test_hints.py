@@ -18,7 +18,7 @@ BALL = swarm.Sphere(0.5)
 DOWN = (0.0, 0.0, -9.81)
 
 
-def said(scene, method=None, until=1.0, caplog=None, particles=None, **options):
+def hints_of(scene, method=None, until=1.0, caplog=None, particles=None, **options):
     """The hints on a run; checks of its arguments come before them."""
     particles = swarm.fill(scene, 20, speed=1.0, seed=1) if particles is None else particles
     task = task_of(scene, particles, method or swarm.Impact(), RunOptions(until=until, **options))
@@ -46,37 +46,37 @@ COMES = {
 
 
 @pytest.mark.parametrize("name", COMES)
-def test_it_is_said(name, caplog):
+def test_hints_are_given(name, caplog):
     surfaces, method, options, *parts = COMES[name]
-    told = said(swarm.Scene(surfaces), method, caplog=caplog, **options)
-    assert len(told) == 1
+    hints = hints_of(swarm.Scene(surfaces), method, caplog=caplog, **options)
+    assert len(hints) == 1
     for part in parts:
-        assert part in told[0]
+        assert part in hints[0]
 
 
 def test_what_rests_and_what_falls(caplog):
-    (told,) = said(swarm.Scene([BOX]), particles=AT_REST, caplog=caplog)
-    assert "all 1 particles are at rest" in told
-    assert said(swarm.Scene([BOX], DOWN), particles=AT_REST, caplog=caplog) == []
-    (told,) = said(CELL, caplog=caplog)
-    assert "gravity[2] = -9.81 m/s^2 pulls along period[2] = 1 m" in told
-    assert said(LOSSY, caplog=caplog) == said(LEVEL, caplog=caplog) == []
+    (hint,) = hints_of(swarm.Scene([BOX]), particles=AT_REST, caplog=caplog)
+    assert "all 1 particles are at rest" in hint
+    assert hints_of(swarm.Scene([BOX], DOWN), particles=AT_REST, caplog=caplog) == []
+    (hint,) = hints_of(CELL, caplog=caplog)
+    assert "gravity[2] = -9.81 m/s^2 pulls along period[2] = 1 m" in hint
+    assert hints_of(LOSSY, caplog=caplog) == hints_of(LEVEL, caplog=caplog) == []
 
 
 @pytest.mark.parametrize("until", [1.0, 1e3, 1e7])
 def test_a_run_of_a_usual_length_is_not_late(until, caplog):
-    assert said(swarm.Scene([BOX]), until=until, caplog=caplog) == []
+    assert hints_of(swarm.Scene([BOX]), until=until, caplog=caplog) == []
 
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 @pytest.mark.parametrize("name", SURFACES)
-def test_no_surface_of_the_tables_is_told_of(name, method, caplog):
+def test_no_hint_for_the_surfaces_of_the_tables(name, method, caplog):
     scene = swarm.Scene([SURFACES[name](), swarm.Sphere(3.0)])
-    assert said(scene, method, caplog=caplog) == []
+    assert hints_of(scene, method, caplog=caplog) == []
 
 
 @pytest.mark.parametrize("path", sorted(Path("examples/scenes").glob("*.toml")), ids=lambda path: path.stem)
-def test_no_scene_of_the_examples_is_told_of(path, caplog):
+def test_no_hint_for_the_scenes_of_the_examples(path, caplog):
     job = scene_file.read(path)
     task = task_of(job.scene, job.start(), job.method, job.run)
     with caplog.at_level(logging.WARNING, "swarm"):
@@ -84,13 +84,13 @@ def test_no_scene_of_the_examples_is_told_of(path, caplog):
     assert [record.getMessage() for record in caplog.records] == []
 
 
-def test_the_depth_that_is_said_is_the_one_that_comes(caplog):
+def test_the_predicted_depth_is_the_one_that_comes(caplog):
     """A particle that flies along the radius of a soft ball."""
     start = swarm.Particles(np.array([0.1, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
     method, scene = swarm.Penalty(dt=1e-3, penalty=20.0), swarm.Scene([BALL])
-    (told,) = said(scene, method, until=1.5, caplog=caplog, particles=start)
+    (hint,) = hints_of(scene, method, until=1.5, caplog=caplog, particles=start)
     run = swarm.simulate(scene, start, method, until=1.5, every=0.01, compile="never")
-    depth = float(told.split("sinks ")[1].split(" m")[0])
+    depth = float(hint.split("sinks ")[1].split(" m")[0])
     assert depth == pytest.approx(run.observables["max_penetration"].max(), rel=0.05)
 
 

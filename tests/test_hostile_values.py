@@ -113,7 +113,7 @@ def test_surfaces_that_are_no_list(value):
 
 
 @pytest.mark.parametrize("given", [swarm.Sphere, [swarm.Sphere]])
-def test_forgotten_brackets_are_told(given):
+def test_forgotten_brackets_are_reported(given):
     with pytest.raises(swarm.SceneError, match=r"to make one of the class, call it: Sphere\(\.\.\.\)$"):
         swarm.Scene(given)
 
@@ -129,7 +129,7 @@ def test_numbers_of_the_standard_library_are_numbers():
     assert (packed[0] == packed[1]).all()
 
 
-def test_a_motion_within_itself_is_told():
+def test_a_motion_within_itself_is_reported():
     both = [swarm.Translation((1, 0, 0))]
     both.append(both)
     for motion in (ITSELF, both):

@@ -114,7 +114,7 @@ def test_a_contact_step_begins_at_the_impact(tmp_path):
     assert (np.diff(np.sort(table["time"])) > 0.0).all()
 
 
-def test_where_it_has_gone_is_told_by_the_images(tmp_path):
+def test_the_images_say_where_it_has_gone(tmp_path):
     """From one impact to the next a particle flies straight."""
     run(tmp_path / "i.h5", SCENES["cell that repeats"], 2, until=40.0, every=20.0)
     table = table_of(tmp_path / "i.h5", particles=1)
@@ -125,7 +125,7 @@ def test_where_it_has_gone_is_told_by_the_images(tmp_path):
 
 
 @pytest.mark.parametrize("gravity", [None, DOWN])
-def test_who_escapes_has_a_last_row(tmp_path, gravity):
+def test_an_escaped_particle_has_a_last_row(tmp_path, gravity):
     hole = swarm.Sphere(0.3, center=(0.0, 0.0, -0.5))
     vessel = swarm.Scene([swarm.Sphere(0.5, friction=0.1, restitution=0.8, openings=[hole])], gravity)
     result = run(tmp_path / "i.h5", vessel, until=6.0)
@@ -278,8 +278,8 @@ def test_a_run_does_not_go_on_behind_a_damaged_row_of_the_frame_under_way(tmp_pa
     data = (tmp_path / "i.h5").read_bytes()
     place = data.rindex(number.tobytes())
     (tmp_path / "i.h5").write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
-    told = rf"impacts/impulse after frame {complete - 1}: expected the checksum that .*run.h5.*has"
-    with pytest.raises(swarm.SceneError, match=told):
+    message = rf"impacts/impulse after frame {complete - 1}: expected the checksum that .*run.h5.*has"
+    with pytest.raises(swarm.SceneError, match=message):
         run(tmp_path / "i.h5", ROUGH, **options, **more)
     (tmp_path / "i.h5").write_bytes(data)
     with pytest.raises(swarm.WallTimeError):
@@ -297,16 +297,16 @@ KILLED = """
     start = swarm.fill(scene, 50, speed=1.0, seed=1)
 
     def child(into):
-        told = 0
+        calls = 0
 
         def tell(frame):
-            nonlocal told
-            told += 1
+            nonlocal calls
+            calls += 1
             os.write(into, frame.written.to_bytes(8, "little"))
-            if told == 60:
+            if calls == 60:
                 signal.pause()
 
-        time.monotonic = lambda: float(told)
+        time.monotonic = lambda: float(calls)
         try:
             swarm.simulate(scene, start, swarm.Impact(), until=120.0, every=1.0, trajectory={path!r}, threads=2,
                            impacts={log!r}, progress=tell, checkpoint=10.0, resume=True, compile="never", frames="none")
@@ -322,17 +322,17 @@ KILLED = """
         if pid == 0:
             child(into)
         os.close(into)
-        told = b"".join(os.read(out, 8) for _ in range(random.randint(1, 60)))
+        data = b"".join(os.read(out, 8) for _ in range(random.randint(1, 60)))
         time.sleep(random.uniform(0.0, 0.005))
         os.kill(pid, signal.SIGKILL)
         _, status = os.waitpid(pid, 0)
         while more := os.read(out, 1 << 16):
-            told += more
+            data += more
         os.close(out)
         if not os.WIFSIGNALED(status):
             break
         kills += 1
-        reported = max([int.from_bytes(told[i : i + 8], "little") for i in range(0, len(told) - 7, 8)], default=0)
+        reported = max([int.from_bytes(data[i : i + 8], "little") for i in range(0, len(data) - 7, 8)], default=0)
         if Path({log!r}).exists():
             with swarm.load_impacts({log!r}) as log:
                 counts, table = log.ends, log.table()
@@ -351,9 +351,9 @@ def test_kill_9_loses_nothing_that_was_reported(tmp_path):
     """At random moments, until a run is through: every row once, and with every frame that is reported its impacts."""
     path, log = tmp_path / "run.h5", tmp_path / "i.h5"
     code = textwrap.dedent(KILLED).format(path=str(path), log=str(log))
-    told = python("-c", code)
-    assert (told.returncode, told.stderr) == (0, "")
-    assert int(told.stdout.split()[1]) >= 5
+    output = python("-c", code)
+    assert (output.returncode, output.stderr) == (0, "")
+    assert int(output.stdout.split()[1]) >= 5
     start = swarm.fill(SPHERE, 50, speed=1.0, seed=1)
     swarm.simulate(
         SPHERE, start, swarm.Impact(), until=120.0, every=1.0, impacts=tmp_path / "whole.h5", compile="never"

@@ -446,18 +446,18 @@ def one_more(x):
 @compiled_only
 def test_compilations_are_reported_and_cached_kernels_are_not(tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
-    told = []
-    with caplog.at_level("INFO", "swarm"), cache.kernels_compiled(told.append) as spent:
+    sentences = []
+    with caplog.at_level("INFO", "swarm"), cache.kernels_compiled(sentences.append) as spent:
         first = _jit.kernel(one_more)
         assert first(1.0) == first(1.0) == 2.0
         numba.njit(lambda x: x)(1.0)  # no kernel of swarm's
     sentence = "compiling a kernel, once: one_more"
-    assert told == caplog.messages == [sentence]
+    assert sentences == caplog.messages == [sentence]
     assert spent.seconds > 0.0
     first(1)  # no observer
-    with cache.kernels_compiled(told.append) as spent:
+    with cache.kernels_compiled(sentences.append) as spent:
         assert _jit.kernel(one_more)(1.0) == 2.0  # as another process does
-    assert told == [sentence]
+    assert sentences == [sentence]
     assert spent.seconds == 0.0
 
 

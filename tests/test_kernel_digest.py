@@ -112,8 +112,8 @@ def test_what_a_function_takes_is_what_its_instructions_say():
             constants = frozen._taken(part, names)
             instructions = list(dis.get_instructions(part))
             assert names == {one.argval for one in instructions if one.opname == "LOAD_GLOBAL"}
-            said = {part.co_consts[one.arg] for one in instructions if one.opcode in dis.hasconst}
-            assert set(constants) == {one for one in said if not isinstance(one, CodeType)}
+            values = {part.co_consts[one.arg] for one in instructions if one.opcode in dis.hasconst}
+            assert set(constants) == {one for one in values if not isinstance(one, CodeType)}
 
 
 @pytest.fixture

@@ -58,10 +58,10 @@ def test_each_sentence_says_what_is_not_supported_what_came_and_what_to_use_inst
     """What came stands before the reason; the remedy is an instruction, and the sentence is one line."""
     verbs = ("use", "give", "leave", "make", "move", "run", "heat")
     for _capability, _engines, one in REFUSALS:
-        assert re.fullmatch(r"[^;]+ (must|need) [^;]+, got [^;]+", one.said), one.said
+        assert re.fullmatch(r"[^;]+ (must|need) [^;]+, got [^;]+", one.problem), one.problem
         assert one.remedy.split()[0] in verbs, one.remedy
         assert not re.search(r"[;.\n]$|\bgot\b", one.remedy), one.remedy
-        assert one.sentence() == f"{one.said}; {one.remedy}"
+        assert one.sentence() == f"{one.problem}; {one.remedy}"
 
 
 METHODS = {

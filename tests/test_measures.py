@@ -167,7 +167,7 @@ def test_a_function_that_fails_later_ends_the_run_and_leaves_the_frames_before(t
         assert written.observables["late"].tolist() == [1.0, 2.0]
 
 
-def test_not_a_number_says_that_there_is_none_also_to_those_who_read_the_file(tmp_path):
+def test_not_a_number_stands_for_no_measure_also_in_the_file(tmp_path):
     def of_the_slow(frame):
         return np.array([np.nan, np.inf, frame.time])
 
@@ -187,7 +187,7 @@ def test_what_they_take_is_counted_before_the_run():
         run({"all": lambda frame: np.zeros(10**7)}, until=1e5)
 
 
-def test_who_has_come_and_who_is_absorbed():
+def test_numbers_of_births_and_of_absorbed_particles():
     """A frame has the particles that are there: those not yet born have no place in it, absorbed ones have a time."""
     scene = swarm.Scene([swarm.Sphere(0.5, laws=[swarm.Absorb(0.5)])])
     own = {

@@ -14,6 +14,7 @@ ROOT = Path(swarm.__file__).parent
 PACKAGES = sorted({path.parent.relative_to(ROOT) for path in ROOT.rglob("*.py")}, key=str)
 FILES = [path for name in ("swarm", "tests", "bench", "examples") for path in (ROOT.parent / name).rglob("*.py")]
 DEFINITIONS = ast.FunctionDef | ast.ClassDef
+NAMES = re.compile(r"(^|_)(who|whom|told|said)(_|$)", re.IGNORECASE)
 # Turns of phrase that a reader has to decode: a function returns -1, and particles are no people.
 TURNS = re.compile(
     r"\b([Ww]ho|[Ww]hom|[Ww]hoever|[Nn]obody|[Kk]nows? no|of one's own|(is|are) none|ha(s|ve) gone)\b(?![/|])",
@@ -66,4 +67,17 @@ def test_texts_are_in_plain_words():
             tokens = list(tokenize.tokenize(file.readline))
         texts = [one for one in tokens if one.type in (tokenize.COMMENT, tokenize.STRING)]
         found += [f"{path}:{one.start[0]}: {turn[0]}" for one in texts for turn in TURNS.finditer(one.string)]
+    assert found == []
+
+
+def test_names_say_what_they_hold():
+    """A text, a message, a title: `told` and `said` may be any of them."""
+    found = []
+    for path in (path for path in FILES if path.relative_to(ROOT.parent).parts[0] in ("swarm", "tests")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            is_bound = isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store)
+            name = getattr(node, "id", "") or getattr(node, "attr", "") if is_bound else ""
+            name = name or (node.arg if isinstance(node, ast.arg) else "")
+            name = name or (node.name if isinstance(node, DEFINITIONS) else "")
+            found += [f"{path}:{node.lineno}: {name}"] if NAMES.search(name) else []
     assert found == []

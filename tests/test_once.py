@@ -41,10 +41,10 @@ kernel = cache.cached(twice, {})
 argument = {"int": 3, "float": 1.5}[sys.argv[2]]
 print("ready", flush=True)
 sys.stdin.readline()
-told = []
-with event.install_listener("numba:compile", Slowly()), cache.kernels_compiled(told.append):
+compiled = []
+with event.install_listener("numba:compile", Slowly()), cache.kernels_compiled(compiled.append):
     assert kernel(argument) == 2 * argument
-print(len(told))
+print(len(compiled))
 """
 HOLDER = """
 import sys, pathlib
@@ -93,10 +93,10 @@ def test_of_processes_that_start_together_one_compiles(tmp_path, monkeypatch):
     for one in processes:
         one.stdin.write("\n")
         one.stdin.flush()
-    told = [int(one.communicate()[0]) for one in processes]
+    counts = [int(one.communicate()[0]) for one in processes]
     assert [one.returncode for one in processes] == [0, 0, 0]
-    assert told[0] == 1
-    assert sorted(told[1:]) == [0, 1]
+    assert counts[0] == 1
+    assert sorted(counts[1:]) == [0, 1]
     # Both entries are there, each with its file, and no lock is left.
     monkeypatch.setattr(cache, "_folder", cache.cache_folder)
     monkeypatch.syspath_prepend(tmp_path)

@@ -46,7 +46,7 @@ def test_one_particle_escapes_when_and_where_it_reaches_the_opening():
     assert found.observables["total_energy"].tolist() == [0.5 * (0.64 + 1.0)] * 9
 
 
-def test_who_escapes_has_reached_the_opening_and_nobody_else():
+def test_particles_escape_at_the_opening_alone():
     scene = swarm.Scene([swarm.Sphere(0.5, openings=[HOLE])])
     found = run(scene, swarm.fill(scene, 200, speed=1.0, seed=1), until=10.0)
     out, r = ~np.isnan(found.escape_time), found.particles.position
@@ -74,7 +74,7 @@ VOLUMES = {
 
 @pytest.mark.parametrize("volume", VOLUMES.values(), ids=VOLUMES)
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-3])
-def test_who_slides_into_an_opening_leaves_at_its_edge(volume, tolerance):
+def test_a_particle_that_slides_into_an_opening_leaves_at_its_edge(volume, tolerance):
     y = np.array([0.0, 0.05, 0.0999, 0.0999999, 0.1001, -0.02])
     start = np.array([0.0 * y - 0.3, y, 0.0 * y - 0.5]), np.array([0.0 * y + 1.0, 0.0 * y, 0.0 * y])
     scene = swarm.Scene([swarm.Box((2.0, 2.0, 0.5), openings=[volume])], gravity=(0.0, 0.0, -9.81))

@@ -95,8 +95,8 @@ def test_no_second_run_writes_the_same_file(tmp_path):
         assert file["parameters/time"].shape == (2,)
 
 
-def test_the_version_that_runs_is_one_that_is_said_to_work():
+def test_the_version_that_runs_is_declared():
     project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
-    said = [name.rpartition(" ")[2] for name in project["classifiers"] if "Python :: 3." in name]
-    assert f"{sys.version_info.major}.{sys.version_info.minor}" in said
-    assert project["requires-python"] == f">={said[0]}"
+    versions = [name.rpartition(" ")[2] for name in project["classifiers"] if "Python :: 3." in name]
+    assert f"{sys.version_info.major}.{sys.version_info.minor}" in versions
+    assert project["requires-python"] == f">={versions[0]}"

@@ -48,12 +48,12 @@ def test_examples_that_draw_ask_alike():
 PARSERS = """
 import argparse, contextlib, runpy, sys
 
-def told(self, *given, real=argparse.ArgumentParser.parse_args, **more):
+def parse_with_progress(self, *given, real=argparse.ArgumentParser.parse_args, **more):
     (output,) = (one for one in self._actions if "-o" in one.option_strings)
     print(output.default)
     sys.exit()
 
-argparse.ArgumentParser.parse_args = told
+argparse.ArgumentParser.parse_args = parse_with_progress
 names, sys.argv = sys.argv[1:], ["x"]
 for name in names:
     with contextlib.suppress(SystemExit):
@@ -100,9 +100,9 @@ def test_without_its_extras_an_example_is_one_sentence(name, extras, tmp_path, m
     with pytest.raises(SystemExit) as end:
         module.main()
     assert end.value.code == 1
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.endswith(f'pip install ".[{extras}]"\n')
-    assert told.err.count("\n") == 1
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.endswith(f'pip install ".[{extras}]"\n')
+    assert output.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
     assert issubclass(asked.Asked, argparse.ArgumentParser)

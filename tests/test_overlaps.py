@@ -38,16 +38,16 @@ MEANT = {
 }  # fmt: skip
 
 
-def said(scene, caplog):
+def hints_of(scene, caplog):
     with caplog.at_level(logging.WARNING, "swarm"):
         warn_of_overlap(scene)
     return [record.getMessage() for record in caplog.records]
 
 
 @pytest.mark.parametrize("name", APART)
-def test_what_is_cut_is_said(name, caplog):
+def test_what_is_cut_is_reported(name, caplog):
     surfaces, given = APART[name]
-    (sentence,) = said(swarm.Scene(surfaces, **given), caplog)
+    (sentence,) = hints_of(swarm.Scene(surfaces, **given), caplog)
     assert "surfaces[0]" in sentence
     assert "surfaces[1]" in sentence
 
@@ -55,12 +55,12 @@ def test_what_is_cut_is_said(name, caplog):
 @pytest.mark.parametrize("name", MEANT)
 def test_what_is_meant_is_not(name, caplog):
     surfaces, given = MEANT[name]
-    assert said(swarm.Scene(surfaces, **given), caplog) == []
+    assert hints_of(swarm.Scene(surfaces, **given), caplog) == []
 
 
 @pytest.mark.parametrize("path", sorted(Path("examples/scenes").glob("*.toml")), ids=lambda path: path.stem)
 def test_no_scene_of_the_examples_is_cut(path, caplog):
-    assert said(scene_file.read(path).scene, caplog) == []
+    assert hints_of(scene_file.read(path).scene, caplog) == []
 
 
 def test_a_run_says_it_once_before_it_starts(caplog):

@@ -171,7 +171,7 @@ def test_what_editors_and_other_programs_do(table, text):
         ("\n\n", "the file is empty"),
     ],
 )
-def test_a_header_that_is_none_is_told_how_to_mend(table, text, hint):
+def test_a_wrong_header_is_refused_with_its_mend(table, text, hint):
     with pytest.raises(swarm.SceneError, match=r"start\.csv: expected the columns x, y, z") as caught:
         table(text)
     assert hint in str(caught.value)

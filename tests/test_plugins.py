@@ -355,8 +355,8 @@ def test_commands_allow_modules_of_the_current_folder(folder, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     with swarm.load(tmp_path / "scene.h5") as trajectory:
         assert trajectory.observables["depth"].shape == (5,)
-    told = command("info", "scene.h5", cwd=tmp_path)
-    assert "Damped(e=0.9)" in told.stdout
+    info = command("info", "scene.h5", cwd=tmp_path)
+    assert "Damped(e=0.9)" in info.stdout
 
 
 @pytest.mark.physics

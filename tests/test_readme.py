@@ -121,9 +121,9 @@ def test_the_python_runs_from_top_to_bottom(tmp_path, monkeypatch, capsys):
     universe = names["universe"]
     assert universe.trajectory.n_frames == 101
     assert universe.trajectory[-1].positions[7] == pytest.approx(result.particles.position[:, 7], rel=1e-6)
-    told = capsys.readouterr().out
-    assert "impacts" in told
-    assert "True" in told
+    output = capsys.readouterr().out
+    assert "impacts" in output
+    assert "True" in output
 
 
 # What the words of a command stand for.

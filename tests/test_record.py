@@ -89,6 +89,6 @@ def too_many_arguments_of_a_method():
 def test_what_would_be_hidden_is_refused(make, parts):
     with pytest.raises(swarm.SceneError) as caught:
         make()
-    told = str(caught.value)
-    assert "\n" not in told
-    assert all(part in told for part in parts), told
+    message = str(caught.value)
+    assert "\n" not in message
+    assert all(part in message for part in parts), message

@@ -57,19 +57,19 @@ def test_a_machine_by_the_name_of_a_file():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "errors", "told"),
+    ("seconds", "errors", "expected"),
     [
         ([1.0, 4.0, 3.0], [3e-16, 2e-16, 4e-16], "; Uzawa is as near, first at dt=2, in 3.0 times its time"),
         ([1.0, 4.0, 3.0], [3e-16, 1e-6, 1e-7], "; the nearest of the others, Uzawa at dt=2, is 1e-07 m off in 3.0"),
     ],
 )
-def test_the_advice_names_the_fastest_that_is_exact_or_the_nearest(seconds, errors, told):
+def test_the_advice_names_the_fastest_that_is_exact_or_the_nearest(seconds, errors, expected):
     names, settings = ("Impact", "Uzawa", "Uzawa"), ("default", "dt=1", "dt=2")
     found = [
         accuracy.Point("sphere", name, setting, spent, (error,) * 3, 0.0, 0.0)
         for name, setting, spent, error in zip(names, settings, seconds, errors, strict=True)
     ]
-    assert told in accuracy.advice("sphere", found)
+    assert expected in accuracy.advice("sphere", found)
 
 
 def test_a_folder_that_is_not_there_is_a_sentence(tmp_path):

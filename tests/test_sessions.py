@@ -447,10 +447,10 @@ def test_plain_lines_tell_how_it_goes(capsys, monkeypatch):
         # The first frame compiles for a minute and a half, which the estimate must not include; then 20 s each.
         clock[0] += 90.0 if number == 1 else 20.0
         show.frame(Frame(number, 0.5 * number, 50.0, {"impacts": 1000 * number, "energy_error": 2e-16}))
-    told = capsys.readouterr().err.splitlines()
-    assert told[0].startswith("1.0%  0.5/50 s")
-    assert told[1] == "4.0%  2/50 s  ETA 0:32:00  50 impacts/s  energy error 2.0e-16"
-    assert len(told) == 3
+    printed = capsys.readouterr().err.splitlines()
+    assert printed[0].startswith("1.0%  0.5/50 s")
+    assert printed[1] == "4.0%  2/50 s  ETA 0:32:00  50 impacts/s  energy error 2.0e-16"
+    assert len(printed) == 3
     clock[0] += 100.0
     show.within(3.75, 50.0)  # half of the way to the next frame; the last 10 s and more were the last 0.25 s
     assert capsys.readouterr().err.splitlines() == ["7.5%  3.75/50 s  ETA 5:08:20  50 impacts/s  energy error 2.0e-16"]
@@ -463,8 +463,8 @@ def test_lines_on_the_way_to_a_far_frame(capsys, monkeypatch):
     start = swarm.fill(SPHERE, 300, speed=1.0, seed=1)
     whole = swarm.simulate(SPHERE, start, swarm.Impact(), until=60.0, threads=1)
     clock = halted_after(monkeypatch, 12, 60.0)
-    told = swarm.simulate(SPHERE, start, swarm.Impact(), until=60.0, threads=1, progress=True)
-    assert np.array_equal(told.particles.position, whole.particles.position)
+    result = swarm.simulate(SPHERE, start, swarm.Impact(), until=60.0, threads=1, progress=True)
+    assert np.array_equal(result.particles.position, whole.particles.position)
     shares = [float(line.split("%")[0]) for line in capsys.readouterr().err.splitlines()]
     assert len(shares) == len(clock) - 1 >= 10
     assert shares == sorted(shares)
@@ -473,14 +473,14 @@ def test_lines_on_the_way_to_a_far_frame(capsys, monkeypatch):
 
 @pytest.mark.physics
 def test_the_example_is_stopped_twice_and_conserves(tmp_path):
-    told = long_run.main(particles=50, impacts=200.0, folder=tmp_path)
-    assert told["sessions"] == ["stopped", "stopped", "complete"]
-    assert told["frames at the stops"] == [51, 301, 501]
-    assert told["frames"] == long_run.FRAMES + 1
-    assert told["impacts"] == pytest.approx(50 * 200.0, rel=0.1)
-    assert told["energy error, worst particle"] <= 1e-14
-    assert told["Joachimsthal's integral, worst relative change"] <= 1e-9
-    assert told["largest penetration [m]"] <= 4.0 * np.spacing(0.6)
+    result = long_run.main(particles=50, impacts=200.0, folder=tmp_path)
+    assert result["sessions"] == ["stopped", "stopped", "complete"]
+    assert result["frames at the stops"] == [51, 301, 501]
+    assert result["frames"] == long_run.FRAMES + 1
+    assert result["impacts"] == pytest.approx(50 * 200.0, rel=0.1)
+    assert result["energy error, worst particle"] <= 1e-14
+    assert result["Joachimsthal's integral, worst relative change"] <= 1e-9
+    assert result["largest penetration [m]"] <= 4.0 * np.spacing(0.6)
 
 
 # --- Processes -------------------------------------------------------------------------------------------
@@ -499,16 +499,16 @@ KILLED = """
                               progress=progress, **more)
 
     def child(into):
-        told = 0
+        calls = 0
 
         def tell(frame):
-            nonlocal told
-            told += 1
+            nonlocal calls
+            calls += 1
             os.write(into, frame.written.to_bytes(8, "little"))
-            if told == {farthest}:
+            if calls == {farthest}:
                 signal.pause()
 
-        time.monotonic = lambda: float(told)
+        time.monotonic = lambda: float(calls)
         try:
             run({path!r}, tell, checkpoint=20.0, resume=True)
         except swarm.CompleteError:
@@ -524,17 +524,17 @@ KILLED = """
         if pid == 0:
             child(into)
         os.close(into)
-        told = b"".join(os.read(out, 8) for _ in range(random.randint(1, {farthest})))
+        data = b"".join(os.read(out, 8) for _ in range(random.randint(1, {farthest})))
         time.sleep(random.uniform(0.0, 0.005))  # anywhere in what follows that frame
         os.kill(pid, signal.SIGKILL)
         _, status = os.waitpid(pid, 0)
         while more := os.read(out, 1 << 16):
-            told += more
+            data += more
         os.close(out)
         if not os.WIFSIGNALED(status):
             break
         kills += 1
-        reports = [int.from_bytes(told[i : i + 8], "little") for i in range(0, len(told) - 7, 8)]
+        reports = [int.from_bytes(data[i : i + 8], "little") for i in range(0, len(data) - 7, 8)]
         print(len(swarm.load({path!r})) if Path({path!r}).exists() else 0, max(reports, default=0))
     print("kills", kills)
 """
@@ -545,9 +545,9 @@ def test_kill_9_at_random_moments(tmp_path):
     """Each child is killed for good and the next goes on from its checkpoint, until one is through."""
     path = tmp_path / "run.h5"
     code = textwrap.dedent(KILLED).format(path=str(path), farthest=FARTHEST)
-    told = python("-c", code)
-    assert (told.returncode, told.stderr) == (0, "")
-    *pairs, last = told.stdout.splitlines()
+    output = python("-c", code)
+    assert (output.returncode, output.stderr) == (0, "")
+    *pairs, last = output.stdout.splitlines()
     print(last, *pairs, sep="; ")
     for pair in pairs:
         held, reported = map(int, pair.split())

@@ -38,16 +38,16 @@ def beyond(surface, depth):
 @every_surface
 def test_how_far_and_which_side(name):
     surface = SURFACES[name]()
-    told, particle = started([surface, ROOM], beyond(surface, DEPTH)[:, None])
+    message, particle = started([surface, ROOM], beyond(surface, DEPTH)[:, None])
     assert particle == 0
     side = "inside" if surface.is_solid() else "beyond" if name == "plane" else "outside"
-    found = re.search(rf"([\d.e-]+) m {side} surfaces\[0\] \({type(surface).__name__}\): admissible is ", told)
-    assert found is not None, told
+    found = re.search(rf"([\d.e-]+) m {side} surfaces\[0\] \({type(surface).__name__}\): admissible is ", message)
+    assert found is not None, message
     # Along the gradient, not by the shortest way, where the two differ.
     assert float(found[1]) == pytest.approx(DEPTH, rel=0.02)
     which = "its outside, where phi is 0 or more" if surface.is_solid() else "its inside, where phi is 0 or less"
-    assert ("normal.r <= offset" if name == "plane" else which) in told
-    assert re.search(r"and phi = |and normal.r = ", told)
+    assert ("normal.r <= offset" if name == "plane" else which) in message
+    assert re.search(r"and phi = |and normal.r = ", message)
 
 
 BALL, PEBBLE = swarm.Sphere(0.5), swarm.Sphere(0.5, side="outside")
@@ -71,12 +71,12 @@ LINE = [[0.0, 0.1, 0.2], [0.0] * 3, [0.0] * 3]
     ],
 )  # fmt: skip
 def test_what_would_mend_it(surfaces, position, sentences):
-    told, _particle = started(surfaces, position)
+    message, _particle = started(surfaces, position)
     for sentence in sentences:
-        assert sentence in told
+        assert sentence in message
 
 
-def test_balls_are_told_too():
+def test_balls_are_reported_too():
     scene = swarm.Scene([swarm.Box((0.5,) * 3)])
     balls = swarm.Particles([[0.0, 0.45], [0.0] * 2, [0.0] * 2], np.zeros((3, 2)), radius=0.1)
     with pytest.raises(

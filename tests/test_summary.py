@@ -51,20 +51,20 @@ LASTING = {
 }
 
 
-def test_where_nothing_lasts_no_word_is_said(path):
+def test_where_nothing_lasts_there_is_no_word_of_it(path):
     assert {"sliding", "wall heat"}.isdisjoint(summary.of_trajectory(path))
-    told = summary.numbers(path)
-    assert [told[name] for name in YOUNGER] == [0, 0.0, [0.0, 0.0]]
+    totals = summary.numbers(path)
+    assert [totals[name] for name in YOUNGER] == [0, 0.0, [0.0, 0.0]]
 
 
-def test_sliding_and_wall_heat_are_told(path):
+def test_sliding_and_wall_heat_are_reported(path):
     observed(path, **LASTING)
-    rows, told = summary.of_trajectory(path), summary.numbers(path)
+    rows, totals = summary.of_trajectory(path), summary.numbers(path)
     assert rows["sliding"] == "12 at the end, 3.4 s in all"
     assert rows["wall heat"] == "surface 0: 0.75 J, surface 1: -0.5 J"
     assert rows["balance of energy"].startswith("✓ closes to 0 of what moved")
-    assert [told[name] for name in YOUNGER] == [12, 3.4, [0.75, -0.5]]
-    assert told["energy_drift"] == 0.0
+    assert [totals[name] for name in YOUNGER] == [12, 3.4, [0.75, -0.5]]
+    assert totals["energy_drift"] == 0.0
 
 
 def test_what_is_dissipated_is_beside_kinetic_energies(tmp_path):
@@ -75,8 +75,8 @@ def test_what_is_dissipated_is_beside_kinetic_energies(tmp_path):
     result = swarm.simulate(scene, start, swarm.Impact(), until=1.0, trajectory=file, compile="never")
     seen = result.observables
     assert seen["dissipated_energy"][-1] > 10.0 * seen["total_energy"][0]
-    told = f"{seen['dissipated_energy'][-1]:.4g} J; the kinetic energy: 1 J, then {seen['kinetic_energy'][-1]:.4g} J"
-    assert summary.of_trajectory(file)["dissipated"] == summary.of_result(result, None)["dissipated"] == told
+    text = f"{seen['dissipated_energy'][-1]:.4g} J; the kinetic energy: 1 J, then {seen['kinetic_energy'][-1]:.4g} J"
+    assert summary.of_trajectory(file)["dissipated"] == summary.of_result(result, None)["dissipated"] == text
 
 
 def test_the_drift_of_a_fall_that_begins_near_the_zero_of_its_energy_is_round_off():
@@ -85,24 +85,24 @@ def test_the_drift_of_a_fall_that_begins_near_the_zero_of_its_energy_is_round_of
     start = swarm.Particles([[0.1, -0.1], [0.0, 0.0], [1e-12, 0.0]], np.zeros((3, 2)), 2.0)
     result = swarm.simulate(scene, start, swarm.Impact(), until=5.0, every=0.1, compile="never")
     rows = summary.of_result(result, None)
-    told = rows["total energy"]
+    row = rows["total energy"]
     part = observables.drift(result.observables)
     assert 0.0 < part < 1e-15
-    assert told == f"✓ constant: it changes by {plain(part, 2)} of the energy that moved"
+    assert row == f"✓ constant: it changes by {plain(part, 2)} of the energy that moved"
 
 
-def test_the_work_of_walls_is_told(tmp_path, path):
+def test_the_work_of_walls_is_reported(tmp_path, path):
     """A piston that comes with u gives a particle of mass m and speed v the work 2 m u (v + u)."""
     assert summary.numbers(path)["wall_work"] == []
     ends = swarm.Plane((-1, 0, 0), 1.0), swarm.Plane((1, 0, 0), 1.0, motion=swarm.Translation((-0.5, 0.0, 0.0)))
     scene, start = swarm.Scene(ends), swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 2.0)
     file = tmp_path / "piston.h5"
     result = swarm.simulate(scene, start, swarm.Impact(), until=1.0, every=0.5, trajectory=file, compile="never")
-    rows, told = summary.of_trajectory(file), summary.numbers(file)
+    rows, totals = summary.of_trajectory(file), summary.numbers(file)
     assert rows["wall work"] == summary.of_result(result, None)["wall work"] == "surface 1: 3 J"
     assert rows["balance of energy"].startswith("✓ closes to 0 of what moved")
-    assert told["wall_work"] == [0.0, 3.0]
-    assert told["energy_drift"] == 0.0
+    assert totals["wall_work"] == [0.0, 3.0]
+    assert totals["energy_drift"] == 0.0
 
 
 def test_pictures_show_sliding_where_there_is_some(path, monkeypatch):
@@ -139,7 +139,7 @@ def test_a_file_of_an_older_version_is_read(path):
         assert trajectory.observed().keys().isdisjoint(YOUNGER)
 
 
-def test_a_log_of_impacts_is_told(tmp_path):
+def test_a_log_of_impacts_is_reported(tmp_path):
     """Not as a broken trajectory."""
     start = swarm.fill(HOT, 6, speed=0.5, seed=1)
     for some, kept in (("all", 6), (4, 2), ([5, 3, 5], 2)):
@@ -191,14 +191,14 @@ def test_every_printer_reads_one_list(tmp_path, monkeypatch):
     with swarm.load(file) as trajectory:
         listed = facts.of_content(content_of(trajectory))
         page = Read(trajectory.report().html)
-        told = verdicts.marked(content_of(trajectory))
+        sentences = verdicts.marked(content_of(trajectory))
     rows = rows_of(listed)
     assert len(rows) == len(listed)
     assert {"surface 0, box", "counter 0", "balance of energy", "particles", "wall heat"} <= set(rows)
     assert rows["counter 0"].startswith("a plane of offset 0.4 m, normal along -z, within a sphere of radius 0.2 m")
     assert not re.search(r"\w\(\w+=|[\[\]{}<>]|None|True|False|array|  ", " ".join(rows.values()))
     assert summary.of_file(file).items() >= rows.items() <= summary.of_result(result, None).items()
-    assert {f"{text[:1]} {label}: {text[2:]}" for label, text in rows.items() if text[0] in "✓✗·"} >= set(told)
+    assert {f"{text[:1]} {label}: {text[2:]}" for label, text in rows.items() if text[0] in "✓✗·"} >= set(sentences)
     html = result._repr_html_()
     texts = " ".join(" ".join(page.texts.values()).split())
     for one in listed:
@@ -226,10 +226,10 @@ def test_the_numbers_of_json_have_their_types(path):
     with h5py.File(path, "r+") as file:
         for name in ("sliding", "sliding_time", "wall_heat"):
             del file[f"observables/{name}"]
-    told = summary.numbers(path)
-    floats = {"time", "energy_drift", *(name for name in told if name in OBSERVABLES and not OBSERVABLES[name].axes)}
+    totals = summary.numbers(path)
+    floats = {"time", "energy_drift", *(name for name in totals if name in OBSERVABLES and not OBSERVABLES[name].axes)}
     counts = {"impacts", "sliding", "escaped", "unconverged"}
-    assert {name: type(told[name]) for name in counts} == dict.fromkeys(counts, int)
-    assert {name: type(told[name]) for name in floats - counts} == dict.fromkeys(floats - counts, float)
-    assert told["wall_heat"] == told["born"] == []
-    assert json.loads(json.dumps(told)) == told
+    assert {name: type(totals[name]) for name in counts} == dict.fromkeys(counts, int)
+    assert {name: type(totals[name]) for name in floats - counts} == dict.fromkeys(floats - counts, float)
+    assert totals["wall_heat"] == totals["born"] == []
+    assert json.loads(json.dumps(totals)) == totals

@@ -168,9 +168,9 @@ def test_those_of_all_members_are_those_of_all_particles_in_every_kind_of_run(na
         assert seen["member_residence"].sum(axis=1) == pytest.approx(seen["sliding_time"], rel=1e-13, abs=1e-13)
     with swarm.load(path) as written:
         for k in (-1, 2):
-            told = written.members(k)
-            assert np.concatenate(told["impacts"]).tolist() == seen["member_impacts"][k].tolist()
-        assert [len(one) for one in told["impacts"]] == [len(one) for one in result.member_impacts]
+            impulses = written.members(k)
+            assert np.concatenate(impulses["impacts"]).tolist() == seen["member_impacts"][k].tolist()
+        assert [len(one) for one in impulses["impacts"]] == [len(one) for one in result.member_impacts]
         assert "member_impacts" in written.to_xarray()
         assert not any("member" in column for column in written.table().columns)
         with pytest.raises(swarm.SceneError, match="frame must lie between -5 and 4, got 5"):

@@ -161,12 +161,16 @@ print(found)
 @compiled_only
 def test_kernels_of_another_process_are_found(tmp_path):
     """By what Numba does not document: this fails when it changes."""
-    told = {}
+    results = {}
     for k, compile in enumerate(("auto", "always", "auto")):
         done = python("-c", FOUND.format(compile=compile), env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
         assert done.returncode == 0, done.stderr
-        told[k] = done.stdout.strip(), "compiling the kernel of flights and impacts (1 of 2)" in done.stderr
-    assert told == {0: ("[False, False]", False), 1: ("[False, False, True, False]", True), 2: ("[True, True]", False)}
+        results[k] = done.stdout.strip(), "compiling the kernel of flights and impacts (1 of 2)" in done.stderr
+    assert results == {
+        0: ("[False, False]", False),
+        1: ("[False, False, True, False]", True),
+        2: ("[True, True]", False),
+    }
 
 
 def test_another_word_is_refused():

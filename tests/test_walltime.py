@@ -140,8 +140,8 @@ def test_a_compilation_under_way_ends_first_and_the_message_says_so(clock, monke
     clock.now = max(ends, 110.0)
     with pytest.raises(swarm.WallTimeError) as stop:
         made.look(Still(), Queue(clock, 0.0), 1, 0.5, None)
-    said = ": a compilation was under way, which ended first, "
-    assert str(stop.value) == "the wall time of this run is over at 0.5 s" + (said + late + " after it") * bool(late)
+    message = ": a compilation was under way, which ended first, "
+    assert str(stop.value) == "the wall time of this run is over at 0.5 s" + (message + late + " after it") * bool(late)
     assert stop.value.compiled == (ends - 110.0 if late else 0.0)
     assert saved
 
@@ -198,8 +198,8 @@ def test_the_limit_of_a_command_counts_from_its_begin(tmp_path, clock, monkeypat
     with pytest.raises(typer.Exit) as stop:
         command(tmp_path / "scene.toml", walltime="50s", quiet=True, threads=1)
     assert stop.value.exit_code == 75
-    said = "the wall time limit is reached" + ", after a compilation that was under way" * bool(compiled)
-    assert capsys.readouterr().err.startswith(f"{said}: scene.h5 holds the frames")
+    message = "the wall time limit is reached" + ", after a compilation that was under way" * bool(compiled)
+    assert capsys.readouterr().err.startswith(f"{message}: scene.h5 holds the frames")
     with swarm.load(tmp_path / "scene.h5") as begun:
         assert begun.times.tolist() == [0.0]
     assert (tmp_path / "scene.h5.checkpoint").exists()

@@ -41,9 +41,9 @@ def test_degenerate_scenes_are_refused(name, method):
     before = None if numba.config.DISABLE_JIT else len(blocks.advance_block.signatures)
     with pytest.raises(swarm.SceneError) as caught:
         swarm.simulate(swarm.Scene(surfaces), moving(*place), method, until=1.0)
-    told = str(caught.value)
+    message = str(caught.value)
     for part in ("1e+10 impacts a frame", f"surfaces[0] ({type(surfaces[0]).__name__})", "lasts 1 s", "every at most"):
-        assert part in told
+        assert part in message
     assert before == (None if numba.config.DISABLE_JIT else len(blocks.advance_block.signatures))
 
 

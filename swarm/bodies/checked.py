@@ -143,11 +143,11 @@ def numbers(name: str, rows: Iterable[Any], width: int, count: int | None) -> Pa
     return np.array(result, dtype=np.int64).reshape(-1, width)
 
 
-def _require_once(name: str, keys: Iterable[Hashable], said: Sequence[str]) -> None:
+def _require_once(name: str, keys: Iterable[Hashable], names: Sequence[str]) -> None:
     found: dict[Hashable, int] = {}
     for k, key in enumerate(keys):
         if found.setdefault(key, k) < k:
-            raise SceneError(f"{name}[{k}]{said[k]} is there already as {name}[{found[key]}]; leave one of them out")
+            raise SceneError(f"{name}[{k}]{names[k]} is there already as {name}[{found[key]}]; leave one of them out")
 
 
 def each(name: str, rows: Iterable[Any], width: int, parts: str) -> Iterator[tuple[str, tuple[Any, ...]]]:

@@ -23,8 +23,8 @@ def require(points: int, ties: int = 0, contacts: int = 0, edges: int = 0) -> No
     most = min(_MOST, _SHARE * checks.memory())
     if size > most:
         held = {"points": p, "ties": t, "contact points": k}
-        said = ", ".join(f"{count:.6g} {name}" for name, count in held.items() if count)
+        parts = ", ".join(f"{count:.6g} {name}" for name, count in held.items() if count)
         raise SceneError(
-            f"a body must fit in {checks.in_bytes(most)}, got {said}, whose matrices of masses, ties and contacts are "
+            f"a body must fit in {checks.in_bytes(most)}, got {parts}, whose matrices of masses, ties and contacts are "
             f"full and take {checks.in_bytes(size)}; use fewer points, or several bodies"
         )

@@ -78,20 +78,21 @@ def require_independent(
         f"{tie.name} {tie.points}" if tie.surface is None else f"{tie.name} (point {tie.points[0]})" for tie in given
     ]
     involved = [names[k] for k, row in zip(left, np.abs(null), strict=True) if row.max() > _SHARE]
-    said = ", ".join(involved[:_NAMED]) + (f" and {len(involved) - _NAMED} more" if len(involved) > _NAMED else "")
+    listing = ", ".join(involved[:_NAMED]) + (f" and {len(involved) - _NAMED} more" if len(involved) > _NAMED else "")
     # Somewhere else the same links may be independent: then it is the place of the points that is special.
     size = np.ptp(points, axis=0).max()
     elsewhere = points + 0.1 * size * np.random.default_rng(0).standard_normal(points.shape)
     moved = list(ties(links, guides, elsewhere.T[:, :, None]))
     if _dependences([moved[k] for k in left], anchors).shape[1] < excess:
         raise SceneError(
-            f"links and guides must be independent, got {said}, whose directions depend on each other where the points "
-            "are (in a line or in a plane, say): their forces are not determined; leave out "
+            f"links and guides must be independent, got {listing}, whose directions depend on each other where the "
+            "points are (in a line or in a plane, say): their forces are not determined; leave out "
             f"{excess} of them, or move a point"
         )
     raise SceneError(
-        f"links and guides must be independent, got {said}, of which {excess} {'follows' if excess == 1 else 'follow'} "
-        f"from the others: their forces are not determined; leave out {excess} of them"
+        f"links and guides must be independent, got {listing}, of which {excess} "
+        f"{'follows' if excess == 1 else 'follow'} from the others: their forces are not determined; leave "
+        f"out {excess} of them"
     )
 
 

@@ -87,7 +87,7 @@ def sweep(  # noqa: PLR0913  one argument an option
 
 
 def _report(outcome: "Outcome", quiet: bool, as_json: bool) -> None:
-    from ..fleet.plan import told
+    from ..fleet.plan import in_one_line
 
     results = outcome.results
     numbers = {state: len(results.of_state(state)) for state in ("done", "failed", "waiting")}
@@ -97,8 +97,8 @@ def _report(outcome: "Outcome", quiet: bool, as_json: bool) -> None:
     ]
     again = command_again() if outcome.stopped else None
     if again is not None:
-        said = f"{REASONS[outcome.stopped]}: {numbers['waiting']} runs are left; resume with\n  {again}"
-        print(said, file=sys.stderr)
+        message = f"{REASONS[outcome.stopped]}: {numbers['waiting']} runs are left; resume with\n  {again}"
+        print(message, file=sys.stderr)
     if others := results.others():
         print(
             f"{results.folder} also holds {len(others)} run{'s' * (len(others) > 1)} that {results.plan.path} does not "
@@ -107,11 +107,11 @@ def _report(outcome: "Outcome", quiet: bool, as_json: bool) -> None:
         )
     if as_json:
         status = outcome.stopped or ("failed" if failures else "complete")
-        told_failures = [dict(zip(("file", "parameters", "error"), one, strict=True)) for one in failures]
-        more: dict[str, Any] = {"table": str(results.path), "wall_time": outcome.wall_time, "failures": told_failures}
+        failure_rows = [dict(zip(("file", "parameters", "error"), one, strict=True)) for one in failures]
+        more: dict[str, Any] = {"table": str(results.path), "wall_time": outcome.wall_time, "failures": failure_rows}
         print(json.dumps({"status": status, **numbers, **more, "resume": again}, indent=2, default=str))
     elif not quiet:
-        shown = [f"{file}, {told(parameters)}: {error}" for file, parameters, error in failures[:_SHOWN]]
+        shown = [f"{file}, {in_one_line(parameters)}: {error}" for file, parameters, error in failures[:_SHOWN]]
         more_failures = [f"and {len(failures) - _SHOWN} more, in the table"] if len(failures) > _SHOWN else []
         rows = {"runs": ", ".join(f"{count} {state}" for state, count in numbers.items() if count)}
         rows |= {"failed": "\n".join(shown + more_failures)} if failures else {}

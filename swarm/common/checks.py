@@ -35,10 +35,10 @@ def shown(value: Any) -> str:
     'array([[0., 0.], [0., 0.]])'
     """
     try:
-        said = repr(value)
+        text = repr(value)
     except Exception:  # of an object of others, or a number of too many digits
         return f"a {type(value).__name__}"
-    return " ".join(said.split())[:_SHOWN]
+    return " ".join(text.split())[:_SHOWN]
 
 
 def assign(frozen: Any, **values: Any) -> None:

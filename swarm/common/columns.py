@@ -34,8 +34,8 @@ def flattened(observables: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     """
     columns = {}
     # Those of members would be too many.
-    told = [name for name in observables if not name.startswith("member_")]
-    for name in sorted(told, key=lambda name: name != "time"):
+    written = [name for name in observables if not name.startswith("member_")]
+    for name in sorted(written, key=lambda name: name != "time"):
         values = np.asarray(observables[name])
         for place in np.ndindex(values.shape[1:]):
             parts = [str(i) for i in place]

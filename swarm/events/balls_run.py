@@ -81,7 +81,7 @@ class CollidingRun(BaseRun):
             state.crossed,
         )  # fmt: skip
         self._ball_numbers = BallNumbers(scene, particles)
-        self._told_of_rest = False
+        self._rest_was_reported = False
         self._frame_before = 0.0  # [s]
         self._walls = self._walls_seen(0.0)
         self._choose_tier()
@@ -111,7 +111,7 @@ class CollidingRun(BaseRun):
             self._follow(moment, page)
         if page is not None:
             page.close()
-        self._told_of_rest = self._told_of_rest or warn_of_rest(self._box, self._clock)
+        self._rest_was_reported = self._rest_was_reported or warn_of_rest(self._box, self._clock)
         return status, ball
 
     def _with_log(self, page: ThreadLog | None) -> Any:
@@ -120,10 +120,12 @@ class CollidingRun(BaseRun):
 
     def _follow(self, moment: float, page: ThreadLog | None) -> None:
         """Tell the counters of all flights until the end of a frame."""
-        told, now = 0, self._since(moment)
-        while told < self.state.mass.size:
-            told = self._call(events.follow_all, self._with_log(page), self._flock, self._books, self._clock, now, told)
-            if page is not None and told < self.state.mass.size:
+        followed, now = 0, self._since(moment)
+        while followed < self.state.mass.size:
+            followed = self._call(
+                events.follow_all, self._with_log(page), self._flock, self._books, self._clock, now, followed
+            )
+            if page is not None and followed < self.state.mass.size:
                 page.turn()
 
     def _make_room(self) -> None:

@@ -14,7 +14,7 @@ from ..motion import pose
 from ..particles import Particles
 from ..placing.filling import check_velocities, fill_velocities, room_of
 from ..placing.fitting_shapes import require_shapes
-from ..placing.sequential import VolumeBox, place_balls, require_size, told
+from ..placing.sequential import VolumeBox, packing_of, place_balls, require_size
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces.surface import Surface
@@ -87,7 +87,7 @@ def pack(
     require_shapes(still, radii)
     require_size(still, radii)
     packing = balls_volume(still, radii) / room.volume
-    _require_below("the packing", packing, len(still.axes()), f" of {told(still, radii, room)}")
+    _require_below("the packing", packing, len(still.axes()), f" of {packing_of(still, radii, room)}")
     made.position, made.volume = _places(still, radii, room, random), room.volume
     made.image = None if scene.period is None else np.zeros((3, radii.size), np.int64)
     if moves:
@@ -132,11 +132,11 @@ def _as_many_as_fit(scene: Scene, radius: float, fraction: float, room: VolumeBo
     return np.full(count, radius)
 
 
-def _require_below(name: str, packing: float, axes: int, told_more: str) -> None:
+def _require_below(name: str, packing: float, axes: int, detail: str) -> None:
     """Raise a `SceneError` for more than what is grown."""
     if packing > _MOST[axes] * (1.0 + _CLOSE):
         why = next((f"; {why} more than {most:.4g}" for most, why in _LIMITS[axes] if packing > most), "")
-        raise SceneError(f"{name} must be at most {_MOST[axes]:g}, got {packing:.4g}{told_more}{why}")
+        raise SceneError(f"{name} must be at most {_MOST[axes]:g}, got {packing:.4g}{detail}{why}")
 
 
 def _places(scene: Scene, radius: Floats, room: VolumeBox, random: np.random.Generator) -> Floats:
@@ -153,14 +153,14 @@ def _places(scene: Scene, radius: Floats, room: VolumeBox, random: np.random.Gen
             scale *= _LESS
     else:
         raise SceneError(
-            f"pack found no places to begin with within the walls, got {told(scene, radius, room)}; use fewer or "
+            f"pack found no places to begin with within the walls, got {packing_of(scene, radius, room)}; use fewer or "
             "smaller balls, or a larger vessel"
         )
     found, reached = grow(scene, places, radius, scale, random) if scale < 1.0 else (places, 1.0)
     if reached < 1.0:
         raise SceneError(
             f"pack reached a packing of {packing * reached**axes:.4g} before the balls jammed, got "
-            f"{told(scene, radius, room)}; ask for less, or give another seed"
+            f"{packing_of(scene, radius, room)}; ask for less, or give another seed"
         )
     return found
 

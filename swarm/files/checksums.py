@@ -87,7 +87,7 @@ class RowSums:
             "\n".join(f"{name} {count} {block}" for name, (count, block) in blocks.items()).encode()
         )
         sums = {name: checksum_of(_value(file[name])) for name in constants(file) if name not in other}
-        file[_CONSTANTS] = np.bytes_(_told(sums | _attributes(file)))
+        file[_CONSTANTS] = np.bytes_(_serialized(sums | _attributes(file)))
         # From a full disk nothing can be read back.
         return cls(file, blocks)
 
@@ -149,7 +149,9 @@ def replace(file: Any, values: dict[str, Any]) -> None:
         return
     for sums in (dict.fromkeys(values, 0), {name: checksum_of(file[name].dtype.type(values[name])) for name in values}):
         if known:
-            file[_CONSTANTS][()] = np.bytes_(_told(known | {name: sums[name] for name in values if name in known}))
+            file[_CONSTANTS][()] = np.bytes_(
+                _serialized(known | {name: sums[name] for name in values if name in known})
+            )
             file.flush()
         if not any(sums.values()):
             for name, value in values.items():
@@ -311,7 +313,7 @@ def _value(data: Any) -> Any:
     return str(data.asstr(errors="surrogateescape")[()]) if _is_text(data) else data[()]
 
 
-def _told(sums: dict[str, int]) -> bytes:
+def _serialized(sums: dict[str, int]) -> bytes:
     return "\n".join(f"{name} {known:08x}" for name, known in sums.items()).encode()
 
 

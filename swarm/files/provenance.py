@@ -44,10 +44,10 @@ def makers() -> dict[str, str]:
 def _processor() -> str:
     """The name of the processor, or of its kind."""
     try:
-        told = [line.partition(":")[2].strip() for line in _CPUS.read_text().splitlines() if "model name" in line]
+        models = [line.partition(":")[2].strip() for line in _CPUS.read_text().splitlines() if "model name" in line]
     except OSError:
-        told = []
-    return told[0] if told else platform.machine()
+        models = []
+    return models[0] if models else platform.machine()
 
 
 def is_own(file: Any) -> bool:

@@ -35,9 +35,9 @@ def require_file(path: Path, expected: str) -> None:
 
 def cause(error: BaseException) -> str:
     """The message of the system about a file that cannot be written, without names of parts and texts of HDF5."""
-    told = re.findall(r"error message = '([^']*)'", str(error))
+    messages = re.findall(r"error message = '([^']*)'", str(error))
     number = getattr(error, "errno", None)
-    return os.strerror(number) if number else told[-1] if told else reason(error)
+    return os.strerror(number) if number else messages[-1] if messages else reason(error)
 
 
 def reason(error: BaseException | None) -> str:

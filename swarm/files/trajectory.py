@@ -104,10 +104,10 @@ class Trajectory(Stored):
             times = self.times
             span = f", {times[0]:g} s to {times[-1]:g} s" if len(times) else ""
             bodies = f"{self.copies} bodies of " if self.copies else ""
-            told = f"{len(times)} frame{'s' * (len(times) != 1)}{span}, {bodies}{self.count} particles, {self.method!r}"
+            text = f"{len(times)} frame{'s' * (len(times) != 1)}{span}, {bodies}{self.count} particles, {self.method!r}"
         except SceneError as error:
-            told = str(error).removeprefix(f"{self.path} is ")
-        return f"Trajectory({str(self.path)!r}, {told})"
+            text = str(error).removeprefix(f"{self.path} is ")
+        return f"Trajectory({str(self.path)!r}, {text})"
 
     def _repr_html_(self) -> str:
         try:

@@ -33,9 +33,9 @@ def main_observables(sweep: SweepFolder) -> list[str]:
     found = [name for name, values in columns.items() if len(values) and _differ(values)]
     found = [name for name in found if name not in ERRORS or columns[name].max() > _ROUND_OFF]
     own = [name for name in found if not any(name == known or name.startswith(f"{known}_") for known in NAMES)]
-    told = sorted((name for name in found if _stem(name) in MAIN), key=lambda name: MAIN.index(_stem(name)))
+    main = sorted((name for name in found if _stem(name) in MAIN), key=lambda name: MAIN.index(_stem(name)))
     chosen: list[str] = []
-    for name in [*own, *told]:
+    for name in [*own, *main]:
         # Without gravity the total energy is the kinetic one.
         if not any(_alike(columns[name], columns[other]) for other in chosen):
             chosen.append(name)
@@ -52,14 +52,14 @@ def _alike(one: Any, other: Any) -> bool:
 
 def worst(sweep: SweepFolder) -> list[tuple[str, str]]:
     """The largest error of the energy and the largest penetration of all runs, as far as these have them."""
-    told = []
+    texts = []
     for name, what, unit in zip(ERRORS, ("largest error of the energy", "largest penetration"), ("", "m"), strict=True):
         values = {str(row["file"]): row[name] for row in sweep.rows if isinstance(row.get(name), (int, float))}
         if values:
             file = max(values, key=lambda file: values[file])
             of = unit or "of the worst particle's energy"
-            told.append((what, f"{plain(values[file], 2)} {of}, in {file}" if values[file] else "none"))
-    return told
+            texts.append((what, f"{plain(values[file], 2)} {of}, in {file}" if values[file] else "none"))
+    return texts
 
 
 def _stem(name: str) -> str:

@@ -48,7 +48,10 @@ class Reporter(NamedTuple):
                 self.tell({"share": moment / until})
 
         return Display(
-            lambda frame: within(frame.time, frame.until), within, REPORTS, lambda said: self.tell({"compiling": said})
+            lambda frame: within(frame.time, frame.until),
+            within,
+            REPORTS,
+            lambda sentence: self.tell({"compiling": sentence}),
         )
 
 

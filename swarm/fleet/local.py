@@ -33,9 +33,9 @@ def started(workers: int) -> Iterator[str]:
     folders = [str(_ROOT), *(os.path.abspath(folder) for folder in sys.path)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(folders)}
     command = [sys.executable, "-P", "-m", "swarm.fleet.local", str(workers)]
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as output:
         process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=said, env=environment,
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=output, env=environment,
             start_new_session=True, text=True,
         )  # fmt: skip
         assert process.stdin is not None
@@ -44,8 +44,8 @@ def started(workers: int) -> Iterator[str]:
             address = process.stdout.readline().strip()
             if not address:
                 process.wait()
-                said.seek(0)
-                lines = said.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
+                output.seek(0)
+                lines = output.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
                 raise RunError(f"the local cluster did not start: {lines[-1]}")
             yield address
         finally:

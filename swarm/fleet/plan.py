@@ -66,12 +66,12 @@ class Plan:
 
     def text(self, variant: Variant) -> str:
         """The scene file of a run."""
-        return f"# A run of {self.path.name}: {told(variant.parameters)}\n\n" + tomli_w.dumps(
+        return f"# A run of {self.path.name}: {in_one_line(variant.parameters)}\n\n" + tomli_w.dumps(
             _with(self.document, variant.parameters)
         )
 
 
-def told(parameters: Mapping[str, Any]) -> str:
+def in_one_line(parameters: Mapping[str, Any]) -> str:
     """Parameters as a sweep file has them, in one line."""
     return ", ".join(f'"{key}" = {json.dumps(value, default=str):.200}' for key, value in parameters.items())
 
@@ -224,8 +224,8 @@ def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> tupl
         made = Variant(len(variants), parameters, stem, kind, job.run.impacts is not None)
         if stem in variants:
             raise SceneError(
-                f"sweep: the runs with {told(variants[stem].parameters)} and with {told(parameters)} are the same; "
-                "remove the value that comes twice or makes no difference"
+                f"sweep: the runs with {in_one_line(variants[stem].parameters)} and with "
+                f"{in_one_line(parameters)} are the same; remove the value that comes twice or makes no difference"
             )
         variants[stem] = made
     return list(variants.values()), tuple(file.absolute() for file, content in contents.items() if content)
@@ -267,7 +267,7 @@ def _attributed(sentence: str, parameters: Mapping[str, Any], k: int, n: int) ->
     if len(owners) == 1:
         ((key, value),) = owners.items()
         return f'sweep."{key}" = {json.dumps(value, default=str):.200}: {sentence}'
-    return f"run {k + 1} of {n}, with {told(parameters)}: {sentence}"
+    return f"run {k + 1} of {n}, with {in_one_line(parameters)}: {sentence}"
 
 
 def _digest(document: Document, path: Path, contents: dict[Path, str]) -> str:

@@ -71,11 +71,11 @@ class Processes(jobs.Fleet):
         if not isinstance(error, BrokenExecutor):
             return f"unexpected {type(error).__name__}: {error}"
         self.hear()
-        said, ready = place.death(str(error)), place.ready
+        message, ready = place.death(str(error)), place.ready
         place.close()
         if not ready and not self._stop.reason:
-            raise RunError(f"a worker process did not start: {said}")
-        return said
+            raise RunError(f"a worker process did not start: {message}")
+        return message
 
     def close(self) -> None:
         """End all processes at once: the files of a run survive an end at any moment."""
@@ -131,11 +131,11 @@ class _Place:
             with contextlib.suppress(OSError):  # it has died, which its future says
                 self._line.send(token)
 
-    def death(self, said: str) -> str:
+    def death(self, message: str) -> str:
         """The end of the process, in a sentence."""
         printed = self._printed.read_bytes()[-_LAST:].decode(errors="replace").strip().splitlines()
         last = f"; the last that it printed: {printed[-1]}" if printed else ""
-        found = _EXIT.search(said)
+        found = _EXIT.search(message)
         if found is None:
             return f"its process has died{last}"
         name, code = found[1], int(found[2])

@@ -87,7 +87,7 @@ def of_folder(folder: Path, place: Path) -> "Page":
 
     sweep = found(folder)
     states = [str(row["state"]) for row in sweep.rows]
-    told = ", ".join(f"{states.count(state)} {state}" for state in ("done", "failed", "waiting") if state in states)
+    counts = ", ".join(f"{states.count(state)} {state}" for state in ("done", "failed", "waiting") if state in states)
     spent = sum(row["wall_time"] for row in sweep.rows if isinstance(row["wall_time"], (int, float)))
     name = folder.resolve().name
     title = (
@@ -99,16 +99,16 @@ def of_folder(folder: Path, place: Path) -> "Page":
     page = filled(
         "sweep.html.j2",
         title=title,
-        about=f"folder {name} · {told} · {spent:.3g} s of runs in all",
+        about=f"folder {name} · {counts} · {spent:.3g} s of runs in all",
         notes=_notes(sweep, states),
-        failures=[(row["file"], row["error"], _told(row, sweep)) for row in sweep.rows if row["state"] == "failed"],
+        failures=[(row["file"], row["error"], _given(row, sweep)) for row in sweep.rows if row["state"] == "failed"],
         columns=["file", *shown],
         rows=[[(row["file"], _link(folder / str(row["file"]), place)), *(_cell(row.get(one)) for one in shown)]
               for row in sweep.rows],
         table=None if sweep.table is None else (sweep.table.name, _link(sweep.table, place)),
         left_out=len(set(sweep.observables) - set(shown)),
         graphs=curves.drawn(sweep),
-        worst=[("runs", told), *curves.worst(sweep), ("wall time", f"{spent:.4g} s of all runs together")],
+        worst=[("runs", counts), *curves.worst(sweep), ("wall time", f"{spent:.4g} s of all runs together")],
         sweep_file=sweep.text or "",
         command=_command(sweep),
         name=name,
@@ -116,7 +116,7 @@ def of_folder(folder: Path, place: Path) -> "Page":
     return Page(title, page)
 
 
-def _told(row: dict[str, Any], sweep: Any) -> str:
+def _given(row: dict[str, Any], sweep: Any) -> str:
     return ", ".join(f"{key} = {row.get(key)}" for key in sweep.parameters)
 
 

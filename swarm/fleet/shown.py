@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from ..run.progress import Pace, Told, told
+from ..run.progress import Pace, ProgressListener, progress_listener
 
 # Seconds whose pace gives the ETA: several runs.
 _WINDOW = 120.0
@@ -31,11 +31,11 @@ def shown(progress: bool) -> Iterator[Show]:
     if not progress:
         yield lambda now: None
         return
-    with told(sentences_stay=True) as one:
+    with progress_listener(sentences_stay=True) as one:
         yield show_by(one)
 
 
-def show_by(one: Told) -> Show:
+def show_by(one: ProgressListener) -> Show:
     """The function that tells the numbers of runs, and the time that is left at the pace of the last seconds."""
     pace = Pace(_WINDOW)
 

@@ -229,9 +229,9 @@ def kernels_compiled(tell: Callable[[str], None], sentence: Callable[[Any], str]
             begun.append(time.monotonic())
             kernel = compiled.data["dispatcher"]
             if kernel in _kernels:
-                said = _COMPILING.format(kernel.__name__) if sentence is None else sentence(kernel)
-                _LOG.info(said)
-                tell(said)
+                message = _COMPILING.format(kernel.__name__) if sentence is None else sentence(kernel)
+                _LOG.info(message)
+                tell(message)
 
         def on_end(self, compiled: Any) -> None:
             first = begun.pop()

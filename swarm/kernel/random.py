@@ -71,9 +71,9 @@ def uniforms(seed, particle, number):
     """
     seed, particle, number = int(seed), int(particle), int(number)
     key = seed & _WORD, (seed >> 32) & _WORD
-    low, high, who = number & _WORD, (number >> 32) & _WORD, particle & _WORD
-    a, b, c, d = philox((low, high, who, 0), key)
-    e, f, g, h = philox((low, high, who, 1), key)
+    low, high, item = number & _WORD, (number >> 32) & _WORD, particle & _WORD
+    a, b, c, d = philox((low, high, item, 0), key)
+    e, f, g, h = philox((low, high, item, 1), key)
     return Uniforms(_fraction(a, b), _fraction(c, d), _fraction(e, f), _fraction(g, h))
 
 

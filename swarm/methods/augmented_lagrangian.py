@@ -161,22 +161,22 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
 
     def failure(self, moment: float, remaining: float, sweeps: int, stored: float, mass: float) -> str:
         now = moment - (remaining if self.adaptive else remaining * self.dt)
-        told = (
+        message = (
             f"in the step from {now:.9g} s (step {round(now / self.dt) + 1} of dt): {sweeps} sweeps left V = "
             f"{stored:.3g} J, above tolerance = {self.tolerance:g} J. "
         )
         if not self.adaptive or self.exponent != 1.0:
-            return told + (
+            return message + (
                 "The loop converges for exponent = 1 from the surface: use exponent = 1 and adaptive=True, or "
                 'on_unconverged="count" or "impact"'
             )
         stiffness = self.penalty * self.dt * self.dt / mass
-        told += (
+        message += (
             "A sweep divides the gap by about 1 + alpha h^2/(4 m), with alpha = penalty and h = dt, and alpha h^2/m = "
             f"{stiffness:.3g} here: use "
         )
         if stiffness < _GOOD:
             quicker = "" if self.acceleration == "reflection" else 'acceleration="reflection", '
             larger = _GOOD / stiffness * self.penalty
-            told += f"{quicker}a penalty that grows as 1/dt^2 ({larger:.2g} makes alpha h^2/m = {_GOOD:g}), "
-        return told + 'more max_sweeps, or on_unconverged="count" or "impact"'
+            message += f"{quicker}a penalty that grows as 1/dt^2 ({larger:.2g} makes alpha h^2/m = {_GOOD:g}), "
+        return message + 'more max_sweeps, or on_unconverged="count" or "impact"'

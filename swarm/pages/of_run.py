@@ -148,7 +148,7 @@ def _speed(content: Content, spent: float | None, threads: int | None) -> list[t
 def _versions(makers: dict[str, str], seed: int | None) -> list[tuple[str, str]]:
     """What the run was computed with."""
     names = {"version": "swarm", "python": "Python", "numpy": "NumPy", "numba": "Numba", "hdf5": "HDF5"}
-    rows = [(told, makers[name]) for name, told in names.items() if name in makers]
+    rows = [(title, makers[name]) for name, title in names.items() if name in makers]
     rows += [("machine", makers["machine"])] if "machine" in makers else []
     return rows + ([] if seed is None else [("seed of thermal walls", str(seed))])
 

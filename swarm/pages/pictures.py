@@ -81,29 +81,29 @@ def of_series(content: Content) -> list[PagePicture]:
     return found
 
 
-def svg(figure: Any, told: str) -> Markup:
-    """A figure in the light style as SVG in the colours of the page; `told` is its text for screen readers."""
+def svg(figure: Any, description: str) -> Markup:
+    """A figure in the light style as SVG in the colours of the page; `description` is its text for screen readers."""
     buffer = io.StringIO()
     with style.applied(), rc_context({"svg.hashsalt": "swarm"}):
         figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=False)
     text = buffer.getvalue()
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     if len(text) > _LARGEST:
-        return _png(lambda dark: figure, told, variants=False)
+        return _png(lambda dark: figure, description, variants=False)
     for colour, name in _COLOURS.items():
         text = re.sub(colour, name, text, flags=re.IGNORECASE)
     # Of several pictures in a page no two things have one name.
-    mine = f"g{hashlib.sha256((told + text).encode()).hexdigest()[:12]}-"
+    mine = f"g{hashlib.sha256((description + text).encode()).hexdigest()[:12]}-"
     text = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{mine}", text)
     head = re.search(r'viewBox="[^"]*"', text)
     body = text[text.index(">") + 1 :]
     label = Markup('<svg role="img" aria-label="{}" {} xmlns:xlink="http://www.w3.org/1999/xlink">').format(
-        told, Markup(head.group() if head else "")
+        description, Markup(head.group() if head else "")
     )
     return label + Markup(body)
 
 
-def _png(make: Any, told: str, variants: bool = True) -> Markup:
+def _png(make: Any, description: str, variants: bool = True) -> Markup:
     """A figure as PNG, light and dark; `make` draws it in the style that is applied."""
     data = []
     for dark in (False, True) if variants else (False,):
@@ -111,7 +111,7 @@ def _png(make: Any, told: str, variants: bool = True) -> Markup:
         with style.applied(dark):
             make(dark).savefig(buffer, format="png", dpi=_DPI)
         data.append(base64.b64encode(_smaller(buffer)).decode())
-    image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format(told, data[0])
+    image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format(description, data[0])
     if not variants:
         return image
     source = Markup('<source media="(prefers-color-scheme: dark)" srcset="data:image/png;base64,{}">').format(data[1])

@@ -28,14 +28,14 @@ class Again(NamedTuple):
         notes: sentences about them, in order.
         command: of a shell, or "".
         scene_file: the text of the scene file that the command runs, or "".
-        told: the name of that file, or a description of it.
+        file_name: the name of that file, or a description of it.
         python: the same in Python, or "".
     """
 
     notes: list[str]
     command: str = ""
     scene_file: str = ""
-    told: str = ""
+    file_name: str = ""
     python: str = ""
 
 
@@ -60,8 +60,8 @@ def of_trajectory(trajectory: Any) -> Again:
         notes.append("Its scene has long arrays, which are in the file too, and no scene file describes them.")
         return Again([*notes, _SAME], python=python)
     command = f"swarm run again.toml -o again.h5{plugins_of(tomllib.loads(text))}"
-    told = f"again.toml, a scene file made of what {name} holds; it must be beside {name}"
-    return Again([*notes, _SAME], command, text, told, python)
+    file_name = f"again.toml, a scene file made of what {name} holds; it must be beside {name}"
+    return Again([*notes, _SAME], command, text, file_name, python)
 
 
 def _of_scene_file(trajectory: Any, text: str) -> Again:
@@ -104,17 +104,17 @@ def _files_of(place: Any) -> Iterator[str]:
 
 def _hindrance(trajectory: Any) -> str:
     """Why a run cannot go on from the first frame of its trajectory, in a sentence; "" if it can."""
-    kept, told = _storage(trajectory), "It cannot be reproduced from this file alone: "
+    kept, cannot = _storage(trajectory), "It cannot be reproduced from this file alone: "
     if kept.frames == "none":
-        return f"{told}it was run in Python, and the file keeps no particles; keep the script that made it."
+        return f"{cannot}it was run in Python, and the file keeps no particles; keep the script that made it."
     if kept.frames != "all":
-        return f"{told}it was run in Python, and the file keeps every {kept.frames}th particle only; keep the script."
+        return f"{cannot}it was run in Python, and the file keeps every {kept.frames}th particle only; keep the script."
     if trajectory.has_births():
-        return f"{told}it was run in Python, and the file does not keep its sources; keep the script that made it."
+        return f"{cannot}it was run in Python, and the file does not keep its sources; keep the script that made it."
     if trajectory.body is not None and _is_rounded(trajectory):
-        return f"{told}it was run in Python, and the file keeps its bodies in float32; keep the script that made it."
+        return f"{cannot}it was run in Python, and the file keeps its bodies in float32; keep the script that made it."
     if any(table.get("kind") == "own" for table in _tables_of(tomllib.loads(trajectory.descriptions["scene"]))):
-        return f"{told}it has a user-defined surface, which no file holds; keep the script that made it."
+        return f"{cannot}it has a user-defined surface, which no file holds; keep the script that made it."
     return ""
 
 

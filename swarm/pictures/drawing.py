@@ -70,8 +70,8 @@ def colour_bar(
     every = np.unique(np.concatenate(packed)) if packed else np.empty(0, np.uint32)
     there = every[every & 0xFF > 0]
     if len(there) == 1:
-        told = _colour_in_words(quantity, low, high, there) if values is None else _values_in_words(quantity, values)
-        figure.supxlabel(told, fontsize=8.5, color=INK)
+        caption = _colour_in_words(quantity, low, high, there) if values is None else _values_in_words(quantity, values)
+        figure.supxlabel(caption, fontsize=8.5, color=INK)
         return
     bar = figure.colorbar(
         ScalarMappable(Normalize(low, high), MAP), ax=axes, location="bottom", shrink=0.5, aspect=55, pad=0.01
@@ -102,8 +102,8 @@ def _colour_in_words(quantity: str, low: float, high: float, colour: Colours) ->
     ends = [f"{low + k / MAP.N * (high - low):.4g}" for k in (step, step + 1)]
     name, unit = _named(quantity)
     within = f"of at most {ends[1]}" if step == 0 else f"of at least {ends[0]}"
-    told = within if step in (0, MAP.N - 1) else f"from {ends[0]} to {ends[1]}"
-    return f"all at a {name} {told} {unit}".strip()
+    text = within if step in (0, MAP.N - 1) else f"from {ends[0]} to {ends[1]}"
+    return f"all at a {name} {text} {unit}".strip()
 
 
 def _named(quantity: str) -> tuple[str, str]:

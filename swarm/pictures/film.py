@@ -130,9 +130,9 @@ def has_ffmpeg() -> bool:
 def _reason(error: Exception) -> str:
     """The message of an error, of ffmpeg the last line that it has written."""
     if isinstance(error, CalledProcessError):
-        said = error.stderr.decode(errors="replace") if isinstance(error.stderr, bytes) else error.stderr
+        message = error.stderr.decode(errors="replace") if isinstance(error.stderr, bytes) else error.stderr
         ended = signal.strsignal(-error.returncode) if error.returncode < 0 else f"exit code {error.returncode}"
-        return (said or "").strip().rpartition("\n")[2] or f"ffmpeg ended: {ended}"
+        return (message or "").strip().rpartition("\n")[2] or f"ffmpeg ended: {ended}"
     return cause(error)
 
 

@@ -206,7 +206,7 @@ def _errors(axes: Any, drawn: Curves, limit: float | None, unit: str) -> None:
     """The axis of errors: linear with the band of round-off, or logarithmic where they span decades above it."""
     values = np.concatenate([values for _times, values in drawn.values()])
     worst, least = float(values.max()), float(values[values > 0.0].min())
-    told = f"at most {plain(worst, 2)} {unit}".strip()
+    summary = f"at most {plain(worst, 2)} {unit}".strip()
     if limit is not None and worst > _DECADES * max(least, limit):
         low = 10.0 ** np.floor(np.log10(max(least, 1e-2 * limit)))
         axes.set_yscale("log", nonpositive="mask")
@@ -220,8 +220,8 @@ def _errors(axes: Any, drawn: Curves, limit: float | None, unit: str) -> None:
     bottom, top = axes.get_ylim()
     if limit is not None and limit > bottom:
         axes.axhspan(bottom, min(limit, top), color=GREY, alpha=0.16, linewidth=0, zorder=0, label="round-off")
-        told += ", round-off" if worst <= limit else ""
+        summary += ", round-off" if worst <= limit else ""
         if axes.get_yscale() == "log":
             axes.text(0.99, limit, "round-off below", color=GREY, transform=axes.get_yaxis_transform(), ha="right",
                       va="bottom", fontsize=8)  # fmt: skip
-    axes.text(0.5, 0.97, told, transform=axes.transAxes, ha="center", va="top", fontsize=8.5)
+    axes.text(0.5, 0.97, summary, transform=axes.transAxes, ha="center", va="top", fontsize=8.5)

@@ -73,8 +73,8 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
     shapes = shapes_of(still, np.zeros((3, 1)) if end is None else most_of(end.position), float(times[-1]))
     plots, spread = _shown(content, shapes), speeds.of_frames(content)
     count, width = len(plots) + bool(spread), wide * (1.0 if end is None else _SERIES)
-    told = sentences.in_lines(verdicts.marked(content), width)
-    text = sentences.height_of_lines(told)
+    lines = sentences.in_lines(verdicts.marked(content), width)
+    text = sentences.height_of_lines(lines)
     rows = graphs.rows_of(count, width)
     high = high or max(_LEAST, _HIGH * len(rows) + text + 0.4)
     picture = style.picture(wide, high)
@@ -92,7 +92,7 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
     _series(cells[: len(plots)], content, plots, rows[-1] - bool(spread))
     if spread:
         speeds.draw(cells[-1], content, spread)
-    sentences.write_below(below, told, text)
+    sentences.write_below(below, lines, text)
     picture.suptitle(words.title(content), fontsize=12)
     return picture
 
@@ -167,10 +167,10 @@ def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most:
     left = how_many_left(content.seen, content.gone.get(name))
     here = drawn.shown if content.body else int((~np.isnan(position[0])).sum())
     count -= sum(left.values())
-    told = many(count) if here == count else f"{many(here)} of {many(count)}"
+    count_text = many(count) if here == count else f"{many(here)} of {many(count)}"
     noun = drawn.noun if end.radius is None else "balls" if content.scene.plane is None else "discs"
     noun = noun if count != 1 else {"bodies": "body"}.get(noun, noun.removesuffix("s"))
-    title = f"{told} {noun}{' inside' * bool(left)}, t = {amount(float(content.seen['time'][-1]), 's')}"
+    title = f"{count_text} {noun}{' inside' * bool(left)}, t = {amount(float(content.seen['time'][-1]), 's')}"
     if (alike := speeds.of_all(content)) is not None:
         title += f",\neach with {amount(alike, 'm/s')}" if alike else ", all at rest"
     if left:

@@ -15,15 +15,15 @@ def in_lines(texts: list[str], width: float) -> list[str]:
     return [textwrap.fill(text, letters, subsequent_indent="    ") for text in texts]
 
 
-def height_of_lines(told: list[str]) -> float:
+def height_of_lines(lines: list[str]) -> float:
     """The height of these lines [inches]."""
-    return _LINE * (1.0 + sum(text.count("\n") + 1 for text in told))
+    return _LINE * (1.0 + sum(text.count("\n") + 1 for text in lines))
 
 
-def write_below(figure: Any, told: list[str], high: float) -> None:
+def write_below(figure: Any, lines: list[str], high: float) -> None:
     """Sentences, one below the other, in a figure of this height [inches]; what does not hold is red."""
     line = 0.3
-    for text in told:
+    for text in lines:
         figure.text(0.02, 1.0 - line * _LINE / high, text, va="top", fontsize=8.5,
                     color=style.RED if text.startswith("✗") else style.ink())  # fmt: skip
         line += text.count("\n") + 1

@@ -169,8 +169,8 @@ def _lines_of_numbers(seen: Mapping[str, Any]) -> list[Line]:
     """
     lines = []
     if "inside" in seen:
-        told = {"inside": "inside", "born": "came", "escaped": "escaped", "absorbed": "absorbed"}
-        lines = [Line(f"/number/{k}", name, k) for k, name in told.items() if np.any(seen.get(k, 0))]
+        words = {"inside": "inside", "born": "came", "escaped": "escaped", "absorbed": "absorbed"}
+        lines = [Line(f"/number/{k}", name, k) for k, name in words.items() if np.any(seen.get(k, 0))]
     counters = np.shape(seen.get("crossings", [[]]))[1]
     for k in range(counters):
         which = "" if counters == 1 else f"counter {k}"

@@ -30,9 +30,9 @@ def of_frames(content: Any) -> Spread:
     if not found:
         return {}
     top = _top(found)
-    told = [values for values in found.values() if not are_alike(values)]
+    varied = [values for values in found.values() if not are_alike(values)]
     return (
-        found if any(np.histogram(values, _BINS, (0.0, top))[0].max() < _ALL * len(values) for values in told) else {}
+        found if any(np.histogram(values, _BINS, (0.0, top))[0].max() < _ALL * len(values) for values in varied) else {}
     )
 
 

@@ -66,13 +66,13 @@ def require_packing(scene: Scene, radius: Floats, room: VolumeBox, most: float |
     # The volume is an estimate.
     if packing > _ABOUT * densest:
         raise SceneError(
-            f"radius must leave a packing of at most {densest:g} to random places, got {told(scene, radius, room)}; "
-            "use fewer or smaller balls, or swarm.pack, which grows them up to 0.6"
+            f"radius must leave a packing of at most {densest:g} to random places, got "
+            f"{packing_of(scene, radius, room)}; use fewer or smaller balls, or swarm.pack, which grows them up to 0.6"
         )
     return packing
 
 
-def told(scene: Scene, radius: Floats, room: VolumeBox) -> str:
+def packing_of(scene: Scene, radius: Floats, room: VolumeBox) -> str:
     """Balls in a volume, for a sentence."""
     unit, kind = ("m^3", "balls") if scene.plane is None else ("m^2", "discs")
     size = f"{radius[0]:g} m" if radius.min() == radius.max() else f"{radius.min():g} to {radius.max():g} m"
@@ -166,5 +166,6 @@ def _full(
     reached = balls_volume(scene, radius[done]) / room.volume
     return SceneError(
         f"fill found places for {int(done.sum())} of {radius.size} balls, a packing of {reached:.4g}, in {tried} "
-        f"tries, got {told(scene, radius, room)}; use fewer or smaller balls, or swarm.pack, which grows them up to 0.6"
+        f"tries, got {packing_of(scene, radius, room)}; use fewer or smaller balls, or swarm.pack, which grows "
+        "them up to 0.6"
     )

@@ -101,14 +101,14 @@ class Playback:
         drawn = self._rows.get((PARTICLES, _POSITIONS))
         if not drawn or "/time" not in scalars:
             raise ValueError("it is not a recording of swarm, or holds no frame")
-        said = {name: column for (entity, name), column in self._static.items() if entity == "/about"}
+        facts = {name: column for (entity, name), column in self._static.items() if entity == "/about"}
         for name in _ABOUT:
-            if name not in said:
+            if name not in facts:
                 raise ValueError(f"it does not say its {name}")
         known = (*_ABOUT, _NOUN, _PLANE, _TITLE)
-        self.about = {_NOUN: "particles", **{name: said[name].as_py()[0] for name in known if name in said}}
-        self.verdicts: list[str] | None = said[_VERDICTS].as_py() if _VERDICTS in said else None
-        self.center = np.array(said[_CENTER].as_py()) if _CENTER in said else np.zeros(3)
+        self.about = {_NOUN: "particles", **{name: facts[name].as_py()[0] for name in known if name in facts}}
+        self.verdicts: list[str] | None = facts[_VERDICTS].as_py() if _VERDICTS in facts else None
+        self.center = np.array(facts[_CENTER].as_py()) if _CENTER in facts else np.zeros(3)
         moments = scalars.pop("/time")
         # A crash may have left more points than rows of the time series.
         self.numbers = sorted(number for number in drawn if number in moments)

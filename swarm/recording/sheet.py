@@ -87,8 +87,11 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     every = series.plots_of({path: (playback.names[path], *values) for path, values in playback.series.items()})
     plots = {group: curves for group, curves in every.items() if not series.says_nothing(group, curves)}
     wide = _CELL * _COLUMNS
-    told = sentences.in_lines(_told(playback, every), wide)
-    rows, text = graphs.rows_of(len(plots), _PLOT * wide), sentences.height_of_lines(told) if told else 0.0
+    sentence_lines = sentences.in_lines(_sentences(playback, every), wide)
+    rows, text = (
+        graphs.rows_of(len(plots), _PLOT * wide),
+        sentences.height_of_lines(sentence_lines) if sentence_lines else 0.0,
+    )
     heights = [_HIGH * -(-len(frames) // _COLUMNS), max(2.7 * len(rows), 0.1), max(text, 0.1)]
     picture = style.picture(wide, sum(heights))
     top, middle, bottom = picture.subfigures(3, 1, height_ratios=heights, squeeze=False).ravel()
@@ -100,7 +103,7 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
         cells += list(part.subplots(1, number, squeeze=False).ravel()) if number else []
     for axes, (group, curves) in zip(cells, plots.items(), strict=True):
         graphs.lines(axes, series.GRAPHS[group].across(plane), curves)
-    sentences.write_below(bottom, told, heights[-1])
+    sentences.write_below(bottom, sentence_lines, heights[-1])
     return picture
 
 
@@ -136,7 +139,7 @@ def title_of_sheet(playback: Playback) -> str:
     return f"{playback.path.name}: {many(shown)}{of} {noun}, {frames} frame{'s' * (frames > 1)}"
 
 
-def _told(playback: Playback, every: dict[str, graphs.Curves]) -> list[str]:
+def _sentences(playback: Playback, every: dict[str, graphs.Curves]) -> list[str]:
     """Whether the run went well, or, where the recording does not say so, what would be empty plots."""
     if playback.verdicts is not None:
         return playback.verdicts

@@ -13,7 +13,7 @@ from ..kernel.vector import ZERO, column
 from ..methods.base import Method
 from ..scene import Scene
 from ..state import State
-from ..surfaces.wall_law import leave_of, mirrored, said_of, why_wrong
+from ..surfaces.wall_law import leave_of, mirrored, sentence_of, why_wrong
 from .preflight import softness
 from .starting_state import Seeding
 
@@ -109,7 +109,7 @@ def _of_law(compiled: CompiledScene, state: State, particle: int, moment: float,
                 given = law.leave(v, n, u, random.of_law(k), state.mass[particle])
                 if wrong := why_wrong(given, v, n, u, scene.moves()):
                     name = f"surfaces[{compiled.numbering.members[0, int(wall)]}].laws[{k}]"
-                    return f"; {name} {wrong}; {said_of(law, given, v, n, u)}"
+                    return f"; {name} {wrong}; {sentence_of(law, given, v, n, u)}"
                 v = mirrored(leave_of(given).v, n, u)
     return ""
 

@@ -48,11 +48,11 @@ def display(progress: "bool | Callable[[Any], None] | Display") -> Iterator[Disp
     elif not progress:
         yield Display(_nothing)
     else:
-        with told() as one:
+        with progress_listener() as one:
             yield _of_run(one, _A_MOMENT if sys.stderr.isatty() else _A_MINUTE)
 
 
-class Told(NamedTuple):
+class ProgressListener(NamedTuple):
     """A listener to progress: by the share that is done and a line about it, or by a sentence."""
 
     put: Callable[[float, str], None]
@@ -60,7 +60,7 @@ class Told(NamedTuple):
 
 
 @contextlib.contextmanager
-def told(sentences_stay: bool = False) -> Iterator[Told]:
+def progress_listener(sentences_stay: bool = False) -> Iterator[ProgressListener]:
     """A bar on a terminal, above which sentences stay, or which shows them for a moment; else a line a minute."""
     if not sys.stderr.isatty():
         yield in_lines(_A_MINUTE)
@@ -81,10 +81,10 @@ def told(sentences_stay: bool = False) -> Iterator[Told]:
             else:
                 bar.update(task, line=sentence, refresh=True)
 
-        yield Told(put, say)
+        yield ProgressListener(put, say)
 
 
-def in_lines(interval: float) -> Told:
+def in_lines(interval: float) -> ProgressListener:
     """Print a line when the last one is `interval` seconds old."""
     last = time.monotonic()
 
@@ -95,7 +95,7 @@ def in_lines(interval: float) -> Told:
             print(f"{100.0 * share:.1f}%  {line}", file=sys.stderr, flush=True)
             last = now
 
-    return Told(put, lambda sentence: print(sentence, file=sys.stderr, flush=True))
+    return ProgressListener(put, lambda sentence: print(sentence, file=sys.stderr, flush=True))
 
 
 def lines(interval: float) -> Display:
@@ -103,7 +103,7 @@ def lines(interval: float) -> Display:
     return _of_run(in_lines(interval), interval)
 
 
-def _of_run(one: Told, every: float) -> Display:
+def _of_run(one: ProgressListener, every: float) -> Display:
     """A display of the share that is done, and of a line about the last seconds."""
     recent = _Recent()
 

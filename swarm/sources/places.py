@@ -24,7 +24,7 @@ _LOG = logging.getLogger("swarm")
 # place of a birth.
 _BATCH, _FEW, _MOST_BATCHES = 1 << 14, 1 << 11, 250
 # The progress of the search is logged after so many batches, and after every doubling of their number.
-_TOLD = 32
+_FIRST_REPORT = 32
 # Steps of a point onto its surface.
 _STEPS = 3
 # Of the extent, a way out of a wall on which no other part of a union is in that place.
@@ -171,15 +171,15 @@ class PointBatches:
             SceneError: fewer than one in a million of the points tried are admissible.
         """
         found: list[Floats] = []
-        count, tried, told = 0, 0, _TOLD * self._batch
+        count, tried, next_report = 0, 0, _FIRST_REPORT * self._batch
         while count < n:
             some = self._volume(random) if self._place.volume else self._surface(random)
             found.append(some[:, : n - count])
             count, tried = count + found[-1].shape[1], tried + self._batch
             if tried >= _MOST_BATCHES * self._batch and count < 1e-6 * tried:
                 raise SceneError(self._sentence(count, tried))
-            if tried >= told and count < n:
-                told = 2 * tried
+            if tried >= next_report and count < n:
+                next_report = 2 * tried
                 _LOG.warning("%s: %d of %d births have a place so far, after %d points", self._name, count, n, tried)
         points, normals = np.concatenate(found, axis=1).reshape(2, 3, n)
         return points, normals

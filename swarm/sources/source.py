@@ -93,8 +93,8 @@ class Source(Validated):
 
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults."""
-        said = [f for f in fields(self) if f.default is MISSING or getattr(self, f.name) is not f.default]
-        return f"Source({', '.join(f'{f.name}={_said(getattr(self, f.name))}' for f in said)})"
+        given = [f for f in fields(self) if f.default is MISSING or getattr(self, f.name) is not f.default]
+        return f"Source({', '.join(f'{f.name}={_as_text(getattr(self, f.name))}' for f in given)})"
 
     def _check_place(self) -> None:
         if isinstance(self.where, (int, np.integer)) and not isinstance(self.where, bool):
@@ -168,5 +168,5 @@ def checked_sources(name: str, value: Any) -> tuple[Source, ...]:
     return tuple(given)
 
 
-def _said(value: Any) -> str:
+def _as_text(value: Any) -> str:
     return checks.shown(value) if isinstance(value, tuple) and len(value) > 3 else repr(value)

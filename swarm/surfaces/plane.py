@@ -87,10 +87,10 @@ def require_start(scene: Any, particles: Any) -> None:
         off = np.flatnonzero(rows[across])
         if off.size:
             k = int(off[np.argmax(np.abs(rows[across, off]))])
-            told = "out of it" if what == "start" else "with a velocity out of it"
+            where = "out of it" if what == "start" else "with a velocity out of it"
             raise SceneError(
                 f'particles must be in the plane {scene.plane} = 0 of a scene with plane = "{scene.plane}", got '
-                f"{off.size} of {rows.shape[1]} {told}; the farthest is particle {k}, by {rows[across, k]:g} {unit}; "
+                f"{off.size} of {rows.shape[1]} {where}; the farthest is particle {k}, by {rows[across, k]:g} {unit}; "
                 f"set particles.{'position' if what == 'start' else 'velocity'}[{across}] to 0, or use swarm.fill"
             )
 
@@ -120,7 +120,7 @@ def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> Non
             name = type(surface).__name__
             raise SceneError(
                 f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got {name}, whose '
-                f"normal at {_told(places[:, k])} is {_size(part[k])} out of the plane and would send particles out "
+                f"normal at {_as_text(places[:, k])} is {_size(part[k])} out of the plane and would send particles out "
                 f"of it; {_mended(surface, across)}"
             )
 
@@ -130,7 +130,7 @@ def _require_upright(plane: str, i: int, surface: Outlined) -> None:
     if surface.across != PLANES[plane]:
         raise SceneError(
             f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got '
-            f"{type(surface).__name__} with its axis along {_told(surface.frame[:, 2])[:-2]}; give it axis = "
+            f"{type(surface).__name__} with its axis along {_as_text(surface.frame[:, 2])[:-2]}; give it axis = "
             f"{tuple(float(name == plane) for name in PLANES)}, and turn it about that"
         )
 
@@ -139,7 +139,7 @@ def _size(part: float) -> str:
     return f"{math.degrees(math.asin(min(1.0, abs(part)))):.3g} degrees"
 
 
-def _told(point: Any) -> str:
+def _as_text(point: Any) -> str:
     return f"({', '.join(f'{x:.4g}' for x in point)}) m"
 
 
@@ -204,9 +204,9 @@ def _starts(surface: Surface, across: int, reach: float) -> Floats:
 def _require_motion(plane: str, where: str, surface: Surface) -> None:
     across = PLANES[plane]
     for part in parts_of(surface.motion):
-        for said in _leaving(part, across):
+        for came in _leaving(part, across):
             raise SceneError(
-                f'{where} must stay in the plane where plane = "{plane}", got {said}; leave that out, or move the wall '
+                f'{where} must stay in the plane where plane = "{plane}", got {came}; leave that out, or move the wall '
                 f"along the plane and turn it about {plane}"
             )
 
@@ -222,8 +222,8 @@ def _require_laws(plane: str, where: str, surface: Surface) -> None:
             if stays and after[across] != 0.0:
                 raise SceneError(
                     f'{where}[{k}] must send particles along the plane where plane = "{plane}": {plane} = 0 of the '
-                    f"velocity that leave returns; {law} returned {checks.shown(after)} for v = {_told(v)[:-2]} "
-                    f"and n = {_told(n)[:-2]}"
+                    f"velocity that leave returns; {law} returned {checks.shown(after)} for v = {_as_text(v)[:-2]} "
+                    f"and n = {_as_text(n)[:-2]}"
                 )
 
 

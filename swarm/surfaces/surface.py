@@ -131,8 +131,8 @@ class Surface(Validated):
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults."""
         own = sorted(fields(self), key=lambda field: bool(field.kw_only))
-        said = [f for f in own if f.default is MISSING or getattr(self, f.name) != f.default]
-        return f"{type(self).__name__}({', '.join(f'{f.name}={getattr(self, f.name)!r}' for f in said)})"
+        changed = [f for f in own if f.default is MISSING or getattr(self, f.name) != f.default]
+        return f"{type(self).__name__}({', '.join(f'{f.name}={getattr(self, f.name)!r}' for f in changed)})"
 
     def numbers(self) -> Any:
         """The record that kernels take in place of this description, before it is rotated."""

@@ -143,7 +143,7 @@ def _try(name: str, law: Any) -> None:
     """Raise a `SceneError` where a law sends a particle into the wall, or gives no velocity."""
     for v, n, given in tries_of(law):
         if wrong := why_wrong(given, v, n, ZERO):
-            raise SceneError(f"{name} {wrong}; {said_of(law, given, v, n, ZERO)}")
+            raise SceneError(f"{name} {wrong}; {sentence_of(law, given, v, n, ZERO)}")
 
 
 def why_wrong(given: Any, v: Vec, n: Vec, u: Vec, moves: bool = False) -> str:
@@ -188,19 +188,19 @@ def may_end(law: Any) -> bool:
     return isinstance(next(tries_of(law))[2], Leave)
 
 
-def said_of(law: Any, given: Any, v: Vec, n: Vec, u: Vec) -> str:
+def sentence_of(law: Any, given: Any, v: Vec, n: Vec, u: Vec) -> str:
     """What a law has returned for which arguments."""
-    return f"{law} returned {_shown(given)} for v = {_said(v)}, n = {_said(n)} and u = {_said(u)}"
+    return f"{law} returned {_shown(given)} for v = {_as_text(v)}, n = {_as_text(n)} and u = {_as_text(u)}"
 
 
 def _shown(given: Any) -> str:
     if isinstance(given, Leave):
         return f"Leave({_shown(given.v)}, stays={given.stays}, wait={given.wait})"
     try:
-        return _said(given)
+        return _as_text(given)
     except (TypeError, ValueError):
         return shown(given)
 
 
-def _said(vector: Vec) -> str:
+def _as_text(vector: Vec) -> str:
     return f"({', '.join(f'{part:.3g}' for part in vector)})"

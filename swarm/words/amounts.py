@@ -89,8 +89,8 @@ def amounts(values: Sequence[float], unit: str, digits: int = 4) -> str:
     """
     largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
     factor, written = prefixed(float(f"{largest:.{digits}g}"), unit)
-    told = [plain(float(f"{value * factor:.12g}"), digits) for value in values]
-    return f"{listed(told)} {written}"
+    texts = [plain(float(f"{value * factor:.12g}"), digits) for value in values]
+    return f"{listed(texts)} {written}"
 
 
 def prefixed(size: float, unit: str) -> tuple[float, str]:

@@ -57,11 +57,11 @@ def labels(scene: Scene) -> dict[tuple[int, Place], str]:
         surface = part_at(scene.surfaces[i], where)
         number, noun = number_of(surface), noun_of(surface, scene)
         nouns[i, where] = noun if number == 1 else f"{many(number)} {plural_of(noun)}"
-    often, seen, told = Counter(nouns.values()), Counter[str](), {}
+    often, seen, names = Counter(nouns.values()), Counter[str](), {}
     for key, noun in nouns.items():
         seen[noun] += 1
-        told[key] = noun if often[noun] == 1 else f"{noun} {seen[noun]}"
-    return told
+        names[key] = noun if often[noun] == 1 else f"{noun} {seen[noun]}"
+    return names
 
 
 def moves_how(surface: Surface) -> str:
@@ -69,74 +69,74 @@ def moves_how(surface: Surface) -> str:
     if surface.reacts():
         return "impacts swing" if surface.mass is None or surface.inertia is not None else "impacts push"
     kinds = {type(part).__name__ for part in getattr(surface.motion, "parts", (surface.motion,))}
-    for kind, told in (("Rotation", "turns"), ("Oscillation", "shakes"), ("Translation", "moves"), ("Path", "moves")):
+    for kind, verb in (("Rotation", "turns"), ("Oscillation", "shakes"), ("Translation", "moves"), ("Path", "moves")):
         if kind in kinds:
-            return told
+            return verb
     return "" if surface.motion is None else "is moved"
 
 
 def size_of(surface: Surface) -> str:
     """The size of a surface, such as "of radius 0.5 m"; "" if it has no length."""
-    told = []
+    texts = []
     for name, noun in _SIZES.items():
         value = getattr(surface, name, None)
         if value is None or (name == "length" and type(surface).__name__ in ("Formula", "OwnSurface")):
             continue
         numbers = np.unique(np.asarray(value, np.float64).ravel()) if surface.is_field else np.ravel(value)
         if len(numbers) > 3 or (surface.body_count() and len(numbers) > 1):
-            told.append(f"{noun} from {amounts([numbers.min(), numbers.max()], 'm').replace(' and ', ' to ')}")
+            texts.append(f"{noun} from {amounts([numbers.min(), numbers.max()], 'm').replace(' and ', ' to ')}")
         elif name != "offset" or numbers[0]:
-            told.append(f"{noun} {amounts(numbers.tolist(), 'm')}")
+            texts.append(f"{noun} {amounts(numbers.tolist(), 'm')}")
     if hasattr(surface, "half_angle"):
-        told.append(f"half angle {math.degrees(surface.half_angle):.4g}°")
+        texts.append(f"half angle {math.degrees(surface.half_angle):.4g}°")
     if isinstance(surface, Mesh):
-        told.append(f"{many(len(surface))} triangles, volume {amount(surface.volume(), 'm³')}")
+        texts.append(f"{many(len(surface))} triangles, volume {amount(surface.volume(), 'm³')}")
     elif surface.face_noun:
-        told.append(f"{many(len(surface))} {surface.face_noun}s")  # type: ignore[arg-type]
+        texts.append(f"{many(len(surface))} {surface.face_noun}s")  # type: ignore[arg-type]
     if hasattr(surface, "formula"):
-        told.append(f"{surface.formula} = 0".replace("**", "^"))
+        texts.append(f"{surface.formula} = 0".replace("**", "^"))
     if surface.parts:
-        told.append(f"of {listed([in_full(part) for part in surface.parts])}")
-    return ", ".join(told)
+        texts.append(f"of {listed([in_full(part) for part in surface.parts])}")
+    return ", ".join(texts)
 
 
 def in_full(surface: Surface, scene: Scene | None = None) -> str:
     """A surface in full: what it is, its size, where it is, its laws, its openings and its motion."""
     number, noun = number_of(surface), noun_of(surface, scene)
-    told = [counted_in_words(number, noun) if number > 1 else one(noun)]
+    texts = [counted_in_words(number, noun) if number > 1 else one(noun)]
     if size := size_of(surface):
-        told[0] += f" {size}" if size.startswith("of ") else f" of {size}"
+        texts[0] += f" {size}" if size.startswith("of ") else f" of {size}"
     if hasattr(surface, "normal"):
-        told.append(f"normal along {direction(surface.normal)}")
+        texts.append(f"normal along {direction(surface.normal)}")
     axis = getattr(surface, "axis", None)
     if axis is not None and scene is not None and scene.plane is None:
-        told.append(f"axis along {direction(axis)}")
+        texts.append(f"axis along {direction(axis)}")
     center = getattr(surface, "center", None)
     if center is not None and any(center):
-        told.append(f"centre at {place(center)}")
+        texts.append(f"centre at {place(center)}")
     if surface.rotation is not None:
-        told.append(f"turned by {math.degrees(2.0 * math.acos(min(1.0, abs(surface.rotation[0])))):.4g}°")
-    return ", ".join(told + _of_mesh(surface) + laws_of(surface) + changes_of(surface))
+        texts.append(f"turned by {math.degrees(2.0 * math.acos(min(1.0, abs(surface.rotation[0])))):.4g}°")
+    return ", ".join(texts + _of_mesh(surface) + laws_of(surface) + changes_of(surface))
 
 
 def _of_mesh(surface: Any) -> list[str]:
     """How far a surface is from the mesh that it is made of, and how far corners were moved to close seams."""
     error, moved = getattr(surface, "mesh_error", None), getattr(surface, "mesh_weld", None)
-    told = [] if error is None else [f"within {amount(error, 'm', 2)} of its mesh"]
-    return told + ([f"corners moved by up to {amount(moved, 'm', 2)} to close seams"] if moved else [])
+    texts = [] if error is None else [f"within {amount(error, 'm', 2)} of its mesh"]
+    return texts + ([f"corners moved by up to {amount(moved, 'm', 2)} to close seams"] if moved else [])
 
 
 def laws_of(surface: Surface) -> list[str]:
     """The laws of the wall of a surface; empty for a wall that keeps the energy."""
-    told = []
+    texts = []
     if surface.restitution < 1.0:
-        told.append(f"restitution {plain(surface.restitution)}")
+        texts.append(f"restitution {plain(surface.restitution)}")
     if surface.friction:
-        told.append(f"friction {plain(surface.friction)}")
+        texts.append(f"friction {plain(surface.friction)}")
     if surface.temperature is not None:
         part = "" if surface.accommodation == 1.0 else f" for {plain(100.0 * surface.accommodation)} % of the impacts"
-        told.append(f"warm, k_B T = {amount(surface.temperature, 'J')}{part}")
-    return told + [law_of(law) for law in surface.laws]
+        texts.append(f"warm, k_B T = {amount(surface.temperature, 'J')}{part}")
+    return texts + [law_of(law) for law in surface.laws]
 
 
 def law_of(law: Any) -> str:
@@ -148,34 +148,34 @@ def law_of(law: Any) -> str:
         chance = float(law.probability)
         return "absorbs" if chance == 1.0 else f"absorbs {plain(100.0 * chance)} %"
     named = {"CercignaniLampis": "Cercignani and Lampis' law", "Lambert": "diffuse by Lambert's law"}
-    told = named.get(kind, {"Sticky": "holds particles for a time"}.get(kind, f"the law {law}"))
+    text = named.get(kind, {"Sticky": "holds particles for a time"}.get(kind, f"the law {law}"))
     if kind == "CercignaniLampis":
-        told += f" at k_B T = {amount(float(law.temperature), 'J')}"
-    return told
+        text += f" at k_B T = {amount(float(law.temperature), 'J')}"
+    return text
 
 
 def changes_of(surface: Surface) -> list[str]:
     """The changes of a surface with time: openings, doors, motion, and the effects of impacts."""
-    told = []
+    texts = []
     doors = [one for one in surface.openings if isinstance(one, Opening) and one.times is not None]
     if doors:
-        told.append(counted_in_words(len(doors), "door"))
+        texts.append(counted_in_words(len(doors), "door"))
     if holes := len(surface.openings) - len(doors):
-        told.append(counted_in_words(holes, "opening"))
+        texts.append(counted_in_words(holes, "opening"))
     if faces := getattr(surface, "open", ()):
-        told.append(f"open at {listed(list(map(str, faces)))}")
+        texts.append(f"open at {listed(list(map(str, faces)))}")
     if surface.present is not None:
         spans = [
             f"from {amount(begin, 's')}" + ("" if math.isinf(end) else f" to {amount(end, 's')}")
             for begin, end in surface.present
         ]
-        told.append(f"there {listed(spans)}")
-    told += [motion_of(part) for part in getattr(surface.motion, "parts", (surface.motion,)) if part is not None]
+        texts.append(f"there {listed(spans)}")
+    texts += [motion_of(part) for part in getattr(surface.motion, "parts", (surface.motion,)) if part is not None]
     if surface.mass is not None:
-        told.append(f"mass {amount(surface.mass, 'kg')}, moved by impacts")
+        texts.append(f"mass {amount(surface.mass, 'kg')}, moved by impacts")
     if surface.inertia is not None:
-        told.append(f"inertia {plain(surface.inertia)} kg m², turned by impacts")
-    return told
+        texts.append(f"inertia {plain(surface.inertia)} kg m², turned by impacts")
+    return texts
 
 
 def motion_of(motion: Any) -> str:

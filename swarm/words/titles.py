@@ -37,17 +37,17 @@ def _brief(scene: Scene, brief: int) -> str:
     solids = [one for one in scene.surfaces if one.is_solid()]
     around = [one for one in scene.surfaces if not one.is_solid()]
     flat = scene.plane is not None
-    told = _around(scene, around, brief)
+    text = _around(scene, around, brief)
     if solids:
-        told += f" {'with' if around else 'among'} {_several(scene, solids, brief)}" + " in it" * bool(around)
+        text += f" {'with' if around else 'among'} {_several(scene, solids, brief)}" + " in it" * bool(around)
     if flat and brief < 5:
-        told = f"in a billiard of two dimensions: {told.strip().removeprefix('in ')}"
+        text = f"in a billiard of two dimensions: {text.strip().removeprefix('in ')}"
     if scene.period is not None:
-        told = "in a cell that repeats" + f" {told}" * bool(told) * (brief < 5)
-    leans = any(name in told for name in (" floor", " lid", " slope"))
+        text = "in a cell that repeats" + f" {text}" * bool(text) * (brief < 5)
+    leans = any(name in text for name in (" floor", " lid", " slope"))
     if scene.gravity is not None and brief < 6 and not (brief == 3 and leans):
-        told += ", under gravity"
-    return (told + _laws(scene) if brief < 1 else told).strip()
+        text += ", under gravity"
+    return (text + _laws(scene) if brief < 1 else text).strip()
 
 
 def _around(scene: Scene, around: list[Surface], brief: int) -> str:
@@ -75,14 +75,14 @@ def _several(scene: Scene, surfaces: list[Surface], brief: int) -> str:
         found[nouns.noun_of(surface, scene), moves] += nouns.number_of(surface)
     if brief >= 4 and len(found) > 1 and (brief >= 5 or len(found) > _FEW):
         return counted_in_words(sum(found.values()), "solid" if surfaces[0].is_solid() else "wall")
-    told = []
+    texts = []
     for (noun, moves), count in found.items():
         named = counted_in_words(count, noun)
         if count == 1 and noun in ("vessel", "compound solid", "intersection") and not moves:
             named = _compound(scene, surfaces, noun)
         verb = moves[:-1] if count > 1 and moves.endswith("s") and not moves.startswith("i") else moves
-        told.append(f"{named} that {verb}" if moves else named)
-    return listed(told)
+        texts.append(f"{named} that {verb}" if moves else named)
+    return listed(texts)
 
 
 def _compound(scene: Scene, surfaces: list[Surface], noun: str) -> str:
@@ -98,12 +98,13 @@ def _laws(scene: Scene) -> str:
     """What the walls do to the energy or the number of particles, as the end of a title."""
     pieces = [*scene.surfaces, *(part_at(scene.surfaces[i], where) for i, where in scene.parts)]
     kinds = {type(law).__name__ for piece in pieces for law in piece.laws}
-    told = ["warm"] * (any(piece.temperature is not None for piece in pieces) or "CercignaniLampis" in kinds)
-    told += ["diffuse"] * ("Lambert" in kinds) + ["absorbing"] * ("Absorb" in kinds) + ["sticky"] * ("Sticky" in kinds)
+    adjectives = ["warm"] * (any(piece.temperature is not None for piece in pieces) or "CercignaniLampis" in kinds)
+    for kind, adjective in (("Lambert", "diffuse"), ("Absorb", "absorbing"), ("Sticky", "sticky")):
+        adjectives += [adjective] * (kind in kinds)
     lossy = any(piece.restitution < 1.0 or piece.friction for piece in pieces)
-    told += ["lossy"] * lossy
+    adjectives += ["lossy"] * lossy
     doors = ", with doors" * any("door" in " ".join(nouns.changes_of(piece)) for piece in pieces)
-    return (f", {' and '.join(told)} walls" if told else "") + doors
+    return (f", {' and '.join(adjectives)} walls" if adjectives else "") + doors
 
 
 # --- What runs -------------------------------------------------------------------------------------------
@@ -122,12 +123,12 @@ def of_particles(content: Any) -> str:
     noun = "particle"
     if radius is not None:
         noun = "ball" if content.scene.plane is None else "disc"
-    told = f"1 {noun}" if count == 1 else f"{many(count)} {plural_of(noun)}"
+    text = f"1 {noun}" if count == 1 else f"{many(count)} {plural_of(noun)}"
     if radius is not None and len(radius):
         low, high = float(np.nanmin(radius)), float(np.nanmax(radius))
         size = amount(low, "m") if low == high else amounts([low, high], "m").replace(" and ", " to ")
-        told += f" of {size} radius"
-    return told
+        text += f" of {size} radius"
+    return text
 
 
 def noun_of_body(body: Body) -> str:
@@ -175,7 +176,7 @@ def title(content: Any) -> str:
     step, name = of_method(content.method), of_method(content.method).split(",")[0]
     for brief in _BREVITY:
         method = step if brief < 2 else name
-        told = f"{what}{came} {_brief(content.scene, brief)}: {method}, {end}"
-        if len(told) < LONGEST:
-            return told
+        text = f"{what}{came} {_brief(content.scene, brief)}: {method}, {end}"
+        if len(text) < LONGEST:
+            return text
     return f"{what}: {name}, {end}"

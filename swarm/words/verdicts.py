@@ -101,13 +101,13 @@ def _balance(content: Any) -> list[Statement]:
             return [Statement("total energy", "constant to the last bit", True)]
         kept, moved = "constant" if holds else "not constant", f"{plain(part, 2)} of the energy that moved"
         return [Statement("total energy", f"{kept}: it changes by {moved}{why}", holds)]
-    told = [
+    terms = [
         f"{name} {amount(float(values[-1]) * (-1 if name == 'dissipated' else 1), 'J', 3)}"
         for name, values in changes.items()
     ]
     closes = "closes" if holds else "does not close: it is off by"
     to = f"to {plain(part, 2)}" if holds else plain(part, 2)
-    return [Statement("balance of energy", f"{closes} {to} of what moved ({listed(told)})", holds)]
+    return [Statement("balance of energy", f"{closes} {to} of what moved ({listed(terms)})", holds)]
 
 
 def _penetration(content: Any) -> list[Statement]:

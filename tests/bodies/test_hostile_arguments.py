@@ -149,8 +149,8 @@ def outcome(make, arguments):
     try:
         made = make(**arguments)
     except swarm.SwarmError as error:
-        said = str(error)
-        return None if 0 < len(said) < 700 and "\n" not in said else said
+        message = str(error)
+        return None if 0 < len(message) < 700 and "\n" not in message else message
     except Exception as error:
         return repr(error)
     return None if made is not None else "nothing"

@@ -41,7 +41,7 @@ def test_balls_far_away_have_not_escaped():
     assert end.observables["collisions"][-1] == 1
 
 
-def test_points_are_told_what_they_lack():
+def test_points_are_refused_with_what_they_lack():
     point = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
     for method in (swarm.Impact(), swarm.Penalty(dt=1e-3, penalty=1e3)):
         with pytest.raises(swarm.SceneError, match=r"at least one surface.*give walls, or give the particles a rad"):

@@ -129,7 +129,7 @@ def test_a_door_that_comes_and_goes():
     np.testing.assert_allclose(first[1], -0.5, atol=1e-14)
 
 
-def test_a_wall_that_comes_where_a_ball_is_is_told():
+def test_a_wall_that_comes_where_a_ball_is_is_reported():
     wall = swarm.Slab((1.0, 0.0, 0.0), 0.1, side="outside", present=[(1.0, math.inf)])
     start = swarm.Particles((-0.25, 0.0, 0.0), (0.1, 0.0, 0.0), radius=0.1)
     with pytest.raises(

@@ -47,7 +47,7 @@ def run(made, until, **options):
     return swarm.simulate(*made, swarm.Impact(), until=until, **{"compile": "never", "threads": 1, **options})
 
 
-def said_in(caplog, made, until, frames=1000, **options):
+def warning_in(caplog, made, until, frames=1000, **options):
     """What is said in a run, which ends with the frame after it: balls at rest are dear."""
 
     def stop(_frame):
@@ -56,13 +56,13 @@ def said_in(caplog, made, until, frames=1000, **options):
 
     with pytest.raises(SaidError):
         run(made, until, every=until / frames, progress=stop, **options)
-    (said,) = sentences(caplog)
-    return said
+    (warning,) = sentences(caplog)
+    return warning
 
 
-def moment_of(said):
+def moment_of(warning):
     """When balls rested first [s]."""
-    return float(said.split(", at ")[1].split()[0])
+    return float(warning.split(", at ")[1].split()[0])
 
 
 def heap(duration=None):
@@ -92,31 +92,31 @@ REST = {
 
 
 @pytest.mark.parametrize("name", REST)
-def test_a_ball_that_rests_is_said(name, caplog):
-    said = said_in(caplog, REST[name](), 0.2)
-    assert "contact_duration" in said
-    assert "Penalty" in said
-    assert moment_of(said) == pytest.approx(LIES, abs=0.25 * LIES)
+def test_a_ball_that_rests_is_reported(name, caplog):
+    warning = warning_in(caplog, REST[name](), 0.2)
+    assert "contact_duration" in warning
+    assert "Penalty" in warning
+    assert moment_of(warning) == pytest.approx(LIES, abs=0.25 * LIES)
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_elastic_balls_that_start_at_rest_are_said(count, caplog):
+def test_elastic_balls_that_start_at_rest_are_reported(count, caplog):
     """On a floor, and on one another: nothing is lost, and no time passes from impact to impact."""
     floor = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0)], gravity=G)
     position = np.zeros((3, count))
     position[2] = RADIUS * (1.0 + 2.0 * np.arange(count))
-    said = said_in(caplog, (floor, swarm.Particles(position, 0.0 * position, 5e-3, radius=RADIUS)), 1e-3)
-    assert "start them elsewhere" in said
-    assert moment_of(said) < 1e-3
+    warning = warning_in(caplog, (floor, swarm.Particles(position, 0.0 * position, 5e-3, radius=RADIUS)), 1e-3)
+    assert "start them elsewhere" in warning
+    assert moment_of(warning) < 1e-3
 
 
 def test_the_moment_is_the_same_in_pieces(tmp_path, caplog):
     """Frames, threads and sessions change no bit of it; a session that goes on behind it says it again, once."""
-    said = said_in(caplog, heap(), 0.3)
-    assert LIES < moment_of(said) < 0.3
-    end = moment_of(said) + 1e-3
+    warning = warning_in(caplog, heap(), 0.3)
+    assert LIES < moment_of(warning) < 0.3
+    end = moment_of(warning) + 1e-3
     run(heap(), end, threads=2)
-    assert sentences(caplog) == [said]
+    assert sentences(caplog) == [warning]
     files = {"trajectory": tmp_path / "heap.h5", "checkpoint": 1e3, "every": 0.25 * end}
 
     def stop(frame):
@@ -127,14 +127,14 @@ def test_the_moment_is_the_same_in_pieces(tmp_path, caplog):
         run(heap(), end, progress=stop, **files)
     assert not sentences(caplog)
     run(heap(), end, resume=True, **files)
-    assert sentences(caplog) == [said]
+    assert sentences(caplog) == [warning]
     with swarm.load(tmp_path / "heap.h5") as trajectory:
         assert trajectory.times[-1] == end
 
 
-def test_with_the_contact_duration_that_is_proposed_nothing_is_said(caplog):
-    said = said_in(caplog, heap(), 0.3)
-    proposed = float(said.split("contact_duration=")[1].split(")")[0])
+def test_no_warning_with_the_contact_duration_that_is_proposed(caplog):
+    warning = warning_in(caplog, heap(), 0.3)
+    proposed = float(warning.split("contact_duration=")[1].split(")")[0])
     assert proposed == pytest.approx(0.05 * FALL, rel=0.1)
     run(heap(proposed), 0.6)
     assert not sentences(caplog)
@@ -178,7 +178,7 @@ FLY = {
 
 
 @pytest.mark.parametrize("name", FLY)
-def test_of_balls_that_fly_nothing_is_said(name, caplog):
+def test_no_warning_of_balls_that_fly(name, caplog):
     made, until = FLY[name]()
     with caplog.at_level(logging.WARNING, "swarm"):
         seen = run(made, until).observables
@@ -193,13 +193,13 @@ def test_the_heap_of_a_user():
     ends = [swarm.Plane((0.0, 0.0, -1.0), 0.0, **law), swarm.Plane((0.0, 0.0, 1.0), 1.0)]
     scene = swarm.Scene([swarm.Cylinder(0.05, **law), *ends], gravity=G, pairs=swarm.Pairs(0.7))
     start = swarm.fill(scene, 200, radius=0.008, mass=5e-3, speed=0.0, seed=1)
-    logger, said = logging.getLogger("swarm"), []
+    logger, messages = logging.getLogger("swarm"), []
     handler = logging.Handler()
-    handler.emit = lambda record: said.append(record.getMessage())
+    handler.emit = lambda record: messages.append(record.getMessage())
     logger.addHandler(handler)
     try:
         seen = run((scene, start), 0.65, compile="auto").observables
     finally:
         logger.removeHandler(handler)
-    assert any("rest on one another" in one and "contact_duration" in one for one in said)
+    assert any("rest on one another" in one and "contact_duration" in one for one in messages)
     assert seen["collisions"][-1] < 2e5

@@ -28,7 +28,7 @@ def test_a_ball_escapes_where_its_foot_is_in_the_opening():
     assert seen.observables["impacts"][-1] == 1
 
 
-def test_who_has_escaped_meets_nobody():
+def test_an_escaped_ball_meets_no_other():
     start = swarm.Particles([[0.0, -0.5], [0.0] * 2, [0.0] * 2], [[1.0, 0.5], [0.0] * 2, [0.0] * 2], radius=0.1)
     scene = swarm.Scene([swarm.Box((1.0,) * 3, openings=[swarm.Sphere(0.05, center=(1.0, 0.0, 0.0))])])
     seen = swarm.simulate(scene, start, swarm.Impact(), until=5.0, compile="never")
@@ -149,7 +149,7 @@ class Waits(swarm.WallLaw):
         return swarm.Leave(mirrored(v, n, u), wait=self.time)
 
 
-def test_who_would_wait_on_a_wall_is_told():
+def test_a_ball_that_would_wait_on_a_wall_is_refused():
     start = swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), radius=0.1)
     with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws\[0\] must not let particles with a radius wait"):
         swarm.simulate(swarm.Scene([swarm.Box((1.0,) * 3, laws=[swarm.Sticky(0.1)])]), start, swarm.Impact(), until=1.0)

@@ -398,14 +398,14 @@ def test_reaction_of_the_composite_form_solves_its_step(name, **step):
     step = Contact(name, **step)
     for law in LAWS.values():
         for part in MULTIPLIERS:
-            held, end, told, solved = step.reaction(COMPOSITE, law, part)
+            held, end, level, solved = step.reaction(COMPOSITE, law, part)
             assert solved, (law, part)
             d = vector(forms.composite, law, step.surface, step.start, end)
             first, last = (constraint(law, step.surface, r) for r in (step.start, end))
             expected = step.c(law) * d * (0.5 * law.alpha * (first + last) + (step.multiplier(law, part) or 0.0))
             assert size(held - expected) <= step.slack(law, part, end), (law, part)
             unsure = 2.0 * steepest(law, step.surface, step.start, end) * uncertainty(step.surface, step.start, end)
-            assert told == pytest.approx(last, rel=1e-12, abs=unsure), (law, part)
+            assert level == pytest.approx(last, rel=1e-12, abs=unsure), (law, part)
 
 
 def _mean_value_step(name, law, part, lean, depth, length, stiffness):
@@ -415,13 +415,13 @@ def _mean_value_step(name, law, part, lean, depth, length, stiffness):
     """
     point, direction = np.array([0.4, -0.7, 0.5]), np.array([0.3, 0.5, -0.6])
     step = Contact(name, point, direction, lean, depth, length, stiffness)
-    held, end, told, solved = step.reaction(MEAN_VALUE, law, part)
+    held, end, level, solved = step.reaction(MEAN_VALUE, law, part)
     first, last = (constraint(law, step.surface, r) for r in (step.start, end))
     strength = step.c(law) * (0.5 * law.alpha * (first + last) + (step.multiplier(law, part) or 0.0))
     unsure = 4.0 * steepest(law, step.surface, step.start, end) * uncertainty(step.surface, step.start, end)
     miss = abs(held @ (end - step.start) - strength * (last - first))
     slack = strength * unsure + 4.0 * step.slack(law, part, end) * size(end - step.start) + 8 * EPSILON * length**2
-    assert not solved or told == pytest.approx(last, rel=1e-12, abs=unsure)
+    assert not solved or level == pytest.approx(last, rel=1e-12, abs=unsure)
     return solved, miss <= slack, (step, held, end, strength)
 
 

@@ -218,9 +218,9 @@ def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, held, tmp_pat
     while not reached.wait(1.0):
         assert process.poll() is None
     process.send_signal(signal.SIGINT)
-    _out, said = process.communicate(timeout=100)
-    assert process.returncode == 130, said
-    assert "--resume" in said
+    _out, errors = process.communicate(timeout=100)
+    assert process.returncode == 130, errors
+    assert "--resume" in errors
     held()
     again = command(*words, "--resume", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
@@ -377,17 +377,17 @@ def test_lines_of_progress_come_from_a_cluster_too(client, tmp_path, capsys):
         *cavity(), until=1.0, every=0.25, compile="never", trajectory=tmp_path / "run.h5", cluster=client,
         progress=lines(0.0),
     )  # fmt: skip
-    told = capsys.readouterr().err.splitlines()
-    assert told
-    assert all("%  " in line and "/1 s" in line for line in told)
+    printed = capsys.readouterr().err.splitlines()
+    assert printed
+    assert all("%  " in line and "/1 s" in line for line in printed)
 
 
-def test_what_a_worker_compiles_is_told(tmp_path, monkeypatch):
-    told, path = [], tmp_path / "run.h5"
+def test_what_a_worker_compiles_is_reported(tmp_path, monkeypatch):
+    sentences, path = [], tmp_path / "run.h5"
     monkeypatch.setattr(shards, "task_of", lambda folder, k: task_of(*cavity(), RunOptions(1.0, trajectory=path)))
     monkeypatch.setattr(
         machine, "carry_out_task", lambda task, session: task.options.progress.compiling("compiling it")
     )
     monkeypatch.setattr(shards, "write_end", lambda path, end: None)
-    assert jobs.carried_out(shard_run.run_shard, (tmp_path, 0), tell=told.append) == {"state": "done"}
-    assert told == [{"compiling": "compiling it"}]
+    assert jobs.carried_out(shard_run.run_shard, (tmp_path, 0), tell=sentences.append) == {"state": "done"}
+    assert sentences == [{"compiling": "compiling it"}]

@@ -60,7 +60,7 @@ def test_a_page_has_the_table_the_graphs_and_the_sweep_file(folder, page):
 @pytest.fixture
 def words(monkeypatch):
     """Pages without graphs, which take a second: for tests of what they say."""
-    monkeypatch.setattr(curves, "svg", lambda figure, told: "")
+    monkeypatch.setattr(curves, "svg", lambda figure, description: "")
 
 
 def test_names_of_folders_are_escaped_and_links_lead_to_files(folder, page, words):
@@ -83,8 +83,8 @@ def test_a_sweep_that_is_not_complete_and_a_run_that_failed_say_so(folder, tmp_p
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
     status = sorted(file for file in copy.glob("*.json"))[0]
-    told = json.loads(status.read_text())
-    status.write_text(json.dumps({**told, "state": "failed", "error": "it went <b>wrong</b>"}))
+    record = json.loads(status.read_text())
+    status.write_text(json.dumps({**record, "state": "failed", "error": "it went <b>wrong</b>"}))
     read = Read(swarm.report(copy).html)
     assert "1 run failed" in read.texts["failures"]
     assert "it went <b>wrong</b>" in read.texts["failures"]

@@ -251,7 +251,7 @@ def require_same_file(one, other):
 
 
 @pytest.mark.parametrize("case", ["sphere", "bodies"])
-def test_a_flipped_bit_of_a_shard_is_told(case, on_a_cluster, tmp_path):
+def test_a_flipped_bit_of_a_shard_is_reported(case, on_a_cluster, tmp_path):
     make, keywords = CASES[case]
     on_a_cluster(*make(), 3, **TIMES | keywords, trajectory=tmp_path / "run.h5")
     with swarm.load(tmp_path / "run.h5") as trajectory:
@@ -281,11 +281,11 @@ from swarm.run.preflight.admission import task_of
 path, resume, dies = sys.argv[1], sys.argv[2] == "resume", int(sys.argv[3])
 joined._AT_ONCE = 2
 real = joined._joined
-told = []
+calls = []
 
 def one(*about):
-    told.append(1)
-    if len(told) == dies:
+    calls.append(1)
+    if len(calls) == dies:
         os.kill(os.getpid(), signal.SIGKILL)
     return real(*about)
 

@@ -32,21 +32,21 @@ def failed(tmp_path_factory):
     return folder, outcomes[0]
 
 
-def test_failures_are_told_with_their_sentences(failed, capsys):
+def test_failures_are_reported_with_their_sentences(failed, capsys):
     module._report(failed[1], False, False)
-    told = " ".join(capsys.readouterr().out.split())
-    assert "runs 6 failed" in told
-    assert '"particles.count" = 1000000000000000: ' in told
-    assert "and 1 more, in the table" in told
-    assert "results.csv" in told.replace(" ", "")
+    output = " ".join(capsys.readouterr().out.split())
+    assert "runs 6 failed" in output
+    assert '"particles.count" = 1000000000000000: ' in output
+    assert "and 1 more, in the table" in output
+    assert "results.csv" in output.replace(" ", "")
 
 
 def test_json_has_the_same_also_of_bad_input(failed, capsys):
     folder, outcome = failed
     module._report(outcome, False, True)
-    told = json.loads(capsys.readouterr().out)
-    assert (told["status"], told["failed"], told["done"], told["waiting"]) == ("failed", 6, 0, 0)
-    assert told["failures"][5]["parameters"]["particles.count"] == 10**15 + 5
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["status"], summary["failed"], summary["done"], summary["waiting"]) == ("failed", 6, 0, 0)
+    assert summary["failures"][5]["parameters"]["particles.count"] == 10**15 + 5
     with pytest.raises(swarm.SceneError):
         sweep(folder / "sweep.toml", folder / "out", as_json=True)
     assert "--resume" in json.loads(capsys.readouterr().out)["error"]
@@ -56,10 +56,10 @@ def test_runs_that_the_file_no_longer_has_are_named(failed, capsys):
     folder, outcome = failed
     (folder / "out" / "0123456789ab.h5").touch()
     module._report(outcome, True, False)
-    told = capsys.readouterr()
-    assert "also holds 1 run that" in told.err
-    assert "0123456789ab.h5" in told.err
-    assert told.out == ""
+    output = capsys.readouterr()
+    assert "also holds 1 run that" in output.err
+    assert "0123456789ab.h5" in output.err
+    assert output.out == ""
 
 
 def test_the_wall_time_has_an_exit_code_of_its_own(tmp_path, capsys):

@@ -119,7 +119,7 @@ def test_what_soft_balls_do_not_know_is_refused(scene, words):
         ran(scene, cloud(), METHOD, 0.1)
 
 
-def test_a_step_that_is_long_for_a_contact_is_told(caplog):
+def test_a_step_that_is_long_for_a_contact_is_reported(caplog):
     start = swarm.Particles([[0.0, 3.0], [0.0, 0.0], [0.0, 0.0]], [[0.1, 0.0], [0.0, 0.0], [0.0, 0.0]], radius=0.5)
     ran(ROOM, start, swarm.Penalty(0.1, 1000.0), 0.1)
     assert "touch for 0.0702 s; use dt <= 0.0035 s" in caplog.text

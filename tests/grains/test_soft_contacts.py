@@ -81,7 +81,7 @@ def test_a_wall_gives_way_by_what_the_energy_says(kind):
 
 
 @pytest.mark.parametrize("restitution", [0.8, 0.3, math.exp(-2.0), 0.05])
-def test_a_damper_takes_of_the_depth_what_is_said(restitution):
+def test_a_damper_takes_of_the_depth_what_is_predicted(restitution):
     wall = swarm.Plane((1.0, 0.0, 0.0), restitution=restitution)
     method = swarm.Penalty(1e-5, 1e4)
     seen = ran(swarm.Scene([ROOM, wall]), thrown(1.0, 0.0), method, 0.006).observables
@@ -116,17 +116,17 @@ def test_balls_that_pass_one_another_end_the_run(exponent):
 @pytest.mark.parametrize("restitution", [1.0, 0.5])
 def test_a_box_and_its_mesh_hold_or_fail_alike(speed, restitution):
     """They end the run at the same step and the same place, or leave the ball in the same place."""
-    told = []
+    outcomes = []
     for wall in plates(restitution=restitution).values():
         try:
             end = ran(swarm.Scene([ROOM, wall]), thrown(speed), SOFT, 0.05, every=1e-2).particles
-            told.append(tuple(end.position[:, 0].round(12)))
+            outcomes.append(tuple(end.position[:, 0].round(12)))
         except RunError as error:
-            told.append(str(error).partition(" by ")[0].replace("Mesh", "Box"))
-    assert told[0] == told[1]
+            outcomes.append(str(error).partition(" by ")[0].replace("Mesh", "Box"))
+    assert outcomes[0] == outcomes[1]
     holds = depth_of(SOFT, MASS, speed) < RADIUS or (restitution < 1.0 and speed < 5.0)
-    assert isinstance(told[0], tuple) == holds
-    assert holds or "overlaps surfaces[1] (Box)" in told[0]
+    assert isinstance(outcomes[0], tuple) == holds
+    assert holds or "overlaps surfaces[1] (Box)" in outcomes[0]
 
 
 def test_a_penalty_that_is_named_is_enough():
@@ -175,34 +175,34 @@ def test_a_grazing_ball_goes_by():
 # --- What is said -----------------------------------------------------------------------------------------
 
 
-def said(caplog, scene, start, method):
+def warnings_of(caplog, scene, start, method):
     caplog.clear()
     try:
         ran(scene, start, method, method.dt)
     finally:
-        told = [record.getMessage() for record in caplog.records]
-    return [one for one in told if one.startswith("contacts are soft")]
+        messages = [record.getMessage() for record in caplog.records]
+    return [one for one in messages if one.startswith("contacts are soft")]
 
 
-def test_it_is_said_before_the_run(caplog):
-    (pair,) = said(caplog, swarm.Scene([], period=(1.0, 1.0, 1.0)), two((10.0, -10.0)), SOFT)
+def test_soft_contacts_are_reported_before_the_run(caplog):
+    (pair,) = warnings_of(caplog, swarm.Scene([], period=(1.0, 1.0, 1.0)), two((10.0, -10.0)), SOFT)
     depth = depth_of(SOFT, 0.5 * MASS, 20.0)
     assert f"by 20 m/s, sinks up to {depth:.2g} m into it, {depth / RADIUS:.2g} radii" in pair
-    (wall,) = said(caplog, swarm.Scene([ROOM]), thrown(5.0), SOFT)
+    (wall,) = warnings_of(caplog, swarm.Scene([ROOM]), thrown(5.0), SOFT)
     assert "with 5 m/s, sinks up to 0.016 m into a wall, 1.6 radii" in wall
     assert "use a penalty of 6.2e+04 or more (1000 here)" in wall
-    assert said(caplog, swarm.Scene([ROOM]), thrown(5.0), swarm.Penalty(1e-5, 6.3e4)) == []
+    assert warnings_of(caplog, swarm.Scene([ROOM]), thrown(5.0), swarm.Penalty(1e-5, 6.3e4)) == []
 
 
 def test_what_a_fall_and_a_wall_that_moves_add_is_known(caplog):
     floor = swarm.Plane((0.0, 0.0, -1.0), 50.0)
     rest = swarm.Particles([[0.0], [0.0], [1.25 - 49.0]], [[0.0]] * 3, MASS, radius=RADIUS)
-    (told,) = said(caplog, swarm.Scene([floor], (0.0, 0.0, -10.0)), rest, SOFT)
-    assert f"with {math.sqrt(2.0 * 10.0 * 2.25):.3g} m/s" in told
+    (warning,) = warnings_of(caplog, swarm.Scene([floor], (0.0, 0.0, -10.0)), rest, SOFT)
+    assert f"with {math.sqrt(2.0 * 10.0 * 2.25):.3g} m/s" in warning
     shaken = swarm.Box((1.0, 1.0, 50.0), motion=swarm.Oscillation((0.0, 0.0, 0.1), 10.0))
-    (told,) = said(caplog, swarm.Scene([shaken]), rest, SOFT)
-    assert f"with {0.1 * 2.0 * math.pi * 10.0:.3g} m/s" in told
-    assert said(caplog, swarm.Scene([floor]), rest, SOFT) == []
+    (warning,) = warnings_of(caplog, swarm.Scene([shaken]), rest, SOFT)
+    assert f"with {0.1 * 2.0 * math.pi * 10.0:.3g} m/s" in warning
+    assert warnings_of(caplog, swarm.Scene([floor]), rest, SOFT) == []
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
@@ -210,9 +210,9 @@ def test_points_and_thin_solids(exponent, caplog):
     scene = swarm.Scene([swarm.Box((1.0, 1.0, 1.0)), swarm.Slab((1.0, 0.0, 0.0), 0.005, side="outside")])
     start = swarm.Particles([-0.1, 0.0, 0.0], [1.0, 0.0, 0.0], MASS)
     needed = (exponent + 1.0) * 0.5 * MASS / 0.002 ** (exponent + 1.0)
-    (told,) = said(caplog, scene, start, swarm.Penalty(1e-4, 0.9 * needed, exponent))
-    assert "surfaces[1] (Slab) is 0.01 m thick" in told
-    assert said(caplog, scene, start, swarm.Penalty(1e-4, 1.1 * needed, exponent)) == []
+    (warning,) = warnings_of(caplog, scene, start, swarm.Penalty(1e-4, 0.9 * needed, exponent))
+    assert "surfaces[1] (Slab) is 0.01 m thick" in warning
+    assert warnings_of(caplog, scene, start, swarm.Penalty(1e-4, 1.1 * needed, exponent)) == []
 
 
 # --- Points -----------------------------------------------------------------------------------------------
@@ -270,14 +270,14 @@ def test_the_penalty_that_is_named_for_a_point_is_enough(name):
 
 
 def test_a_box_and_its_samples_agree_on_points():
-    told = []
+    messages = []
     for name in ("Box", "Sampled", "Slab"):
         with pytest.raises(RunError) as failed:
             ran(swarm.Scene([CELL, thin(name)]), point(5.0), SOFT, 0.01)
-        told.append(str(failed.value).replace(name, "Slab"))
-    assert told[0] == told[2]
+        messages.append(str(failed.value).replace(name, "Slab"))
+    assert messages[0] == messages[2]
     # The spline through the samples is round in the middle.
-    places = [float(one.split("at (")[1].split(",")[0]) for one in told]
+    places = [float(one.split("at (")[1].split(",")[0]) for one in messages]
     assert places[1] == pytest.approx(places[0], abs=1e-6)
 
 
@@ -324,12 +324,12 @@ def test_an_overlap_is_in_files_and_in_verdicts(tmp_path):
         f"✗ balls overlapped by at most {1e3 * deepest:.2g} mm, {percent}"
     )
     content = Content("", scene, SOFT, None, 2, dict(result.observables), {"end": result.particles})
-    (told,) = [one for one in judged(content) if one.label == "contacts"]
-    assert told.verdict is False
-    assert f"balls overlapped by at most {1e3 * deepest:.2g} mm, {percent} of their radius" in told.text
+    (statement,) = [one for one in judged(content) if one.label == "contacts"]
+    assert statement.verdict is False
+    assert f"balls overlapped by at most {1e3 * deepest:.2g} mm, {percent} of their radius" in statement.text
     content.seen["largest_overlap"] = 0.4 * content.seen["largest_overlap"]
-    (told,) = [one for one in judged(content) if one.label == "contacts"]
-    assert told.verdict is True
+    (statement,) = [one for one in judged(content) if one.label == "contacts"]
+    assert statement.verdict is True
 
 
 # --- Everywhere -------------------------------------------------------------------------------------------

@@ -277,19 +277,19 @@ def test_multipliers_add_up(adaptive):
     start = swarm.fill(SPHERE, 6, speed=1.0, seed=4)
     method = method_of(1.0 / 64.0, 1e5, tolerance=1e-6, adaptive=adaptive, max_sweeps=30, on_unconverged="count")
     result = simulate(SPHERE, start, method, 2.0, 0.5)
-    told, seen = result.multipliers, result.observables
-    assert told.sweeps.sum() == seen["sweeps"][-1]
-    assert told.unconverged.sum() == seen["unconverged"][-1]
+    contact, seen = result.multipliers, result.observables
+    assert contact.sweeps.sum() == seen["sweeps"][-1]
+    assert contact.unconverged.sum() == seen["unconverged"][-1]
     for name in ("sweeps", "unconverged", "impacts"):
         assert (np.diff(seen[name]) >= 0).all()
         assert seen[name][0] == 0
-    assert (told.contacts >= 1).all()
-    assert (told.sweeps >= told.contacts).all()
-    assert (told.sweeps <= 30 * told.contacts).all()
-    assert (told.unconverged <= told.contacts).all()
-    assert ((told.stored_energy <= 1e-6) == (told.unconverged == 0)).all()
+    assert (contact.contacts >= 1).all()
+    assert (contact.sweeps >= contact.contacts).all()
+    assert (contact.sweeps <= 30 * contact.contacts).all()
+    assert (contact.unconverged <= contact.contacts).all()
+    assert ((contact.stored_energy <= 1e-6) == (contact.unconverged == 0)).all()
     if adaptive:
-        assert told.unconverged.sum() == 0
+        assert contact.unconverged.sum() == 0
 
 
 def test_accelerations_take_fewer_sweeps():

@@ -86,16 +86,16 @@ def test_a_run_begins_where_one_has_ended(run, tmp_path):
 
 
 def test_frames_during_a_run_have_them():
-    told = []
+    rows = []
     scene = SCENES["box"]
     start = swarm.fill(scene, N, speed=1.0, radius=RADIUS, seed=4)
     swarm.simulate(
         scene, start, swarm.Impact(), until=0.2, compile="never",
-        progress=lambda frame: told.append((frame.radius.tolist(), int(frame.collisions.sum()), frame.spin)),
+        progress=lambda frame: rows.append((frame.radius.tolist(), int(frame.collisions.sum()), frame.spin)),
         observables={"wide": lambda frame: float(frame.radius.sum())},
     )  # fmt: skip
-    assert [radius for radius, _count, _spin in told] == [RADIUS.tolist()] * 2
-    assert told[0][1:] == (0, None)
+    assert [radius for radius, _count, _spin in rows] == [RADIUS.tolist()] * 2
+    assert rows[0][1:] == (0, None)
 
 
 def test_points_have_none_of_it(tmp_path):
@@ -174,15 +174,17 @@ def test_exports_have_the_radii(run, tmp_path):
 
 def test_texts_say_how_large_and_how_full(run):
     with swarm.load(run.trajectory) as trajectory:
-        told = facts.of_trajectory(trajectory)
-        assert told["impacts of two"].startswith("restitution 0.9, ")
+        statements = facts.of_trajectory(trajectory)
+        assert statements["impacts of two"].startswith("restitution 0.9, ")
         assert "Pairs(" in trajectory.scene._repr_html_()
-    assert " of 50 to 120 mm radius" in told["what runs"] or " of 0.05 to 0.12 m radius" in told["what runs"]
+    assert (
+        " of 50 to 120 mm radius" in statements["what runs"] or " of 0.05 to 0.12 m radius" in statements["what runs"]
+    )
     unit = "m³" if run.scene.plane is None else "m²"
     volume = 0.48 if run.scene.plane is None else 0.8
     filled = 4.0 / 3.0 * np.pi * (RADIUS**3).sum() if run.scene.plane is None else np.pi * (RADIUS**2).sum()
-    assert told["packing"] == f"{100.0 * filled / volume:.4g} % of {volume:.4g} {unit}"
-    assert told["collisions"] == str(run.observables["collisions"][-1])
+    assert statements["packing"] == f"{100.0 * filled / volume:.4g} % of {volume:.4g} {unit}"
+    assert statements["collisions"] == str(run.observables["collisions"][-1])
     assert numbers(run.trajectory)["collisions"] == run.observables["collisions"][-1]
     assert "radius" in run.particles._repr_html_()
 

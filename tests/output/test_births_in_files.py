@@ -119,9 +119,9 @@ def test_tables_and_arrays(path):
         assert np.isnan(dataset.position.values).sum() == 3 * (4 + 3 + 2 + 1)
         np.testing.assert_array_equal(dataset.birth_time.values[n:], TIMES)
         assert dataset.born.dims == ("time", "source")
-        told = facts.of_trajectory(trajectory)
-    assert told["born"] == "source 0: 4"
-    assert "4 of them from sources" in told["particles"]
+        statements = facts.of_trajectory(trajectory)
+    assert statements["born"] == "source 0: 4"
+    assert "4 of them from sources" in statements["particles"]
     found = numbers(path)
     assert found["born"] == [4]
     assert found["source_energy"] > 0.0

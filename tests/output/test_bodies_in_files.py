@@ -364,12 +364,12 @@ def test_pictures_show_bodies_and_the_error_of_links(run, tmp_path, monkeypatch)
 
 def test_the_summary_says_what_they_are(run, tmp_path):
     path, frames = run
-    rows, told = summary.of_trajectory(path), summary.numbers(path)
+    rows, summed = summary.of_trajectory(path), summary.numbers(path)
     assert rows["body"] == ("4 points, 6 links" if frames[0].body is CUBE else "3 points, 2 links")
     assert rows["what runs"].startswith(f"{COPIES} ")
     assert rows["links"] == "✓ they keep their lengths: the worst is off by 9·10⁻¹⁶ of it"
     assert "work of anchors" not in " ".join(rows.values())
-    assert (told["bodies"], told["link_error"], told["work"]) == (COPIES, 9e-16, 0.0)
+    assert (summed["bodies"], summed["link_error"], summed["work"]) == (COPIES, 9e-16, 0.0)
     with swarm.load(path) as trajectory:
         recorded.record(trajectory, tmp_path / "run.rrd", recording.Settings())
     assert summary.of_recording(tmp_path / "run.rrd", False)["bodies"] == f"{COPIES} of {COPIES}"

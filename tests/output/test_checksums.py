@@ -30,15 +30,15 @@ def values_of(path):
     with swarm.load(path) as trajectory:
         trajectory.require_index()
         trajectory.require_intact()
-        told = [trajectory.times, trajectory.ids, trajectory.frame(0).mass, trajectory.radius, trajectory.wall_times]
-        told += trajectory.observables.values()
+        arrays = [trajectory.times, trajectory.ids, trajectory.frame(0).mass, trajectory.radius, trajectory.wall_times]
+        arrays += trajectory.observables.values()
         for k in range(len(trajectory)):
-            told += trajectory.columns(k).values()
+            arrays += trajectory.columns(k).values()
         for i in (0, N - 1):
-            told += trajectory.particle(i)
+            arrays += trajectory.particle(i)
         texts = [trajectory.descriptions, trajectory.makers, trajectory.scene_text, trajectory.start]
         texts += [trajectory.seed, trajectory.until, trajectory.threads, trajectory.count, str(trajectory.scene)]
-    return [one.tobytes() for one in told], texts
+    return [one.tobytes() for one in arrays], texts
 
 
 def rows_of(path):
@@ -53,22 +53,22 @@ def flipped(data, place, bit):
     return data[:place] + bytes([data[place] ^ 1 << bit]) + data[place + 1 :]
 
 
-def require_told_or_harmless(path, data, read, seed, count):
+def require_reported_or_harmless(path, data, read, seed, count):
     """How many of so many bits, flipped one at a time, are reported; the others change nothing that is read."""
     path.write_bytes(data)
-    expected, chosen, said = read(path), random.Random(seed), 0
+    expected, chosen, reported = read(path), random.Random(seed), 0
     # Half of them in the first part of a file, where texts, headers and indexes are.
     places = [chosen.randrange(len(data) if k % 2 else min(len(data), 20_000)) for k in range(count)]
     for place in places:
         bit = chosen.randrange(8)
         path.write_bytes(flipped(data, place, bit))
-        told, found = told_or_read(path, read)
-        said += bool(told)
-        assert found == expected or (told.startswith(str(path)) and "\n" not in told), (place, bit, told)
-    return said
+        message, found = error_or_values(path, read)
+        reported += bool(message)
+        assert found == expected or (message.startswith(str(path)) and "\n" not in message), (place, bit, message)
+    return reported
 
 
-def told_or_read(path, read):
+def error_or_values(path, read):
     """The error, or what is read."""
     try:
         return "", read(path)
@@ -85,17 +85,17 @@ KINDS = {
     ("kind", "count"),
     [("none", 60), ("gzip", 10), *(pytest.param(kind, 2000, marks=pytest.mark.long) for kind in KINDS)],
 )
-def test_a_flipped_bit_is_told_or_harmless(tmp_path, kind, count):
+def test_a_flipped_bit_is_reported_or_harmless(tmp_path, kind, count):
     simulate(tmp_path, until=0.2, **KINDS[kind])
     path = tmp_path / "run.h5"
-    assert require_told_or_harmless(path, path.read_bytes(), values_of, f"{kind} {count}", count) > count // 8
+    assert require_reported_or_harmless(path, path.read_bytes(), values_of, f"{kind} {count}", count) > count // 8
 
 
 @pytest.mark.parametrize("count", [20, pytest.param(2000, marks=pytest.mark.long)])
-def test_a_flipped_bit_of_a_log_is_told_or_harmless(tmp_path, count):
+def test_a_flipped_bit_of_a_log_is_reported_or_harmless(tmp_path, count):
     simulate(tmp_path, impacts=tmp_path / "impacts.h5")
     path = tmp_path / "impacts.h5"
-    assert require_told_or_harmless(path, path.read_bytes(), rows_of, count, count) > count // 8
+    assert require_reported_or_harmless(path, path.read_bytes(), rows_of, count, count) > count // 8
 
 
 @pytest.fixture
@@ -111,7 +111,7 @@ def harmed(tmp_path):
 
 
 def test_the_frame_and_the_dataset_are_named_and_other_frames_are_read(harmed, tmp_path):
-    told = re.escape(f"{POSITION} of frame 3 does not match its checksum")
+    message = re.escape(f"{POSITION} of frame 3 does not match its checksum")
     with swarm.load(harmed) as trajectory:
         for k in (0, 1, 2, 4):
             assert np.isfinite(trajectory.frame(k).position).all()
@@ -123,7 +123,7 @@ def test_the_frame_and_the_dataset_are_named_and_other_frames_are_read(harmed, t
             lambda: trajectory.export(tmp_path / "all.xyz"),
             lambda: trajectory.export(tmp_path / "all.vtkhdf", surfaces=False),
         ):
-            with pytest.raises(swarm.SceneError, match=told):
+            with pytest.raises(swarm.SceneError, match=message):
                 read()
     assert {one.name for one in tmp_path.iterdir()} == {"run.h5", "others.xyz"}
     rows = summary.of_file(harmed)

@@ -53,7 +53,7 @@ def everything(path):
     with swarm.load(path) as trajectory:
         seen = trajectory.observables
         parts = [trajectory.times, trajectory.wall_times, *seen.values()]
-        told = [*trajectory.descriptions, type(trajectory.scene), type(trajectory.method), trajectory.count]
+        described = [*trajectory.descriptions, type(trajectory.scene), type(trajectory.method), trajectory.count]
         if "none" not in trajectory.descriptions["storage"].split("\n")[0]:
             for k in range(len(trajectory)):
                 frame = trajectory.frame(k)
@@ -61,7 +61,7 @@ def everything(path):
             for i in (0, N - 1):
                 parts += trajectory.particle(i)
     assert all(np.isfinite(part).all() for part in parts)
-    return [*told, *seen, *(part.shape for part in parts)]
+    return [*described, *seen, *(part.shape for part in parts)]
 
 
 def require_right_or_reported(path, expected):
@@ -69,10 +69,10 @@ def require_right_or_reported(path, expected):
     try:
         assert everything(path) == expected
     except swarm.SceneError as error:
-        told = str(error)
-        assert told.startswith(str(path))
-        assert "damaged" in told
-        assert len(told.splitlines()) == 1
+        message = str(error)
+        assert message.startswith(str(path))
+        assert "damaged" in message
+        assert len(message.splitlines()) == 1
         return True
     return False
 
@@ -81,12 +81,12 @@ def require_right_or_reported(path, expected):
 def test_a_flipped_byte_is_harmless_or_reported(files, tmp_path, kind):
     path, data, chosen = tmp_path / "run.h5", files[kind], random.Random(kind)
     path.write_bytes(data)
-    expected, said = everything(path), 0
+    expected, reported = everything(path), 0
     first, later = chosen.sample(range(3000), 30), chosen.sample(range(3000, len(data)), 10)
     for place in (0, 9, *first, *later, data.index(b'kind = "sphere"'), data.index(b"EAIB") + 9):
         path.write_bytes(data[:place] + bytes([data[place] ^ chosen.choice((255, 1, 32))]) + data[place + 1 :])
-        said += require_right_or_reported(path, expected)
-    assert said > 10
+        reported += require_right_or_reported(path, expected)
+    assert reported > 10
 
 
 def test_a_heap_in_which_hdf5_would_loop_forever(files, tmp_path):
@@ -198,10 +198,10 @@ def test_values_that_no_run_writes_are_reported(whole, name):
     change, message = STRANGE[name]
     with edited(whole) as file:
         change(file)
-    with pytest.raises(swarm.SceneError) as told:
+    with pytest.raises(swarm.SceneError) as caught:
         everything(whole)
-    assert str(told.value).startswith(f"{whole} is damaged: ")
-    assert message in str(told.value)
+    assert str(caught.value).startswith(f"{whole} is damaged: ")
+    assert message in str(caught.value)
 
 
 class Cycle:
@@ -268,9 +268,9 @@ def test_a_path_without_a_file_is_one_sentence(tmp_path):
             ("empty", r"empty(\.h5)? is empty; expected a "),
             ("text", r"text(\.h5)? is not an? (HDF5 file|recording of swarm)"),
         ):
-            with pytest.raises(swarm.SceneError, match=message) as told:
+            with pytest.raises(swarm.SceneError, match=message) as caught:
                 read(tmp_path / name)
-            assert "errno" not in str(told.value)
+            assert "errno" not in str(caught.value)
     for path in (None, "", 3, b"run.h5", True, "a\0"):
         with pytest.raises(swarm.SceneError, match=r"path must be the path of a file, got "):
             swarm.load(path)
@@ -307,7 +307,7 @@ def cut_to(path, frames):
 
 
 @pytest.mark.physics
-def test_one_frame_is_drawn_recorded_and_told(whole):
+def test_one_frame_is_drawn_recorded_and_reported(whole):
     cut_to(whole, 1)
     assert summary.of_trajectory(whole)["frames"] == "1, 0 s to 0 s"
     with swarm.load(whole) as trajectory:
@@ -379,14 +379,14 @@ def saved(tmp_path_factory):
 
 def test_a_checkpoint_with_a_flipped_byte_is_as_it_was_or_damaged(saved, tmp_path):
     job, arrays, data = saved
-    path, said = tmp_path / "run.h5.checkpoint", 0
+    path, reported = tmp_path / "run.h5.checkpoint", 0
     for place in range(len(data)):
         path.write_bytes(data[:place] + bytes([data[place] ^ (255, 1, 64)[place % 3]]) + data[place + 1 :])
         try:
             its_job, its_arrays = checkpoint.read(path)
         except swarm.SceneError as error:
             require_damaged_checkpoint(error, path)
-            said += 1
+            reported += 1
         else:
             assert its_job == job
             assert all((its_arrays[name] == arrays[name]).all() for name in its_arrays)
@@ -394,7 +394,7 @@ def test_a_checkpoint_with_a_flipped_byte_is_as_it_was_or_damaged(saved, tmp_pat
                 # The list of entries of a zip file has no checksum: a run does not go on without one of them.
                 with pytest.raises(swarm.SceneError, match=r"or damaged: .*expected the arrays"):
                     checkpoint.require_fit(path, its_arrays, arrays)
-    assert said > len(data) // 2
+    assert reported > len(data) // 2
 
 
 def savez(path, **arrays):
@@ -403,11 +403,11 @@ def savez(path, **arrays):
 
 
 def require_damaged_checkpoint(error, path, what="is damaged: "):
-    told = str(error)
-    assert told.startswith(f"{path} {what}")
-    assert "start again" in told
-    assert "pickle" not in told
-    assert len(told.splitlines()) == 1
+    message = str(error)
+    assert message.startswith(f"{path} {what}")
+    assert "start again" in message
+    assert "pickle" not in message
+    assert len(message.splitlines()) == 1
 
 
 @pytest.mark.parametrize("size", [0, 1, 30, 500, 1000, -1])
@@ -415,9 +415,9 @@ def test_a_checkpoint_that_was_cut_off_is_damaged(saved, tmp_path, size):
     path = tmp_path / "run.h5.checkpoint"
     for data in (saved[2][:size], b"text\n" * size):
         path.write_bytes(data)
-        with pytest.raises(swarm.SceneError) as told:
+        with pytest.raises(swarm.SceneError) as caught:
             checkpoint.read(path)
-        require_damaged_checkpoint(told.value, path)
+        require_damaged_checkpoint(caught.value, path)
 
 
 @pytest.mark.parametrize(
@@ -431,9 +431,9 @@ def test_a_checkpoint_without_a_job_is_damaged(saved, tmp_path, change):
     job, arrays, _data = saved
     path, table = tmp_path / "run.h5.checkpoint", vars(job)
     savez(path, job=json.dumps({**table, **change} if isinstance(change, dict) else change), **arrays)
-    with pytest.raises(swarm.SceneError) as told:
+    with pytest.raises(swarm.SceneError) as caught:
         checkpoint.read(path)
-    require_damaged_checkpoint(told.value, path)
+    require_damaged_checkpoint(caught.value, path)
 
 
 def test_a_checkpoint_of_other_things_is_damaged(saved, tmp_path):
@@ -441,9 +441,9 @@ def test_a_checkpoint_of_other_things_is_damaged(saved, tmp_path):
     objects = np.array([{}], dtype=object)
     for arrays in ({}, {"job": objects}, {"job": np.array(1.0), "x": objects}):
         savez(path, **arrays)
-        with pytest.raises(swarm.SceneError) as told:
+        with pytest.raises(swarm.SceneError) as caught:
             checkpoint.read(path)
-        assert str(told.value).startswith(f"{path} is damaged: ")
+        assert str(caught.value).startswith(f"{path} is damaged: ")
     with path.open("wb") as file:
         np.save(file, np.zeros(3))
     with pytest.raises(swarm.SceneError, match="is damaged"):
@@ -478,11 +478,11 @@ def test_arrays_of_another_shape_are_damage(stopped, name):
     ARRAYS[name](arrays)
     checkpoint.save(path, job, arrays)
     before = stopped.read_bytes()
-    with pytest.raises(swarm.SceneError) as told:
+    with pytest.raises(swarm.SceneError) as caught:
         simulate(stopped, checkpoint=60.0, resume=True)
     is_of_a_halt = name.startswith("a halt of particle") or name.endswith("twice")
-    told_of = "is damaged: " if is_of_a_halt else "is of another version of swarm, or damaged: "
-    require_damaged_checkpoint(told.value, path, told_of)
+    expected = "is damaged: " if is_of_a_halt else "is of another version of swarm, or damaged: "
+    require_damaged_checkpoint(caught.value, path, expected)
     assert stopped.read_bytes() == before
 
 

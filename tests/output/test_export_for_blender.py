@@ -113,7 +113,7 @@ def test_far_from_the_origin_positions_are_less_the_center(stored, tmp_path):
         )
 
 
-def test_who_comes_later_is_not_there_yet(stored, tmp_path):
+def test_a_particle_that_comes_later_is_not_there_yet(stored, tmp_path):
     with swarm.load(stored["born"]) as trajectory:
         files = trajectory.export(tmp_path / "out.ply")
         counts = [len(trajectory.frame(k).born()) if k > 1 else 0 for k in range(6)]
@@ -212,12 +212,12 @@ def test_what_cannot_be_finished_leaves_the_older_sequence(stored, tmp_path, mon
 KILLED = """
 import os, signal, sys, swarm
 
-def told(done, of):
+def report(done, of):
     if done == 3:
         os.kill(os.getpid(), signal.SIGKILL)
 
 with swarm.load(sys.argv[1]) as trajectory:
-    trajectory.export(sys.argv[2], overwrite=True, progress=told)
+    trajectory.export(sys.argv[2], overwrite=True, progress=report)
 """
 
 

@@ -69,7 +69,7 @@ def test_pandas_reads_every_bit(stored, tmp_path, kind):
         assert 0 < table.escape_time[-30:].isna().sum() < 30
 
 
-def test_who_comes_later_has_no_line_yet(stored, tmp_path):
+def test_a_particle_that_comes_later_has_no_line_yet(stored, tmp_path):
     with swarm.load(stored["born"]) as trajectory:
         trajectory.export(tmp_path / "out.csv")
     table = pandas.read_csv(tmp_path / "out.csv")

@@ -225,9 +225,9 @@ def test_plots_fill_the_sheet_and_say_what_runs(until):
     assert figure.get_suptitle() == f"20 particles in a sphere: Impact, {until:g} s"
     assert all(axes.has_data() for axes in cells.values())
     assert "depth [m]" not in cells
-    said = [text.get_text() for part in figure.findobj(type(figure.subfigs[0])) for text in part.texts]
+    headings = [text.get_text() for part in figure.findobj(type(figure.subfigs[0])) for text in part.texts]
     for verdict in verdicts.judged(content):
-        assert verdict.label == "numbers" or any(verdict.text[:30] in text.replace("\n    ", " ") for text in said)
+        assert verdict.label == "numbers" or any(verdict.text[:30] in text.replace("\n    ", " ") for text in headings)
 
 
 # --- Speeds ---------------------------------------------------------------------------------------------------

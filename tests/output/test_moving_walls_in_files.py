@@ -53,7 +53,7 @@ def test_the_trajectory_has_them(run):
             np.testing.assert_array_equal(seen[name], values)
 
 
-def test_a_given_motion_is_where_it_is_said():
+def test_a_given_motion_is_where_its_table_says():
     result = swarm.simulate(
         MOVING, swarm.fill(MOVING, 5, speed=0.5, seed=1), swarm.Impact(), until=1.0, every=0.25, compile="never"
     )

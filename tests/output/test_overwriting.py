@@ -116,17 +116,17 @@ def test_a_picture_replaces_pictures_of_swarm_alone(tmp_path, suffix):
 
 def test_plot_keeps_a_picture_of_others(whole, tmp_path):
     (tmp_path / "photo.png").write_bytes(b"\x89PNG\r\n\x1a\n and a holiday")
-    code, told = command("plot", whole / "run.h5", "-o", tmp_path / "photo.png")
+    code, output = command("plot", whole / "run.h5", "-o", tmp_path / "photo.png")
     assert (code, (tmp_path / "photo.png").read_bytes()) == (1, b"\x89PNG\r\n\x1a\n and a holiday")
-    assert "photo.png is not a picture of swarm, and only such a file is overwritten" in told
+    assert "photo.png is not a picture of swarm, and only such a file is overwritten" in output
 
 
 def test_record_keeps_a_file_of_others(whole, tmp_path):
     (tmp_path / "out.rrd").write_text("mine")
     for target in (tmp_path / "out.rrd", whole / "log.h5"):
         before = target.read_bytes()
-        _code, told = command("record", whole / "run.h5", "-o", target, "--overwrite")
-        assert "is not a recording of Rerun" in told
+        _code, output = command("record", whole / "run.h5", "-o", target, "--overwrite")
+        assert "is not a recording of Rerun" in output
         assert target.read_bytes() == before
 
 
@@ -157,9 +157,9 @@ def test_a_scene_file_writes_in_its_folder_alone(tmp_path, monkeypatch, key, nam
     (tmp_path / "scenes" / "linked").symlink_to(tmp_path)
     for here in (tmp_path, tmp_path / "scenes"):
         monkeypatch.chdir(here)
-        code, told = command("run", scene, "--quiet", *overwrite)
+        code, output = command("run", scene, "--quiet", *overwrite)
         assert code == 1
-        assert f"scene.toml: run.{key}: expected a file in the folder of the scene file" in told
+        assert f"scene.toml: run.{key}: expected a file in the folder of the scene file" in output
         assert (tmp_path / "thesis.txt").read_text() == "my thesis"
         assert not (here / "scene.h5").exists()
 
@@ -181,9 +181,9 @@ def test_outputs_of_a_scene_file_are_beside_it_and_never_overwritten(tmp_path, m
     before = log.read_bytes()
     assert (tmp_path / "scene.h5").is_file()
     for words in (["--overwrite"], ["--overwrite", "-o", "other.h5"], ["--resume", "--overwrite"]):
-        code, told = command("run", scene, "--quiet", *words)
+        code, output = command("run", scene, "--quiet", *words)
         assert code == 1
-        assert f"overwrite it by naming it on the command line: --impacts {log} --overwrite" in told
+        assert f"overwrite it by naming it on the command line: --impacts {log} --overwrite" in output
         assert log.read_bytes() == before
     assert command("run", scene, "--quiet", "--overwrite", "--impacts", log) == (0, "")
 
@@ -214,10 +214,10 @@ def test_an_output_is_no_file_that_the_scene_reads(whole, tmp_path, name, option
     os.symlink(tmp_path / name, tmp_path / "link")
     before = (tmp_path / name).read_bytes()
     for target in (tmp_path / name, tmp_path / "link"):
-        code, told = command("run", tmp_path / "scene.toml", "--quiet", "--overwrite", option, target)
+        code, output = command("run", tmp_path / "scene.toml", "--quiet", "--overwrite", option, target)
         assert code == 1
         if name != "part.stl":  # which is no closed mesh, and is refused before
-            assert f"{name} is also the " in told
+            assert f"{name} is also the " in output
         assert (tmp_path / name).read_bytes() == before
 
 
@@ -227,13 +227,13 @@ def test_an_output_is_no_plugin(tmp_path, monkeypatch):
     (tmp_path / "numbers_for_a_run.py").write_text(code)
     scene = scene_in(tmp_path, 'observables = {one = "numbers_for_a_run:one"}')
     try:
-        told = command(
+        output = command(
             "run", scene, "--plugins", "numbers_for_a_run", "-o", "numbers_for_a_run.py", "--overwrite", "--quiet"
         )[1]
     finally:
         sys.modules.pop("numbers_for_a_run", None)
         plugins.imported.discard("numbers_for_a_run")
-    assert "is also the module numbers_for_a_run of --plugins" in told
+    assert "is also the module numbers_for_a_run of --plugins" in output
     assert (tmp_path / "numbers_for_a_run.py").read_text() == code
 
 

@@ -81,7 +81,7 @@ def test_a_file_of_the_users_own_in_the_checkpoints_place_is_refused(tmp_path, k
     assert os.listdir(tmp_path) == ["run.h5.checkpoint"]
 
 
-def test_who_runs_again_is_told_how_to_go_on(tmp_path):
+def test_a_second_run_says_how_to_resume(tmp_path):
     """One that is complete is overwritten; one that was stopped is resumed."""
     path = tmp_path / "run.h5"
 

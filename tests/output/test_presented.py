@@ -123,8 +123,8 @@ def test_a_figure_of_a_file_without_all_particles(frames, tmp_path):
         figure = trajectory.plot()
     titles = [text.get_text() for text in figure.findobj(Text) if "of 30 particles" in text.get_text()]
     assert titles == ([] if frames == "none" else ["10 of 30 particles, t = 1 s,\neach with 1 m/s"])
-    told = [text.get_text() for text in result.plot().findobj(Text)]
-    assert "30 particles, t = 1 s,\neach with 1 m/s" in told
+    texts = [text.get_text() for text in result.plot().findobj(Text)]
+    assert "30 particles, t = 1 s,\neach with 1 m/s" in texts
 
 
 # --- Films ---------------------------------------------------------------------------------------------------
@@ -176,7 +176,7 @@ def test_a_frame_is_what_matplotlib_draws(run):
 
 def test_what_a_film_refuses(run, tmp_path, monkeypatch):
     trajectory = run[1]
-    for name, options, told in (
+    for name, options, sentence in (
         ("run.avi", {}, "ends in .mp4 or .gif"),
         ("none/run.gif", {}, "does not exist"),
         ("run.gif", {"fps": 60}, "fps must be at most 50"),
@@ -184,7 +184,7 @@ def test_what_a_film_refuses(run, tmp_path, monkeypatch):
         ("run.gif", {"size": (10, 10)}, "size must be"),
         ("run.gif", {"size": 100}, "size must be width and height in pixels"),
     ):
-        with pytest.raises(SceneError, match=told):
+        with pytest.raises(SceneError, match=sentence):
             trajectory.animate(tmp_path / name, **options)
     monkeypatch.setattr(film, "_ffmpeg", lambda: "false")
     with pytest.raises(FileError, match="cannot write the film"):
@@ -265,13 +265,13 @@ def test_a_scene_of_many_solids_is_a_line():
 
 def test_objects_tell_what_they_are(run):
     result, trajectory = run
-    for one, told in (
+    for one, words in (
         (result, ("20 particles", "5 frames to 1 s", "impacts", "energy error", "<run>.h5")),
         (trajectory, ("<run>.h5", "5 frames", "0 s to 1 s", "20 particles", "Impact(")),
         (SCENE, ("Box(", "Rotation(", "Sphere(")),
         (result.particles, ("Particles(20)",)),
     ):
-        assert all(word in repr(one) for word in told)
+        assert all(word in repr(one) for word in words)
         shown = one._repr_html_()
         assert "<run>" not in shown
         assert "<script" not in shown

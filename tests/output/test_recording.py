@@ -211,8 +211,8 @@ def test_energy_errors_as_colours(tmp_path):
     deep = np.array([[0.0], [0.0], [0.51]]) + np.zeros((3, 50))
     before = 0.5 - (-1.0) * start.position[2]
     after = 0.5 * 1.1**2 + 0.51 + 1e4 * 0.01**2.5 / 2.5
-    told = values(deep, 1.1 * start.velocity)
-    np.testing.assert_allclose(10.0**told, np.abs(after - before) / (0.5 + 0.5), rtol=1e-9)
+    text = values(deep, 1.1 * start.velocity)
+    np.testing.assert_allclose(10.0**text, np.abs(after - before) / (0.5 + 0.5), rtol=1e-9)
     assert (scale.low, scale.high) == (-16.0, -6.0)
     for law in ({"restitution": 0.9}, {"friction": 0.1}, {"temperature": 300.0}, {"motion": DRIFT}, {"mass": 1.0}):
         with pytest.raises(swarm.SceneError, match="record_color must be 'speed'"):
@@ -355,9 +355,9 @@ def test_live_reaches_a_viewer(tmp_path, request):
 def test_a_sheet_says_what_drew_it(run, tmp_path, monkeypatch):
     held = playback.Playback(run[0] / "run.rrd")
     monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path / "none.json"))
-    told = sheet.draw_sheet(held, tmp_path / "sheet.png", [0.0, 3.1], None)
-    assert "matplotlib" in told
-    assert ("Vulkan" in told) == (sys.platform == "linux")
+    drawn = sheet.draw_sheet(held, tmp_path / "sheet.png", [0.0, 3.1], None)
+    assert "matplotlib" in drawn
+    assert ("Vulkan" in drawn) == (sys.platform == "linux")
     assert (tmp_path / "sheet.png").stat().st_size > 20_000
     assert sheet._chosen(held, [0.0, 3.1]) == [0, 6]
     assert sheet._chosen(held, None) == [0, 20, 40]

@@ -174,9 +174,9 @@ def test_the_lines_of_python_give_the_same_bits(folder, page, tmp_path):
 
 def test_a_run_of_python_gets_a_scene_file(tmp_path, words):
     run(tmp_path / "run.h5", seed=4)
-    told = reproduce(swarm.report(tmp_path / "run.h5"), tmp_path)
-    assert "only this file holds" in told
-    text = told[told.index("gravity = ") : told.index("In Python")]
+    section = reproduce(swarm.report(tmp_path / "run.h5"), tmp_path)
+    assert "only this file holds" in section
+    text = section[section.index("gravity = ") : section.index("In Python")]
     (tmp_path / "again.toml").write_text(text)
     done = python("-m", "swarm", "run", "again.toml", "-o", "again.h5", "--quiet", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
@@ -184,7 +184,7 @@ def test_a_run_of_python_gets_a_scene_file(tmp_path, words):
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "reason"),
     [
         ({"frames": "none"}, "keeps no particles"),
         ({"frames": 3}, "every 3th particle only"),
@@ -192,9 +192,9 @@ def test_a_run_of_python_gets_a_scene_file(tmp_path, words):
     ],
     ids=str,
 )
-def test_what_cannot_be_reproduced_is_said(options, told, tmp_path, words):
+def test_what_cannot_be_reproduced_is_reported(options, reason, tmp_path, words):
     run(tmp_path / "run.h5", **options)
-    assert told in reproduce(swarm.report(tmp_path / "run.h5"), tmp_path)
+    assert reason in reproduce(swarm.report(tmp_path / "run.h5"), tmp_path)
 
 
 # --- Runs of all kinds -----------------------------------------------------------------------------------
@@ -213,9 +213,9 @@ def cut(path):
 
 def test_a_run_that_was_cut_says_so(tmp_path, words):
     cut(tmp_path / "run.h5")
-    told = Read(swarm.report(tmp_path / "run.h5").html).texts[""]
-    assert "This run is not complete: it was stopped at" in told
-    assert "of 1 s" in told
+    page = Read(swarm.report(tmp_path / "run.h5").html).texts[""]
+    assert "This run is not complete: it was stopped at" in page
+    assert "of 1 s" in page
 
 
 def test_a_run_that_goes_on_says_so(folder, words):
@@ -275,12 +275,12 @@ def test_every_kind_of_run_has_one(kind, tmp_path, coarse):
 
 
 def test_bad_input_is_a_sentence(folder, tmp_path):
-    for path, told in (
+    for path, message in (
         (tmp_path / "absent.h5", "there is no file"),
         (folder / "scene.toml", "is not an HDF5 file"),
         (tmp_path, "is not the folder of a sweep: expected results.csv"),
     ):
-        with pytest.raises(swarm.SceneError, match=told):
+        with pytest.raises(swarm.SceneError, match=message):
             swarm.report(path)
     log = tmp_path / "log.h5"
     run(tmp_path / "run.h5", impacts=log)
@@ -312,8 +312,8 @@ def test_the_impacts_a_second_are_named_by_what_they_count(page, folder):
     assert "impacts a second of it" in page.html
     result = run(folder / "named.h5")
     for compiling, end in ((0.0, " impacts/s"), (0.5 * result.wall_time, " impacts/s in the rest")):
-        told = summary.of_result(replace(result, compile_time=compiling), None)["wall time"]
-        assert told.endswith(end)
+        row = summary.of_result(replace(result, compile_time=compiling), None)["wall time"]
+        assert row.endswith(end)
 
 
 def test_a_cavity_is_dark_on_a_dark_page():

@@ -55,9 +55,9 @@ def test_a_page_is_light_or_dark_as_the_reader_asks(run, scheme, is_dark):
 
 
 def test_a_page_needs_no_network_and_logs_nothing(run):
-    told = browser(run, "--dump-dom", (run / "run.html").as_uri())
-    assert "How to reproduce it" in told
-    assert told.count("<svg") >= 3
+    page = browser(run, "--dump-dom", (run / "run.html").as_uri())
+    assert "How to reproduce it" in page
+    assert page.count("<svg") >= 3
 
 
 def rows(values):
@@ -78,9 +78,9 @@ def test_the_table_of_a_sweep_is_sorted(tmp_path, asked, order):
         name="sweep",
     )  # fmt: skip
     page.write_text(html)
-    told = browser(tmp_path, "--dump-dom", page.as_uri() + asked)
-    assert [int(k) for k in re.findall(r'data-value="(\d)\.h5"', told)] == order
-    assert len(re.findall(r"<th [^>]*aria-sort", told)) == (asked != "")
+    document = browser(tmp_path, "--dump-dom", page.as_uri() + asked)
+    assert [int(k) for k in re.findall(r'data-value="(\d)\.h5"', document)] == order
+    assert len(re.findall(r"<th [^>]*aria-sort", document)) == (asked != "")
 
 
 def test_a_click_sorts_too(tmp_path):
@@ -91,6 +91,6 @@ def test_a_click_sorts_too(tmp_path):
     clicks = "<script>for (let k = 0; k < 2; k++) document.querySelectorAll('th button')[1].click();</script></body>"
     page = tmp_path / "sweep.html"
     page.write_text(html.replace("</body>", clicks))
-    told = browser(tmp_path, "--dump-dom", page.as_uri())
-    assert 'aria-sort="descending"' in told
-    assert [int(k) for k in re.findall(r'data-value="(\d)\.h5"', told)] == [0, 1]
+    document = browser(tmp_path, "--dump-dom", page.as_uri())
+    assert 'aria-sort="descending"' in document
+    assert [int(k) for k in re.findall(r'data-value="(\d)\.h5"', document)] == [0, 1]

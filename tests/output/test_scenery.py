@@ -114,7 +114,7 @@ def test_the_eye_shows_what_is_wide(extents, across):
     np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15)
 
 
-def test_who_is_far_away_does_not_widen_the_picture_and_is_counted():
+def test_a_far_particle_does_not_widen_the_picture_and_is_counted():
     scene = swarm.Scene([swarm.Sphere(0.5, openings=[swarm.Sphere(0.2, (0.0, 0.0, 0.5))])])
     axes, _scenery, _picture = drawn(scene, [[0.0, 0.0, 0.0], [0.0, 0.0, 100.0], [70.0, 0.0, 0.0]])
     assert np.ptp(axes.get_ylim()) < 2.0
@@ -149,8 +149,8 @@ def test_a_triangle_is_where_it_is_and_the_nearest_one_is_seen():
 
 def test_lengths_are_round():
     assert [triad.round_length(x) for x in (0.28, 1.0, 4.99, 5.0, 7e-6)] == pytest.approx([0.2, 1.0, 2.0, 5.0, 5e-6])
-    told = [triad.length_in_words(x) for x in (0.2, 2.0, 5e-3, 2e-6, 5e3, 1e-8, 1e-13)]
-    assert told == ["20 cm", "2 m", "5 mm", "2 µm", "5 km", "10 nm", "1e-13 m"]
+    lengths = [triad.length_in_words(x) for x in (0.2, 2.0, 5e-3, 2e-6, 5e3, 1e-8, 1e-13)]
+    assert lengths == ["20 cm", "2 m", "5 mm", "2 µm", "5 km", "10 nm", "1e-13 m"]
 
 
 def test_in_a_plane_what_closed_walls_enclose_is_filled():
@@ -264,7 +264,7 @@ def test_what_is_open_far_and_wide_is_not_filled():
     assert area(loop) == pytest.approx(3.0)
 
 
-def test_in_an_open_plane_who_is_far_away_is_counted():
+def test_in_an_open_plane_a_far_particle_is_counted():
     points = np.random.default_rng(1).normal(size=(200, 3))
     points[:3] *= 1e4
     axes = style.picture(4.0, 3.0).add_subplot()
@@ -281,14 +281,14 @@ def a_leak(folder):
     return swarm.load(folder / "leak.h5")
 
 
-def test_who_has_escaped_is_not_drawn_and_is_counted(tmp_path):
+def test_an_escaped_particle_is_not_drawn_and_is_counted(tmp_path):
     with a_leak(tmp_path) as trajectory:
         content = plots.content_of(trajectory)
         assert np.isnan(content.inside("end").position[0]).tolist() == [True, False]
         assert not np.isnan(content.frames["end"].position).any()
         figure = trajectory.plot()
-        told = [one.get_text() for one in figure.findobj(Text) if "inside, t" in one.get_text()]
-        assert told == ["1 particle inside, t = 2 s,\neach with 1 m/s\n1 escaped, not drawn"]
+        captions = [one.get_text() for one in figure.findobj(Text) if "inside, t" in one.get_text()]
+        assert captions == ["1 particle inside, t = 2 s,\neach with 1 m/s\n1 escaped, not drawn"]
         (dots,) = [one for axes in figure.findobj(Axes) for one in axes.collections if isinstance(one, PathCollection)]
         assert (~np.ma.getmaskarray(dots.get_offsets())).all(axis=1).sum() == 1
 
@@ -363,6 +363,6 @@ def test_where_all_have_gone_there_are_only_walls(plane, tmp_path):
     start = swarm.Particles([[0.0, 0.1], [0.0, 0.1], [0.0, 0.0]], [[1.0, 2.0], [0.0, 0.0], [0.0, 0.0]])
     swarm.simulate(scene, start, swarm.Impact(), until=3.0, every=1.5, trajectory=tmp_path / "run.h5")
     with swarm.load(tmp_path / "run.h5") as trajectory:
-        told = [one.get_text() for one in trajectory.plot().findobj(Text)]
+        texts = [one.get_text() for one in trajectory.plot().findobj(Text)]
         assert shown_film(trajectory)._title.get_text() == "t = 3 s,  0 of 2 particles"
-    assert any(one.endswith("\n2 escaped, not drawn") and one.startswith("0 particles inside") for one in told)
+    assert any(one.endswith("\n2 escaped, not drawn") and one.startswith("0 particles inside") for one in texts)

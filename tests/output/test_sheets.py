@@ -64,13 +64,13 @@ def test_a_recording_has_the_words_of_plots(tmp_path, monkeypatch):
     assert "largest penetration [m]" not in drawn
 
 
-def test_what_is_bad_is_said(tmp_path):
+def test_what_is_bad_is_reported(tmp_path):
     held, content = recorded(tmp_path, swarm.Scene([swarm.Sphere(0.5)]), swarm.Verlet(5e-3, 1e4))
     assert held.verdicts == verdicts.marked(content)
     assert any(text.startswith("✗ energy: not kept, Verlet does not conserve it") for text in held.verdicts)
 
 
-def test_of_more_particles_than_are_drawn_the_number_is_said(tmp_path):
+def test_of_more_particles_than_are_drawn_the_number_is_reported(tmp_path):
     held, _content = recorded(tmp_path, shown=20)
     assert sheet.title_of_sheet(held).endswith("Impact, 1 s\n20 of 60 particles are drawn")
     held.about |= {"shown": 10_000, "particles": 20_000}
@@ -126,8 +126,8 @@ def test_the_eye_sees_all_corners_of_the_box_and_no_more_than_it_must(scene, pla
     center = np.array([3.0, -2.0, 1.0])
     shapes = shapes_of(scene, np.zeros((3, 1)))
     controls = sight.eye_controls(plane, shapes, np.full((2, 3), np.nan), center)
-    told = (controls.position, controls.look_target, controls.eye_up)
-    place, target, up = (np.array(part.as_arrow_array().to_pylist()[0]) for part in told)
+    view = (controls.position, controls.look_target, controls.eye_up)
+    place, target, up = (np.array(part.as_arrow_array().to_pylist()[0]) for part in view)
     every = np.concatenate([curve for shape in shapes for curve in (*shape.wires, shape.vertices) if len(curve)])
     low, high = every.min(axis=0) - center, every.max(axis=0) - center
     np.testing.assert_allclose(target, 0.5 * (low + high), atol=1e-6)

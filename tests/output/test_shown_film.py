@@ -90,16 +90,16 @@ def test_a_film_plays_in_a_browser(result, tmp_path):
     """The browser has decoded a frame ahead (readyState 4), and knows how long it is and its size."""
     page = tmp_path / "film.html"
     html = result.film(size=(160, 120), fps=10)._repr_html_()
-    script = """<p id="told"></p><script>
-    const film = document.querySelector("video"), told = document.querySelector("#told");
-    film.addEventListener("canplaythrough", () => { told.textContent =
+    script = """<p id="state"></p><script>
+    const film = document.querySelector("video"), state = document.querySelector("#state");
+    film.addEventListener("canplaythrough", () => { state.textContent =
         `ready ${film.readyState}, ${film.duration} s, ${film.videoWidth} x ${film.videoHeight}`; });
-    film.addEventListener("error", () => { told.textContent = `error ${film.error.message}`; });
+    film.addEventListener("error", () => { state.textContent = `error ${film.error.message}`; });
     </script>"""
     page.write_text(f"<!doctype html><body>{html}{script}</body>")
     command = [CHROMIUM, "--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}",
                "--virtual-time-budget=10000", "--dump-dom", page.as_uri()]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    told = re.search('<p id="told">(.*?)</p>', done.stdout)
-    assert told is not None, done.stderr[-1000:]
-    assert told[1] == "ready 4, 0.5 s, 160 x 120"
+    state = re.search('<p id="state">(.*?)</p>', done.stdout)
+    assert state is not None, done.stderr[-1000:]
+    assert state[1] == "ready 4, 0.5 s, 160 x 120"

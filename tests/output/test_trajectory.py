@@ -219,18 +219,18 @@ if len(sys.argv) > 2:
 @pytest.mark.physics
 def test_other_programs_read_it_while_the_run_goes_on(tmp_path):
     """h5py, and MDAnalysis where it is installed, in processes of their own, with nothing swarm has to tell them."""
-    path, told = tmp_path / "run.h5", []
+    path, messages = tmp_path / "run.h5", []
     with_mdanalysis = [] if importlib.util.find_spec("MDAnalysis") is None else ["MDAnalysis"]
 
     def look(frame):
         if frame.number == 3:
             wait_for(path, 4)
-            told.append(python("-c", OTHERS, path, *with_mdanalysis))
+            messages.append(python("-c", OTHERS, path, *with_mdanalysis))
 
     particles = swarm.fill(SCENE, 30, speed=0.3)
     swarm.simulate(SCENE, particles, METHOD, until=0.05, every=0.01, trajectory=path, progress=look)
-    assert (told[0].returncode, told[0].stderr) == (0, "")
-    assert told[0].stdout.splitlines() == ["4 True", *(["4 (30, 3) True"] if with_mdanalysis else [])]
+    assert (messages[0].returncode, messages[0].stderr) == (0, "")
+    assert messages[0].stdout.splitlines() == ["4 True", *(["4 (30, 3) True"] if with_mdanalysis else [])]
 
 
 def test_places_velocities_masses_and_times_say_their_unit(tmp_path):

@@ -61,12 +61,12 @@ def test_a_folder_that_cannot_be_made_is_a_sentence(tmp_path):
 KILLED = """
 import os, signal, sys, swarm
 
-def told(done, of):
+def report(done, of):
     if done == 3:
         os.kill(os.getpid(), signal.SIGKILL)
 
 with swarm.load(sys.argv[1]) as trajectory:
-    trajectory.export(sys.argv[2], surfaces=False, overwrite=True, progress=told)
+    trajectory.export(sys.argv[2], surfaces=False, overwrite=True, progress=report)
 """
 
 

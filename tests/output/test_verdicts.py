@@ -23,12 +23,12 @@ def run(scene, method, n=20, until=2.0, every=0.2, speed=1.0, **keywords):
     return content_of(result, scene, method)
 
 
-def told(content):
+def verdicts_by_label(content):
     return {one.label: one for one in verdicts.judged(content)}
 
 
 def test_impact_is_good_in_every_way():
-    found = told(run(SPHERE, swarm.Impact()))
+    found = verdicts_by_label(run(SPHERE, swarm.Impact()))
     assert set(found) == {"energy", "total energy", "walls", "numbers"}
     assert all(one.verdict for one in found.values())
     assert found["energy"].text.startswith("kept to round-off: the worst particle's error is ")
@@ -39,7 +39,7 @@ def test_impact_is_good_in_every_way():
     "method", [swarm.Verlet(5e-3, 1e4), swarm.Trapezoidal(5e-3, 1e4)], ids=["verlet", "trapezoidal"]
 )
 def test_a_drift_is_judged_bad(method):
-    found = told(run(SPHERE, method))
+    found = verdicts_by_label(run(SPHERE, method))
     name = type(method).__name__
     assert found["energy"].verdict is False
     assert found["energy"].text.startswith(f"not kept, {name} does not conserve it")
@@ -48,7 +48,7 @@ def test_a_drift_is_judged_bad(method):
 
 
 def test_penalty_keeps_the_energy_and_gives_way():
-    found = told(run(SPHERE, swarm.Penalty(5e-3, 1e4)))
+    found = verdicts_by_label(run(SPHERE, swarm.Penalty(5e-3, 1e4)))
     assert found["energy"].verdict
     assert found["walls"].verdict is None
 
@@ -57,11 +57,11 @@ def test_a_loop_keeps_the_energy_up_to_its_tolerance():
     """And particles that do not converge are counted."""
     method = swarm.AugmentedLagrangian(1e-2, 1e4, tolerance=1e-8, adaptive=True)
     content = run(SPHERE, method, n=5)
-    found = told(content)
+    found = verdicts_by_label(content)
     assert found["energy"].verdict
     assert found["loops"].verdict
     content.seen["unconverged"] = content.seen["unconverged"] + 3
-    assert told(content)["loops"] == ("loops", "three contacts did not converge", False)
+    assert verdicts_by_label(content)["loops"] == ("loops", "three contacts did not converge", False)
 
 
 def test_the_balance_closes_with_losses_heat_and_work():
@@ -71,12 +71,12 @@ def test_the_balance_closes_with_losses_heat_and_work():
         swarm.Sphere(0.1, side="outside", motion=swarm.Oscillation((0.0, 0.0, 0.05), 2.0)),
     ]
     content = run(swarm.Scene(walls, (0.0, 0.0, -9.81)), swarm.Impact())
-    balance = told(content)["balance of energy"]
+    balance = verdicts_by_label(content)["balance of energy"]
     assert balance.verdict
     for what in ("dissipated", "heat of the walls", "work of the walls"):
         assert what in balance.text
     content.seen["dissipated_energy"] = content.seen["dissipated_energy"] * (1.0 - 1e-9)
-    balance = told(content)["balance of energy"]
+    balance = verdicts_by_label(content)["balance of energy"]
     assert balance.verdict is False
     assert balance.text.startswith("does not close")
 
@@ -100,7 +100,7 @@ def test_numbers_add_up(tmp_path):
     )
     with swarm.load(tmp_path / "run.h5") as trajectory:
         content = plots.content_of(trajectory)
-    number = told(content)["particles"]
+    number = verdicts_by_label(content)["particles"]
     assert number.verdict
     born, escaped = int(result.observables["born"][-1].sum()), int(result.observables["escaped"][-1])
     absorbed, n = int(result.observables["absorbed"][-1].sum()), len(result.particles)
@@ -110,23 +110,23 @@ def test_numbers_add_up(tmp_path):
         f"{n} = {n - escaped - absorbed} inside + {escaped} escaped + {absorbed} absorbed, {born} of them from sources"
     )
     content.seen["born"][-1] += 1
-    assert told(content)["particles"].verdict is False
+    assert verdicts_by_label(content)["particles"].verdict is False
 
 
-def test_who_leaves_a_closed_vessel_is_told():
+def test_a_particle_that_leaves_a_closed_vessel_is_reported():
     content = run(SPHERE, swarm.Impact())
     content.seen["escaped"] = content.seen["escaped"] + 2
-    assert told(content)["particles"] == ("particles", "2 of 20 passed through a closed wall", False)
+    assert verdicts_by_label(content)["particles"] == ("particles", "2 of 20 passed through a closed wall", False)
 
 
 def test_momentum_holds_where_there_are_no_walls():
     scene = swarm.Scene([], period=(1.0, 1.0, 1.0))
     start = swarm.fill(scene, 20, temperature=1.0, radius=0.1, seed=1)
     content = run(scene, swarm.Impact(), start=start, until=0.5)
-    assert told(content)["momentum"].verdict
-    assert "walls" not in told(content)
+    assert verdicts_by_label(content)["momentum"].verdict
+    assert "walls" not in verdicts_by_label(content)
     content.seen["momentum"] = content.seen["momentum"] + np.arange(len(content.seen["time"]))[:, None] * 1e-6
-    assert told(content)["momentum"].verdict is False
+    assert verdicts_by_label(content)["momentum"].verdict is False
 
 
 def test_links_of_bodies_keep_their_lengths():
@@ -135,20 +135,20 @@ def test_links_of_bodies_keep_their_lengths():
     method = swarm.Impact(dt=1e-2)
     result = swarm.simulate(SPHERE, bodies, method, until=0.5, every=0.1, compile="never")
     content = content_of(result, SPHERE, method, body)
-    assert told(content)["links"].verdict
-    assert "worst body" in told(content)["energy"].text
+    assert verdicts_by_label(content)["links"].verdict
+    assert "worst body" in verdicts_by_label(content)["energy"].text
     content.seen["link_error"] = content.seen["link_error"] + 1e-6
-    assert told(content)["links"].verdict is False
+    assert verdicts_by_label(content)["links"].verdict is False
 
 
-def test_numbers_that_are_none_are_told_alone():
+def test_what_is_not_a_number_is_reported_alone():
     content = run(SPHERE, swarm.Impact())
     content.seen["total_energy"] = np.where(content.seen["time"] > 0.5, np.nan, 1.0)
     assert list(verdicts.judged(content)) == [("numbers", "not finite: total_energy from 0.6 s on", False)]
     # One's own observables may be what they like, and pressures are unknown at the start.
     content = run(SPHERE, swarm.Impact())
     content.seen.update(mine=np.full(11, np.nan), pressure=np.full(11, np.nan))
-    assert told(content)["numbers"].verdict
+    assert verdicts_by_label(content)["numbers"].verdict
 
 
 @pytest.mark.parametrize("each", [0, 10, 10**9])

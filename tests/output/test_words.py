@@ -46,7 +46,7 @@ def every_text(run):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_every_surface_is_said(law):
+def test_every_surface_is_reported(law):
     """A sphere around it makes it a scene."""
     for name in WALLS:
         with row(name):
@@ -60,12 +60,12 @@ def test_every_surface_is_said(law):
                 assert not PYTHON.search(text.replace(formula, "")), text
             assert len(words.title(run)) < words.LONGEST
             if law != "plain":
-                said = next(one.text for one in facts.of_setting(run) if one.label.startswith("surface 0"))
-                assert len(said) > len(nouns.in_full(bare, scene))
+                statement = next(one.text for one in facts.of_setting(run) if one.label.startswith("surface 0"))
+                assert len(statement) > len(nouns.in_full(bare, scene))
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_every_method_is_said(name):
+def test_every_method_is_reported(name):
     run = content(swarm.Scene([swarm.Sphere(1.0)]), METHODS[name])
     assert words.title(run).startswith("1000 particles in a sphere: ")
     assert not any(PYTHON.search(text) for text in every_text(run))
@@ -144,6 +144,6 @@ def test_labels_are_unique_and_readable():
     vessel = swarm.Union([swarm.Sphere(0.5), swarm.Cylinder(0.2, length=2.0)])
     floor = swarm.Plane((0.0, 0.0, -1.0), 0.9)
     scene = swarm.Scene([vessel, floor, BALL, swarm.Sphere(0.1, (0.0, 0.0, 0.3), side="outside")], DOWN)
-    told = nouns.labels(scene)
-    assert list(told.values()) == ["vessel", "floor", "ball 1", "ball 2", "sphere", "cylinder"]
+    found = nouns.labels(scene)
+    assert list(found.values()) == ["vessel", "floor", "ball 1", "ball 2", "sphere", "cylinder"]
     assert nouns.labels(swarm.Scene([swarm.Sphere(1.0), floor]))[1, ()] == "plane"

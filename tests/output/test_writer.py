@@ -190,20 +190,20 @@ def test_a_file_that_is_harmed_ends_the_run(tmp_path, harm, message):
 @pytest.mark.parametrize("size", [20_000, appended._BEGINNING - 1])
 def test_a_disk_without_room_for_the_beginning_has_no_file(tmp_path, size):
     path = tmp_path / "run.h5"
-    with pytest.raises(swarm.FileError) as told, files_limited_to(size), writer_of(path):
+    with pytest.raises(swarm.FileError) as caught, files_limited_to(size), writer_of(path):
         pass
-    assert str(told.value) == f"cannot write the trajectory {path}: File too large"
+    assert str(caught.value) == f"cannot write the trajectory {path}: File too large"
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("size", [*range(appended._BEGINNING, appended._BEGINNING + 8_000, 800), 165_537])
 def test_a_full_disk_loses_no_frame(tmp_path, size):
     path, count = tmp_path / "run.h5", 0
-    with pytest.raises(swarm.FileError) as told, files_limited_to(size), writer_of(path) as write:  # noqa: PT012
+    with pytest.raises(swarm.FileError) as caught, files_limited_to(size), writer_of(path) as write:  # noqa: PT012
         while count < 5000:
             write([frame(count)])
             count += 1
-    assert str(told.value) == f"cannot write frame {count} to {path}: File too large"
+    assert str(caught.value) == f"cannot write frame {count} to {path}: File too large"
     assert require_frames(path, count) == count > 0
     with h5py.File(path) as file:
         assert file["particles/all/position/value"].shape[1:] == (N, 3)

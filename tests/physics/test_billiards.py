@@ -66,7 +66,7 @@ def test_the_exponent_of_the_stadium_is_that_of_neighbours_without_swarm(compile
     assert stadium.measure(0.05, 200, 300.0)[0] < 0.5 * value
 
 
-def test_who_stays_in_the_mushroom_is_known_one_by_one():
+def test_particles_that_stay_in_the_mushroom_are_known_one_by_one():
     found = mushroom.run(10_000, 300.0)
     stays = found.stays()
     assert pytest.approx(0.7831, abs=5e-5) == mushroom.STAYS

@@ -177,15 +177,15 @@ def test_a_run_that_is_resumed_has_the_same_bits(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("method", "said"),
+    ("method", "sentence"),
     [
         (swarm.Impact(), "Impact with a step"),
         (swarm.Impact(dt=0.01, contact_step=0.001), "contact_step must be 0"),
         (swarm.Verlet(dt=0.01, penalty=1.0), "Impact with a step"),
     ],
 )
-def test_a_method_that_cannot_serve_bodies_says_so(method, said):
-    with pytest.raises(swarm.SceneError, match=said):
+def test_a_method_that_cannot_serve_bodies_says_so(method, sentence):
+    with pytest.raises(swarm.SceneError, match=sentence):
         swarm.simulate(swarm.Scene(SPHERE), some("dumbbell", SPHERE, 2), method, until=1.0)
 
 
@@ -273,18 +273,18 @@ def test_a_body_that_turns_by_radians_in_a_step_keeps_its_energy(kind, spin):
     assert seen["link_error"].max() < 1e-13
 
 
-def test_a_body_that_turns_far_in_a_step_is_said_before_the_run(caplog):
+def test_a_body_that_turns_far_in_a_step_is_reported_before_the_run(caplog):
     scene = swarm.Scene([swarm.Sphere(1000.0)])
-    for spin, said in ((20.0, ""), (400.0, r"body 0 turns by 2 rad in a step of 0.005 s \(links\[0\]\)")):
+    for spin, warning in ((20.0, ""), (400.0, r"body 0 turns by 2 rad in a step of 0.005 s \(links\[0\]\)")):
         start = swarm.place(scene, MAKERS["dumbbell"](), 1, spin=1.0, seed=1)
         relative = start.velocity[:, 0] - start.velocity[:, 1]
         rate = np.sqrt((relative**2).sum()) / 0.1
         turning = swarm.Bodies(start.body, start.position, start.velocity * (spin / rate))
         caplog.clear()
         swarm.simulate(scene, turning, swarm.Impact(dt=STEP), until=STEP)
-        assert bool(said) == bool(caplog.text)
-        if said:
-            assert re.search(said, caplog.text)
+        assert bool(warning) == bool(caplog.text)
+        if warning:
+            assert re.search(warning, caplog.text)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

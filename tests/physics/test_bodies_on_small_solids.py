@@ -52,16 +52,18 @@ def test_a_cube_comes_to_rest_on_a_pedestal():
     assert seen["dissipated_energy"][-1] == pytest.approx(9.81 * 0.325, rel=1e-6)
 
 
-def test_a_cube_that_passes_is_said_before_the_run(caplog):
+def test_a_cube_that_passes_is_reported_before_the_run(caplog):
     """By its corners alone it meets nothing; the sentence says what would hold it."""
     seen = fall(None, 0.6).observables
     assert seen["impacts"][-1] == 0
     (record,) = caplog.records
     assert record.levelno == logging.WARNING
-    said = record.getMessage()
-    assert said.startswith("surfaces[0] (Box) can pass through the body without an impact: only contact points touch")
-    assert "0.71 m away from them" in said
-    assert "contacts = 0.1 [m] of rigid" in said
+    message = record.getMessage()
+    assert message.startswith(
+        "surfaces[0] (Box) can pass through the body without an impact: only contact points touch"
+    )
+    assert "0.71 m away from them" in message
+    assert "contacts = 0.1 [m] of rigid" in message
     caplog.clear()
     fall(0.1, 0.01)
     assert not caplog.text
@@ -71,7 +73,7 @@ SMALL = swarm.rigid(0.1 * CUBE, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("surface", "body", "said"),
+    ("surface", "body", "sentence"),
     [
         (swarm.Sphere(0.01, side="outside"), SMALL, r"\(Sphere\) can pass through the body"),
         (swarm.Spheres([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)], [0.5, 0.01]), SMALL, r"\(Spheres\) can pass through"),
@@ -92,13 +94,13 @@ SMALL = swarm.rigid(0.1 * CUBE, 1.0)
         (swarm.Sphere(0.01, side="outside"), swarm.dumbbell(1.0, 1.0), None),
     ],
 )
-def test_what_is_said(surface, body, said, caplog):
+def test_the_warning(surface, body, sentence, caplog):
     warn_of_passing(swarm.Scene([VESSEL, surface]), body)
-    if said is None:
+    if sentence is None:
         assert not caplog.text
     else:
         assert caplog.records
-        assert re.search(r"surfaces\[1\] " + said, caplog.text)
+        assert re.search(r"surfaces\[1\] " + sentence, caplog.text)
 
 
 @pytest.mark.parametrize("surface", [
@@ -106,7 +108,7 @@ def test_what_is_said(surface, body, said, caplog):
     swarm.Sphere(0.2, side="outside"),
     swarm.Capsule(0.1, 1.0, (0.0, 0.0, 1.0), side="outside"),
 ])  # fmt: skip
-def test_the_spacing_that_is_said_is_enough(surface, caplog):
+def test_the_proposed_spacing_is_enough(surface, caplog):
     scene = swarm.Scene([VESSEL, surface])
     warn_of_passing(scene, swarm.rigid(CUBE, 1.0))
     spacing = float(caplog.text.split("contacts = ")[1].split(" ")[0])

@@ -326,14 +326,14 @@ def test_a_loop_that_is_too_slow_names_the_cause_and_the_remedy(start):
     given = {"adaptive": True, "contact_start": start}
     with pytest.raises(swarm.RunError) as caught:
         simulate(SPHERE, particles, swarm.AugmentedLagrangian(2.5e-3, 1e5, **given), 2.0)
-    told = str(caught.value)
+    message = str(caught.value)
     for part in (
         "alpha h^2/m = 0.25 here",
         'acceleration="reflection"',
         "grows as 1/dt^2 (1.6e+06 makes",
         "max_sweeps",
     ):
-        assert part in told, told
+        assert part in message, message
     simulate(SPHERE, particles, swarm.AugmentedLagrangian(2.5e-3, 1.6e6, **given), 2.0)
     simulate(SPHERE, particles, swarm.AugmentedLagrangian(2.5e-3, 1e5, acceleration="reflection", **given), 2.0)
 

@@ -215,7 +215,7 @@ def test_storage_is_exponential_with_the_loss():
     assert absorbed == pytest.approx((result.absorbed_time[:, None] <= result.observables["time"]).sum(axis=0))
 
 
-def test_a_barrier_absorbs_who_comes_fast():
+def test_a_barrier_absorbs_fast_particles():
     rng, n, mass = np.random.default_rng(2), 20_000, 2.0
     b = rng.uniform(0.1, 2.0, n)
     wall = swarm.Plane((0, 0, -1), 0.0, laws=[swarm.Absorb(barrier=1.0, loss=0.25)])
@@ -236,7 +236,7 @@ def test_a_barrier_absorbs_who_comes_fast():
     assert result.observables["energy_error"].max() <= 4.0 * EPSILON
 
 
-def test_who_is_absorbed_costs_nothing_and_stays_where_it_is(tmp_path):
+def test_an_absorbed_particle_costs_nothing_and_stays_where_it_is(tmp_path):
     """In all files, and in the log of impacts, too."""
     scene = swarm.Scene([swarm.Sphere(0.5, laws=[swarm.Absorb(0.2)]), swarm.Sphere(0.1, side="outside")], G)
     path, log = tmp_path / "run.h5", tmp_path / "impacts.h5"
@@ -248,9 +248,9 @@ def test_who_is_absorbed_costs_nothing_and_stays_where_it_is(tmp_path):
     assert not seen["absorbed"][:, 1].any()
     with swarm.load(path) as written:
         for k, time in enumerate(times):
-            told = written.absorbed_times(k)
-            assert np.array_equal(~np.isnan(told), result.absorbed_time <= time)
-            gone = ~np.isnan(told)
+            written_times = written.absorbed_times(k)
+            assert np.array_equal(~np.isnan(written_times), result.absorbed_time <= time)
+            gone = ~np.isnan(written_times)
             assert np.array_equal(written.frame(k).position[:, gone], result.particles.position[:, gone])
     with swarm.load_impacts(log) as impacts:
         rows = impacts.table()
@@ -285,7 +285,7 @@ def test_of_a_field_each_member_is_known():
 # --- Residence -------------------------------------------------------------------------------------------
 
 
-def test_who_sticks_leaves_after_the_mean_time():
+def test_a_particle_that_sticks_leaves_after_the_mean_time():
     """A particle meets the wall once in 4 V/A/v + the residence time; the frames do not matter to it."""
     scene = swarm.Scene([swarm.Sphere(0.5, laws=[swarm.Lambert(), swarm.Sticky(0.5)])])
     start = swarm.fill(scene, 4000, speed=1.0, seed=1)
@@ -303,7 +303,7 @@ def test_who_sticks_leaves_after_the_mean_time():
     assert one.observables["energy_error"].max() <= 4.0 * EPSILON
 
 
-def test_who_waits_has_the_velocity_of_its_leave(tmp_path):
+def test_a_particle_that_waits_has_the_velocity_of_its_leave(tmp_path):
     wall = swarm.Plane((0, 0, -1), 0.0, laws=[swarm.Sticky(1.0)])
     n = 2000
     start = swarm.Particles(np.tile([[0.0], [0.0], [0.5]], n), np.tile([[0.0], [0.0], [-1.0]], n))

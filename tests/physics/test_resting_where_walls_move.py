@@ -107,16 +107,16 @@ def test_a_rotor_sweeps_a_grain_along_a_table_that_rises():
     require_booked(after)
 
 
-def test_a_ceiling_that_closes_on_what_rests_is_told(tmp_path):
+def test_a_ceiling_that_closes_on_what_rests_is_reported(tmp_path):
     """It does not pass it: the run ends with where and when."""
     lid = swarm.Plane((0.0, 0.0, 1.0), 0.25, restitution=0.0, motion=swarm.Translation((0.0, 0.0, -0.5)))
     with pytest.raises(swarm.RunError) as caught:
         run([floor(), lid], 1.0, every=0.2, trajectory=tmp_path / "run.h5")
     place = r"it is at \(0\.5, 0, (\S+)\) m, .* at ([\d.]+) s: walls that move"
-    told = re.search(place, str(caught.value))
-    assert told is not None, str(caught.value)
+    reported = re.search(place, str(caught.value))
+    assert reported is not None, str(caught.value)
     # It is seen after the short step in which it happens: there the lid has pressed it down by its way since.
-    height, instant = (float(number) for number in told.groups())
+    height, instant = (float(number) for number in reported.groups())
     assert instant == pytest.approx(0.5, abs=1e-4)
     assert 0.25 - 0.5 * instant <= height <= 0.0
     with swarm.load(tmp_path / "run.h5") as trajectory:

@@ -535,8 +535,8 @@ def test_walls_that_close_say_where_and_when(tmp_path, monkeypatch):
     walls = [swarm.Plane((-1, 0, 0), 0.0), swarm.Plane((1, 0, 0), 0.5, motion=swarm.Translation((-0.5, 0.0, 0.0)))]
     start = swarm.Particles([[0.2, 0.3], [0.0, 0.0], [0.0, 0.0]], [[1.0, -0.7], [0.0, 0.1], [0.0, 0.0]])
     file = tmp_path / "run.h5"
-    told = r"at particle [01]: .* it is at .* s: walls that move have closed on it; end the run before"
-    with pytest.raises(swarm.RunError, match=told) as caught:
+    message = r"at particle [01]: .* it is at .* s: walls that move have closed on it; end the run before"
+    with pytest.raises(swarm.RunError, match=message) as caught:
         run(swarm.Scene(walls), start, 2.0, frames=20, trajectory=file)
     moment = float(re.search(r" at ([\d.]+) s: walls that move", str(caught.value)).group(1))
     assert moment == pytest.approx(1.0, abs=1e-2)

@@ -43,7 +43,7 @@ def test_balls_in_a_row_and_at_one_place():
     assert (found.number, found.depth) == (6, 2.0)
 
 
-def test_who_enters_overlaps_nobody():
+def test_a_ball_that_enters_overlaps_no_other():
     random = np.random.default_rng(1)
     radius = 0.1 + 0.15 * random.random(40)
     cells = empty_cells(np.zeros(3), np.ones(3), None, radius)

@@ -294,7 +294,7 @@ def main():
             "{\n" + ",\n".join(f" {json.dumps(k)}: {json.dumps(v)}" for k, v in (kept | found).items()) + "\n}\n"
         )
         return
-    other = [said for said in found.values() if said]
+    other = [difference for difference in found.values() if difference]
     print("\n".join([*other, f"{len(found) - len(other)} of {len(found)} runs are as they were"]))
     sys.exit(1 if other else 0)
 

@@ -102,7 +102,7 @@ def main():
     if "--write" in sys.argv:
         write({name: outcome.what for name, outcome in done.items()})
         refused = {name: outcome.said for name, outcome in done.items() if outcome.what == "refused"}
-        write_refusals({name: digest_of(said) for name, said in refused.items()})
+        write_refusals({name: digest_of(sentence) for name, sentence in refused.items()})
 
 
 def write(done):

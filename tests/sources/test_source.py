@@ -21,7 +21,7 @@ def without(*names, **more):
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "sentence"),
     [
         (without("rate"), "needs one of rate, times and count, got none"),
         (without(times=[0.5]), "needs one of rate, times and count .*, got rate and times"),
@@ -53,8 +53,8 @@ def without(*names, **more):
         (without(within=3), "within must be a surface"),
     ],
 )
-def test_a_source_that_is_none(given, said):
-    with pytest.raises(swarm.SceneError, match=said):
+def test_a_source_that_is_none(given, sentence):
+    with pytest.raises(swarm.SceneError, match=sentence):
         swarm.Source(0, **given)
 
 
@@ -79,7 +79,7 @@ TIMED = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Sphere(0.2, side="outside
 
 
 @pytest.mark.parametrize(
-    ("scene", "source", "said"),
+    ("scene", "source", "sentence"),
     [
         (SPHERE, swarm.Source(1, **GIVEN), r"sources\[0\].where must be the number of a surface .* from 0 to 0, got 1"),
         (SPHERE, swarm.Source(swarm.Sphere(0.1, (2.0, 0, 0)), **GIVEN), r"sources\[0\].where must be in the vessel"),
@@ -121,9 +121,9 @@ TIMED = swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Sphere(0.2, side="outside
         ),
     ],
 )
-def test_a_source_that_does_not_go_with_the_scene(scene, source, said, monkeypatch):
+def test_a_source_that_does_not_go_with_the_scene(scene, source, sentence, monkeypatch):
     monkeypatch.setattr(places, "_MOST_BATCHES", 3)
-    with pytest.raises(swarm.SceneError, match=said):
+    with pytest.raises(swarm.SceneError, match=sentence):
         run(scene, [source])
 
 
@@ -133,7 +133,7 @@ FAR = swarm.Sphere(0.1, (2.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
-    ("scene", "where", "more", "said"),
+    ("scene", "where", "more", "sentence"),
     [
         (SPHERE, FAR, {}, "from 1.9 to 2.1 m along x: births can be from -0.5 to 0.5 m there; move it"),
         (SPHERE, FAR, {"volume": True}, "from 1.9 to 2.1 m along x"),
@@ -150,15 +150,15 @@ FAR = swarm.Sphere(0.1, (2.0, 0.0, 0.0))
     ],
 )
 def test_a_source_whose_bounds_miss_the_vessel_is_refused_before_points_are_drawn(
-    scene, where, more, said, monkeypatch
+    scene, where, more, sentence, monkeypatch
 ):
     drawn = []
     for name in ("_volume", "_surface"):
         monkeypatch.setattr(PointBatches, name, lambda *about: drawn.append(1) or np.zeros((6, 0)))
     monkeypatch.setattr(places, "_MOST_BATCHES", 3)
-    with pytest.raises(swarm.SceneError, match=rf"sources\[0\].where must be in the vessel.*{said}"):
+    with pytest.raises(swarm.SceneError, match=rf"sources\[0\].where must be in the vessel.*{sentence}"):
         run(scene, swarm.Source(where, **GIVEN, **more))
-    assert len(drawn) == (3 if said == "are; move it" else 0)
+    assert len(drawn) == (3 if sentence == "are; move it" else 0)
 
 
 def test_bounds_refuse_no_source_that_has_a_place():
@@ -179,18 +179,18 @@ def test_bounds_refuse_no_source_that_has_a_place():
         assert len(made) == 5
 
 
-def test_a_long_search_for_places_is_told(caplog, monkeypatch):
+def test_a_long_search_for_places_is_reported(caplog, monkeypatch):
     """Whenever it has taken twice as many points."""
     monkeypatch.setattr(places, "_MOST_BATCHES", 100)
     corner = swarm.Source(swarm.Sphere(0.05, (0.45, 0.45, 0.45)), volume=True, **GIVEN)
     with pytest.raises(swarm.SceneError, match="of which 0 of 1638400 points are"):
         run(SPHERE, corner)
-    told = [message for message in caplog.messages if "have a place so far" in message]
-    assert [message.split("after ")[1] for message in told] == ["524288 points", "1048576 points"]
-    assert told[0].startswith("sources[0]: 0 of ")
+    reports = [message for message in caplog.messages if "have a place so far" in message]
+    assert [message.split("after ")[1] for message in reports] == ["524288 points", "1048576 points"]
+    assert reports[0].startswith("sources[0]: 0 of ")
 
 
-def test_who_has_no_sources():
+def test_runs_that_support_no_sources():
     source = swarm.Source(0, **GIVEN)
     for given in (3, "all", [source, 3]):
         with pytest.raises(swarm.SceneError, match="sources"):

@@ -50,40 +50,40 @@ def check_births(seed):
     random = np.random.default_rng([10, seed])
     kind = KINDS[seed % len(KINDS)]
     source = a_source(random, kind)
-    told = f"seed {seed}: {source}"
+    case = f"seed {seed}: {source}"
     whole = births_of(source, seed, LONGEST)
     times = times_of(whole)
     stop = math.inf if source.stop is None else source.stop
-    assert (np.diff(times) >= 0.0).all(), told
-    assert (times <= LONGEST).all(), told
+    assert (np.diff(times) >= 0.0).all(), case
+    assert (times <= LONGEST).all(), case
     if kind == "times":
-        assert times.tolist() == sorted(source.times), told
+        assert times.tolist() == sorted(source.times), case
     else:
-        assert (times >= source.start).all(), told
-        assert (times == source.start).all() if kind == "count at once" else (times < stop).all(), told
-        assert source.count is None or len(times) <= source.count, told
+        assert (times >= source.start).all(), case
+        assert (times == source.start).all() if kind == "count at once" else (times < stop).all(), case
+        assert source.count is None or len(times) <= source.count, case
     if kind in ("count", "count at once") and stop <= LONGEST:
-        assert len(times) == source.count, told
+        assert len(times) == source.count, case
     if "even" in kind and len(times):
         most = math.inf if source.count is None else source.count
-        np.testing.assert_allclose(times, source.start + np.arange(len(times)) / source.rate, rtol=1e-14, err_msg=told)
+        np.testing.assert_allclose(times, source.start + np.arange(len(times)) / source.rate, rtol=1e-14, err_msg=case)
         # The next one is the first that is not in the interval, is after the end, or is one too many.
         following = source.start + len(times) / source.rate
         round_off = 1e-12 * max(1.0, following)
-        assert len(times) == most or following >= min(stop, LONGEST) - round_off, told
+        assert len(times) == most or following >= min(stop, LONGEST) - round_off, case
     # A run that ends before has the first of these, up to its end and at it.
     for until in (0.25, 1.0, 1.5, *random.uniform(0.1, 2.5, 2), *times[-2:]):
         some = births_of(source, seed, float(until))
         n = 1 + int((times <= until).sum())
-        assert some.births.there(float(until)) == n == whole.births.there(float(until)), (told, until)
+        assert some.births.there(float(until)) == n == whole.births.there(float(until)), (case, until)
         for what in ("position", "velocity", "mass"):
             rows = getattr(some, what)[..., :n], getattr(whole, what)[..., :n]
-            assert np.array_equal(*rows), (told, until, what)
+            assert np.array_equal(*rows), (case, until, what)
     if kind == "even" and source.stop is not None and source.stop > source.start:
-        check_neighbours(source, times, seed, told)
+        check_neighbours(source, times, seed, case)
 
 
-def check_neighbours(source, times, seed, told):
+def check_neighbours(source, times, seed, case):
     """Two sources, of which one begins where the other stops, have no birth at both ends and leave out none."""
     k = max(1, len(times) // 2)
     middle = source.start + k / source.rate
@@ -92,8 +92,8 @@ def check_neighbours(source, times, seed, told):
     second = swarm.Source(0, start=middle, stop=max(source.stop, middle), **ends)
     both = [births_of(one, seed, LONGEST) for one in (first, second)]
     found = [len(times_of(one)) for one in both]
-    assert found[0] == k, told
-    assert sum(found) == max(len(times), k), told
+    assert found[0] == k, case
+    assert sum(found) == max(len(times), k), case
 
 
 def check_frames(seed):

@@ -243,7 +243,7 @@ def test_a_face_that_cannot_be_opened_is_a_sentence():
         )
 
 
-def test_parts_that_touch_and_move_otherwise_are_said(caplog):
+def test_parts_that_touch_and_move_otherwise_are_reported(caplog):
     box = swarm.Box((1.0, 1.0, 1.0))
     moving = swarm.Box((1.0, 1.0, 1.0), (2.0, 0.0, 0.0), motion=swarm.Translation((1.0, 0.0, 0.0)))
     start = swarm.Particles([[0.0]] * 3, [[1.0]] * 3)

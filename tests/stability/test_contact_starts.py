@@ -50,9 +50,9 @@ def test_both_methods(seed):
     ends = []
     for method in methods:
         result = simulate(scene, start, method, 1.5, random.uniform(0.05, 0.2) if len(ends) == 0 else None)
-        said = f"seed {seed}: {scene.surfaces}, gravity={gravity}, {method}"
-        assert result.observables["energy_error"].max() <= 1e-13, said
-        assert result.observables["max_penetration"].max() <= 64.0 * np.spacing(scene.extent()), said
+        case = f"seed {seed}: {scene.surfaces}, gravity={gravity}, {method}"
+        assert result.observables["energy_error"].max() <= 1e-13, case
+        assert result.observables["max_penetration"].max() <= 64.0 * np.spacing(scene.extent()), case
         ends.append(result)
     if gravity is None:
         # Both cut by the same frames: by none.

@@ -105,7 +105,7 @@ def test_every_export_has_those_that_are_there(tmp_path, seed):
         scene, start, swarm.Impact(), until=1.0, every=1.0 / (FRAMES - 1), sources=sources, seed=seed, compile="never",
         trajectory=tmp_path / "run.h5",
     )  # fmt: skip
-    told = f"seed {seed}: {scene_table(scene, {})}, {sources}, {chosen}"
+    case = f"seed {seed}: {scene_table(scene, {})}, {sources}, {chosen}"
     with swarm.load(tmp_path / "run.h5") as trajectory:
         numbers = list(range(len(trajectory))[chosen["frames"] or slice(None)])
         numbers = numbers if (chosen["frames"] or slice(None)).step != -1 else numbers[::-1]
@@ -113,13 +113,13 @@ def test_every_export_has_those_that_are_there(tmp_path, seed):
         for k in numbers:
             frame, kept = trajectory.frame(k), np.arange(len(trajectory.ids)) % chosen["particles"] == 0
             there = kept & (trajectory.birth_time <= trajectory.times[k])
-            assert len(frame.born()) == (trajectory.birth_time <= trajectory.times[k]).sum(), told
+            assert len(frame.born()) == (trajectory.birth_time <= trajectory.times[k]).sum(), case
             expected[k] = trajectory.ids[there], frame.position.T[there]
         for form, (read, off) in READERS.items():
             paths = trajectory.export(tmp_path / f"out.{form}", surfaces=False, **chosen)
             some = [k for k in numbers if len(expected[k][0])] if form == "csv" else numbers
             found = list(read(paths))
-            assert len(found) == len(some), (form, told)
+            assert len(found) == len(some), (form, case)
             for k, (ids, position) in zip(some, found, strict=True):
-                np.testing.assert_array_equal(ids, expected[k][0], f"{form}, frame {k}, {told}")
-                np.testing.assert_allclose(position, expected[k][1], 0.0, off, f"{form}, frame {k}, {told}")
+                np.testing.assert_array_equal(ids, expected[k][0], f"{form}, frame {k}, {case}")
+                np.testing.assert_allclose(position, expected[k][1], 0.0, off, f"{form}, frame {k}, {case}")

@@ -145,7 +145,7 @@ def change(path, chosen):
                 file[name] = h5py.ExternalLink("other.h5", name)
 
 
-def require_told(whole, folder, seed):
+def require_reported(whole, folder, seed):
     path = shutil.copy(whole, folder / "run.h5")
     shutil.copy(whole, folder / "other.h5")
     change(path, random.Random(seed))
@@ -159,14 +159,14 @@ def require_told(whole, folder, seed):
 
 
 @pytest.mark.parametrize("seed", range(FEW))
-def test_a_changed_trajectory_is_told(whole, tmp_path, seed):
-    require_told(whole, tmp_path, seed)
+def test_a_changed_trajectory_is_reported(whole, tmp_path, seed):
+    require_reported(whole, tmp_path, seed)
 
 
 @pytest.mark.long
-def test_many_changed_trajectories_are_told(whole, tmp_path):
+def test_many_changed_trajectories_are_reported(whole, tmp_path):
     for seed in range(FEW, MANY):
-        require_told(whole, tmp_path, seed)
+        require_reported(whole, tmp_path, seed)
     assert sorted(os.listdir(tmp_path)) == ["other.h5", "run.h5"]
 
 
@@ -192,7 +192,7 @@ def require_known(path, name, value):
 
 @pytest.mark.parametrize("value", [None, 5, [1.0, 2.0]], ids=["group", "number", "list"])
 @pytest.mark.parametrize("kind", ["run.h5", "log.h5"])
-def test_another_thing_under_a_name_of_a_file_is_told(whole, tmp_path, kind, value):
+def test_another_thing_under_a_name_of_a_file_is_reported(whole, tmp_path, kind, value):
     """Of the parameters, among them the checksums; what follows needs no other error than a sentence."""
     names = [name for name in names_in(whole.with_name(kind)) if name.startswith("parameters/")]
     for name in names:
@@ -201,7 +201,7 @@ def test_another_thing_under_a_name_of_a_file_is_told(whole, tmp_path, kind, val
 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["run.h5", "log.h5"])
-def test_anything_under_any_name_of_a_file_is_told(whole, tmp_path, kind):
+def test_anything_under_any_name_of_a_file_is_reported(whole, tmp_path, kind):
     for name in names_in(whole.with_name(kind)):
         for value in (None, *HDF5_VALUES):
             require_known(shutil.copy(whole.with_name(kind), tmp_path / kind), name, value)

@@ -71,12 +71,12 @@ def flown(scene, start, method, steps):
             observables={"place": lambda frame: frame.position},
         )  # fmt: skip
     except swarm.SwarmError as error:
-        told = str(error)
+        message = str(error)
     else:
         if start.radius is not None:
             assert result.observables["largest_overlap"].max() <= start.radius.max(), start
         return result.observables["place"]
-    assert any(sentence in told for sentence in SENTENCES), told
+    assert any(sentence in message for sentence in SENTENCES), message
     return None
 
 
@@ -165,7 +165,7 @@ def point_at_a_solid(seed):
     aim = random.uniform(-0.03, 0.03, 3) * (0.0, 1.0, 1.0) if flat else half * random.uniform(-0.9, 0.9, 3)
     start = swarm.Particles(aim - (2.5 + 5.0 * random.uniform()) * half * way - 0.02 * flat * way, speed * way, MASS)
     count = min(400, int(np.ceil((14.0 * half + 0.04 * flat) / speed / dt)))
-    told = f"seed {seed}: {name}, half = {half:g} m, {speed:g} m/s, {method}, {start.position}, {start.velocity}"
+    case = f"seed {seed}: {name}, half = {half:g} m, {speed:g} m/s, {method}, {start.position}, {start.velocity}"
     places = flown(swarm.Scene([ROOM, solid]), start, method, count)
     if places is None:
         return "refused"
@@ -176,7 +176,7 @@ def point_at_a_solid(seed):
         return "missed"
     ends = solid.gradient(places[:, [max(inside[0] - 1, 0), inside[-1] + 1]])
     cosine = float(ends[:, 0] @ ends[:, 1] / np.linalg.norm(ends, axis=0).prod())
-    assert cosine > (0.0 if flat else -0.8), (told, cosine)
+    assert cosine > (0.0 if flat else -0.8), (case, cosine)
     return "held"
 
 

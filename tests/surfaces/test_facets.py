@@ -306,8 +306,8 @@ def test_what_a_mesh_does_not_go_with_is_one_sentence():
             r"Mesh",
         ),
     ]
-    for make, said in cases:
-        with pytest.raises(swarm.SceneError, match=said) as caught:
+    for make, message in cases:
+        with pytest.raises(swarm.SceneError, match=message) as caught:
             make()
         assert "\n" not in str(caught.value)
 

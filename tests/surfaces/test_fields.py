@@ -190,22 +190,22 @@ def test_more_than_a_few_of_one_kind_are_one_field():
         (lambda: swarm.Ellipsoids([[0, 0, 0]], (1, 1, 1), [[0, 0, 0, 0]]), ["rotations[0]", "not all 0"]),
     ],
 )  # fmt: skip
-def test_bad_bodies_are_told(build, parts):
+def test_bad_bodies_are_reported(build, parts):
     with pytest.raises(SceneError) as caught:
         build()
     assert all(part in str(caught.value) for part in parts), str(caught.value)
 
 
-def test_a_hundred_million_bodies_are_told_what_memory_they_take(monkeypatch):
+def test_a_hundred_million_bodies_are_refused_with_their_memory(monkeypatch):
     """Before it is tried: of those that are turned ten times as much as of balls."""
     monkeypatch.setattr(checks, "memory", lambda: 16_000_000_000)
     places = np.broadcast_to(0.0, (10**8, 3))
-    for build, said in ((swarm.Spheres, "30 GB"), (swarm.Cylinders, "300 GB")):
-        with pytest.raises(SceneError, match=rf"got 1e\+08 bodies, which take {said}; this machine has 16 GB"):
+    for build, memory in ((swarm.Spheres, "30 GB"), (swarm.Cylinders, "300 GB")):
+        with pytest.raises(SceneError, match=rf"got 1e\+08 bodies, which take {memory}; this machine has 16 GB"):
             build(places, 0.1)
 
 
-def test_a_packing_without_room_is_told():
+def test_a_packing_without_room_is_reported():
     places = np.stack(np.meshgrid(*3 * [np.linspace(-0.5, 0.5, 8)], indexing="ij"), -1).reshape(-1, 3)
     with pytest.raises(SceneError, match="must leave a volume for particles"):
         swarm.Scene([swarm.Box((0.5, 0.5, 0.5)), swarm.Spheres(places, 0.15)])

@@ -351,7 +351,7 @@ def test_its_table_and_back():
 
 
 @pytest.mark.parametrize(
-    ("table", "said"),
+    ("table", "message"),
     [
         ({}, r"surface\[0\].phi: expected"),
         ({"phi": 3}, r"surface\[0\].phi: expected str, got int \(in phi = 3\)"),
@@ -362,8 +362,8 @@ def test_its_table_and_back():
         ({"phi": "__import__('os').system('touch /tmp/owned')"}, r"surface\[0\].phi must call only"),
     ],
 )
-def test_a_scene_file_names_its_key(table, said):
-    with pytest.raises(swarm.SceneError, match=said):
+def test_a_scene_file_names_its_key(table, message):
+    with pytest.raises(swarm.SceneError, match=message):
         tables.scene_of([{"kind": "formula", **table}], None)
 
 

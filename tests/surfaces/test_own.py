@@ -61,7 +61,7 @@ def test_a_solid_in_a_cell_that_repeats_is_the_ellipsoid():
 
 
 @pytest.mark.parametrize("missing", ["phi", "gradient", "size"])
-def test_what_is_missing_is_said(missing):
+def test_what_is_missing_is_reported(missing):
     given = {"phi": phi, "gradient": gradient, "size": 0.3}
     del given[missing]
     with pytest.raises(swarm.SceneError, match=f"needs the argument {missing}, got none"):
@@ -294,10 +294,10 @@ def test_what_numba_cannot_compile_is_one_sentence(functions, parts, tmp_path):
 
     with pytest.raises(swarm.SceneError) as caught:
         run()
-    told = str(caught.value)
-    assert "\n" not in told
-    assert len(told) < 250
-    assert all(part in told for part in (*parts, "Numba can compile")), told
+    message = str(caught.value)
+    assert "\n" not in message
+    assert len(message) < 250
+    assert all(part in message for part in (*parts, "Numba can compile")), message
     assert len(blocks.advance_block.signatures) == before
     assert not list(tmp_path.iterdir())
 

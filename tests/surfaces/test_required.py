@@ -109,13 +109,13 @@ def refused(surface, method, gravity=None):
     with pytest.raises(swarm.SceneError) as caught:
         swarm.simulate(scene, PARTICLES, method, until=0.1)
     assert before == ([] if numba.config.DISABLE_JIT else [len(kernel.signatures) for kernel in kernels])
-    told = str(caught.value)
-    assert "\n" not in told
-    assert len(told) < 300
-    assert "surfaces[1] (Mine)" in told
-    assert "MineNumbers" in told
-    assert type(method).__name__ in told
-    return told
+    message = str(caught.value)
+    assert "\n" not in message
+    assert len(message) < 300
+    assert "surfaces[1] (Mine)" in message
+    assert "MineNumbers" in message
+    assert type(method).__name__ in message
+    return message
 
 
 @pytest.fixture(scope="module")
@@ -135,10 +135,10 @@ def test_every_shipped_surface_gives_what_every_method_needs(shipped, name, grav
 
 
 def test_no_falling_hit_is_refused_under_gravity():
-    told = refused(ball_like(*LEVEL, "first_hit")(), swarm.Impact(), PULL)
-    assert "falling_hit()" in told
-    assert "hessian_bounds()" in told
-    assert "under gravity" in told
+    message = refused(ball_like(*LEVEL, "first_hit")(), swarm.Impact(), PULL)
+    assert "falling_hit()" in message
+    assert "hessian_bounds()" in message
+    assert "under gravity" in message
 
 
 def test_without_gravity_it_is_not_asked():
@@ -194,13 +194,13 @@ def test_a_quartic_without_its_polynomial_is_refused():
 @pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(dt=0.1, penalty=1.0)], ids=["impact", "penalty"])
 def test_another_inner_function_comes_with_its_gap(method):
     """q without g(q) would count q itself as the gap."""
-    told = refused(ball_like(*LEVEL, "first_hit", "hessian", "farthest_push", "inner")(), method)
-    assert "gap_of() for its `inner`" in told
+    message = refused(ball_like(*LEVEL, "first_hit", "hessian", "farthest_push", "inner")(), method)
+    assert "gap_of() for its `inner`" in message
 
 
 def test_the_sign_of_the_gap_is_asked_for():
-    told = refused(ball_like(*LEVEL, "first_hit", sided=False)(), swarm.Impact())
-    assert "the field `side`" in told
+    message = refused(ball_like(*LEVEL, "first_hit", sided=False)(), swarm.Impact())
+    assert "the field `side`" in message
 
 
 # --- One sentence ----------------------------------------------------------------------------------------
@@ -223,8 +223,8 @@ def test_what_each_method_needs(name, gravity):
 
 
 def test_no_hessian_and_no_farthest_push_are_named_together():
-    told = refused(ball_like(*LEVEL, "first_hit")(), swarm.Penalty(dt=0.1, penalty=1.0))
-    assert "farthest_push() and hessian()" in told
+    message = refused(ball_like(*LEVEL, "first_hit")(), swarm.Penalty(dt=0.1, penalty=1.0))
+    assert "farthest_push() and hessian()" in message
 
 
 def test_no_first_hit():

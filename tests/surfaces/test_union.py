@@ -26,7 +26,7 @@ def _inside(surface, points):
 
 
 @pytest.mark.parametrize("side", ["inside", "outside"])
-def test_in_a_union_is_who_is_in_a_part_and_in_an_intersection_who_is_in_all(side):
+def test_a_union_holds_what_one_part_holds_and_an_intersection_what_all_hold(side):
     points, parts = _points(), (BALL, TUBE, swarm.Intersection([BOX, swarm.Sphere(0.4, (1.5, 0.0, 0.0), "outside")]))
     held = np.array([_inside(part, points) for part in parts])
     sign = side == "inside"
@@ -103,7 +103,7 @@ class Nowhere(swarm.Sphere):
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda: swarm.Union([]), "parts must hold at least one surface of the Union, got none"),
         (lambda: swarm.Union(BALL), "parts must be a list of surfaces such as swarm.Sphere, got Sphere"),
@@ -154,8 +154,8 @@ class Nowhere(swarm.Sphere):
         ),
     ],
 )
-def test_bad_input_is_a_sentence(make, said):
-    with pytest.raises(swarm.SceneError, match=said):
+def test_bad_input_is_a_sentence(make, message):
+    with pytest.raises(swarm.SceneError, match=message):
         make()
 
 
@@ -202,7 +202,7 @@ def _beside_a_wall_with_a_mass():
 
 
 @pytest.mark.parametrize(
-    ("run", "said"),
+    ("run", "message"),
     [
         (_with_bodies, r"surfaces\[0\].openings must be left out with bodies"),
         (_one_contact_step, r"surfaces\[0\] must be at rest, without motion"),
@@ -211,8 +211,8 @@ def _beside_a_wall_with_a_mass():
         (_beside_a_wall_with_a_mass, r"surfaces\[0\].openings must be left out where a wall has a mass"),
     ],
 )
-def test_what_does_not_go_with_a_run_is_found_in_a_part(run, said):
-    with pytest.raises(swarm.SceneError, match=said):
+def test_what_does_not_go_with_a_run_is_found_in_a_part(run, message):
+    with pytest.raises(swarm.SceneError, match=message):
         run()
 
 
@@ -256,7 +256,7 @@ def test_a_scene_file_names_the_opening_of_a_part():
     (made,) = run_tables.sources_of([{**source, "where": place}], room)
     assert made.where is HOLE
     assert run_tables.source_table(made, room)["where"] == place
-    for wrong, said in (
+    for wrong, message in (
         ({**place, "part": 2}, r"source\[0\].where.part: expected a number from 0 to 1, got 2"),
         (
             {**place, "part": [1, 0, 0, 0]},
@@ -269,5 +269,5 @@ def test_a_scene_file_names_the_opening_of_a_part():
         ({**place, "prat": 1}, r"source\[0\].where.prat: unknown key"),
         ({"opening": 0}, r"source\[0\].where.surface: expected the number of a surface"),
     ):
-        with pytest.raises(swarm.SceneError, match=said):
+        with pytest.raises(swarm.SceneError, match=message):
             run_tables.sources_of([{**source, "where": wrong}], room)

@@ -107,7 +107,7 @@ def test_an_index_picks_its_surface(names, point, free, kappa):
 
 @every_chain
 @given(point=vectors, free=vectors)
-def test_who_is_outside_and_who_is_touched(names, point, free):
+def test_which_walls_are_violated_and_which_are_touched(names, point, free):
     whole, single = both(names)
     out = [is_out(numbers, point) for numbers in single]
     assert call(Walls.outside, whole, -1.0, point) == any(out)

@@ -159,14 +159,14 @@ NEITHER = [
 ]
 
 
-@pytest.mark.parametrize(("function", "said"), NEITHER)
-def test_what_neither_can_do_is_said_in_one_sentence(function, said, left):
+@pytest.mark.parametrize(("function", "sentence"), NEITHER)
+def test_what_neither_can_do_is_reported_in_one_sentence(function, sentence, left):
     helper = jit.inlined(copied(function))
     with pytest.raises(TypingError):
         numba.njit(**FLAGS)(cache.calling(helper))(1.0)
     (reason,) = left.values()
     assert "\n" not in reason
-    assert said in reason
+    assert sentence in reason
     assert f"{__file__}, line {function.__code__.co_firstlineno + 1}" in reason
 
 
@@ -189,7 +189,7 @@ def of_large_numbers(a):
     return a
 
 
-def test_nothing_is_said_while_a_trace_does_what_is_known(left):
+def test_no_warning_while_a_trace_does_what_is_known(left):
     """A square root of -1 warns in plain Python, and nothing in a kernel."""
 
     @jit.inlined

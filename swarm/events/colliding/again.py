@@ -16,6 +16,6 @@ def aim_again(box, flock, i, now):
 def queue_both(flock, i):
     """Bring a ball to its place in the queue, and its partner too if `tell_partner` has changed the partner's event."""
     requeue(flock, i)
-    told = tell_partner(flock, i)
-    if told >= 0:
-        requeue(flock, told)
+    partner = tell_partner(flock, i)
+    if partner >= 0:
+        requeue(flock, partner)

@@ -253,13 +253,13 @@ def look_ahead(box, flock, i, now):
 def tell_partner(flock, i):
     """Give the collision of a ball to its partner too, if it is its soonest too. Return the partner or `NOBODY`."""
     mate, time = flock.tag[index(WHOLES * i + PARTNER)], flock.event[index(FLOATS * i + MEETS)]
-    told = NOBODY
+    partner = NOBODY
     if mate >= 0 and time < flock.event[index(FLOATS * mate + MEETS)]:
         flock.event[index(FLOATS * mate + MEETS)] = time
         flock.tag[index(WHOLES * mate + PARTNER)] = i
         flock.tag[index(WHOLES * mate + SEEN)] = flock.tag[index(WHOLES * i + STAMP)]
-        told = mate
-    return told
+        partner = mate
+    return partner
 
 
 def forget_wall(box, flock, i):

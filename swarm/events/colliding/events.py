@@ -146,9 +146,9 @@ def _enter(box, flock, books, clock, i, now):
         find_wall(box, flock, i, now)
         requeue(flock, i)
         if found:
-            told = tell_partner(flock, i)
-            if told >= 0:
-                requeue(flock, told)
+            partner = tell_partner(flock, i)
+            if partner >= 0:
+                requeue(flock, partner)
     return fits
 
 

@@ -1,4 +1,4 @@
-"""Counters of balls: each flight is told to them where it ends, where it leaves the cell, and at the end of a frame."""
+"""Counters of balls: they get each flight where it ends, where it leaves the cell, and at the end of a frame."""
 
 from ...kernel.arrays import index
 from ...kernel.jit import outlined

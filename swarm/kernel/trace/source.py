@@ -23,7 +23,7 @@ def node_of(code: types.CodeType) -> Any:
         is_lambda = isinstance(node, ast.Lambda)
         body = [ast.copy_location(ast.Return(node.body), node)] if is_lambda else node.body
         given = ast.copy_location(definition(_TWIN, node.args, body), node)
-        if len(found) == 1 or _told(_inner(compiled(given, code))) == _told(code):
+        if len(found) == 1 or _compared(_inner(compiled(given, code))) == _compared(code):
             return given if _is_as_written(code, text) else None
     return None
 
@@ -53,7 +53,7 @@ def _inner(code: types.CodeType) -> types.CodeType:
     return next(one for one in code.co_consts if isinstance(one, types.CodeType))
 
 
-def _told(code: types.CodeType) -> Any:
+def _compared(code: types.CodeType) -> Any:
     """The difference of two functions of one line; code itself depends on what the file imports."""
     return code.co_names, code.co_varnames, code.co_freevars, [one for one in code.co_consts if one is not None]
 

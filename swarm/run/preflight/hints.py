@@ -140,24 +140,24 @@ def _warn_of_steps(task: Task, speed: float) -> None:
     if max(step / _STEP, contact / _CONTACT) < _SURELY * _crossing(scene, speed):
         return
     between = workload.time_between(task.compiled, particles)
-    said = f"the time between impacts is about T = {between:.2g} s; "
+    period = f"the time between impacts is about T = {between:.2g} s; "
     if step > _STEP * between:
         _LOG.warning(
             "%s%s = %g s is %.2g of it: steps are as long as flights, and impacts come late or not at all; use %s <= "
             "%.1g s, or Impact() alone",
-            said, name, step, step / between, name, 0.1 * _STEP * between,
+            period, name, step, step / between, name, 0.1 * _STEP * between,
         )  # fmt: skip
     elif contact > _CONTACT * between and not method.has_multipliers():
         _LOG.warning(
             "%sa contact lasts %.2g s, %.2g of it, and the fastest sinks %.2g m into its wall: such walls are no "
             "walls; use a larger penalty (%g here), or Impact",
-            said, contact, contact / between, depth, method.penalty,  # type: ignore[attr-defined]
+            period, contact, contact / between, depth, method.penalty,  # type: ignore[attr-defined]
         )  # fmt: skip
     if isinstance(method, Verlet) and method.exponent == 1.0 and step * math.pi > _STABLE * contact:
         _LOG.warning(
             "%sdt = %g s is %.2g of a contact, which lasts %.2g s: beyond %.2g of it Verlet is unstable, its energy "
             "grows; use dt <= %.1g s, or Penalty, which keeps the energy at any step",
-            said, step, step / contact, contact, _STABLE / math.pi, 0.1 * contact,
+            period, step, step / contact, contact, _STABLE / math.pi, 0.1 * contact,
         )  # fmt: skip
 
 

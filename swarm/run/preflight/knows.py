@@ -306,12 +306,12 @@ def _measured_in_part(asked: Asked) -> Found:
 class Refusal(NamedTuple):
     """What an engine does not support, with what was given, and what to use instead."""
 
-    said: str
+    problem: str
     remedy: str
 
     def sentence(self) -> str:
         """The sentence of the error, with its fields in braces."""
-        return f"{self.said}; {self.remedy}"
+        return f"{self.problem}; {self.remedy}"
 
 
 _TO_MOTION = "give that wall a motion instead of a mass"

@@ -111,16 +111,16 @@ def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: M
     depths = depths_of(method, mass, speeds, (scene.pairs or Pairs()).restitution)
     least = np.minimum(radius, radius[fastest])
     k = int(np.nanargmax(depths / least))
-    who = f"particle {k}, whose velocity differs from that of particle {fastest} by {speeds[k]:.3g} m/s,"
-    _warn(method, who, "it", float(depths[k]), float(least[k]))
+    subject = f"particle {k}, whose velocity differs from that of particle {fastest} by {speeds[k]:.3g} m/s,"
+    _warn(method, subject, "it", float(depths[k]), float(least[k]))
 
 
-def _warn(method: Method, who: str, what: str, depth: float, radius: float) -> None:
+def _warn(method: Method, subject: str, what: str, depth: float, radius: float) -> None:
     if depth > MOST_PRESSED * radius:
         _LOG.warning(
             "contacts are soft for the speed: %s sinks up to %.2g m into %s, %.2g radii, where %g is small and 1 ends "
             "the run; use a penalty of %.1e or more (%g here) with a dt that fits it, or Impact",
-            who, depth, what, depth / radius, MOST_PRESSED, _penalty(method, depth, MOST_PRESSED * radius),
+            subject, depth, what, depth / radius, MOST_PRESSED, _penalty(method, depth, MOST_PRESSED * radius),
             method.penalty,  # type: ignore[attr-defined]
         )  # fmt: skip
 

@@ -46,8 +46,8 @@ def error_of(scene: Scene, particles: Particles, outside: NDArray[np.intp], dist
     walls = np.argmax(np.where(np.isnan(distances), np.inf, distances), axis=0)
     first, wall = int(outside[0]), int(walls[0])
     met, counts = np.unique(walls, return_counts=True)
-    told = zip(met.tolist(), counts.tolist(), strict=True)
-    several = "" if len(met) == 1 else f" ({', '.join(f'surfaces[{i}]: {count}' for i, count in told)})"
+    wall_counts = zip(met.tolist(), counts.tolist(), strict=True)
+    several = "" if len(met) == 1 else f" ({', '.join(f'surfaces[{i}]: {count}' for i, count in wall_counts)})"
     place = position[:, first : first + 1]
     where = f"{tuple(place[:, 0].tolist())}, "
     if particles.radius is None:

@@ -98,8 +98,8 @@ class Sampled(Surface):
         parts = [f"<{shape}>", f"spacing={self.spacing}", f"origin={self.origin}"]
         named = [one for one in fields(Surface) if getattr(self, one.name) != one.default]
         own = [one for one in fields(self) if one.name in ("side", "mesh_error", "mesh_weld")]
-        said = [one for one in [*own, *named] if getattr(self, one.name) != one.default]
-        return f"Sampled({', '.join([*parts, *(f'{one.name}={getattr(self, one.name)!r}' for one in said)])})"
+        written = [one for one in [*own, *named] if getattr(self, one.name) != one.default]
+        return f"Sampled({', '.join([*parts, *(f'{one.name}={getattr(self, one.name)!r}' for one in written)])})"
 
     # --- For kernels -------------------------------------------------------------------------------------
 

@@ -106,9 +106,9 @@ class Mesh(Surface):
         if self._made is None or any(a is not b for a, b in zip(self._made.given, given, strict=True)):
             made = self._mended()
             given = made.vertices, made.triangles, made.group, made.names
-            said = {"scale": 1.0, "weld": None, "mesh_weld": made.weld or self.mesh_weld or None}
+            settled = {"scale": 1.0, "weld": None, "mesh_weld": made.weld or self.mesh_weld or None}
             own = dict(zip(("vertices", "triangles", "group", "names"), given, strict=True))
-            checks.assign(self, **own, **said, _made=made._replace(given=given))
+            checks.assign(self, **own, **settled, _made=made._replace(given=given))
         object.__setattr__(self, "groups", self._checked_groups())
 
     def _mended(self) -> _Made:
@@ -150,9 +150,10 @@ class Mesh(Surface):
     def __repr__(self) -> str:
         """The number of triangles, and what is not a default."""
         own = ("side", "center", "groups", "mesh_weld", *(one.name for one in fields(Surface)))
-        said = [one for one in fields(self) if one.name in own and getattr(self, one.name) != one.default]
+        changed = [one for one in fields(self) if one.name in own and getattr(self, one.name) != one.default]
         return (
-            ", ".join([f"Mesh(<{len(self)} triangles>", *(f"{f.name}={getattr(self, f.name)!r}" for f in said)]) + ")"
+            ", ".join([f"Mesh(<{len(self)} triangles>", *(f"{f.name}={getattr(self, f.name)!r}" for f in changed)])
+            + ")"
         )
 
     # --- For kernels -------------------------------------------------------------------------------------

@@ -77,7 +77,7 @@ def closed(path: Path, soup: Soup, weld: float | None) -> TriangleMesh:
 
 def _refuse_open(path: Path, vertices: Floats, edges: Indices, counts: Indices, weld: float | None) -> None:
     """Raise the error of a mesh that is not closed."""
-    said = []
+    messages = []
     rims = edges[counts == 1]
     if len(rims):
         corners, ends = np.unique(rims, return_inverse=True)
@@ -86,18 +86,18 @@ def _refuse_open(path: Path, vertices: Floats, edges: Indices, counts: Indices, 
         order = np.argsort(sizes)[::-1].tolist()
         others = f" and {len(holes) - 1} more place{'s' if len(holes) > 2 else ''}; the largest hole"
         others = others if len(holes) > 1 else "; the hole"
-        said.append(f"open at {shown(holes[order[0]].mean(axis=0))}{others} is {sizes[order[0]]:.3g} m across")
+        messages.append(f"open at {shown(holes[order[0]].mean(axis=0))}{others} is {sizes[order[0]]:.3g} m across")
         if len(holes) > 1:
             listed = (f"{sizes[k]:.3g} m at {shown(holes[k].mean(axis=0))}" for k in order[1:_LISTED])
-            said.append(f"then {', '.join(listed)}{', ...' if len(holes) > _LISTED else ''}")
+            messages.append(f"then {', '.join(listed)}{', ...' if len(holes) > _LISTED else ''}")
     many = edges[counts > 2]
     if len(many):
-        said.append(f"three or more triangles meet at {shown(vertices[many[0]].mean(axis=0))}")
+        messages.append(f"three or more triangles meet at {shown(vertices[many[0]].mean(axis=0))}")
     if weld is not None:
-        said.append(f"corners of open edges within weld = {weld:.3g} m of each other are joined")
+        messages.append(f"corners of open edges within weld = {weld:.3g} m of each other are joined")
     raise SceneError(
         f"the mesh {path} must be closed (watertight), with two triangles at each edge, got {len(rims)} edges of one "
-        f"triangle and {len(many)} of more than two: {'; '.join(said)}; close its holes, for example with "
+        f"triangle and {len(many)} of more than two: {'; '.join(messages)}; close its holes, for example with "
         "trimesh.repair or MeshLab"
     )
 

@@ -55,8 +55,8 @@ def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0
     shifts: list[list[float]] = [[0.0], [0.0], [0.0]]
     for k, length in enumerate(period):
         if length is not None and not is_same_along(surface, k, period):
-            said = f"{name} ({type(surface).__name__})"
-            shifts[k] = _shifts(surface, (low[k], high[k]), length, said, k, largest)
+            title = f"{name} ({type(surface).__name__})"
+            shifts[k] = _shifts(surface, (low[k], high[k]), length, title, k, largest)
     found = [_shifted(surface, shift) for shift in itertools.product(*shifts)]
     if len(found) > 1 and any(isinstance(one, Rotation) for one in parts_of(surface.motion)):
         raise SceneError(

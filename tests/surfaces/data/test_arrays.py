@@ -87,12 +87,12 @@ def test_any_damage_of_a_header_is_one_sentence(seed, tmp_path):
         for place in random.integers(0, 128, random.integers(1, 4)):
             damaged[place] = random.integers(0, 256)
         path.write_bytes(damaged)
-        said = ""
+        message = ""
         try:
             assert read_samples(path).nbytes <= VALUES.nbytes
         except swarm.SceneError as error:
-            said = str(error)
-        assert "\n" not in said
+            message = str(error)
+        assert "\n" not in message
 
 
 SHAPES = {

@@ -93,12 +93,12 @@ def test_holes_are_listed_by_place_and_size():
     faces = np.delete(np.array(ball.faces), np.arange(0, 1280, 160), axis=0)
     with pytest.raises(swarm.SceneError) as caught:
         mesh_of(ball.vertices, faces)
-    said = str(caught.value)
-    assert "24 edges of one triangle" in said
-    assert "and 7 more places; the largest hole is 0." in said
-    assert said.count(" m at (") == 4
-    assert "weld = " in said
-    assert "\n" not in said
+    message = str(caught.value)
+    assert "24 edges of one triangle" in message
+    assert "and 7 more places; the largest hole is 0." in message
+    assert message.count(" m at (") == 4
+    assert "weld = " in message
+    assert "\n" not in message
 
 
 def test_an_edge_is_not_split_beyond_the_distance():
@@ -184,7 +184,7 @@ WRONG = {
 def test_what_is_refused_in_one_sentence(tmp_path, name):
     rest = np.setdiff1d(np.arange(12), TOP)
     path = ascii_stl(tmp_path / "part.stl", [("walls", CORNERS, FACES[rest]), ("shutter", CORNERS, FACES[TOP])])
-    make, said = WRONG[name]
-    with pytest.raises(swarm.SceneError, match=said) as caught:
+    make, message = WRONG[name]
+    with pytest.raises(swarm.SceneError, match=message) as caught:
         make(path)
     assert "\n" not in str(caught.value)

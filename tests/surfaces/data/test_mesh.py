@@ -80,10 +80,10 @@ def test_a_summary_says_how_far_the_surface_is_from_its_mesh(tmp_path):
     scene, file = swarm.Scene([swarm.Sphere(5.0), box]), tmp_path / "run.h5"
     start = swarm.Particles([0.1, 0.0, 0.0], [0.0, 0.0, 0.0])
     result = swarm.simulate(scene, start, swarm.Impact(), until=0.1, trajectory=file, compile="never")
-    said = f"within {amount(box.mesh_error, 'm', 2)} of its mesh, corners moved by up to 1 µm to close seams"
+    text = f"within {amount(box.mesh_error, 'm', 2)} of its mesh, corners moved by up to 1 µm to close seams"
     for rows in (summary.of_result(result, None), summary.of_file(file)):
-        assert said in rows["surface 1, sampled cavity"]
-    assert said in result._repr_html_()
+        assert text in rows["surface 1, sampled cavity"]
+    assert text in result._repr_html_()
     free = swarm.simulate(swarm.Scene([swarm.Sphere(1.0)]), start, swarm.Impact(), until=0.1, compile="never")
     assert "mesh" not in " ".join(summary.of_result(free, None).values())
 
@@ -108,14 +108,14 @@ def test_bad_meshes_are_one_sentence(tmp_path):
         (lambda: swarm.from_mesh(whole, 0.1, "in"), "side must be one of"),
         (lambda: swarm.from_mesh(whole, 0.1, scale=-1.0), "scale must be above 0"),
     ]
-    for make, said in cases:
-        with pytest.raises(swarm.SceneError, match=said) as caught:
+    for make, message in cases:
+        with pytest.raises(swarm.SceneError, match=message) as caught:
             make()
         assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["trimesh", "igl"])
-def test_a_missing_library_is_said(tmp_path, monkeypatch, name):
+def test_a_missing_library_is_reported(tmp_path, monkeypatch, name):
     path = written(tmp_path, trimesh.creation.icosphere(2))
     monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(
@@ -149,13 +149,13 @@ def test_a_mesh_in_a_scene_file(tmp_path):
 
     surface = read('file = "parts/part.stl"\nspacing = 0.1\nrestitution = 0.9')
     assert (surface.restitution, surface.mesh_error > 0.0, surface.spacing) == (0.9, True, (0.1, 0.1, 0.1))
-    for more, said in {
+    for more, message in {
         'file = "part.stl"\nspacing = 0.1': r"surface\[0\].cannot read the mesh .*part.stl",
         "spacing = 0.1": r"surface\[0\].file: expected the name of a file, got nothing",
         'file = "parts/part.stl"\nspacing = "a"': r"surface\[0\].spacing must be",
         'file = "parts/part.stl"\nspacing = 0.1\norigin = [0, 0, 0]': r"surface\[0\].origin: unknown key of a mesh",
     }.items():
-        with pytest.raises(swarm.SceneError, match=said):
+        with pytest.raises(swarm.SceneError, match=message):
             read(more)
 
 

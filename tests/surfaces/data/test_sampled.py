@@ -34,7 +34,7 @@ def spoiled(value, place=(1, 2, 3)):
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda: sampled(spoiled(np.nan)), ["values must be finite", "nan at values[1, 2, 3]"]),
         (lambda: sampled(spoiled(np.inf)), ["values must be finite", "inf at values[1, 2, 3]"]),
@@ -53,10 +53,10 @@ def spoiled(value, place=(1, 2, 3)):
         (lambda: sampled(mass=1.0, inertia=1.0, motion=swarm.Rotation((0, 0, 1), 1.0, (0, 0, 0))), ["no center"]),
     ],
 )
-def test_bad_arguments_are_one_sentence(make, said):
+def test_bad_arguments_are_one_sentence(make, message):
     with pytest.raises(swarm.SceneError) as caught:
         make()
-    assert all(part in str(caught.value) for part in said), str(caught.value)
+    assert all(part in str(caught.value) for part in message), str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -222,7 +222,7 @@ def test_samples_from_files(tmp_path):
     for name in ("data/phi.npy", "phi.h5"):
         assert np.array_equal(read(tmp_path, f'file = "{name}"').values, SQUARE)
         assert np.array_equal(sampled(tmp_path / name).values, SQUARE)
-    for more, said in {
+    for more, message in {
         'file = "no.npy"': r"surface\[0\].*cannot read the samples in .*no.npy",
         'file = "two.h5"': "one dataset with three axes, got '/phi' and '/psi'",
         'file = "scene.toml"': "cannot read the samples",
@@ -231,5 +231,5 @@ def test_samples_from_files(tmp_path):
         "": r"surface\[0\].values: expected",
         'file = "phi.h5"\nradius = 1.0': r"surface\[0\].radius: unknown key",
     }.items():
-        with pytest.raises(swarm.SceneError, match=said):
+        with pytest.raises(swarm.SceneError, match=message):
             read(tmp_path, more)

@@ -167,8 +167,8 @@ def test_folds_are_accepted(tmp_path, name):
 
 @pytest.mark.parametrize("name", THIN)
 def test_what_is_thin_is_refused(tmp_path, name):
-    make, said = THIN[name]
-    with pytest.raises(swarm.SceneError, match=rf"{said}\d* m at \(.*\) is thinner than 1.25 spacings") as caught:
+    make, message = THIN[name]
+    with pytest.raises(swarm.SceneError, match=rf"{message}\d* m at \(.*\) is thinner than 1.25 spacings") as caught:
         swarm.from_mesh(written(tmp_path, make()), SPACING)
     assert "\n" not in str(caught.value)
 

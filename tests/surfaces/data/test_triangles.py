@@ -74,8 +74,8 @@ def test_the_distance_of_what_is_joined_can_be_given(tmp_path):
     assert 1e-4 < swarm.from_mesh(path, 0.1, weld=2e-3).mesh_weld < 2e-3
     with pytest.raises(swarm.SceneError, match="closed"):
         swarm.from_mesh(written(tmp_path, *halves(1e-9)), 0.1, weld=0.0)
-    for wrong, said in ((-1.0, "weld must be 0 or more, got -1"), ("wide", "weld must be a finite number")):
-        with pytest.raises(swarm.SceneError, match=said):
+    for wrong, message in ((-1.0, "weld must be 0 or more, got -1"), ("wide", "weld must be a finite number")):
+        with pytest.raises(swarm.SceneError, match=message):
             swarm.from_mesh(path, 0.1, weld=wrong)
 
 
@@ -198,8 +198,8 @@ WRONG = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_what_is_refused_has_a_place(tmp_path, name):
-    make, said = WRONG[name]
-    with pytest.raises(swarm.SceneError, match=said) as caught:
+    make, message = WRONG[name]
+    with pytest.raises(swarm.SceneError, match=message) as caught:
         swarm.from_mesh(written(tmp_path, *make()), 0.1)
     assert "\n" not in str(caught.value)
 
