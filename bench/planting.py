@@ -38,7 +38,7 @@ GROUPS: dict[str, str] = {
     "motion": "",
     "pictures": "series|speeds",
     "placing": "",
-    "run": "base|counting|doors|engine|impacts|knows|measures|observed|overlaps|present|result|sequence|softness"
+    "run": "base|counting|doors|engine|impacts|knows|measures|observed|present|result|sequence|softness"
     "|starting_state|tally|turns",
     "sources": "",
     "surfaces": "",
