@@ -259,6 +259,6 @@ def test_a_run_in_shards_has_two_and_other_bits_are_a_third_outcome(monkeypatch)
     monkeypatch.setattr(
         shards,
         "task_of",
-        lambda folder, k: (dataclasses.replace(task_of(folder, k)[0], first=0), task_of(folder, k)[1]),
+        lambda folder, k: dataclasses.replace(task_of(folder, k), first=0),
     )
     assert outcomes.outcome(cell).said.startswith("on a cluster ")

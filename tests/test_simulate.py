@@ -156,9 +156,9 @@ def test_an_error_in_progress_ends_the_run():
     [
         ({"until": 0.0}, "until must"),
         ({"until": -1.0}, "until must"),
-        ({"until": float("nan")}, "until must be a finite number, got nan"),
-        ({"until": float("inf")}, "until must be a finite number, got inf"),
-        ({"until": "soon"}, "until must be a finite number, got 'soon'"),
+        ({"until": float("nan")}, "until must be a finite number above 0, got nan"),
+        ({"until": float("inf")}, "until must be a finite number above 0, got inf"),
+        ({"until": "soon"}, "until must be a finite number above 0, got 'soon'"),
         ({"every": 0.0}, "every must be above 0, got 0"),
         ({"every": -0.5}, "every must be above 0, got -0.5"),
         ({"every": 3.0}, "every must be at most until = 2, got 3"),

@@ -17,7 +17,7 @@ from .jobs import PATIENCE, JobEnd, Reporter, session_of
 from .results import final, of_trajectory
 
 
-class Order(NamedTuple):
+class RunOrder(NamedTuple):
     """A run: its scene file and where that is, the files that it writes, its threads, and the code that it names."""
 
     text: str
@@ -29,7 +29,7 @@ class Order(NamedTuple):
     modules: bytes | None = None
 
 
-def run_variant(reporter: Reporter, order: Order) -> JobEnd:
+def run_variant(reporter: Reporter, order: RunOrder) -> JobEnd:
     """Carry out a run, or go on with it: from its checkpoint if it has one, else from the start."""
     target = order.trajectory
     # A worker that ends because its parent was killed may still hold it.
@@ -51,7 +51,7 @@ def run_variant(reporter: Reporter, order: Order) -> JobEnd:
     return _simulated(job, order, reporter, resumes=False)
 
 
-def _simulated(job: scene_file.Job, order: Order, reporter: Reporter, resumes: bool) -> JobEnd:
+def _simulated(job: scene_file.Job, order: RunOrder, reporter: Reporter, resumes: bool) -> JobEnd:
     options = dataclasses.replace(
         job.run,
         trajectory=order.trajectory,

@@ -23,7 +23,7 @@ from .plan import Plan, Variant, read
 from .processes import Processes
 from .results import TABLES, Results, require_written
 from .shown import Progress, Show, shown
-from .sweep_run import Order, run_variant
+from .sweep_run import RunOrder, run_variant
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -226,9 +226,9 @@ class _Runs:
         with fleet, shown(self._options.progress) as show:
             fleet.run(made, self._note, lambda: self._look(fleet, show))
 
-    def _order(self, variant: Variant, threads: int, modules: bytes | None) -> Order:
+    def _order(self, variant: Variant, threads: int, modules: bytes | None) -> RunOrder:
         impacts = self._results.impacts(variant)
-        return Order(
+        return RunOrder(
             self._plan.text(variant), self._plan.path.absolute(), self._results.trajectory(variant).absolute(),
             None if impacts is None else impacts.absolute(), threads, self._plan.plugins, modules,
         )  # fmt: skip

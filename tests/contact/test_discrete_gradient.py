@@ -74,8 +74,9 @@ def uncertainty(surface, *points):
 
 
 def steepest(law, surface, *points):
-    """The largest Phi' of these points."""
-    return call(law.constraint_gradient, max(0.0, *(gap(surface, point) for point in points)))
+    """The largest Phi' of these points, and of those within round-off of them."""
+    deepest = max(0.0, *(gap(surface, point) for point in points)) + uncertainty(surface, *points)
+    return call(law.constraint_gradient, deepest)
 
 
 def gap_gradient(surface, point):

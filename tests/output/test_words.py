@@ -1,5 +1,6 @@
 """Runs and scenes in words: of every surface, law, motion and method, and never the text of Python."""
 
+import dataclasses
 import re
 import types
 
@@ -51,7 +52,7 @@ def test_every_surface_is_reported(law):
     for name in WALLS:
         with row(name):
             bare = surface_of(name)
-            given = {f: getattr(bare, f) for f in bare.__dataclass_fields__ if f[0] != "_"}
+            given = {f.name: getattr(bare, f.name) for f in dataclasses.fields(bare) if f.name[0] != "_"}
             surface = type(bare)(**given | LAWS[law])
             scene = swarm.Scene([surface, swarm.Sphere(50.0)], DOWN)
             run = content(scene)

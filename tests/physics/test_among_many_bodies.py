@@ -36,7 +36,7 @@ def both(places, radius, gravity=None, **laws):
 )
 def test_a_field_is_its_balls(gravity, laws, until):
     field, apart = both(places(4), 0.15, gravity, **laws)
-    assert len(apart.order.others) == 5
+    assert len(apart.compiled().order.others) == 5
     start = swarm.fill(field, 10, speed=1.0, seed=2)
     one, other = run(field, start, until), run(apart, start, until)
     # What a flight through cells rounds differently grows from impact to impact.
