@@ -1,4 +1,4 @@
-"""Where walls are absent, for particles at them: the one place where kernels ask for openings, patches and rooms.
+"""Where walls are absent, for points at a wall: in a lasting contact, and at the end of a flight.
 
 A wall `stands` at a place on it unless it has ended there, beyond its patch or in another room, or is open: each is an
 `Absence`. Where a wall has ended, particles that slide go on on the wall after it, or fly. At an opening they escape,

@@ -1,7 +1,7 @@
 """The watchers of the particles of one thread: what engines tell of impacts and flights goes to each of them.
 
-An engine calls `hit` for each impact and `flown` for each flight. Lanes call the forms of the log, the
-counts and the counters that take all lanes of a pass at once. A run without watchers compiles none of this code.
+An engine calls `hit` for each impact and `flown` for each flight. Lanes call the forms of the log, the counts and the
+counters that take all lanes of a pass at once. A run without watchers compiles none of this code.
 """
 
 from typing import Any, NamedTuple
