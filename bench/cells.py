@@ -5,7 +5,7 @@ takes 0.01 to 0.3 s. `CELLS` is the whole matrix. What has no meaning is no cell
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -237,13 +237,25 @@ class Draft:
         """Where particles may be."""
         return _moved(self.center, *STARTS[self.start][2])
 
+    def across(self) -> int:
+        """The axis across the plane of the scene."""
+        return "xyz".index(self.scene["plane"])
+
     def surfaces(self) -> list[Any]:
         """The surfaces of the scene, first the wall of the cell."""
         made = WALLS[self.cell.wall].make(self.center, self.side, self.laws)
+        if self.scene.get("plane") is not None and self.cell.wall in _OF_BALLS_APART:
+            made = [_within(one, self.across()) for one in made]
         moving = {} if self.beside is None else {"motion": self.beside}
         if self.side == "outside" and self.vessel:
             return [*made, _vessel(self.center, moving)]
         return [*made, _ceiling(self, moving)] if moving else made
+
+
+def _within(balls: Any, across: int) -> Any:
+    """The same balls with their centres in a plane through the origin."""
+    name = "centers" if isinstance(balls, swarm.Spheres) else "center"
+    return replace(balls, **{name: np.array(getattr(balls, name)) * (np.arange(3) != across)})
 
 
 class Build(NamedTuple):
@@ -259,7 +271,7 @@ def _arrays(draft: Draft) -> tuple[np.ndarray, np.ndarray]:
     places, speeds, _spot, _x = STARTS[draft.start]
     places, speeds = places.copy(), speeds.copy()
     if draft.scene.get("plane") is not None:
-        places[:, 2] = speeds[:, 2] = 0.0
+        places[:, draft.across()] = speeds[:, draft.across()] = 0.0
     if draft.particles.get("meet"):
         # The second comes towards the first, and both miss each other's centre by a part of a radius.
         # As far away as the walls leave room.
@@ -315,7 +327,8 @@ ENGINES: dict[str, Engine] = {
     "points, heavy wall": Engine(_points, swarm.Impact, {}, {"mass": 2.0}),
     "balls, heavy wall": Engine(_balls, swarm.Impact, {}, {"mass": 2.0}),
 }
-_OF_BALLS = ("balls, Impact", "grains, Penalty", "balls, heavy wall")
+_OF_BALLS_APART = ("field", "listed solids")
+_OF_POINTS = ("points, Impact", "points, Penalty", "points, AugmentedLagrangian", "points, heavy wall")
 
 
 # --- Capabilities ----------------------------------------------------------------------------------------
@@ -380,11 +393,15 @@ def _door(draft: Draft) -> None:
     draft.laws["openings"] = [swarm.Opening(half, times=[(0.2, 0.5)], between=True)]
 
 
+# What has no centre turns about the origin.
+_ABOUT_THE_ORIGIN = ("planes", "own surface", "union", "intersection", "field", "foam")
+
+
 def _rotated(draft: Draft) -> None:
-    # By an angle that leaves the start inside; planes and user-defined surfaces turn about the origin.
+    # By an angle that leaves the start inside.
     angle = {"torus": 0.3, "cone": 0.15, "planes": 0.3}.get(draft.cell.wall, TURN["angle"])
     draft.laws["rotation"] = {"axis": AXIS, "angle": angle}
-    if draft.cell.wall in ("planes", "own surface"):
+    if draft.cell.wall in _ABOUT_THE_ORIGIN:
         draft.center = (0.0, 0.0, 0.0)
 
 
@@ -417,8 +434,9 @@ def _other_side(draft: Draft) -> None:
 
 
 def _flat(draft: Draft) -> None:
-    draft.scene["plane"] = "z"
-    draft.center = (CENTER[0], CENTER[1], 0.0)
+    # Through the axis of a wall that is round about z.
+    draft.scene["plane"] = "y" if draft.cell.wall in ("cone", "paraboloid") else "z"
+    draft.center = tuple(np.where(np.arange(3) == draft.across(), 0.0, CENTER).tolist())
 
 
 def _counters(draft: Draft) -> None:
@@ -533,12 +551,16 @@ def _centred(draft: Draft) -> None:
         draft.method["contact_step"] = 1e-2
 
 
+_OF_WHAT_MEETS = ("pair restitution", "pair friction", "contact duration", "spin")
 _WITHOUT_MEANING = {
     ("sphere", "rotation"): "a ball is the same when it is turned",
     ("listed solids", "rotation"): "a ball is the same when it is turned",
     ("listed solids", "opening"): "the volume that reaches each of the solids leaves none that is met",
     ("listed solids", "contact duration"): "no ball meets a solid so soon after another ball",
     ("foam", "motion beside"): "a foam is alone in its scene",
+    ("cone", "period"): "an endless cone is not the same in the next cell",
+    ("paraboloid", "period"): "an endless paraboloid is not the same in the next cell",
+    ("sampled", "plane"): "a spline between samples is upright on a plane to its error of interpolation only",
     (ON_A_CLUSTER, "cluster"): "it is on a cluster",
 }
 
@@ -546,13 +568,17 @@ _WITHOUT_MEANING = {
 def meaning(cell: Cell) -> str | None:
     """None, or why a combination says nothing, and is no cell."""
     engine, wall = ENGINES[cell.engine], WALLS[cell.wall]
-    name = cell.capability
+    name, engine_of_points = cell.capability, cell.engine in _OF_POINTS
     if name == "mass" and "mass" in engine.laws:
         return "the engine is that of walls with a mass"
     if name in ("contact step", "contact start") and engine.method is swarm.Penalty:
         return "Penalty has no such argument"
     if name == "contact step" and engine.method is swarm.AugmentedLagrangian:
         return "AugmentedLagrangian has no such argument"
+    if engine_of_points and name in _OF_WHAT_MEETS:
+        return "a point neither meets another one nor turns"
+    if name == "contact duration" and engine.method is swarm.Penalty:
+        return "a contact with Penalty lasts as long as the particles overlap"
     if name == "side" and len(wall.sides) == 1:
         return "the wall has one side"
     if name == "side" and wall.start == "around":

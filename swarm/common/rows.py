@@ -33,7 +33,7 @@ def bodies(name: str, value: ArrayLike, each: int = _BODY) -> Floats:
     bad = np.flatnonzero(~(np.abs(rows) <= LARGEST).all(axis=1))
     if bad.size:
         raise SceneError(f"{name}[{bad[0]}] must be three finite numbers, got {tuple(rows[bad[0]].tolist())}")
-    return _kept(rows)
+    return kept(rows)
 
 
 def lengths(name: str, value: ArrayLike, count: int) -> Floats:
@@ -45,7 +45,7 @@ def lengths(name: str, value: ArrayLike, count: int) -> Floats:
     if bad.size:
         where = f"{name}[{bad[0]}]" if given.ndim else name
         raise SceneError(f"{where} must be a length above 0 m, got {np.atleast_1d(given)[bad[0]]:g}")
-    return _kept(np.broadcast_to(given, (count,)))
+    return kept(np.broadcast_to(given, (count,)))
 
 
 def widths(name: str, value: ArrayLike, count: int) -> Floats:
@@ -81,10 +81,10 @@ def _rows(
     if bad.size:
         where, row = (f"{name}[{bad[0]}]" if given.ndim == 2 else name), np.atleast_2d(given)[bad[0]]
         raise SceneError(f"{where} must be {expected}, got {tuple(row.tolist())}")
-    return _kept(np.broadcast_to(given, (count, columns)))
+    return kept(np.broadcast_to(given, (count, columns)))
 
 
-def _kept(values: Floats) -> Floats:
+def kept(values: Floats) -> Floats:
     """A copy that stays as it is."""
     copy = np.array(values, np.float64)
     copy.setflags(write=False)

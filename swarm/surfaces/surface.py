@@ -60,7 +60,9 @@ class Surface(Validated):
     """A rigid surface. See the subclasses for their arguments; these are common to all.
 
     Args:
-        rotation: about the centre: None, a quaternion (w, x, y, z) of any length, or {"axis": (x, y, z), "angle": rad}.
+        rotation: about the centre, or the origin where there is no `center`: None, a quaternion (w, x, y, z) of any
+            length, or {"axis": (x, y, z), "angle": rad}. A union, an intersection or a field of many bodies gives it to
+            each of these.
         restitution: e in [0, 1]: an impact turns the normal velocity v_n into -e v_n. 1 keeps the energy.
         friction: Coulomb's coefficient, 0 or more: the tangential impulse, or force, opposes the slip; it is at most
             this times the normal one, and at most what stops the slip.
@@ -199,6 +201,13 @@ class Surface(Validated):
         """The same surface elsewhere."""
         x, y, z = (a + b for a, b in zip(self.center, shift, strict=True))  # type: ignore[attr-defined]
         return replace(self, center=(x, y, z))  # type: ignore[call-arg]
+
+    def turned(self, turn: rotations.Quaternion) -> "Surface":
+        """The same surface, with its openings, rotated about the origin."""
+        given: dict[str, Any] = {"rotation": rotations.after(turn, self.rotation)}
+        if hasattr(self, "center"):
+            given["center"] = rotations.turned(turn, self.center)
+        return replace(self, **given, openings=tuple(_turned_opening(one, turn) for one in self.openings))
 
     def is_solid(self) -> bool:
         """Whether particles are kept out of it rather than in it."""
@@ -438,6 +447,12 @@ def is_along(direction: Vector, axis: Vector) -> bool:
 def volume_of(opening: Surface | Opening) -> Surface:
     """The volume of an opening, present while that is open."""
     return replace(opening.surface, present=opening.times) if isinstance(opening, Opening) else opening
+
+
+def _turned_opening(opening: Surface | Opening, turn: rotations.Quaternion) -> Surface | Opening:
+    if isinstance(opening, Opening):
+        return replace(opening, surface=opening.surface.turned(turn))
+    return opening.turned(turn)
 
 
 def _rows(points: ArrayLike) -> Vec:

@@ -38,7 +38,7 @@ class Joined(Surface):
     parts: Any = field(metadata={"key": "part"})
     side: str = "inside"
 
-    refused: ClassVar[tuple[str, ...]] = ("rotation", "mass", "inertia")
+    refused: ClassVar[tuple[str, ...]] = ("mass", "inertia")
     instead: ClassVar[str] = "give it to each of its parts"
     # The operation of the gaps of parts, and where the wall of one is: inside of the others (1), or outside (-1).
     _of_gaps: ClassVar[Any] = None
@@ -61,6 +61,8 @@ class Joined(Surface):
                     f"parts[{k}] must have no motion of its own where the {name} has one, got {part!r:.200}; give "
                     "each part its motion, or the whole one"
                 )
+        if self.rotation is not None:
+            self._turn()
         if len(self.rooms) > _MOST_ROOMS:
             raise SceneError(
                 f"parts must leave at most {_MOST_ROOMS} rooms, which are unions of parts taken together, got "
@@ -69,6 +71,17 @@ class Joined(Surface):
         if len(self.rooms) > 1:
             _require_alone(self)
         _require_room(self)
+
+    def _turn(self) -> None:
+        """Turn each part about the origin, instead of the whole."""
+        for k, part in enumerate(self.parts):
+            if _moves(part):
+                raise SceneError(
+                    f"parts[{k}] must have no motion of its own where the {type(self).__name__} has a rotation, got "
+                    f"{part!r:.200}; give the motion to the whole, or its rotation to each of its parts"
+                )
+        object.__setattr__(self, "parts", tuple(part.turned(self.rotation) for part in self.parts))
+        object.__setattr__(self, "rotation", None)
 
     @cached_property
     def rooms(self) -> tuple[Room, ...]:

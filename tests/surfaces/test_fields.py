@@ -181,7 +181,6 @@ def test_more_than_a_few_of_one_kind_are_one_field():
         (lambda: swarm.Spheres(np.empty((0, 3)), 0.1), ["centers", "at least one row"]),
         (lambda: swarm.Spheres([[0, 0, math.nan]], 0.1), ["centers[0]", "finite", "nan"]),
         (lambda: swarm.Spheres([[0, 0, 0]], 0.1, side="in"), ["side", "outside", "inside"]),
-        (lambda: swarm.Spheres([[0, 0, 0]], 0.1, rotation=(1, 1, 0, 0)), ["rotation", "None", "Spheres"]),
         (lambda: swarm.Spheres(np.broadcast_to(0.0, (10**12, 3)), 0.1), ["centers", "memory", "bodies", "TB"]),
         (lambda: swarm.Cylinders([[0, 0, 0]], 0.1, (0, 0, 0)), ["axes", "not all 0"]),
         (lambda: swarm.Cylinders([[0, 0, 0]], 0.1, lengths=[-1.0]), ["lengths[0]", "above 0", "-1"]),

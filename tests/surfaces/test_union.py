@@ -118,7 +118,12 @@ class Nowhere(swarm.Sphere):
         ),
         (lambda: swarm.Union([BALL, Nowhere(0.5)]), r"parts\[1\] must have a volume, got .*no point is admissible"),
         (lambda: swarm.Union([BALL, swarm.Formula("x**2 + y**2 + z**2")]), "phi must be 0 somewhere, got above 0"),
-        (lambda: swarm.Union([BALL], rotation=(1.0, 0.0, 0.0, 0.1)), "rotation must be None for Union.*its parts"),
+        (
+            lambda: swarm.Union(
+                [swarm.Sphere(1.0, motion=swarm.Translation((1.0, 0.0, 0.0)))], rotation=(1.0, 0.0, 0.0, 0.1)
+            ),
+            "no motion of its own where the Union has a rotation.*to the whole",
+        ),
         (lambda: swarm.Union([BALL], mass=1.0), "mass must be None for Union"),
         (
             lambda: swarm.Union([swarm.Sphere(1.0, mass=1.0)]),

@@ -151,6 +151,11 @@ class Sampled(Surface):
         x, y, z = (a + b for a, b in zip(self.origin, shift, strict=True))
         return replace(self, origin=(x, y, z))
 
+    def turned(self, turn: rotations.Quaternion) -> Surface:
+        middle = self._middle()
+        shift = np.array(rotations.turned(turn, middle)) - middle
+        return Surface.turned(self.shifted(shift.tolist()), turn)
+
 
 class Samples:
     """The samples of a surface and all that is made of them, once."""

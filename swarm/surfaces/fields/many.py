@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ... import motion as motions
-from ...common.rows import balls, bodies, directions, lengths, quaternions, widths
+from ...common.rows import balls, bodies, directions, kept, lengths, quaternions, widths
 from ...errors import SceneError
 from ...kernel.grid import Floats, one_cell
+from ...motion.wall import product
+from .. import rotation as rotations
 from ..area_samples import AreaSample, Region
 from ..presence.patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
@@ -24,6 +26,8 @@ from .members import Few, GrownLike, Members, alike, nearest, table_of, touched,
 # longer, fewer; and in a cell that repeats, whose faces end flights too: among 27 balls 87 ns, from cell to cell 52.
 # Under gravity cells are faster from 16 on: so few are in one cell.
 _FEW, _FEW_BALLS, _IN_ONE_CELL = 24, 48, 16
+# The quaternion that turns nothing.
+_UNTURNED = (1.0, 0.0, 0.0, 0.0)
 
 
 class _BodyRows(NamedTuple):
@@ -50,7 +54,7 @@ class Many(Surface):
 
     is_field = True
     centers: Any
-    refused = ("rotation", "mass", "inertia")
+    refused: ClassVar[tuple[str, ...]] = ("mass", "inertia")
     instead = "give it to a body that is a surface of the scene by itself"
     # Of one body
     kind: ClassVar[type[Surface]]
@@ -72,6 +76,22 @@ class Many(Surface):
         for what in [field.name for field in fields(self) if field.name in _ROWS and field.name != "centers"]:
             if (value := getattr(self, what)) is not None:
                 object.__setattr__(self, what, _ROWS[what].checked(what, value, len(self)))
+        if self.rotation is not None:
+            self._turn()
+
+    def _turn(self) -> None:
+        """Turn each body about the origin, instead of the field."""
+        turn: Any = self.rotation
+        made = {
+            name: product(rotations.matrix(turn), getattr(self, name).T).T
+            for name in ("centers", "axes") if hasattr(self, name)
+        }  # fmt: skip
+        if hasattr(self, "rotations"):
+            own = np.tile(_UNTURNED, (len(self), 1)) if self.rotations is None else self.rotations
+            made["rotations"] = np.stack(rotations.after(turn, tuple(own.T)), axis=1)  # type: ignore[arg-type]
+        for name, rows in made.items():
+            object.__setattr__(self, name, kept(rows))
+        object.__setattr__(self, "rotation", None)
 
     def is_foam(self) -> bool:
         return self.may_be_foam and getattr(self, "side", "outside") == "inside"
