@@ -17,7 +17,8 @@ class Pairs(Validated):
     Args:
         restitution: e in [0, 1]: the normal velocity of two particles that meet turns from u_n into -e u_n; 1 keeps the
             energy.
-        friction: Coulomb's coefficient between particles, 0 or more; of Penalty, where particles then have a spin.
+        friction: Coulomb's coefficient between particles, 0 or more. Particles then have a spin, of 0 where none is
+            given.
         contact_duration: t_c [s], of Impact: a particle that met another less than this before meets particles and
             walls without a loss, so that losing impacts never become infinitely many in a time. 0: never; None: 1e-4
             of the time in which the smallest particle flies its diameter, under gravity 1e-3 of that in which it flies

@@ -88,7 +88,7 @@ def by_law(laws, walls, gravity, wall, arriving, random):
         away = select(stays, away, 0.0)
     left = select(keeps, twice + work, square(sent) + fall)
     lost, heat = shares(laws, left - work - twice, lost)
-    return happens, Bounce(sent, b + away, left, 2.0 * away, work, lost, heat, wait, keeps)
+    return happens, Bounce(sent, b + away, left, 2.0 * away, work, lost, heat, wait, keeps, True)
 
 
 class _Own(Record):

@@ -20,7 +20,8 @@ _ROUND_OFF = 64.0 * np.finfo(np.float64).eps
 def require_balls(scene: Scene, particles: Particles, method: Method) -> None:
     """Raise a `SceneError` where balls do not fit the scene, the cell or the steps.
 
-    Where contacts turn balls that have no spin, they get one of 0.
+    Where contacts turn balls that have no spin, they get one of 0. Rigid balls without one are turned by friction of
+    pairs only: walls act on them as on points.
     """
     assert particles.radius is not None
     require_shapes(scene, particles.radius)
@@ -32,9 +33,8 @@ def require_balls(scene: Scene, particles: Particles, method: Method) -> None:
 
 
 def _may_turn(scene: Scene, method: Method) -> bool:
-    if method.is_rigid():
-        return False
-    return (scene.pairs is not None and scene.pairs.friction > 0.0) or any(one.friction for one in scene.surfaces)
+    rough_walls = not method.is_rigid() and any(one.friction for one in scene.surfaces)
+    return rough_walls or (scene.pairs is not None and scene.pairs.friction > 0.0)
 
 
 def _require_cell(scene: Scene, particles: Particles, method: Method) -> None:

@@ -49,8 +49,9 @@ class CollidingRun(BaseRun):
         self._clock[[LENGTH, REACH]] = epoch_of(scene, particles, box.grid), reach_of(box.grid)
         self._windows = windows_of(compiled, self._clock)
         laws, openings = box.laws, compiled.openings()
-        loses = laws.may_dissipate or laws.loses or box.loss is not None
-        balls = Balls(particles.radius, np.zeros(n, np.int64), np.zeros(1))
+        rough = box.turning is not None and box.turning.friction is not None
+        loses = laws.may_dissipate or laws.loses or box.loss is not None or rough
+        balls = Balls(particles.radius, np.zeros(n, np.int64), np.zeros(1), particles.spin)
         # The energy of each ball is not kept. An array of zeros that is never written takes one page of memory.
         unused = np.zeros(n)
         # Times are those of the start of each flight: so what is written at frames is no part of the motion.
@@ -213,7 +214,8 @@ class CollidingRun(BaseRun):
         self._look_anew(-1.0)
 
     def _scale_of(self, seen: dict[str, Any]) -> float:
-        return float(seen["kinetic_energy"] + seen["dissipated_energy"] + abs(seen["potential_energy"]))
+        turning = seen.get("rotational_energy", 0.0)
+        return float(seen["kinetic_energy"] + turning + seen["dissipated_energy"] + abs(seen["potential_energy"]))
 
     def _share_done(self, span: float) -> float:
         return min(1.0, max(0.0, (self._now() - self._frame_before) / span))
@@ -232,7 +234,7 @@ class CollidingRun(BaseRun):
             "last": flock.last, "followed": flock.followed, "image": state.image, "heat": state.heat,
             "escape_time": state.escape_time,
             "kept": None if kept is None else kept.twice, "kept_stamp": None if kept is None else kept.stamp,
-            "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
+            "spin": self._balls.spin, "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
             "window": None if self._windows is None else self._windows.numbers,
         }  # fmt: skip
         crossed = {} if state.crossed is None else named("crossed", state.crossed)

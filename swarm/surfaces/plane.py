@@ -79,7 +79,7 @@ def _require_pull(plane: str, gravity: Sequence[float]) -> None:
 
 
 def require_start(scene: Any, particles: Any) -> None:
-    """Raise a `SceneError` where a particle starts out of the plane of a scene, or with a velocity out of it."""
+    """Raise a `SceneError` where a particle starts out of the plane of a scene, or with what would lead out of it."""
     across = across_of(scene.plane)
     if across is None:
         return
@@ -92,6 +92,16 @@ def require_start(scene: Any, particles: Any) -> None:
                 f'particles must be in the plane {scene.plane} = 0 of a scene with plane = "{scene.plane}", got '
                 f"{off.size} of {rows.shape[1]} {where}; the farthest is particle {k}, by {rows[across, k]:g} {unit}; "
                 f"set particles.{'position' if what == 'start' else 'velocity'}[{across}] to 0, or use swarm.fill"
+            )
+    if particles.spin is None:
+        return
+    for axis in along(across):
+        off = np.flatnonzero(particles.spin[axis])
+        if off.size:
+            raise SceneError(
+                f'particles.spin[{axis}] must be 0 in a scene with plane = "{scene.plane}", got '
+                f"{particles.spin[axis, off[0]]:g} rad/s of particle {off[0]}: friction would send it out of the "
+                f"plane; discs turn about {scene.plane} alone, spin[{across}]"
             )
 
 

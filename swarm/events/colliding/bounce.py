@@ -18,6 +18,7 @@ from ...surfaces.presence.openings import is_open
 from .clock import moment_of
 from .followed import follow, settle
 from .rows import FLOATS, WALL
+from .rubbing import rub_wall
 from .window import walls_at
 
 # Besides a status that ends the run: it flies on, or is no more among the walls.
@@ -92,6 +93,9 @@ def _turned(box, flock, books, walls, wall, ball):
     """The `Bounce` of a ball on a wall: its number, the time, its position and its velocity."""
     i, now, r, v = ball
     fall, laws, random = 2.0 * potential(box.pull, r), box.laws, None
+    if box.turning is not None:
+        # Of a ball that turns, friction is below.
+        laws = laws._replace(friction=None)
     if laws.send_off:
         random = box.source.of_impact(i, books.impacts[index(i)], laws)
     arriving = Arriving(r, v, flock.kept.at(i, flock.stamp(i), square(v) + fall), box.kinds.mass_of(i))
@@ -100,7 +104,10 @@ def _turned(box, flock, books, walls, wall, ball):
         turned = impact_on_wall(laws._replace(restitution=None), walls, box.pull, wall, arriving, random)
     # The energy decides the speed: the square of a velocity has a bias.
     v1 = either(turned.keeps, with_square(turned.v, turned.twice_energy - fall), turned.v)
-    return _lifted(box, walls, wall, r, turned._replace(v=v1))
+    turned = turned._replace(v=v1)
+    if box.turning is not None and box.laws.friction is not None and not turned.is_sent:
+        turned = rub_wall(box.laws, walls, wall, box.turning, (i, box.kinds.radius_of(i), r), turned)
+    return _lifted(box, walls, wall, r, turned)
 
 
 @outlined

@@ -21,6 +21,7 @@ from .meet import Loss
 from .queue import FIRST, SPARE
 from .resting import repose_of
 from .rows import CELL, FLOATS, NOBODY, RADIUS, WALL, WHOLES, Flock, Kept
+from .rubbing import Turning
 from .window import OUT
 
 Floats = NDArray[np.float64]
@@ -89,7 +90,9 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     scenery = scenery_of(compiled, 0.0) if scene.reacts() else None
     laws = compiled.laws or NONE if scenery is None else scenery.laws
     pairs = scene.pairs or Pairs()
-    loss = None
+    loss, turning = None, None
+    if particles.spin is not None:
+        turning = Turning(particles.spin, pairs.friction or None)
     heavy_loses = any(surface.reacts() and surface.restitution < 1.0 for surface in scene.surfaces)
     if pairs.restitution < 1.0 or laws.restitution is not None or heavy_loses:
         loss = Loss(pairs.restitution, duration_of(scene, pairs, particles))
@@ -98,6 +101,7 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     shortest = max(_SHORTEST * epoch_of(scene, particles, grid), 0.0 if loss is None else loss.duration)
     walls = compiled.walls(0.0) if scenery is None else scenery.given
     made = Domain(walls, laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest)
+    made = made._replace(turning=turning)
     if scene.gravity is not None:
         # Also where nothing is lost: balls may start at rest on a floor.
         made = made._replace(repose=repose_of(math.hypot(*scene.gravity), particles.radius))

@@ -8,6 +8,7 @@ from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import dot, square, with_square
 from .aim import between
+from .rubbing import rub_pair
 
 # The square of the part of their speeds with which balls part at least: four roundings.
 _PARTS = 2.0**-100
@@ -53,7 +54,7 @@ def _parted(u, b, distance2, speed2):
 
 
 def met(box, flock, one, two, now):
-    """The `Met` of two balls that touch now, each as its number, its position and its velocity."""
+    """The `Met` of two balls that touch now, each as its number, its position and its velocity; it turns them too."""
     (i, r, v), (j, other, w) = one, two
     b, u = between(box.grid, r, other), w - v
     closing, distance2 = dot(b, u), square(b)
@@ -66,5 +67,11 @@ def met(box, flock, one, two, now):
         after = box.growth.turned(u, b, closing, distance2, now)
     share = box.kinds.share(i, j)
     mass = box.kinds.mass_of(i) * share
-    change = _parted(after, b, distance2, square(v) + square(w)) - u
-    return Met(v - share * change, w + box.kinds.share(j, i) * change, mass * dot(b, change), 0.5 * mass * lost)
+    parted = _parted(after, b, distance2, square(v) + square(w))
+    change, taken = parted - u, 0.5 * mass * lost
+    virial = mass * dot(b, change)
+    if box.turning is not None and box.turning.friction is not None:
+        n = b * (1.0 / math.sqrt(distance2))
+        rubbed, lost_by_friction = rub_pair(box.kinds, box.turning, (i, j), n, parted, abs(dot(change, n)))
+        change, taken = change + rubbed, taken + lost_by_friction
+    return Met(v - share * change, w + box.kinds.share(j, i) * change, virial, taken)

@@ -216,12 +216,6 @@ def _duration(asked: Asked) -> Found:
         yield {"got": f"{pairs.contact_duration:g}"}
 
 
-def _rough_pairs(asked: Asked) -> Found:
-    pairs = asked.scene.pairs
-    if pairs is not None and pairs.friction > 0.0:
-        yield {"got": f"{pairs.friction:g}"}
-
-
 def _spins(asked: Asked) -> Found:
     if isinstance(asked.particles, Particles) and asked.particles.spin is not None:
         yield {}
@@ -499,19 +493,10 @@ CAPABILITIES = (
             "overlap", "leave it out, or use Impact",
         ),
     }, within="law of pairs"),
-    Capability("friction of pairs", _rough_pairs, {
-        _RIGID_BALLS: Refusal(
-            "pairs.friction must be 0 with Impact, got {got}: its collisions are without friction",
-            "use Penalty, or leave it out",
-        ),
-    }, within="law of pairs"),
     Capability("spin", _spins, {
-        _RIGID_BALLS: Refusal(
-            "spin must be None with Impact, got spins: its impacts turn no ball", "use Penalty, or leave spin out"
-        ),
         _ALONE: Refusal(
             "spin must be None without a radius, got spins: a point does not turn",
-            "give the particles a radius, and use Penalty",
+            "give the particles a radius",
         ),
     }),
     Capability("plane", _of_scene("plane"), {
@@ -738,8 +723,8 @@ def sentence(engine: str, capability: str) -> str | None:
 
     >>> sentence(POINTS, "source") is None
     True
-    >>> sentence(BALLS, "spin")
-    'spin must be None with Impact, got spins: its impacts turn no ball; use Penalty, or leave spin out'
+    >>> sentence(POINTS, "spin")
+    'spin must be None without a radius, got spins: a point does not turn; give the particles a radius'
     """
     one = next(one for one in CAPABILITIES if one.name == capability)
     return one.sentence(engine) or (sentence(engine, one.within) if one.within else None)

@@ -1,0 +1,87 @@
+"""Coulomb's friction in the impacts of balls that turn.
+
+With n the unit normal and g the slip, the velocity across n with which the surfaces pass at the point of contact, an
+impact has an impulse against g of mu times the normal one, at most what stops the slip. With q = I/(m R^2) = 2/5 that
+is m g/(1 + 1/q), 2/7 of m g, where m is the reduced mass of two balls, or the mass of a ball at a wall. It turns both
+balls the same way, so that linear and angular momentum are conserved.
+
+Source: O. R. Walton, in M. C. Roco (ed.), Particulate Two-Phase Flow (1993), chapter 25, without restitution of the
+slip.
+"""
+
+import math
+from typing import Any
+
+from ...ball_numbers import INERTIA
+from ...contact.reflection import given, relative, wall_velocity
+from ...kernel.arrays import index
+from ...kernel.jit import Array, outlined, select
+from ...kernel.record import Record
+from ...kernel.vector import Vec, cross, dot, square
+
+# Of the slip, what the velocity takes where it stops, and R times the spin: they add up to 1.
+_STOP, _TURN = INERTIA / (1.0 + INERTIA), 1.0 / (1.0 + INERTIA)
+
+
+class Turning(Record):
+    """The spins of balls, and the friction of their collisions."""
+
+    spin: Array  # (3, N) [rad/s]
+    friction: Any  # of two balls; None: their collisions are smooth
+
+    def at(self, i):
+        """The spin of a ball."""
+        k = index(i)
+        return Vec(self.spin[0, k], self.spin[1, k], self.spin[2, k])
+
+    def add(self, i, change):
+        """Change it, and return twice the energy per mass and R^2 that this takes from it."""
+        k, before = index(i), self.at(i)
+        after = before + change
+        self.spin[0, k], self.spin[1, k], self.spin[2, k] = after
+        return INERTIA * (square(before) - square(after))
+
+
+def _across(a, n):
+    return a - dot(a, n) * n
+
+
+def _share(friction, impulse, slip):
+    """The part of the slip that friction stops, of a normal impulse per mass."""
+    speed, most = math.sqrt(square(slip)), friction * impulse
+    return select(most >= _STOP * speed, 1.0, most / (_STOP * select(speed > 0.0, speed, 1.0)))
+
+
+@outlined
+def rub_pair(kinds, turning, pair, n, u, impulse):
+    """The change of the relative velocity u of two balls by friction, and the energy that it takes [J].
+
+    n is the unit normal from the first to the second of the `pair`; `impulse` is the normal one per reduced mass.
+    """
+    i, j = pair
+    one, other = kinds.radius_of(i), kinds.radius_of(j)
+    slip = _across(u, n) - cross(one * turning.at(i) + other * turning.at(j), n)
+    share = _share(turning.friction, impulse, slip)
+    change, twist = (-share * _STOP) * slip, (share * _TURN) * cross(n, slip)
+    mass = kinds.mass_of(i) * kinds.share(i, j)
+    taken = mass * (square(u) - square(u + change))
+    taken += kinds.mass_of(i) * one * one * turning.add(i, (kinds.share(i, j) / one) * twist)
+    taken += kinds.mass_of(j) * other * other * turning.add(j, (kinds.share(j, i) / other) * twist)
+    return change, 0.5 * taken
+
+
+@outlined
+def rub_wall(laws, walls, wall, turning, ball, bounce):
+    """The `Bounce` of a ball, given as its number, its radius and its place, with the friction of the wall."""
+    i, radius, r = ball
+    n = walls.unit_normal(wall, r)
+    u = wall_velocity(laws.moving, walls, wall, r + radius * n)
+    slip = _across(relative(u, bounce.v), n) + radius * cross(turning.at(i), n)
+    share = _share(laws.friction_of(wall), bounce.impulse, slip)
+    change = (-share * _STOP) * slip
+    work, v = given(u, change), bounce.v + change
+    more = square(v) - square(bounce.v)
+    taken = radius * radius * turning.add(i, (-share * _TURN / radius) * cross(n, slip))
+    return bounce._replace(
+        v=v, twice_energy=bounce.twice_energy + more, work=bounce.work + work, lost=bounce.lost + taken - more + work
+    )
