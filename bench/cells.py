@@ -327,6 +327,7 @@ ENGINES: dict[str, Engine] = {
     "points, heavy wall": Engine(_points, swarm.Impact, {}, {"mass": 2.0}),
     "balls, heavy wall": Engine(_balls, swarm.Impact, {}, {"mass": 2.0}),
 }
+_OF_SINGLES = ("points, Impact", "points, Penalty", "points, AugmentedLagrangian", "bodies, Impact")
 _OF_BALLS_APART = ("field", "listed solids")
 _OF_POINTS = ("points, Impact", "points, Penalty", "points, AugmentedLagrangian", "points, heavy wall")
 
@@ -538,12 +539,18 @@ CAPABILITIES: dict[str, Capability] = {
     "contact duration": Capability(_pairs(restitution=0.6, contact_duration=0.5), _lossy, "collisions"),
     "spin": Capability(_spin, _rough),
     "motion beside": Capability(_beside, shown="wall_work"),
-    "cluster": Capability(_option(**shards.OPTIONS), shown="impacts"),
+    "cluster": Capability(lambda draft: draft.options.update(_of_cluster(draft.cell)), shown="impacts"),
 }
 
 
 # Their observable is not 0 without them either.
 STATIC = ("gravity", "pair restitution", "pair friction", "contact duration", "path")
+
+
+def _of_cluster(cell: Cell) -> dict[str, Any]:
+    """Two shards; one where particles depend on one another."""
+    is_coupled = cell.engine not in _OF_SINGLES or cell.capability in ("mass", "inertia")
+    return {**shards.OPTIONS, "shards": None} if is_coupled else dict(shards.OPTIONS)
 
 
 def _centred(draft: Draft) -> None:
@@ -595,9 +602,8 @@ def draft_of(cell: Cell, with_capability: bool = True) -> Draft:
     """The draft of a cell, or of the same run without its capability."""
     engine, wall, capability = ENGINES[cell.engine], WALLS[cell.wall], CAPABILITIES[cell.capability]
     side = wall.sides[0]
-    draft = Draft(
-        cell, side, wall.start, laws=dict(engine.laws), method=dict(engine.arguments), options=dict(wall.options)
-    )
+    options = _of_cluster(cell) if wall.options else {}
+    draft = Draft(cell, side, wall.start, laws=dict(engine.laws), method=dict(engine.arguments), options=options)
     capability.base(draft)
     if with_capability:
         capability.edit(draft)

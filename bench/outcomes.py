@@ -252,7 +252,7 @@ def _other_bits(cell: Cell, done: Ran) -> str:
         return ""
     draft = cells.draft_of(cell)
     for name in shards.OPTIONS:
-        del draft.options[name]
+        draft.options.pop(name, None)
     with shards.of_single_particles():
         alone = run(draft).result
     other = shards.difference(done.result, alone)

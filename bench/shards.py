@@ -12,6 +12,7 @@ import numpy as np
 
 import swarm
 from swarm import observables
+from swarm.bodies import body_run
 from swarm.fleet import jobs, joined, shard_run, sharded_run, shards
 from swarm.run.machine import RunEnd
 from swarm.run.measures import Measures
@@ -35,8 +36,7 @@ def carry_out(task: Task, session: sharded_run.Sharded) -> RunEnd:
     task = dataclasses.replace(task, options=dataclasses.replace(task.options, trajectory=target, checkpoint=_SAVED))
     with session:
         session.prepare_shards(task)
-        assert task.options.shards is not None
-        folder, bounds = session.begin(task, task.options.shards)
+        folder, bounds = session.begin(task, sharded_run.shards_of(task, 1))
         for k in range(len(bounds) - 1):
             outcome = jobs.carried_out(shard_run.run_shard, (folder, k))
             if outcome["state"] != "done":
@@ -58,10 +58,12 @@ def here() -> Iterator[None]:
 @contextlib.contextmanager
 def of_single_particles() -> Iterator[None]:
     """Within it shards may begin at every particle, and sums over the particles of a run in plain Python are of one."""
+    # A module that is imported for the first time within would keep the patched constant.
+    assert body_run.__name__ in sys.modules
     known = [one for name, one in sys.modules.items() if name.startswith("swarm.") and hasattr(one, "CHUNK")]
     with contextlib.ExitStack() as stack:
         for module in known:
-            assert module.CHUNK == observables.CHUNK, module
+            assert module.CHUNK == observables.CHUNK, module.__name__
         for module in known:
             stack.enter_context(mock.patch.object(module, "CHUNK", _CHUNK))
         yield

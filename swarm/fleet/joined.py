@@ -74,6 +74,15 @@ def _gathered(of_shards: list[Trajectory], task: Task, k: int, name: str) -> Any
 
 def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
     """The observables of a frame, from those of all shards."""
+    seen = parts[0] if task.is_coupled else _added(task, parts)
+    if task.options.member_impacts:
+        units = units_of(task)._asdict().items()
+        seen |= {OBSERVED[name]: value_of(seen[OBSERVED[name]], unit) for name, unit in units if unit is not None}
+    return seen
+
+
+def _added(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """The same, of particles that are independent."""
     sums, owners = np.hstack([part[CHUNK_SUMS] for part in parts]), task.compiled.numbering.surfaces_of_rows
     brought = {}
     if task.particles.births is not None:
@@ -100,9 +109,6 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
         else:  # whole numbers, which add up exactly
             total = np.sum(values, axis=0)
             seen[name] = total if total.ndim else int(total)
-    if task.options.member_impacts:
-        units = units_of(task)._asdict().items()
-        seen |= {OBSERVED[name]: value_of(seen[OBSERVED[name]], unit) for name, unit in units if unit is not None}
     return seen
 
 

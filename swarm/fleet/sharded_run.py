@@ -60,12 +60,17 @@ def carry_out(task: Task, session: Sharded) -> RunEnd:
             connection.require_shared(client, target.parent)
             if stop.reason:
                 raise KeyboardInterrupt
-            folder, bounds = session.begin(task, task.options.shards or connection.threads_of(client))
+            folder, bounds = session.begin(task, shards_of(task, connection.threads_of(client)))
             with connection.Workers(client, stop, len(bounds) - 1) as fleet:
                 observables = _Shards(task, session, folder, bounds, fleet, show).run(measures, stop)
         end = shards.joined_end(folder, task, bounds)
         session.finish()
         return end._replace(observables=observables, wall_time=session.wall_time())
+
+
+def shards_of(task: Task, threads: int) -> int:
+    """How many there are, of a cluster with so many threads."""
+    return 1 if task.is_coupled else task.options.shards or threads
 
 
 class _Shards:

@@ -1,5 +1,7 @@
 """Shards: contiguous ranges of the particles, or bodies, of a run, each an ordinary run with files of its own.
 
+Where particles depend on one another the run is one shard.
+
 Beside RUN.h5 they are in the folder RUN.shards: what is run and its start, which the client writes once, and of shard k
 its trajectory k.h5, its checkpoint and its end. Workers read the start there: a worker that takes the place of another
 needs nothing from the client, and the scheduler carries short messages only.
@@ -30,7 +32,7 @@ from ..run.tally import scales_of
 from ..state import Absorbed, Multipliers
 from . import sent_modules
 
-_ARRAYS = ("position", "velocity", "mass", "image")
+_ARRAYS = ("position", "velocity", "mass", "image", "radius", "spin")
 _BIRTHS = ("birth_time", "birth_source")
 
 
@@ -44,6 +46,7 @@ class Whole(NamedTuple):
     bounds: list[int]  # shard k has the particles, or bodies, from bounds[k] to bounds[k + 1]
     start: str
     scales: tuple[float, float]
+    volume: float | None  # that the particles were filled into [m^3]
 
 
 def folder_of(trajectory: Path) -> Path:
@@ -82,7 +85,8 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     sent_modules.send_code()
     body = None if task.bodies is None else task.bodies.body
     options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None, observables=None)
-    whole = Whole(task.compiled, task.method, options, body, bounds, start, scales_of(task))
+    volume = task.particles.volume
+    whole = Whole(task.compiled, task.method, options, body, bounds, start, scales_of(task), volume)
     _replace(folder / "whole.pickle", lambda file: cloudpickle.dump(whole, file))
     for name in _ARRAYS:
         array = getattr(task.particles, name)
@@ -160,6 +164,7 @@ def task_of(folder: Path, k: int) -> Task:
         some = {name: array[..., first:last] for name, array in arrays.items()}
         born = [np.array(some.pop(name)) for name in _BIRTHS if name in some]
         particles = Particles(**some)
+        particles.volume = whole.volume
         if born:
             particles.births = Births(born[0], born[1], len(whole.options.sources))
     else:
@@ -180,8 +185,8 @@ def write_end(path: Path, end: RunEnd) -> None:
         arrays["escape_time"] = end.escape_time
     if end.absorbed is not None:
         arrays |= {f"absorbed.{name}": array for name, array in end.absorbed._asdict().items()}
-    if end.particles.image is not None:
-        arrays["image"] = end.particles.image
+    own = {"image": end.particles.image, "spin": end.particles.spin, "collisions": end.collisions}
+    arrays |= {name: array for name, array in own.items() if array is not None}
     if end.multipliers is not None:
         arrays |= {f"multipliers.{name}": array for name, array in end.multipliers._asdict().items()}
     _replace(path, functools.partial(_save, np.array(list(arrays)), *arrays.values()))
@@ -206,9 +211,10 @@ def joined_end(folder: Path, task: Task, bounds: list[int]) -> RunEnd:
     flat = {name: array.reshape(*array.shape[:-2], -1) for name, array in whole.items()}
     particles = task.particles
     particles.position, particles.velocity, particles.image = flat["position"], flat["velocity"], flat.get("image")
+    particles.spin = flat.get("spin")
     loops = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("multipliers.")}
     gone = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("absorbed.")}
     return RunEnd(
         particles, {}, 0.0, Multipliers(**loops) if loops else None, flat["impacts"], flat["escape_time"],
-        Absorbed(**gone) if gone else None, birth_times(particles),
+        Absorbed(**gone) if gone else None, birth_times(particles), flat.get("collisions"),
     )  # fmt: skip

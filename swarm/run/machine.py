@@ -108,7 +108,7 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
                 seen |= _measured(task, measures, number, read, moment)
                 # Those of a shard are joined to those of the others.
                 if task.is_shard:
-                    seen[CHUNK_SUMS] = run.chunk_sums()
+                    seen |= {} if task.is_coupled else {CHUNK_SUMS: run.chunk_sums()}
                 else:
                     kept.add(seen)
                 if log is not None:

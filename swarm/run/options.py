@@ -178,6 +178,11 @@ class Task:
         return self.compiled.scene
 
     @property
+    def is_coupled(self) -> bool:
+        """Whether particles depend on one another: they meet, or move a wall. Such a run is one shard."""
+        return self.particles.radius is not None or self.scene.reacts()
+
+    @property
     def is_shard(self) -> bool:
         """Whether it is a shard of a run."""
         return bool(self.start)

@@ -116,7 +116,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             extra "cluster". The particles are shards, each with files in the folder TRAJECTORY.shards, which the
             trajectory needs; results have the same bits as without. A worker that dies is replaced, and its shard goes
             on from its checkpoint, by default of every 60 s.
-        shards: their number, of a cluster; None: one for each thread of its workers.
+        shards: their number, of a cluster; None: one for each thread of its workers. A run of particles that meet, or
+            that move a wall, is one shard.
         sources: `Source`s of particles that come during the run, by Impact with contact_step = 0 where no wall has a
             mass; None: no one comes. All births are drawn before the run, from `seed`.
 

@@ -300,13 +300,41 @@ def test_what_cannot_be_is_refused_before_anything_is_written(name, tmp_path, mo
     assert not list(tmp_path.iterdir())
 
 
-def test_walls_that_react_are_refused(tmp_path):
+def test_particles_that_depend_on_one_another_are_one_shard(tmp_path):
     scene = swarm.Scene([swarm.Sphere(0.5, mass=10.0)])
-    with pytest.raises(swarm.SceneError, match="cluster must be left out where a wall has a mass"):
+    with pytest.raises(swarm.SceneError, match="shards must be 1 or left out where a wall has a mass, got 2"):
         swarm.simulate(
             scene, swarm.fill(scene, 10, speed=1.0), swarm.Impact(), until=1.0, trajectory=tmp_path / "run.h5",
-            cluster="local:1",
+            cluster="local:1", shards=2,
         )  # fmt: skip
+
+
+def coupled(name):
+    scene = swarm.Scene([swarm.Sphere(0.5, friction=0.2)], pairs=swarm.Pairs(0.9, friction=0.3))
+    if name == "wall with a mass":
+        scene = swarm.Scene([swarm.Sphere(0.5, mass=10.0)])
+        return scene, swarm.fill(scene, 10, speed=1.0, seed=1), swarm.Impact()
+    method = swarm.Impact() if name == "balls" else swarm.Penalty(dt=5e-3, penalty=1e3)
+    return scene, swarm.fill(scene, 10, speed=1.0, radius=0.08, seed=1), method
+
+
+@pytest.mark.parametrize("name", ["balls", "grains", "wall with a mass"])
+def test_a_coupled_run_is_one_shard_with_the_same_bits(name, client, tmp_path):
+    options = {"until": 1.0, "every": 0.5, "compile": "never"}
+    scene, particles, method = coupled(name)
+    one = swarm.simulate(scene, particles.copy(), method, trajectory=tmp_path / "one.h5", **options)
+    other = swarm.simulate(
+        scene, particles.copy(), method, trajectory=tmp_path / "other.h5", cluster=client, **options
+    )  # fmt: skip
+    require_same(one, other, (tmp_path / "one.h5", tmp_path / "other.h5"))
+    if name == "wall with a mass":
+        assert other.observables["wall_velocity"][-1].any()
+        return
+    assert np.isfinite(other.observables["pressure"][-1])
+    for made in (one.particles, other.particles, swarm.load(tmp_path / "other.h5").frame(-1)):
+        assert np.array_equal(made.spin, one.particles.spin)
+        assert np.array_equal(made.radius, particles.radius)
+    assert np.array_equal(one.collisions_per_particle, other.collisions_per_particle)
 
 
 def test_another_version_on_a_worker_is_named():

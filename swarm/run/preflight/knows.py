@@ -277,6 +277,11 @@ def _on_cluster(found: Callable[[Asked], Found]) -> Callable[[Asked], Found]:
     return lambda asked: found(asked) if asked.options.cluster is not None else iter(())
 
 
+def _several_shards(asked: Asked) -> Found:
+    if (got := asked.options.shards) is not None and got > 1:
+        yield {"got": got}
+
+
 def _no_trajectory(asked: Asked) -> Found:
     if asked.options.trajectory is None:
         yield {}
@@ -683,14 +688,14 @@ CAPABILITIES = (
             'frames must be "all" or "none" with bodies, got {got}: a body is written as a whole', 'give frames="all"'
         ),
     }),
-    Capability("cluster", _option("cluster"), {
+    Capability("shards", _several_shards, {
         _EVERY_BALL: Refusal(
-            "cluster must be left out where particles have a radius, got {got!r:.100}: particles that meet one another "
-            "cannot be in different shards", "run without a cluster",
+            "shards must be 1 or left out where particles have a radius, got {got}: particles that meet one another "
+            "cannot be in different shards", "leave it out",
         ),
         (MASSIVE,): Refusal(
-            "cluster must be left out where a wall has a mass, got {got!r:.100}: through such a wall each particle "
-            "depends on all others", f"{_TO_MOTION}, or run without a cluster",
+            "shards must be 1 or left out where a wall has a mass, got {got}: through such a wall each particle "
+            "depends on all others", "leave it out",
         ),
     }),
     Capability("cluster without a trajectory", _on_cluster(_no_trajectory), {
