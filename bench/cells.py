@@ -300,7 +300,7 @@ def _bodies(draft: Draft) -> swarm.Bodies:
     places, speeds = _arrays(draft)
     middle = body.points.mean(axis=0)
     arms = (body.points - middle).T[:, :, None]
-    some = slice(0, 2)
+    some = slice(0, draft.particles.get("copies", 2))
     velocity = np.repeat(speeds[:, None, some], len(body), axis=1)
     velocity = velocity + np.cross(draft.particles.get("spin", (0.0, 0.0, 0.0)), arms, axisb=0, axisc=0)
     return swarm.Bodies(body, places[:, None, some] + arms, velocity)
@@ -381,12 +381,22 @@ def _half_space(draft: Draft) -> swarm.Plane:
     return swarm.Plane((-1.0, 0.0, 0.0), -draft.center[0] - STARTS[draft.start][3])
 
 
+def _more_bodies(draft: Draft) -> None:
+    """Where two bodies do not both meet the wall and pass an opening of it."""
+    if draft.cell.engine.startswith("bodies") and draft.cell.wall in ("planes", "cone"):
+        draft.particles["copies"], draft.until = 4, 2.0
+
+
 def _opening(draft: Draft) -> None:
     draft.laws["openings"] = [_half_space(draft)]
+    _more_bodies(draft)
 
 
 def _timed_opening(draft: Draft) -> None:
-    draft.laws["openings"] = [swarm.Opening(_half_space(draft), times=[(0.3, 5.0)])]
+    # The points of bodies are at the walls sooner than their centres.
+    begin = 0.1 if draft.cell.engine.startswith("bodies") else 0.3
+    _more_bodies(draft)
+    draft.laws["openings"] = [swarm.Opening(_half_space(draft), times=[(begin, 5.0)])]
 
 
 def _door(draft: Draft) -> None:

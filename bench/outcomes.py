@@ -22,6 +22,7 @@ import numpy as np
 import swarm
 from swarm.surfaces.instant import side_of
 from swarm.surfaces.presence.doors import is_there
+from swarm.surfaces.presence.openings import are_open
 
 from . import cells, shards
 from .cells import Cell
@@ -186,16 +187,16 @@ def _declared(cell: Cell, done: Ran) -> float:
 
 def _miscounted(done: Ran) -> str:
     seen, result = done.result.observables, done.result
-    escaped = int(np.isfinite(result.escape_time).sum())
+    # Those of a body are of each of its points.
+    points = 1 if result.bodies is None else len(result.bodies.body)
+    escaped = int(np.isfinite(result.escape_time).sum()) // points
     if int(seen["escaped"][-1]) < escaped:
-        return f"escaped is {seen['escaped'][-1]}, and {escaped} particles have a time of it"
+        return f"escaped is {seen['escaped'][-1]}, and {escaped} have a time of it"
     if "absorbed" in seen and int(seen["absorbed"][-1].sum()) != int(np.isfinite(result.absorbed_time).sum()):
         return f"absorbed is {seen['absorbed'][-1].sum()}, and another number of particles have a time of it"
     sources = done.given.options.get("sources", ())
     if sources and int(seen["born"][-1].sum()) != sum(len(one.times) for one in sources):
         return f"born is {seen['born'][-1].sum()} of {sum(len(one.times) for one in sources)}"
-    # Those of a body are of each of its points.
-    points = 1 if result.bodies is None else len(result.bodies.body)
     if int(result.impacts_per_particle.sum()) != points * int(seen["impacts"][-1]):
         return f"particles have {result.impacts_per_particle.sum()} of {int(seen['impacts'][-1])} impacts"
     return ""
@@ -211,7 +212,11 @@ def _outside(cell: Cell, done: Ran) -> str:
     inside = ~np.isfinite(result.escape_time)
     position, radius = result.particles.position[:, inside], result.particles.radius
     if cell.engine == "bodies, Impact":
-        position = result.bodies.contact_points().reshape(3, -1)
+        there = inside.reshape(len(result.bodies.body), -1)[0]
+        position = result.bodies.contact_points()[:, :, there].reshape(3, -1)
+        # Some points of a body that is inside may have passed an opening.
+        passed = are_open([one for surface in scene.pieces.volumes for one in surface], position, until)
+        position = position[:, ~passed]
     if scene.reacts():
         scene = scene.placed(seen["wall_position"][-1], seen["wall_orientation"][-1])
     there = [k for k, one in enumerate(scene.surfaces) if is_there(one.present, until)]

@@ -169,9 +169,9 @@ class CompiledScene:
             self._known[there] = self._made(moment)
         return self._known[there]
 
-    def walls_of_bodies(self, own: Sequence[Surface]) -> Walls:
-        """The walls for bodies, and those of a body's own surfaces after them, where nothing moves."""
-        return self._made(0.0, own)
+    def walls_of_bodies(self, own: Sequence[Surface], moment: float = 0.0) -> Walls:
+        """The walls for bodies at a moment, as `walls`, and those of a body's own surfaces, at rest, after them."""
+        return self._made(moment, own)
 
     def cell(self) -> Period | None:
         """The cell that repeats."""
@@ -219,7 +219,7 @@ class CompiledScene:
             return [wall for one in self._pieces_at(numbers) for wall in walls_then(one, moment, self.largest)]
 
         if scene.moves():
-            walls = carried(fields, self._pieces_at(order.alone()), moment, self.largest)
+            walls = carried(fields, [*self._pieces_at(order.alone()), *(own or ())], moment, self.largest)
         else:
             many = [(one.present is None, *walls_then(one, moment, self.largest)) for one in fields]
             walls = Walls((

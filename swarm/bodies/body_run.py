@@ -16,6 +16,7 @@ from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import Particles
 from ..run.base import Arrays, BaseRun
+from ..run.doors import comers
 from ..run.starting_state import UNSEEDED, Seeding
 from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
@@ -54,18 +55,20 @@ class BodyRun(BaseRun):
         self._ties = ties_of(bodies.body, law.alpha if looped else None)
         self._touching = touching_of(bodies.body, self._ties, compiled)
         self._carried = [Scene([surface]).compiled() for surface, _carrier, _point in bodies.body.cavities]
-        self._walls = compiled.walls_of_bodies(()), compiled.walls_of_bodies(own)
+        self._compiled, self._own, self._changes = compiled, own, scene.moves() or scene.has_doors()
+        self._reach(0.0)
         self._energies = BodyEnergies(compiled, self._carried, bodies.body, self._ties, law)
         rows, walls = (
             len(self._ties.ends) + len(bodies.body.guides),
             len(compiled.numbering.surfaces_of_rows) + len(own),
         )
-        self._bodies = _state_of(bodies, particles, rows, walls)
+        self._bodies = _state_of(bodies, particles, rows, walls, self._walls[2] is not None)
         none = np.zeros(0)
         # What files take of a run.
         self.state = State(
             particles.position, particles.velocity, particles.mass, none, none, np.zeros(points * n, np.int64),
             np.zeros((walls, 0)), none, None,
+            escape_time=None if self._walls[2] is None else np.full(points * n, math.nan),
         )  # fmt: skip
         contacts = most_contacts_of(self._touching, soft)
         per_lane = 8 * (24 * points + 10 * rows + rows * rows + 20 * contacts)
@@ -79,6 +82,7 @@ class BodyRun(BaseRun):
         tier = Tier("always" if compile == "auto" else compile, self._walls, n * points)
         pool = threads_with(threads, lanes * per_lane + at_once)
         super().__init__(compiled, method, n, threads, tier, seeding, watched, pool)
+        self._instants = scene.instants if scene.has_doors() else None
         self._size = drawn
         size, gravity = scene.finite_size(), np.array(scene.gravity or (0.0, 0.0, 0.0))
         room = SOLVED_PLACE * max(size, scene.extent())
@@ -112,9 +116,36 @@ class BodyRun(BaseRun):
         return both, self._walls, self._rule, bodies, ticket, self._size, self._watch.passes
 
     def _prepare(self, span: float, moment: float) -> None:
+        if self._changes:
+            self._reach(moment)
         if not self._cut_short:
             self._bodies.remaining.fill(span * self._unit)
+            if self._bodies.escape_time is not None:
+                self._bodies.remaining[~np.isnan(self._bodies.escape_time)] = 0.0
         self._rule = self._rule._replace(end=moment)
+
+    def _reach(self, moment: float) -> None:
+        """The walls of the frame, or its piece, that ends at a moment [s]: alone, with those of the body, and open."""
+        made = self._compiled.walls_of_bodies
+        self._walls = made((), moment), made(self._own, moment), self._compiled.openings(moment)
+
+    def _switch(self, instant: float) -> None:
+        for surface in np.flatnonzero(comers(self._scene, instant)):
+            depth = self._depths(slice(None), self._bodies.position, instant)[surface]
+            if not depth.max(initial=-math.inf) <= self._deepest:
+                body = self._first + int(np.argmax(depth)) % len(self._bodies.remaining)
+                raise RunError(
+                    f"surfaces[{surface}] must come where no body is: at {instant:g} s a contact point of body {body} "
+                    f"is {depth.max():.3g} m inside; let it come later or elsewhere, or start that body elsewhere"
+                )
+
+    def _depths(self, some: slice, r: Floats, moment: float) -> Floats:
+        """How far contact points are outside of each surface (surfaces, K n) [m]; those through an opening are not."""
+        points = self._energies.contact_points(r).reshape(3, -1)
+        depths = self._scene.distances_outside(points, moment)
+        if self._bodies.free is not None:
+            depths[:, self._bodies.free[:, some].reshape(-1) > 0] = -math.inf
+        return depths
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
         threads, ticket = 1 if self._tier.is_plain else self._threads, np.zeros(1, np.int64)
@@ -179,7 +210,9 @@ class BodyRun(BaseRun):
     def _observe(self, moment: float) -> None:
         bodies, surfaces = self._bodies, len(self._scene.surfaces)
         self.state.impacts[:] = np.tile(bodies.impacts, len(self._body))
-        sums, errors, depths = zip(*(self._sums_of(*block) for block in self._blocks()), strict=True)
+        if self.state.escape_time is not None:
+            self.state.escape_time[:] = np.tile(bodies.escape_time, len(self._body))
+        sums, errors, depths = zip(*(self._sums_of(*block, moment) for block in self._blocks()), strict=True)
         self._sums = np.ascontiguousarray(np.array(sums).T)
         self._seen = {
             **summed(self._sums, self._owners, surfaces, len(self._body.cavities)),
@@ -188,13 +221,13 @@ class BodyRun(BaseRun):
             "impacts": int(bodies.impacts.sum()),
             "sliding": int(np.count_nonzero(bodies.lasting)),
             "unconverged": int(bodies.unconverged.sum()),
-            "escaped": 0,
+            "escaped": 0 if bodies.escape_time is None else int(np.count_nonzero(~np.isnan(bodies.escape_time))),
             "link_error": self._link_error(),
         }
         if self._rule.loop:
             self._seen["sweeps"] = int(bodies.sweeps.sum())
 
-    def _sums_of(self, some: slice, r: Floats, v: Floats) -> tuple[list[float], float, float]:
+    def _sums_of(self, some: slice, r: Floats, v: Floats, moment: float) -> tuple[list[float], float, float]:
         """Of one chunk: what is summed, as `summed` takes it, the largest error of the energy, how far it is out."""
         energies, bodies = self._energies, self._bodies
         kinetic, fall, elastic = energies.kinetic(v), energies.fall(r), energies.stored(r)
@@ -204,8 +237,7 @@ class BodyRun(BaseRun):
         scaled = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0.0)
         numbers = (kinetic, fall, elastic, total, lost, bodies.sliding[some], work)
         pushed = np.ascontiguousarray(bodies.impulse[:, some]).sum(axis=1)
-        points = energies.contact_points(r).reshape(3, -1)
-        depth = self._scene.distances_outside(points).max(initial=0.0) if points.size else 0.0
+        depth = self._depths(some, r, moment).max(initial=0.0) if len(self._body.contacts) else 0.0
         return (
             [*(one.sum() for one in numbers), *np.concatenate([*energies.momenta(r, v), pushed])],
             scaled.max().item(),
@@ -231,7 +263,8 @@ class BodyRun(BaseRun):
             )
 
     def _arrays(self) -> Arrays:
-        return {name: array for name, array in self._bodies._asdict().items() if array is not None}
+        pieces = {} if self._instants is None else {"piece.begun": self._begun, "piece.done": self._done}
+        return {name: array for name, array in self._bodies._asdict().items() if array is not None} | pieces
 
 
 def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
@@ -251,8 +284,8 @@ def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
     return pool
 
 
-def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int) -> BodyState:
-    """All copies at the start, with so many rows of multipliers and of walls."""
+def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, opens: bool) -> BodyState:
+    """All copies at the start, with so many rows of multipliers and of walls, and whether walls have openings."""
     n, body = len(bodies), bodies.body
     anchors = [(q, body.anchors[q]) for q in led_points(body)]
     paths = [[motion.harmonic(start) for start in bodies.position[:, q].T] for q, motion in anchors]  # type: ignore[union-attr]
@@ -278,4 +311,6 @@ def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int) -> Bo
         sweeps=whole[3],
         unconverged=whole[4],
         energy=np.zeros(n),
+        free=np.zeros((len(body.contacts), n), np.int8) if opens else None,
+        escape_time=np.full(n, math.nan) if opens else None,
     )

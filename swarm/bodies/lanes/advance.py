@@ -11,6 +11,7 @@ from ...kernel.vector import column
 from . import impact, impact_time, prescribed
 from .body_arrays import PACES, BodyLanes, HeldContacts, LaneNumbers, arrays_of_held, shapes_of_lanes
 from .newton import BRIEF, solve
+from .passages import Passages, look_back
 from .penalty_contact import SoftContacts
 from .persistent_contact import HardContacts
 
@@ -29,14 +30,17 @@ _AFRESH = 32
 def advance_bodies(body, walls, rule, state, ticket, size, halt):
     """Advance all bodies that this thread draws: (status, number of the body).
 
-    `walls` are the walls of the scene, and those with the walls of the body's own guides and cavities after them.
+    `walls` are the walls of the scene, those with the walls of the body's own guides and cavities after them, and the
+    openings, or None.
     """
     points, rows, count = state.position.shape[1], state.guess.shape[1], rule.lanes
     shapes = shapes_of_lanes(points, rows, rows if rule.loop else 0, count)
     lanes = BodyLanes(*(scratch(shape, np.float64) for shape in shapes))
     pace = LaneNumbers(*(scratch(count, kind) for kind in PACES))
     active = HeldContacts(*(scratch(shape, kind) for shape, kind in arrays_of_held(count, rule.most)))
-    contacts = (HardContacts if rule.walls is None else SoftContacts)(*body, walls[1], rule, lanes, pace, active)
+    passages = None if walls[2] is None else Passages(walls[2], state.free, state.escape_time)
+    kind = HardContacts if rule.walls is None else SoftContacts
+    contacts = kind(*body, walls[1], rule, lanes, pace, active, passages)
     c = scratch((3, count), np.float64)
     for i in range(count):
         pace.body[i] = -1
@@ -119,6 +123,8 @@ def _finish(contacts, state, i):
         contacts.strike(state, i)
         for a in range(lanes.recent.shape[0]):
             lanes.older[a, i] = math.nan
+    if contacts.passages is not None:
+        look_back(contacts, i)
     _begin_step(pace, i)
 
 
@@ -250,7 +256,8 @@ def _look(contacts, scene, c):
                         for i in range(count):
                             c[x, i] += b * r1[3 * q + x, i]
         for i in range(count):
-            pace.out[i] = pace.out[i] | scene.outside(-1.0, column(c, 0, i))
+            out = scene.at(pace.remaining[i] - pace.step[i]).outside(-1.0, column(c, 0, i))
+            pace.out[i] = pace.out[i] | (out & (not contacts.is_free(k, i)))
     # Cavities that points carry are checked one by one. Each has one surface, never a wall of thousands of bodies.
     for k in range(touching.points + touching.guides, touching.plain.size):
         wall = float(touching.walls + k - touching.points)

@@ -123,6 +123,8 @@ class BodyState(NamedTuple):
     sweeps: Any  # (n,) of Uzawa's loop
     unconverged: Any  # (n,) steps whose loop did not
     energy: Any  # (n,) at the start of the run [J]
+    free: Any = None  # (K, n) int8, whether a contact point has passed an opening; None without openings
+    escape_time: Any = None  # (n,) when the last one of a body has [s], NaN of bodies that are inside
     counts: Any = None  # (walls,) int64, impacts on each that one thread has computed, where they are counted
 
     def count_impact(self, number, wall):

@@ -44,6 +44,15 @@ class Constrained(Record):
     lanes: BodyLanes
     pace: LaneNumbers
     active: HeldContacts
+    passages: Any = None  # `Passages` where walls have openings
+
+    def walls_now(self, i):
+        """The walls at the start of the step of a lane."""
+        return self.walls.at(self.pace.remaining[i])
+
+    def walls_then(self, i):
+        """The walls at the end of a trial of a lane."""
+        return self.walls.at(self.pace.remaining[i] - self.pace.step[i])
 
     def launch(self):
         """The end p of the stage without ties, and D for that."""

@@ -130,18 +130,53 @@ class BodyContacts(Constrained):
         for a in range(active.name.shape[1]):
             active.impulse[i, a], active.stages[i, a] = 0.0, 0
 
+    # --- At openings
+
+    def is_free(self, k, i):
+        """Whether a contact point of a lane is outside of the walls, through an opening."""
+        if self.passages is None:
+            return False
+        number = self.pace.body[i]
+        return number >= 0 and k < self.touching.points and self.passages.free[k, number] > 0
+
+    def _passes(self, walls, contact, c, i):
+        """Whether the wall of a contact (point, wall) is open at its place: then the point is free from there on."""
+        if self.passages is None:
+            return False
+        k, wall = contact
+        if k >= self.touching.points or not self.passages.takes(walls, float(wall), c, NEAR * self.rule.room):
+            return False
+        self.passages.free[k, self.pace.body[i]] = 1
+        return True
+
+    def is_back(self, k, i):
+        """Whether a free point is inside of all walls again, or at one that is not open there."""
+        walls, room, back = self.walls_now(i), self.rule.room, True
+        c, met = self.touching.place(self.lanes.r, k, i), self.touching.span(k)
+        for j in range(count_at(walls, met, c)):
+            w = float(wall_at(walls, met, j, c))
+            gap = walls.distance(w, c)
+            if gap >= -2.0 * NEAR * room:
+                back = back and gap <= 2.0 * ROOM * room and not self.passages.takes(walls, w, c, NEAR * room)
+        return back
+
+    # --- At their walls
+
     def near(self, i, name, frame, approaching):
         """Find the contacts at their walls, or those that approach: how many there are.
 
         Their names (point, wall), and a normal and two tangents of each.
         """
-        touching, walls, found = self.touching, self.walls, 0
+        touching, walls, found = self.touching, self.walls_now(i), 0
         for k in range(touching.plain.size):
+            if self.is_free(k, i):
+                continue
             c, u = touching.place(self.lanes.r, k, i), touching.place(self.lanes.v, k, i)
             met = touching.span(k)
             for j in range(count_at(walls, met, c)):
                 w = wall_at(walls, met, j, c)
-                if found < MOST_CONTACTS and walls.distance(float(w), c) >= -NEAR * self.rule.room:
+                at_wall = found < MOST_CONTACTS and walls.distance(float(w), c) >= -NEAR * self.rule.room
+                if at_wall and not self._passes(walls, (k, w), c, i):
                     n = walls.unit_normal(float(w), c)
                     # A velocity towards the wall at the level of round-off does not count as an approach.
                     if not approaching or dot(n, u) > 4.0 * EPSILON * norm(u):

@@ -39,6 +39,8 @@ def look(bodies, i, larger):
     room = rule.room if pace.active[i] == 0 else larger
     worst, first, point, wall = -math.inf, tau, -1, -1
     for k in range(touching.plain.size):
+        if bodies.is_free(k, i):
+            continue
         c, met = touching.place(lanes.r1, k, i), touching.span(k)
         for j in range(count_at(walls, met, c)):
             w = wall_at(walls, met, j, c)

@@ -602,10 +602,7 @@ CAPABILITIES = (
         ),
     }),
     Capability("opening", _of_walls("openings", ()), {
-        _EVERY_BODY: Refusal(
-            "surfaces[{i}].openings must be left out with bodies, got {count}",
-            "use particles, or a box with an open face",
-        ),
+        (SOFT_BODIES, PAPER_BODIES): _with_method("openings", "left out", "count"),
         _FIXED_STEPS: _with_method("openings", "left out", "count"),
         (GRAINS,): _CLOSES,
         (MASSIVE, HEAVY): Refusal(
@@ -617,7 +614,7 @@ CAPABILITIES = (
         (CHORDS,): _CHANGES,
     }, within="opening"),
     Capability("present", _of_walls("present", None), {
-        _EVERY_BODY: _with_bodies("present", "None", "use particles, or leave it out"),
+        (SOFT_BODIES, PAPER_BODIES): _with_method("present", "None"),
         _FIXED_STEPS: _with_method("present", "None"),
         (CHORDS,): _CHANGES,
         (GRAINS,): Refusal(f"surfaces[{{i}}].present must be None with {_WITH_PENALTY}, got {{got}}", "use Impact"),
