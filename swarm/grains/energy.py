@@ -8,6 +8,17 @@ from .grain_arrays import BEFORE, RADIUS, X, vector_at
 from .vessel import met
 
 
+@long_kernel
+def store_at_walls(matter, walls, remaining, grains, near, into):
+    """Add what the contacts of each ball with walls store when so much of the frame is left to an array [J]."""
+    place = grains.place
+    for number, wall in enumerate(walls.at(remaining).each):
+        for k in range(near.wall_first[number], near.wall_first[number + 1]):
+            i = index(near.slot[index(k)])
+            own = met(wall, near.listed, near.spans, index(k), place[i, RADIUS])
+            into[index(grains.number[i])] += matter.law.stored_energy(own.gap_of(own.inner(vector_at(place, i, X))))
+
+
 @outlined
 def _stored_at_wall(matter, wall, grains, near, number):
     place, stored, deepest = grains.place, 0.0, 0.0

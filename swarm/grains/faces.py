@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled_scene import CompiledScene
+from ..surfaces.presence.doors import was_there
 from ..surfaces.upright import upright
 from ..surfaces.walls import Field, Walls
 
@@ -30,7 +31,7 @@ class Fields:
         for i in self._compiled.order.fields:
             surface = self._compiled.pieces.each[i]
             members, face = surface.faces_of_balls(self._largest + 2.0 * skin)
-            made.append(upright(Field(members), scene.across()))
+            made.append(upright(Field(members if surface.present is None else members.in_cells()), scene.across()))
             faces.append(face.astype(np.int32))
         self._known, self._each, self.faces = skin, tuple(made), tuple(faces)
 
@@ -47,4 +48,10 @@ class Fields:
             return self._compiled.walls(moment)
         self.reaches(skin)
         walls = self._compiled.walls(moment)
-        return walls._replace(each=(*self._each, *walls.each[len(self._each) :]))
+        pieces = [self._compiled.pieces.each[i] for i in self._compiled.order.fields]
+        there = [was_there(piece.present, moment) for piece in pieces]
+        each = [
+            one if is_there else one._replace(members=one.members.gone())
+            for one, is_there in zip(self._each, there, strict=True)
+        ]
+        return walls._replace(each=(*each, *walls.each[len(each) :]))

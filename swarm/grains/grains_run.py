@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import observables
 from ..ball_numbers import BallNumbers
@@ -13,8 +14,10 @@ from ..compiled_scene import CompiledScene
 from ..errors import RunError
 from ..methods import Penalty
 from ..methods.base import Method
+from ..methods.fixed_step import steps_within
 from ..particles import Particles
-from ..run.base import Arrays, BaseRun, named
+from ..run.base import OUTSIDE, Arrays, BaseRun, named
+from ..run.doors import comers, require_free
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -53,6 +56,8 @@ class GrainsRun(BaseRun):
             spin = np.zeros((3, n))
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
         loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
+        # What contacts store with a wall that goes is lost.
+        loses = loses or scene.has_doors()
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
             np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None, balls=balls,
@@ -63,6 +68,10 @@ class GrainsRun(BaseRun):
         self._fields = Fields(compiled, radius)
         self._walls = self._fields.walls(0.0, 0.0)
         super().__init__(compiled, method, n, 1, Tier(compile, (self._matter, self._walls), n), seeding, watched)
+        self._instants = scene.instants if scene.has_doors() else None
+        # What contacts with walls stored before the instant that has come, and the length of a step [s].
+        self._stored_before: NDArray[np.float64] | None = None
+        self._step = self._matter.h
         state = self.state
         books = ContactTotals(
             balls.collisions,
@@ -159,17 +168,50 @@ class GrainsRun(BaseRun):
                 raise RunError(refused.too_far(self._world.grains, 0.5 * _WIDEST, float(largest), self._matter.h))
         self._list()
 
+    # --- At an instant -----------------------------------------------------------------------------------
+
+    def _switch(self, instant: float) -> None:
+        if instant not in self._scene.instants:
+            return
+        if (came := comers(self._scene, instant)).any():
+            deepest = OUTSIDE * self._scene.finite_size()
+            require_free(self._scene, self.state, came, deepest, instant, self._first)
+        self._stored_before = self._stored_at(self._fields.walls(instant, float(self._clock[SKIN])), 0.0)
+
+    def _switch_walls(self, span: float) -> None:
+        """Lose what contacts stored with walls that went at the instant, by the walls of the piece that begins [s]."""
+        if self._stored_before is not None:
+            self._list()
+            self.state.dissipated[:] += self._stored_before - self._stored_at(self._walls, span)
+            self._stored_before = None
+
+    def _stored_at(self, walls: Any, remaining: float) -> NDArray[np.float64]:
+        """What the contacts of each ball with walls store when so much of the frame is left [s], (N,) [J]."""
+        world, found = self._world, np.zeros(len(self.state.mass))
+        kernel = self._tier.kernel(energy.store_at_walls)
+        kernel(self._matter, walls, remaining, world.grains, world.near, found)
+        return found
+
     # --- A frame -------------------------------------------------------------------------------------------
 
     def _prepare(self, span: float, moment: float) -> None:
         self._walls = self._fields.walls(self._moment, float(self._clock[SKIN]))
+        if self._instants is not None:
+            # Steps of equal lengths, so that the last one ends at the instant.
+            self._matter = self._matter._replace(h=span / self._steps_in(span))
+            self._switch_walls(span)
         if not self._cut_short:
             self._clock[DONE] = 0.0
-            self._world.books.overlap[0] = 0.0
+            if self._done[0] == 0:
+                self._world.books.overlap[0] = 0.0
         self._clock[TAKEN] = 0.0
 
+    def _steps_in(self, span: float) -> float:
+        """The steps of a frame, or of a piece of one, whose span is in the unit of `advance`."""
+        return span if self._instants is None else steps_within(span, self._step)
+
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
-        status, rule = Status.LEASE_ENDED.value, MarchRule(span, self._watch.passes)
+        status, rule = Status.LEASE_ENDED.value, MarchRule(self._steps_in(span), self._watch.passes)
         while status == Status.LEASE_ENDED:
             status = self._call(march, self._matter, self._walls, self._world, self._clock, rule, latest=latest)
             if status == Status.LEASE_ENDED:
@@ -178,7 +220,7 @@ class GrainsRun(BaseRun):
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         # Of the step.
-        moment -= (span - self._clock[DONE]) * self._matter.h
+        moment -= (self._steps_in(span) - self._clock[DONE]) * self._matter.h
         if status == Status.UNSOLVED:
             return refused.unsolved(moment, self._matter.h)
         assert isinstance(self._method, Penalty)
@@ -191,6 +233,9 @@ class GrainsRun(BaseRun):
         yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0)
         yield march, (matter, self._walls, world, self._clock, MarchRule(0.0, self._watch.passes))
         yield energy.stored, (matter, self._walls, world.grains, world.near)
+        if self._instants is not None:
+            into = self.state.dissipated
+            yield energy.store_at_walls, (matter, self._walls, 0.0, world.grains, world.near, into)
         yield energy.show, (world.grains, self.state)
         yield observables.observe, self._observing()
 
@@ -231,7 +276,7 @@ class GrainsRun(BaseRun):
         return max(self._scale, float(seen["kinetic_energy"] + seen["contact_energy"] + weight))
 
     def _share_done(self, span: float) -> float:
-        return float(self._clock[DONE] / span)
+        return float(self._clock[DONE] / self._steps_in(span))
 
     def _arrays(self) -> Arrays:
         kept = {"clock": self._clock, "image": self._image}

@@ -151,6 +151,15 @@ def whole_steps(name: str, duration: float, dt: float) -> float:
     return float(steps)
 
 
+def steps_within(duration: float, dt: float) -> float:
+    """The number of equal steps of a duration [s] that are no longer than dt [s], to round-off.
+
+    >>> steps_within(0.3, 0.1), steps_within(0.31, 0.1), steps_within(1e-12, 0.1)
+    (3.0, 4.0, 1.0)
+    """
+    return float(max(1, math.ceil(duration / dt - _WHOLE)))
+
+
 def whole_time(moment: float, dt: float) -> float:
     """The time of the steps until a moment [s], which they may miss a little: no wall must jump where frames meet."""
     return round(moment / dt) * dt

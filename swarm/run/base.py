@@ -31,7 +31,7 @@ from .watch import Watch
 # A particle this many times the scene's extent away from the origin has escaped from an open scene.
 _FAR = 100.0
 # Beyond this part of the scene's size a particle outside rigid walls is an error; round-off is 1e-15 of it.
-_OUTSIDE = 1e-9
+OUTSIDE = 1e-9
 # The caller's thread looks for an interrupt so often [s].
 _GLANCE = 0.1
 # Kernels take fewer particles than this sooner than another thread is awake.
@@ -84,7 +84,7 @@ class BaseRun:
         self._method, self._first = method, seeding.first
         self._owners, self._parts = numbering.surfaces_of_rows, numbering.parts_of_rows
         self._surfaces_of_walls = numbering.members[0]
-        self._deepest = _OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
+        self._deepest = OUTSIDE * scene.finite_size() if method.is_rigid() else math.inf
         # In a scene without walls no particle escapes: it has only balls in free space.
         self._far = _FAR * scene.extent() if scene.surfaces and scene.is_open() else math.inf
         self._pool = ThreadPoolExecutor(threads, "swarm") if pool is None else pool
@@ -93,8 +93,8 @@ class BaseRun:
         self._size, self._partial = CHUNK, np.zeros((math.ceil(n / CHUNK), observables.ROWS))
         # The energy of the start, and the time of the last frame, of the method's clock.
         self._start, self._moment = np.zeros(1), 0.0
-        # When the frame began [s], and how many of its pieces are done.
-        self._begun, self._done = np.zeros(1), np.zeros(1, np.int64)
+        # When the frame began [s], how many of its pieces are done, and when it ends [s].
+        self._begun, self._done, self._end = np.zeros(1), np.zeros(1, np.int64), 0.0
         self._cut_short = False
 
     def __enter__(self) -> Self:
@@ -176,6 +176,7 @@ class BaseRun:
         Raises:
             RunError: a step failed.
         """
+        self._end = moment
         if self._instants is None:
             return self._advance_piece(span, moment, writing, latest)
         times = self._times(moment)
@@ -198,7 +199,7 @@ class BaseRun:
 
     def _advance_piece(self, span: float, moment: float, writing: float, latest: float) -> bool:
         """Advance by a piece of a frame, as `advance` does by all of it."""
-        self._moment = self._method.instant(moment)
+        self._moment = self._method.instant(moment) if self._instants is None else moment
         self._prepare(span, moment)
         again = True
         while again:
@@ -221,13 +222,16 @@ class BaseRun:
         """The share of a frame that was cut short that is done, on average over the particles, or bodies."""
         if self._instants is None:
             return self._share_done(span)
-        k, times = int(self._done[0]), self._times(float(self._begun[0] + span))
+        k, times = int(self._done[0]), self._times(self._end)
         before, after = times[k : k + 2]
-        return float((before - times[0] + self._share_done(after - before) * (after - before)) / span)
+        done = before - times[0] + self._share_done(after - before) * (after - before)
+        return float(done / (times[-1] - times[0]))
 
     def arrays(self) -> Arrays:
         """The arrays that `restore` needs for the same bits, not copied; to be called between calls of `advance`."""
         found = self._arrays()
+        if self._instants is not None:
+            found |= {"piece.begun": self._begun, "piece.done": self._done}
         for more in (self._ball_numbers, self._tally):
             found |= {} if more is None else more.arrays()
         return found
@@ -254,7 +258,8 @@ class BaseRun:
     def _observe(self, moment: float) -> None:
         """Observe a frame."""
         self._tier.kernel(observables.observe)(*self._observing())
-        if self._ball_numbers is not None:
+        # Rates are those of a frame, not of a piece of one.
+        if self._ball_numbers is not None and moment == self._end:
             self._ball_numbers.frame(self.state, moment, self._summed()["kinetic_energy"])
 
     def _observing(self, drawn: NDArray[Any] | None = None) -> tuple[Any, ...]:

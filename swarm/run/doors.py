@@ -11,7 +11,6 @@ from ..contact.events import ARRIVED, CAREFUL, EDGE, FLYING, HELD
 from ..errors import RunError
 from ..scene import Scene
 from ..state import Contacts, State
-from .base import Arrays
 from .engine import Run
 from .failures import sentence_of_coming
 
@@ -28,9 +27,6 @@ class DoorRun(Run):
         if not self._scene.moves():
             self._walls, self._faces = self._compiled.walls(moment), self._scene.open_faces(moment)
         self.state = self.state._replace(openings=self._compiled.openings(moment))
-
-    def _arrays(self) -> Arrays:
-        return {**super()._arrays(), "piece.begun": self._begun, "piece.done": self._done}
 
     # --- At an instant -----------------------------------------------------------------------------------
 

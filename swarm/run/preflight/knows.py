@@ -617,7 +617,6 @@ CAPABILITIES = (
         (SOFT_BODIES, PAPER_BODIES): _with_method("present", "None"),
         _FIXED_STEPS: _with_method("present", "None"),
         (CHORDS,): _CHANGES,
-        (GRAINS,): Refusal(f"surfaces[{{i}}].present must be None with {_WITH_PENALTY}, got {{got}}", "use Impact"),
         (MASSIVE, HEAVY): Refusal(
             "surfaces[{i}].present must be None where a wall has a mass, got {got}",
             "give the wall a motion instead of a mass",
