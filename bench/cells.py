@@ -456,7 +456,8 @@ def _counters(draft: Draft) -> None:
 
 def _source(draft: Draft) -> None:
     inlet = swarm.Sphere(0.1, draft.spot())
-    draft.options["sources"] = [swarm.Source(inlet, volume=True, times=[0.1, 0.2], speed=1.0, mass=MASS)]
+    size = {"radius": RADIUS} if draft.cell.engine in _OF_BALLS else {}
+    draft.options["sources"] = [swarm.Source(inlet, volume=True, times=[0.1, 0.2], speed=1.0, mass=MASS, **size)]
 
 
 def _option(**options: Any) -> Callable[[Draft], None]:

@@ -104,10 +104,11 @@ class Particles:
 
     @classmethod
     def of_frame(
-        cls, position: Floats, velocity: Floats, mass: Floats, image: NDArray[Any] | None, there: NDArray[np.bool_]
-    ) -> "Particles":
+        cls, position: Floats, velocity: Floats, mass: Floats, image: NDArray[Any] | None, there: NDArray[np.bool_],
+        radius: Floats | None = None, spin: Floats | None = None,
+    ) -> "Particles":  # fmt: skip
         """The particles of a frame, checked; those that are not yet born have positions and velocities of NaN."""
-        made = cls(np.where(there, position, 0.0), np.where(there, velocity, 0.0), mass, image)
+        made = cls(np.where(there, position, 0.0), np.where(there, velocity, 0.0), mass, image, radius, spin)
         made.position[:, ~there] = made.velocity[:, ~there] = np.nan
         return made
 
@@ -147,11 +148,13 @@ class Births(NamedTuple):
         time: (N,) of the birth of each particle [s], 0 for particles of the start.
         source: (N,) the number of its source, -1 for particles of the start.
         sources: the number of sources.
+        balls: the sources, where they are of balls: then the time is the one at which a birth is due.
     """
 
     time: Floats
     source: NDArray[np.int32]
     sources: int
+    balls: tuple[Any, ...] = ()
 
     def there(self, moment: float) -> int:
         """The number of particles, the first ones, that are born by a time [s]."""

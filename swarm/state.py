@@ -100,6 +100,10 @@ class Balls(NamedTuple):
     virial: Floats
     spin: Floats | None = None
 
+    def of(self, some: NDArray[np.bool_], n: int) -> "Balls":
+        """That of some of n balls."""
+        return Balls(*(_of(value, some, n) for value in self))._replace(virial=self.virial)
+
 
 class State(NamedTuple):
     """The arrays that kernels advance.
@@ -132,6 +136,8 @@ class State(NamedTuple):
     absorbed_wall: NDArray[np.int32] | None = None
 
     crossed: Crossed | None = None  # where there are counters
+    # Where balls come during the run:
+    born_time: Floats | None = None  # (N,) when each was born [s], NaN of those that are not
     balls: Balls | None = None  # where particles have a radius
 
     @property
@@ -161,6 +167,12 @@ class State(NamedTuple):
         balls = {name: array for name, array in arrays.items() if name not in mine}
         return self._replace(**mine, balls=None if self.balls is None else self.balls._replace(**balls))
 
+    def of(self, some: NDArray[np.bool_]) -> "State":
+        """The state of some of the particles (N,), copied."""
+        n, balls = self.mass.size, self.balls
+        made = self._replace(**{name: _of(value, some, n) for name, value in self._asdict().items()})
+        return made._replace(balls=None if balls is None else balls.of(some, n))
+
     def gone(self) -> NDArray[np.bool_]:
         """(N,) whether each has escaped or was absorbed: where it is then it stays, whatever the walls do."""
         found = np.zeros(self.mass.size, np.bool_)
@@ -168,6 +180,11 @@ class State(NamedTuple):
             if time is not None:
                 found |= ~np.isnan(time[: found.size])
         return found
+
+
+def _of(value: Any, some: NDArray[np.bool_], n: int) -> Any:
+    has_each = isinstance(value, np.ndarray) and value.shape[-1] == n
+    return np.ascontiguousarray(value[..., some]) if has_each else value
 
 
 def is_gone(state, i):

@@ -60,6 +60,7 @@ OBSERVABLES: dict[str, Observable] = {
     "escaped": Observable("1", "particles that left through openings", every=True, main=True),
     "absorbed": Observable("1", "particles that a law of the surface has absorbed", ("surface",), main=True),
     "born": Observable("1", "particles that the source has released", ("source",), main=True),
+    "blocked": Observable("1", "births of balls that found no free place at their time", ("source",), main=True),
     "crossings": Observable("1", "particles that crossed the counter: out, back", ("counter", "sense"), main=True),
     "wall_heat": Observable("J", "heat from the surface since the start", ("surface",), main=True),
     "wall_work": Observable("J", "work of the surface that moves, since the start", ("surface",), main=True),

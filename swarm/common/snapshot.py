@@ -23,7 +23,7 @@ class Snapshot:
             "radius", "spin" and "collisions" or None for each.
         gravity: [m/s^2], or None.
         period: of the scene [m], or None.
-        there: how many of them, the first ones, are there; None for all.
+        there: how many of them, the first ones, are there, or a mask of those (N,); None for all.
         copies: whether what is read is copied, so that it stays as it is.
     """
 
@@ -32,11 +32,11 @@ class Snapshot:
         read: Read | None,
         gravity: Vector | None = None,
         period: tuple[float | None, ...] | None = None,
-        there: int | None = None,
+        there: int | NDArray[np.bool_] | None = None,
         copies: bool = False,
     ) -> None:
         self._read, self._gravity, self._period, self._copies = read, gravity, period, copies
-        self._there = slice(there)
+        self._there: Any = there if isinstance(there, np.ndarray) else slice(there)
         self._known: dict[str, Any] = {}
         self._views: dict[str, NDArray[Any]] = {}
 

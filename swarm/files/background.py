@@ -134,6 +134,9 @@ class Background:
         if self._born is not None:
             there = int(np.searchsorted(self._born, moment, side="right"))
             copy.position[:, there:] = copy.velocity[:, there:] = np.nan
+        if copy.born_time is not None:
+            unborn = np.isnan(copy.born_time)
+            copy.position[:, unborn] = copy.velocity[:, unborn] = np.nan
         self._frames.put((number, moment, copy, seen))
 
     def do(self, job: Job) -> None:

@@ -11,7 +11,7 @@ import json
 import math
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -113,6 +113,8 @@ def digest_of(particles: Particles, body: str = "") -> str:
     for array in (particles.position, particles.velocity, particles.mass, particles.image, born, *balls):
         if array is not None:
             digest.update(np.ascontiguousarray(array).data)
+    for one in () if particles.births is None else particles.births.balls:
+        digest.update(one.blocked.encode())
     return digest.hexdigest()[:16]
 
 
@@ -176,12 +178,18 @@ def _shortened(surfaces: NDArray[np.int64]) -> str:
     return ", ".join(map(str, surfaces[:_SHOWN])) + ", ..." * (len(surfaces) > _SHOWN)
 
 
-def require_fit(path: Path, arrays: Arrays, run: Arrays, written: str = VERSION) -> None:
+def require_fit(
+    path: Path,
+    arrays: Arrays,
+    run: Arrays,
+    written: str = VERSION,
+    may_grow: Callable[[str], bool] = lambda _name: False,
+) -> None:
     """Raise a SceneError unless the arrays of a checkpoint have the names, types and shapes of the run's own.
 
     The lanes of a run halted within a frame may hold any number of particles, each once; cells of balls more of them.
-    `written` is the version that wrote it. Checksums are right, so what differs is probably the version; but a list of
-    the entries has no checksum.
+    `may_grow` says of which other arrays the first axis may have any length. `written` is the version that wrote it.
+    Checksums are right, so what differs is probably the version; but a list of the entries has no checksum.
     """
     same = ", perhaps of another commit," if written == VERSION else ""
     begin = (
@@ -201,6 +209,8 @@ def require_fit(path: Path, arrays: Arrays, run: Arrays, written: str = VERSION)
         # The cells of balls get more room during a run.
         if name == "room" and arrays[name].ndim == 1 and arrays[name].size >= mine.size:
             shape = arrays[name].shape
+        if may_grow(name) and arrays[name].ndim == mine.ndim:
+            shape = arrays[name].shape[:1] + mine.shape[1:]
         if (arrays[name].dtype, arrays[name].shape) != (mine.dtype, shape):
             came = f"{arrays[name].dtype} {arrays[name].shape}"
             raise SceneError(f"{begin} {name} as {mine.dtype} of the shape {shape}, got {came}; {_ANEW}")

@@ -17,12 +17,14 @@ from .sources import DamagedError
 # when it was absorbed [s], where they may absorb it.
 PARTS, COUNTS, IMAGES, ESCAPES = ("position", "velocity"), "impacts", "image", "escape_time"
 ABSORBED = "absorbed_time"
+# When each ball was born [s], where these come during the run, NaN of those that are not.
+BORN = "born_time"
 # Of balls: how often each has met another one, its spin where balls turn, and its radius, which stays.
 COLLISIONS, SPINS, RADII = "collisions", "spin", "radius"
 _INTEGER, _REAL, _NUMBER = "iu", "f", "iuf"
 _ELEMENTS: dict[str, tuple[str, tuple[int, ...]]] = {
     **dict.fromkeys(PARTS, (_REAL, (3,))), COUNTS: (_INTEGER, ()), IMAGES: (_INTEGER, (3,)), ESCAPES: (_REAL, ()),
-    ABSORBED: (_REAL, ()), COLLISIONS: (_INTEGER, ()), SPINS: (_REAL, (3,)),
+    ABSORBED: (_REAL, ()), BORN: (_REAL, ()), COLLISIONS: (_INTEGER, ()), SPINS: (_REAL, (3,)),
 }  # fmt: skip
 KEPT = tuple(_ELEMENTS)
 # The attribute with the unit of a dataset. H5MD calls it `unit`, of which MDAnalysis takes no SI units.

@@ -196,11 +196,18 @@ class Trajectory(Stored):
             )
             there, mass = self._there(file, k), self._checked.constant("particles/all/mass")
             if there is not None:
-                return Particles.of_frame(position, velocity, mass, image, there)
+                return Particles.of_frame(position, velocity, mass, image, there, self.radius, spin)
             found = Particles(position, velocity, mass, image, self.radius, spin)
             has_volume = "parameters/volume" in file
             found.volume = float(self._checked.constant("parameters/volume")) if has_volume else None
             return found
+
+    def born(self, k: int) -> NDArray[np.bool_]:
+        """Whether each of the particles of frame k was born by then, (N,)."""
+        k = self._number(k)
+        with self._reading(f"frame {k}") as file:
+            there = self._there(file, k)
+            return np.ones(len(file["particles/all/mass"]), np.bool_) if there is None else there
 
     def columns(self, k: int) -> dict[str, NDArray[Any]]:
         """The columns of frame k as they are on file, a row a particle: "position", "velocity", "impacts", ..."""
@@ -302,8 +309,10 @@ class Trajectory(Stored):
             position, velocity = (
                 self._checked.path(f"particles/all/{name}/value", column, self._frames) for name in layout.PARTS
             )
-            born = self._births()[column] if self._comes(file) else -math.inf
+            born = self._births(file)[column] if self._comes(file) else -math.inf
             there = self.times >= born
+            if self._is_of_balls(file):
+                there = np.isfinite(position[:, 0])
             for values in (position, velocity):
                 finite(values[there])
         return position.T, velocity.T
@@ -312,7 +321,9 @@ class Trajectory(Stored):
         """A mask of the particles that are born by frame k; None for a run without sources."""
         if not self._comes(file):
             return None
-        return np.asarray(self._births() <= float(self._checked.row("parameters/time", k)))
+        if self._is_of_balls(file):
+            return np.asarray(~np.isnan(self._of_frame(layout.BORN, k)))
+        return np.asarray(self._births(file) <= float(self._checked.row("parameters/time", k)))
 
     def _of_frame(self, name: str, k: int) -> NDArray[Any]:
         """The values of the particles at frame k with a name, checked."""
@@ -322,9 +333,16 @@ class Trajectory(Stored):
 
     @staticmethod
     def _comes(file: Any) -> bool:
-        return f"particles/all/{layout.BIRTHS[0]}" in file
+        return f"particles/all/{layout.BIRTHS[1]}" in file
 
-    def _births(self) -> NDArray[np.float64]:
+    @staticmethod
+    def _is_of_balls(file: Any) -> bool:
+        """Whether it keeps of each frame which balls were born by then."""
+        return f"particles/all/{layout.BORN}" in file
+
+    def _births(self, file: Any) -> NDArray[np.float64]:
+        if self._is_of_balls(file):
+            return self._of_frame(layout.BORN, len(self) - 1).astype(np.float64)
         return np.asarray(self._checked.constant(f"particles/all/{layout.BIRTHS[0]}"))
 
     def has_births(self) -> bool:
@@ -342,11 +360,15 @@ class Trajectory(Stored):
 
     @property
     def birth_time(self) -> NDArray[np.float64]:
-        """When each of the particles that the file keeps comes [s], (N,); 0 of those of the start."""
+        """When each of the particles that the file keeps comes [s], (N,); 0 of those of the start.
+
+        NaN of balls that were not born by the last frame.
+        """
         with self._reading("the births of its particles") as file:
             if not self._comes(file):
                 return np.zeros(len(file["particles/all/mass"]))
-            return finite(self._births(), "particle")
+            born = self._births(file)
+            return born if self._is_of_balls(file) else finite(born, "particle")
 
     @property
     def birth_source(self) -> NDArray[np.int64]:

@@ -21,6 +21,7 @@ from .layout import (
     ABSORBED,
     ARRAYS,
     BIRTHS,
+    BORN,
     COLLISIONS,
     COUNTS,
     ESCAPES,
@@ -136,9 +137,9 @@ class TrajectoryWriter(AppendedFile):
         everything["mass"].attrs[UNIT], self._time.attrs[UNIT] = UNITS["mass"], UNITS["time"]
         everything["id"] = np.arange(self._count)[self._kept]
         if self._births is not None:
-            everything[BIRTHS[0]], everything[BIRTHS[1]] = (
-                values[self._kept] for values in (self._births.time, self._births.source)
-            )
+            if not self._births.balls:
+                everything[BIRTHS[0]] = self._births.time[self._kept]
+            everything[BIRTHS[1]] = self._births.source[self._kept]
         if self._radius is not None:
             everything[RADII] = self._radius[self._kept]
         if self._bodies is not None:
@@ -149,6 +150,7 @@ class TrajectoryWriter(AppendedFile):
         kept += [(IMAGES, (3,), np.int64)] * (repeats is not None)
         kept += [(COUNTS, (), np.int64), *[(ESCAPES, (), np.float64)] * bool(self._scene.pieces.open_volumes())]
         kept += [(ABSORBED, (), np.float64)] * (laws is not None and laws.may_end)
+        kept += [(BORN, (), np.float64)] * (self._births is not None and bool(self._births.balls))
         kept += [(COLLISIONS, (), np.int64)] * (self._radius is not None)
         kept += [(SPINS, (3,), self._storage.precision)] * self._turns
         for name, width, kind in kept:

@@ -22,22 +22,22 @@ class Drags(NamedTuple):
 
 def _pairs(world: Any) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Of each listed pair a number that only it has, and 1 or -1 where its first particle has the larger number."""
-    number, near = world.grains.number, world.near
+    number, near, most = world.grains.number, world.near, world.books.impacts.size
     first, count = near.first, int(near.first[-1])
     one = number[np.repeat(np.arange(len(number)), np.diff(first))]
     other = number[near.mate[:count]]
-    key = np.minimum(one, other) * len(number) + np.maximum(one, other)
+    key = np.minimum(one, other) * most + np.maximum(one, other)
     return key, np.where(one < other, 1.0, -1.0)
 
 
 def _at_walls(world: Any) -> NDArray[np.int64]:
     """Of each ball that is listed at a wall a number that only they have."""
-    number, near = world.grains.number, world.near
+    number, near, most = world.grains.number, world.near, world.books.impacts.size
     first, count = near.wall_first, int(near.wall_first[-1])
     wall = np.repeat(np.arange(len(first) - 1), np.diff(first))
     if near.spans is not None:
         wall = wall * _FACES + near.spans[: wall.size, FACE]
-    return np.asarray(wall * len(number) + number[near.slot[:count]], np.int64)
+    return np.asarray(wall * most + number[near.slot[:count]], np.int64)
 
 
 def kept_drags(world: Any) -> Drags | None:

@@ -103,6 +103,12 @@ def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = 
     return Grains(np.arange(n), place, speed, np.zeros((n, 4)), turning)
 
 
+def beside(grains: Grains, more: Grains) -> Grains:
+    """The rows of balls, and behind them those of more."""
+    rows: Any = (None if old is None else np.concatenate([old, new]) for old, new in zip(grains, more, strict=True))
+    return Grains(*rows)
+
+
 def near_of(
     n: int, walls: int, pairs: int, touching: int, has_friction: bool = False, members: int | None = None
 ) -> Neighbours:

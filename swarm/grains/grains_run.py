@@ -18,6 +18,7 @@ from ..methods.fixed_step import steps_within
 from ..particles import Particles
 from ..run.base import OUTSIDE, Arrays, BaseRun, named
 from ..run.doors import comers, require_free
+from ..run.feeding import Feed, There
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -25,9 +26,9 @@ from ..state import Balls, State
 from . import energy, lists, refused
 from . import grain_arrays as arrays
 from .booking import ContactTotals
-from .drags import kept_drags, set_drags
+from .drags import Drags, kept_drags, set_drags
 from .faces import Fields
-from .grain_arrays import DONE, LOST, SINCE, SKIN, TAKEN, X
+from .grain_arrays import BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X
 from .matter import matter_of
 from .overlaps import COLUMNS
 from .step import MarchRule, World, march
@@ -36,6 +37,8 @@ from .step import MarchRule, World, march
 _SKIN = 0.2
 # Room in the lists: so many pairs of each ball, and balls at walls, which become so many times as many.
 _PAIRS, _AT_WALLS, _MORE = 6, 1, 1.5
+# A birth that is due so little of a step later than a step begins comes with it; and later than any step.
+_WHOLE, _LATE = 1e-6, 1e18
 # A skin of so many radii of the largest ball is no list any more.
 _WIDEST = 16.0
 
@@ -54,6 +57,7 @@ class GrainsRun(BaseRun):
         rubs, spin = self._matter.rubs, particles.spin
         if spin is None and rubs:
             spin = np.zeros((3, n))
+        feed = None if particles.births is None else Feed(scene, particles, seeding.seed)
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
         loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
         # What contacts store with a wall that goes is lost.
@@ -84,9 +88,13 @@ class GrainsRun(BaseRun):
             np.zeros(1),
             np.zeros(COLUMNS),
         )
+        if feed is not None:
+            self._feed, self.state = feed, state._replace(born_time=feed.born_time)
+        self._rubs = rubs
+        there = np.arange(n) if feed is None else np.flatnonzero(~np.isnan(feed.born_time))
         self._world = World(
-            arrays.grains_of(state.position, state.velocity, radius, state.mass, spin if rubs else None),
-            *self._room(_PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
+            self._rows_of(there),
+            *self._room(len(there), _PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
         )  # fmt: skip
         self._clock = np.zeros(arrays.CLOCK)
         self._clock[SKIN] = _SKIN * radius.min()
@@ -95,15 +103,68 @@ class GrainsRun(BaseRun):
         self._choose_tier()
         self._list()
 
+    def _rows_of(self, some: NDArray[np.int64]) -> arrays.Grains:
+        """The rows of particles with these numbers."""
+        state, spin = self.state, self.state.spin
+        assert state.radius is not None
+        turning = None if spin is None or not self._rubs else spin[:, some]
+        made = arrays.grains_of(
+            state.position[:, some], state.velocity[:, some], state.radius[some], state.mass[some], turning
+        )  # fmt: skip
+        return made._replace(number=some)
+
+    # --- Births --------------------------------------------------------------------------------------------
+
+    def _stop(self, span: float, moment: float) -> float:
+        """Before which step of the frame of a length [steps], that ends at a moment [s], a birth is due."""
+        steps = self._steps_in(span)
+        if self._feed is None:
+            return steps
+        # The first step that begins at it or later; what is due before this one has been looked at.
+        before = self._steps_before(span, moment)
+        due = math.ceil(min(self._feed.next() / self._matter.h, _LATE) - _WHOLE - before)
+        return min(steps, max(float(due), float(self._clock[DONE]) + 1.0))
+
+    def _steps_before(self, span: float, moment: float) -> float:
+        """The steps, of the length of now, before the frame or the piece of one."""
+        return self._method.span("time", moment) - span if self._instants is None else (moment - span) / self._matter.h
+
+    def _feed_in(self, span: float, moment: float) -> None:
+        """Let those come that are due before the next step."""
+        feed = self._feed
+        if feed is None:
+            return
+        grains = self._world.grains
+        now = (self._steps_before(span, moment) + float(self._clock[DONE])) * self._matter.h
+        slack = _WHOLE * self._matter.h
+        if feed.next() > now + slack:
+            return
+        there = There(
+            grains.place[:, X : X + 3].T, grains.speed[:, BEFORE : BEFORE + 3].T, grains.place[:, arrays.RADIUS]
+        )  # fmt: skip
+        born = feed.come(now, there, slack)
+        if not born.number.size:
+            return
+        kept = kept_drags(self._world)
+        state = self.state
+        state.position[:, born.number], state.velocity[:, born.number] = born.position, born.velocity
+        self._world = self._world._replace(grains=arrays.beside(grains, self._rows_of(born.number)))
+        near = self._world.near
+        self._make_room(near.mate.size, near.slot.size)
+        self._list_with(kept)
+
     # --- Lists ---------------------------------------------------------------------------------------------
 
     def _list(self) -> None:
         """List anew what is near, where all are now."""
+        self._list_with(kept_drags(self._world))
+
+    def _list_with(self, kept: Drags | None) -> None:
+        """The same, with these impulses of friction of before."""
         matter, clock, grains, kernel = self._matter, self._clock, self._world.grains, self._tier.kernel
-        kept = kept_drags(self._world)
         self._wrap()
         skin = float(clock[SKIN])
-        reach = 2.0 * float(grains.place[:, arrays.RADIUS].max()) + skin
+        reach = 2.0 * float(grains.place[:, arrays.RADIUS].max(initial=0.0)) + skin
         cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, matter.period)
         for rows in (grains.number, grains.place, grains.speed, grains.spin):
             if rows is not None:
@@ -140,9 +201,9 @@ class GrainsRun(BaseRun):
                 grains.place[:, LOST + axis] += (x - inside) - cells * length
                 self._image[axis, grains.number] += cells.astype(np.int64)
 
-    def _room(self, pairs: int, touching: int, members: int | None) -> tuple[arrays.Neighbours, arrays.Touches]:
-        """Arrays for so many pairs, balls at walls, and members of fields near them, None where there are no fields."""
-        n, walls, rubs = len(self.state.mass), len(self._owners), self._matter.rubs
+    def _room(self, n: int, pairs: int, touching: int, members: int | None) -> tuple[arrays.Neighbours, arrays.Touches]:
+        """Arrays for n balls, so many pairs, balls at walls, and members of fields near them, None without fields."""
+        walls, rubs = len(self._owners), self._matter.rubs
         near = arrays.near_of(n, walls, pairs, touching, rubs, members)
         return near, arrays.touches_of(walls, pairs, touching, rubs, near.listed)
 
@@ -152,7 +213,9 @@ class GrainsRun(BaseRun):
         have = 0 if near.listed is None else near.listed.size
         wanted = (pairs, near.mate.size), (touching, near.slot.size), (members, have)
         pairs, touching, members = (have if need <= have else int(_MORE * need) for need, have in wanted)
-        made, touches = self._room(pairs, touching, None if near.listed is None else members)
+        made, touches = self._room(
+            len(self._world.grains.number), pairs, touching, None if near.listed is None else members
+        )
         for old, new in zip(near, made, strict=True):
             if old is not None:
                 new[: len(old)] = old
@@ -194,6 +257,9 @@ class GrainsRun(BaseRun):
 
     # --- A frame -------------------------------------------------------------------------------------------
 
+    def _begin(self) -> None:
+        self._feed_in(0.0, 0.0)
+
     def _prepare(self, span: float, moment: float) -> None:
         self._walls = self._fields.walls(self._moment, float(self._clock[SKIN]))
         if self._instants is not None:
@@ -211,11 +277,16 @@ class GrainsRun(BaseRun):
         return span if self._instants is None else steps_within(span, self._step)
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
-        status, rule = Status.LEASE_ENDED.value, MarchRule(self._steps_in(span), self._watch.passes)
-        while status == Status.LEASE_ENDED:
+        status, stop, steps = Status.LEASE_ENDED.value, -1.0, self._steps_in(span)
+        while status == Status.LEASE_ENDED or (status == Status.DONE and stop < steps):
+            self._feed_in(span, moment)
+            rule = MarchRule(steps, stop := self._stop(span, moment), self._watch.passes)
             status = self._call(march, self._matter, self._walls, self._world, self._clock, rule, latest=latest)
             if status == Status.LEASE_ENDED:
                 self._list_again()
+        if status == Status.DONE:
+            # Those at the end of the frame.
+            self._feed_in(span, moment)
         return status, 0
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
@@ -231,7 +302,7 @@ class GrainsRun(BaseRun):
         cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
         yield lists.list_pairs, (matter.period, world.grains, world.near, cells, 0.0)
         yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0)
-        yield march, (matter, self._walls, world, self._clock, MarchRule(0.0, self._watch.passes))
+        yield march, (matter, self._walls, world, self._clock, MarchRule(0.0, 0.0, self._watch.passes))
         yield energy.stored, (matter, self._walls, world.grains, world.near)
         if self._instants is not None:
             into = self.state.dissipated
@@ -272,7 +343,7 @@ class GrainsRun(BaseRun):
     def _scale_of(self, seen: dict[str, Any]) -> float:
         """The larger one of now and of the start: kinetic and contact energy, and what weight may make of them."""
         pull = 0.0 if self._scene.gravity is None else math.hypot(*self._scene.gravity)
-        weight = float(self.state.mass.sum()) * pull * self._scene.finite_size()
+        weight = float(self._seen_state().mass.sum()) * pull * self._scene.finite_size()
         return max(self._scale, float(seen["kinetic_energy"] + seen["contact_energy"] + weight))
 
     def _share_done(self, span: float) -> float:
@@ -284,9 +355,15 @@ class GrainsRun(BaseRun):
             kept |= named(name, getattr(self._world, name))
         return kept
 
+    def may_grow(self, name: str) -> bool:
+        return name.startswith(("grains.", "near."))
+
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
-        members = arrays["near.listed"].size if "near.listed" in arrays else 0
-        self._make_room(arrays["near.mate"].size, arrays["near.slot"].size, members)
+        self._world = self._world._replace(grains=self._rows_of(arrays["grains.number"]))
+        members = arrays["near.listed"].size if "near.listed" in arrays else None
+        pairs, touching = (arrays[f"near.{name}"].size for name in ("mate", "slot"))
+        near, touches = self._room(len(arrays["grains.number"]), pairs, touching, members)
+        self._world = self._world._replace(near=near, touches=touches)
         super().restore(arrays, cut_short)
         self._show(self._moment)

@@ -33,7 +33,7 @@ class CellOrder(NamedTuple):
 
 def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[CellOrder, NDArray[np.int64]]:
     """The `CellOrder` of balls at centres (N, 3), no narrower than a reach, and the order of balls by them."""
-    low, high = centres.min(axis=0), centres.max(axis=0)
+    low, high = (centres.min(axis=0), centres.max(axis=0)) if len(centres) else np.zeros((2, 3))
     wraps = np.zeros(3, np.bool_)
     for k, length in enumerate(period or ()):
         if length is not None:

@@ -33,9 +33,10 @@ _STALLED, _BETTER, _LEAST_SHARE = 20, 0.7, 1.0 / 64.0
 
 
 class MarchRule(NamedTuple):
-    """The length of the frame in steps, and after how many to stop."""
+    """The length of the frame in steps, before which of them to stop, and after how many."""
 
     span: float
+    stop: float
     halt: Array  # (1,)
 
 
@@ -262,12 +263,12 @@ def _step(matter, walls, world, skin):
 
 @long_kernel
 def march(matter, walls, world, clock, rule):
-    """Take step after step until the end of the frame: the `Status`.
+    """Take step after step until the end of the frame, or the stop before it: the `Status`.
 
     LEASE_ENDED where lists are to be made anew: then call this again. INTERRUPTED after so many steps as the rule says;
     it goes on with the same bits.
     """
-    while clock[DONE] < rule.span:
+    while clock[DONE] < rule.stop:
         if clock[TAKEN] >= rule.halt[0]:
             return Status.INTERRUPTED.value
         left = (rule.span - clock[DONE]) * matter.h

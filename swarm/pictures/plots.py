@@ -124,7 +124,8 @@ def _with_inside(content: Content) -> dict[str, NDArray[Any]]:
     """The observables, with how many are inside where any come or go."""
     seen = dict(content.seen)
     gone = np.asarray(seen["escaped"]) + np.sum(seen.get("absorbed", np.zeros((len(seen["time"]), 1))), axis=1)
-    if content.body is None and (np.any(gone) or "born" in seen):
+    comes_or_goes = bool(np.any(gone)) or "born" in seen
+    if content.body is None and comes_or_goes and verdicts.knows_start(content):
         born = np.sum(seen["born"], axis=1) if "born" in seen else 0
         seen["inside"] = verdicts.at_start(content) + born - gone
     return seen

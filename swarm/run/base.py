@@ -21,6 +21,7 @@ from ..methods.base import Method
 from ..observables import CHUNK
 from ..state import State
 from . import failures
+from .feeding import Feed
 from .impacts import ThreadLog
 from .observed import Observed, balance, gone_of, poses_of, with_walls
 from .starting_state import Seeding
@@ -68,6 +69,8 @@ class BaseRun:
     _walls: Any
     # Where particles have a radius.
     _ball_numbers: BallNumbers | None = None
+    # Where balls come during the run.
+    _feed: Feed | None = None
     # Where walls react.
     _observed: Observed | None = None
     # What is no flight, of contacts that have lasted.
@@ -232,9 +235,13 @@ class BaseRun:
         found = self._arrays()
         if self._instants is not None:
             found |= {"piece.begun": self._begun, "piece.done": self._done}
-        for more in (self._ball_numbers, self._tally):
+        for more in (self._ball_numbers, self._tally, self._feed):
             found |= {} if more is None else more.arrays()
         return found
+
+    def may_grow(self, name: str) -> bool:
+        """Whether an array of `arrays` has another length in a run that goes on than at its start."""
+        return False
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         """Take the state of the run that gave these `arrays`: at a frame, or within one if it was `cut_short`."""
@@ -260,7 +267,7 @@ class BaseRun:
         self._tier.kernel(observables.observe)(*self._observing())
         # Rates are those of a frame, not of a piece of one.
         if self._ball_numbers is not None and moment == self._end:
-            self._ball_numbers.frame(self.state, moment, self._summed()["kinetic_energy"])
+            self._ball_numbers.frame(self._seen_state(), moment, self._summed()["kinetic_energy"])
 
     def _observing(self, drawn: NDArray[Any] | None = None) -> tuple[Any, ...]:
         """Arguments of `observe`: of all chunks, or of the draws of a thread."""
@@ -274,7 +281,8 @@ class BaseRun:
     def _summary(self) -> dict[str, Any]:
         """The observables that are sums over particles, contacts and walls."""
         seen = self._with_stored(self._summed())
-        seen = seen if self._ball_numbers is None else self._ball_numbers.added(seen, self.state)
+        seen = seen if self._ball_numbers is None else self._ball_numbers.added(seen, self._seen_state())
+        seen = seen if self._feed is None else seen | self._feed.observed()
         return seen if self._observed is None else with_walls(seen, self._observed)
 
     def seen(self) -> dict[str, Any]:
@@ -294,7 +302,7 @@ class BaseRun:
 
     def _seen_state(self) -> State:
         """The state as observers of the last frame know it."""
-        return self.state
+        return self.state if self._feed is None else self._feed.seen(self.state)
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
         """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""

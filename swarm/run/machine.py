@@ -183,12 +183,17 @@ def start_of(task: Task) -> Snapshot:
 def _snapshot_of(task: Task, read: Read, moment: float, copies: bool = False) -> Snapshot:
     """The particles of a run that are there at a moment [s]."""
     scene, births = task.scene, task.particles.births
-    there = None if births is None else births.there(moment)
+    born = read("born_time")
+    there: Any = None if births is None else births.there(moment)
+    there = there if born is None else ~np.isnan(born)
     return Snapshot(read, scene.gravity, scene.period, there, copies)
 
 
 def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> RunEnd:
     state = run.state
+    born = birth_times(task.particles) if state.born_time is None else state.born_time
+    # Those that were never born are nowhere.
+    task.particles.position[:, np.isnan(born)] = task.particles.velocity[:, np.isnan(born)] = np.nan
     is_whole = session.first == 0 or task.is_shard
     return RunEnd(
         task.particles,
@@ -198,7 +203,7 @@ def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> RunEnd:
         state.impacts,
         np.full(len(task.particles), np.nan) if state.escape_time is None else state.escape_time,
         state.absorbed,
-        birth_times(task.particles),
+        born,
         state.collisions,
         session.compiled.seconds,
     )

@@ -44,8 +44,8 @@ def poses_of(scene: Scene, moment: float) -> dict[str, Any]:
 
 
 def balance(seen: dict[str, Any]) -> float:
-    """The energy of all, with what was lost, and without the heat and the work of walls."""
-    kept = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum()
+    """The energy of all, with what was lost, and without what sources brought, and the heat and the work of walls."""
+    kept = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum() - seen.get("source_energy", 0.0)
     return float(kept - np.sum(seen.get("wall_work", 0.0)))
 
 

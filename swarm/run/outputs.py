@@ -48,7 +48,8 @@ def writer_of(task: Task, session: Session, recorder: "Writer | None", log: Impa
     from ..files.background import Background, Several
 
     n = len(task.particles)
-    born = None if task.particles.births is None else task.particles.births.time
+    births = task.particles.births
+    born = None if births is None or births.balls else births.time
     writer, kept = used[0] if len(used) == 1 else (Several(used), slice(None))
     made = Background(writer, n, kept, born)
     if log is not None:

@@ -57,7 +57,8 @@ class Result:
             includes as "angular_momentum" does the spins. Of those with Penalty also "largest_overlap" [m], by how much
             two balls, or a ball and a wall, have overlapped at most, at any end of a step since the frame before.
             With sources "born" (frames, sources), the number of particles born so far, and "source_energy" [J], the
-            energy that they brought in. Particles born later are in no observable of the frame.
+            energy that they brought in. Particles born later are in no observable of the frame. Of balls also "blocked"
+            (frames, sources), the number of births that found no free place at their time.
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
@@ -66,7 +67,8 @@ class Result:
         absorbed_time: (N,) when a law of a wall has absorbed each [s], where it is since then; NaN of the others.
         bodies: the bodies at `until`, or None; then `particles` are all their points.
         scene, method: as they were run.
-        birth_time: (N,) when each came [s], 0 of those of the start.
+        birth_time: (N,) when each came [s], 0 of those of the start, NaN of balls that were never born, which are at
+            NaN in `particles`: `particles.born()` are the others.
         collisions_per_particle: (N,) how often each has met another one; None of points, which do not meet.
         compile_time: seconds of the wall time in which the last session compiled kernels; 0 on a cluster.
     """

@@ -54,7 +54,10 @@ class Frames(Sequence[Frame]):
     def _frame(self, k: int) -> Frame:
         seen = {name: values[k] if values.ndim > 1 else values[k].item() for name, values in self._seen.items()}
         until = float(self._seen["time"][-1])
-        there = None if self._born is None else int(np.searchsorted(self._born, seen["time"], side="right"))
+        born = self._born
+        there: Any = None if born is None else int(np.searchsorted(born, seen["time"], side="right"))
+        if born is not None and self._trajectory.radius is not None:
+            there = self._trajectory.born(k)
         read = functools.partial(values_of, self._trajectory, k)
         arrays = Snapshot(read, self._gravity, self._period, there, copies=True)
         return Frame(k, seen["time"], until, seen, len(self), arrays)

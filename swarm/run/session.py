@@ -199,7 +199,7 @@ class Session:
     def restore(self, run: BaseRun) -> None:
         """Put the run into the state of the checkpoint."""
         if self._arrays is not None:
-            checkpoint.require_fit(self._path, self._arrays, run.arrays(), self._job.version)
+            checkpoint.require_fit(self._path, self._arrays, run.arrays(), self._job.version, run.may_grow)
             if self._log is not None:
                 self._log.total = self._job.rows
             run.restore(self._arrays, self._job.following is not None)

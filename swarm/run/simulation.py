@@ -119,7 +119,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         shards: their number, of a cluster; None: one for each thread of its workers. A run of particles that meet, or
             that move a wall, is one shard.
         sources: `Source`s of particles that come during the run, by Impact with contact_step = 0 where no wall has a
-            mass; None: no one comes. All births are drawn before the run, from `seed`.
+            mass, and of balls by Penalty; None: none come. All that is random of births is drawn from `seed`.
 
     Returns:
         A `Result`.

@@ -18,7 +18,7 @@ from .places import PointBatches, changes, place_of
 from .source import Source
 
 # Streams of a source.
-_TIMES, _PLACES, _VELOCITIES = range(3)
+_TIMES, PLACES, VELOCITIES, _SIZES, _SPINS = range(5)
 # Bytes of a particle in a run, its frames not counted.
 _PARTICLE = 500
 # So many standard deviations more births than are expected are reckoned with.
@@ -43,6 +43,14 @@ def with_births(
         return particles
     given = 0 if particles is None else len(particles)
     _require_room(sources, given, until)
+    has_radius = sources[0].radius is not None if particles is None else particles.radius is not None
+    for k, one in enumerate(sources):
+        if (one.radius is not None) != has_radius:
+            must, got = ("must be given", "have a radius") if has_radius else ("must be left out", "have none")
+            raise SceneError(
+                f"sources[{k}].radius {must} where the other particles of the run {got}, got {one.radius}: balls and "
+                "points do not meet"
+            )
     drawn = [_drawn(scene, one, f"sources[{k}]", k, seed, until) for k, one in enumerate(sources)]
     times = np.concatenate([time for time, _r, _v in drawn])
     if not len(times) + given:
@@ -54,18 +62,52 @@ def with_births(
     number = np.repeat(np.arange(len(sources), dtype=np.int32), [len(time) for time, _r, _v in drawn])[order]
     position, velocity = (np.concatenate([one[k] for one in drawn], axis=1)[:, order] for k in (1, 2))
     mass = np.array([one.mass for one in sources])[number]
+    radius, spin = _sizes(scene, sources, number, seed) if has_radius else (None, None)
+    if radius is not None:
+        density = np.array([one.density or math.nan for one in sources])[number]
+        volume = math.pi * radius**2 if scene.plane else 4.0 / 3.0 * math.pi * radius**3
+        mass = np.where(np.isnan(density), mass, density * volume)
     image = None if scene.period is None else np.zeros((3, len(times)), np.int64)
     if particles is not None:
         position = np.concatenate([particles.position, position], axis=1)
         velocity = np.concatenate([particles.velocity, velocity], axis=1)
         mass = np.concatenate([particles.mass, mass])
+        if radius is not None and particles.radius is not None:
+            radius = np.concatenate([particles.radius, radius])
+            before_spin = particles.spin
+            if spin is not None or before_spin is not None:
+                rows = [np.zeros((3, given)) if before_spin is None else before_spin]
+                rows.append(np.zeros((3, len(times))) if spin is None else spin)
+                spin = np.concatenate(rows, axis=1)
         if image is not None:
             before = np.zeros((3, given), np.int64) if particles.image is None else particles.image
             image = np.concatenate([before, image], axis=1)
-    made = Particles(position, velocity, mass, image)
+    made = Particles(position, velocity, mass, image, radius, spin)
+    made.volume = None if particles is None or radius is None else particles.volume
     number = np.append(np.full(given, -1, np.int32), number).astype(np.int32)
-    made.births = Births(np.append(np.zeros(given), times[order]), number, len(sources))
+    made.births = Births(
+        np.append(np.zeros(given), times[order]), number, len(sources), sources if has_radius else ()
+    )  # fmt: skip
     return made
+
+
+def _sizes(
+    scene: Scene, sources: tuple[Source, ...], number: NDArray[np.int32], seed: int
+) -> tuple[Floats, Floats | None]:
+    """The radii (n,) and the spins (3, n), None if all are 0, of balls of sources with these numbers."""
+    radius, spin = np.zeros(len(number)), np.zeros((3, len(number)))
+    for k, one in enumerate(sources):
+        own = np.flatnonzero(number == k)
+        low, high = np.broadcast_to(np.array(one.radius, np.float64), 2)
+        radius[own] = low + (high - low) * stream(seed, k, _SIZES).random(len(own))
+        if isinstance(one.spin, tuple):
+            spin[:, own] = np.array(one.spin)[:, None]
+        elif one.spin > 0.0:
+            axis = stream(seed, k, _SPINS).standard_normal((len(own), 3)).T
+            if (across := scene.across()) is not None:
+                axis[along(across), :] = 0.0
+            spin[:, own] = one.spin * axis / np.sqrt((axis**2).sum(axis=0))
+    return radius, spin if any(one.spin != 0.0 for one in sources) else None
 
 
 def _require_room(sources: tuple[Source, ...], given: int, until: float) -> None:
@@ -96,39 +138,54 @@ def _end(source: Source, until: float) -> float:
     return until if source.stop is None else min(until, source.stop)
 
 
-def _stream(seed: int, k: int, what: int) -> Random:
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(k, what))))
+def stream(seed: int, k: int, *what: int) -> Random:
+    """The random numbers of source k for one thing."""
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(k, *what))))
 
 
 def _drawn(scene: Scene, source: Source, name: str, k: int, seed: int, until: float) -> tuple[Floats, Floats, Floats]:
     """Times (n,), positions and velocities (3, n) of the births of a source."""
+    times = times_of(source, stream(seed, k, _TIMES), until)
+    if source.radius is not None:
+        # Where balls are born is known when they are: see ball_places.py.
+        return times, *np.zeros((2, 3, len(times)))
     place = place_of(scene, source, name)
     points, across = PointBatches(scene, place, name), scene.across()
-    if across is not None and source.beam is not None and source.beam[across] != 0.0:
-        raise SceneError(
-            f'{name}.beam[{across}] must be 0 where plane = "{scene.plane}", got {source.beam[across]:g} m/s: it would '
-            "lead out of the plane"
-        )
-    times = times_of(source, _stream(seed, k, _TIMES), until)
+    require_in_plane(scene, source, name)
     # A source without births is looked at too.
-    position, normals = points.draw(_stream(seed, k, _PLACES), max(1, len(times)))
+    position, normals = points.draw(stream(seed, k, PLACES), max(1, len(times)))
     position, normals = position[:, : len(times)], normals[:, : len(times)]
-    random = _stream(seed, k, _VELOCITIES)
+    random = stream(seed, k, VELOCITIES)
     if place.volume:
         velocity = from_volume(source, random, len(times), across)
     else:
-        if source.beam is not None and not (good := leads_in(source, normals)).all():
-            i = int(np.argmin(good))
-            raise SceneError(
-                f"{name}.beam must lead from its surface to the admissible side, got {source.beam} at "
-                f"{tuple(position[:, i].tolist())}, where the normal out of that side is "
-                f"{tuple(normals[:, i].round(6).tolist())}; turn it, or give within= for a part of the surface"
-            )
+        require_beam(source, name, position, normals)
         velocity = from_surface(source, random, normals, across)
     if across is not None:
         position[across] = velocity[across] = 0.0
     _require_free(scene, name, times, position)
     return times, position, velocity
+
+
+def require_in_plane(scene: Scene, source: Source, name: str) -> None:
+    """Raise a `SceneError` for a beam that leads out of the plane of a scene."""
+    across = scene.across()
+    if across is not None and source.beam is not None and source.beam[across] != 0.0:
+        raise SceneError(
+            f'{name}.beam[{across}] must be 0 where plane = "{scene.plane}", got {source.beam[across]:g} m/s: it would '
+            "lead out of the plane"
+        )
+
+
+def require_beam(source: Source, name: str, position: Floats, normals: Floats) -> None:
+    """Raise a `SceneError` for a beam that leads out of the vessel from a surface with these normals."""
+    if source.beam is not None and not (good := leads_in(source, normals)).all():
+        i = int(np.argmin(good))
+        raise SceneError(
+            f"{name}.beam must lead from its surface to the admissible side, got {source.beam} at "
+            f"{tuple(position[:, i].tolist())}, where the normal out of that side is "
+            f"{tuple(normals[:, i].round(6).tolist())}; turn it, or give within= for a part of the surface"
+        )
 
 
 def times_of(source: Source, random: Random, until: float) -> Floats:

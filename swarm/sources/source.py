@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..common import checks
-from ..common.validated import Count, Flag, Magnitude, NotNegative, Number, Positive, Validated
+from ..common.validated import Count, Flag, Magnitude, NotNegative, Number, Positive, Validated, choice
 from ..errors import SceneError
 from ..surfaces.presence.doors import Opening
 from ..surfaces.surface import Surface
@@ -27,6 +27,25 @@ def _beam(name: str, value: Any) -> checks.Vector:
     if not any(beam):
         raise SceneError(f"{name} must be a velocity, three numbers that are not all 0, got (0, 0, 0)")
     return beam
+
+
+def _radius(name: str, value: Any) -> float | tuple[float, float]:
+    """One radius, or the bounds of many."""
+    if not isinstance(value, (list, tuple)):
+        return checks.length(name, value)
+    if len(value) != 2:
+        raise SceneError(f"{name} must be a number, or (low, high), got {checks.shown(value)}")
+    low, high = (checks.length(f"{name}[{k}]", one) for k, one in enumerate(value))
+    if not low <= high:
+        raise SceneError(f"{name} must be (low, high) with low <= high, got ({low:g}, {high:g})")
+    return low, high
+
+
+def _spin(name: str, value: Any) -> float | checks.Vector:
+    """An angular speed, or an angular velocity."""
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return checks.vector(name, value)
+    return checks.at_least(name, value, 0.0)
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,6 +80,14 @@ class Source(Validated):
         divergence: of a beam the half angle of a cone about it in which directions are uniform [rad], below pi; those
             into a wall on which particles are born do not occur.
         mass: of each [kg].
+        radius: of balls [m], one number, or (low, high): uniform between them; None: points. Births of balls overlap
+            neither balls nor walls, each at up to 16 random places. On a wall balls touch it with their surface, on
+            another surface and in a volume their centres are there, everywhere as far as the largest one fits.
+        density: of balls [kg/m^3], in a plane [kg/m^2], in place of a mass.
+        spin: of balls by Penalty: the angular speed about random axes, or three numbers, the angular velocity [rad/s].
+        blocked: of balls, what becomes of a birth that finds no free place: "wait", it and those after it come when it
+            finds one, tried again in the time that a ball needs for its radius; "report", it never comes. Both count in
+            the observable `blocked`.
 
     Raises:
         SceneError: an argument is out of its range, or they do not go together. What does not go with the scene (a
@@ -84,12 +111,17 @@ class Source(Validated):
     beam: Annotated[Any, _beam] | None = None
     divergence: NotNegative = 0.0
     mass: Annotated[float, _mass] = 1.0
+    radius: Annotated[Any, _radius] | None = None
+    density: Annotated[float, _mass] | None = None
+    spin: Annotated[Any, _spin] = 0.0
+    blocked: Annotated[str, choice("wait", "report")] = "wait"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_place()
         self._check_times()
         self._check_velocity()
+        self._check_balls()
 
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults."""
@@ -153,6 +185,21 @@ class Source(Validated):
             raise SceneError(f"divergence must be below pi, the half angle of a cone [rad], got {self.divergence:g}")
         if self.divergence > 0.0 and self.beam is None:
             raise SceneError(f"divergence must go with a beam, got {self.divergence:g} without one; give beam=")
+
+    def _check_balls(self) -> None:
+        if self.radius is None:
+            given = {"density": self.density is None, "spin": self.spin == 0.0, "blocked": self.blocked == "wait"}
+            if wrong := [name for name, is_left_out in given.items() if not is_left_out]:
+                raise SceneError(
+                    f"{wrong[0]} must be left out without a radius, got {getattr(self, wrong[0])}: the particles are "
+                    "points; give radius="
+                )
+        elif self.density is not None and self.mass != 1.0:
+            raise SceneError(f"a source needs one of mass and density, got {self.mass:g} kg and {self.density:g}")
+
+    def largest(self) -> float:
+        """The largest radius of its balls [m]; 0 of points."""
+        return float(np.max(self.radius or 0.0))
 
 
 def checked_sources(name: str, value: Any) -> tuple[Source, ...]:

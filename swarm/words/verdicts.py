@@ -212,6 +212,8 @@ def _books(content: Any) -> list[Statement]:
         return [
             Statement("particles", f"{many(ends['escaped'])} of {many(content.count // len(body))} left", whole or None)
         ]
+    if not knows_start(content):
+        return []
     born = int(np.sum(seen["born"][-1])) if "born" in seen else 0
     there = content.count if "born" not in seen else at_start(content) + born
     inside = there - sum(ends.values())
@@ -220,11 +222,19 @@ def _books(content: Any) -> list[Statement]:
     seen_there = there if frame is None else int((~np.isnan(frame.position[0])).sum())
     kept = content.count == (there if frame is None else len(frame.mass))
     came = f", {many(born)} of them from sources" if born else ""
+    blocked = int(np.sum(seen["blocked"][-1])) if "blocked" in seen else 0
+    came += f"; {many(blocked)} births found no free place at their time" if blocked else ""
     if inside < 0 or (kept and frame is not None and seen_there != there):
         return [Statement("particles", f"{listed(parts)} do not add up to {many(there)}{came}", False)]
     if ends["escaped"] and not content.scene.is_open() and not _has_openings(content.scene):
         return [Statement("particles", f"{many(ends['escaped'])} of {many(there)} passed through a closed wall", False)]
     return [Statement("particles", f"{many(there)} = {' + '.join(parts)}{came}", True)]
+
+
+def knows_start(content: Any) -> bool:
+    """Whether it is known how many particles were there at the start: not all births of balls find a place."""
+    frame = content.frames.get("start")
+    return "blocked" not in content.seen or (frame is not None and len(frame.mass) == content.count)
 
 
 def at_start(content: Any) -> int:

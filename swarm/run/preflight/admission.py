@@ -9,6 +9,7 @@ from ...motion import Path, parts_of
 from ...motion.given import require_angles
 from ...particles import Particles, TiedParticles
 from ...scene import Scene
+from ...sources.ball_places import place_unborn
 from ...sources.births import with_births
 from ...surfaces.instant import gaps_of, gradient_of
 from ...surfaces.plane import require_start
@@ -49,18 +50,20 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
     # The arrays of Particles may have been changed since it checked them.
     start = None if particles is None else _in_the_cell(scene, particles.copy(), options.times.until)
     check_surfaces(method, scene)
-    if start is not None and start.radius is not None:
-        engines.wing("events.balls").require_balls(scene, start, method)
-    radius = None if start is None else start.radius
+    times = options.times
+    # Of balls: of those that come too.
+    balls = _balls(scene, start, method, options)
+    radius = None if balls is None else balls.radius
     compiled = scene.compiled(None if radius is None else float(radius.max()), method.apart())
     if options.compile != "never":
         counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
         walls = [*scene.surfaces, *scene.pieces.open_volumes()]
         for surface in [*walls, *counters]:
             surface.require_compiled()
-    times = options.times
     _require_motions(scene, times.until)
-    particles = with_births(scene, start, options.sources, options.seed, times.until)
+    particles = with_births(scene, start, options.sources, options.seed, times.until) if balls is None else balls
+    if balls is not None:
+        place_unborn(scene, balls, options.seed)
     _require_logged(particles, options)
     if options.keeps_float32():
         require_near(scene, particles)
@@ -75,6 +78,15 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
         _require_place(scene, start, method)
     workload.require_few_impacts(compiled, particles, method, times.until, times.every)
     return Task(compiled, particles, method, options)
+
+
+def _balls(scene: Scene, start: Particles | None, method: Method, options: RunOptions) -> Particles | None:
+    """The balls of a run, checked but for their places; None of a run of points."""
+    if start.radius is None if start is not None else options.sources[0].radius is None:
+        return None
+    balls = with_births(scene, start, options.sources, options.seed, options.until)
+    engines.wing("events.balls").require_balls(scene, balls, method)
+    return balls
 
 
 def _require_place(scene: Scene, start: Particles, method: Method) -> None:

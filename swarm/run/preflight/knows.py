@@ -51,10 +51,11 @@ class Asked(NamedTuple):
 
 def engine_of(asked: Asked) -> str:
     """The engine of a run: one of `ENGINES`, or that of a method which this kind of particles does not support."""
-    scene, particles, method, _options = asked
+    scene, particles, method, options = asked
     if isinstance(particles, TiedParticles):
         return _by_method(method, (BODIES, SOFT_BODIES, PAPER_BODIES), OTHER_BODIES)
-    if particles is not None and particles.radius is not None:
+    sizes = [one.radius for one in (options.sources or () if particles is None else [particles])]
+    if sizes and sizes[0] is not None:
         return _by_method(method, (HEAVY if scene.reacts() else BALLS, GRAINS, OTHER_BALLS), OTHER_BALLS)
     rigid = POINTS if not isinstance(method, Impact) else CHORDS if method.contact_step > 0.0 else POINTS
     soft = BASELINE if isinstance(method, SoftWalls) else OTHER_POINTS
@@ -219,6 +220,7 @@ def _duration(asked: Asked) -> Found:
 def _spins(asked: Asked) -> Found:
     if isinstance(asked.particles, Particles) and asked.particles.spin is not None:
         yield {}
+    yield from ({} for one in asked.options.sources if one.spin != 0.0)
 
 
 def _any(_asked: Asked) -> Found:
@@ -390,7 +392,7 @@ CAPABILITIES = (
     Capability("no step", _no_step, {(BODIES,): _NO_METHOD}, True),
     Capability("source", _option("sources"), {
         _EVERY_BODY: Refusal("sources must be left out with bodies, got {count}", "use particles"),
-        _EVERY_BALL: Refusal(
+        _RIGID_BALLS: Refusal(
             "sources must be left out where particles have a radius, got {count}", f"{_TO_POINTS}, and Impact()"
         ),
         (CHORDS, *_FIXED_STEPS, OTHER_POINTS): Refusal(

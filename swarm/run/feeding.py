@@ -1,0 +1,177 @@
+"""The births of balls while a run lasts: which are due, which find a free place, and which wait for one."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ball_numbers import rotational_energy
+from ..particles import Particles
+from ..scene import Scene
+from ..sources.ball_places import ball_places
+from ..sources.places import changes
+from ..state import Floats, State
+
+# So many places are tried for a birth at a time.
+_TRIES = 16
+# Balls that are born are at least this part of the sum of their radii apart, more than the round-off of it.
+_APART = 1.0 + 1e-12
+
+
+class There(NamedTuple):
+    """The balls that are in the vessel at an instant: their centres and velocities (3, n), and their radii (n,)."""
+
+    position: Floats
+    velocity: Floats
+    radius: Floats
+
+
+class Newborn(NamedTuple):
+    """The births of an instant: the numbers of the particles (n,), where they are and how fast, (3, n)."""
+
+    number: NDArray[np.int64]
+    position: Floats
+    velocity: Floats
+
+
+class Feed:
+    """The births of the balls of a run.
+
+    All that is random of them is drawn from the seed by the number of the birth, or of the try, so that the births have
+    the same bits for any threads, and the same run has the same births.
+
+    Args:
+        scene: the vessel.
+        particles: those of the start, and behind them those that may come.
+        seed: of the run.
+
+    Attributes:
+        born_time: (N,) when each was born [s], NaN of those that are not.
+    """
+
+    def __init__(self, scene: Scene, particles: Particles, seed: int) -> None:
+        births = particles.births
+        assert births is not None
+        self._scene, self._particles, self._births = scene, particles, births
+        self._places = ball_places(scene, particles, seed)
+        n, sources = len(particles), births.sources
+        self.born_time = np.where(births.source < 0, 0.0, np.nan)
+        self._due = [np.flatnonzero(births.source == k) for k in range(sources)]
+        # How many births of each source are over, and how many places were tried; those that found none at once; and
+        # when the next may be tried at the earliest [s].
+        self._over, self._tried, self._blocked = np.zeros((3, sources), np.int64)
+        self._earliest, self._counted = np.zeros(sources), np.full(sources, -1)
+        self._energy = np.zeros(n)
+        self._changing = [i for i, one in enumerate(scene.surfaces) if changes(one)]
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """What a run that goes on needs, for `BaseRun.arrays`."""
+        own = {"over": self._over, "tried": self._tried, "blocked": self._blocked, "earliest": self._earliest}
+        own |= {"counted": self._counted, "energy": self._energy, "born_time": self.born_time}
+        return {f"feed.{name}": array for name, array in own.items()}
+
+    def observed(self) -> dict[str, Any]:
+        """The observables of sources."""
+        source, sources = self._births.source, self._births.sources
+        here = source[~np.isnan(self.born_time) & (source >= 0)]
+        return {
+            "born": np.bincount(here, minlength=sources).astype(np.int64), "blocked": self._blocked.copy(),
+            "source_energy": float(np.add.reduce(self._energy)),
+        }  # fmt: skip
+
+    def seen(self, state: State) -> State:
+        """The state of the balls that were born, in the order of their numbers."""
+        there = ~np.isnan(self.born_time)
+        return state if there.all() else state.of(there)
+
+    # --- Births ----------------------------------------------------------------------------------------------
+
+    def next(self) -> float:
+        """When the next birth is due, or is to be tried again [s]; infinite if none is."""
+        return min((self._next_of(k) for k in range(self._births.sources)), default=math.inf)
+
+    def _next_of(self, k: int) -> float:
+        if self._over[k] == len(self._due[k]):
+            return math.inf
+        return max(float(self._births.time[self._due[k][self._over[k]]]), float(self._earliest[k]))
+
+    def come(self, now: float, there: There, slack: float = 0.0) -> Newborn:
+        """The births at an instant [s], also of what is due so little later, beside the balls that are there."""
+        made: list[tuple[int, Floats, Floats]] = []
+        for k in range(self._births.sources):
+            self._come_from(k, (now, now + slack), there, made)
+        position, velocity = (np.array([one[part] for one in made]).reshape(-1, 3).T for part in (1, 2))
+        return Newborn(np.array([one[0] for one in made], np.int64), position, velocity)
+
+    def _come_from(
+        self, k: int, instant: tuple[float, float], there: There, made: list[tuple[int, Floats, Floats]]
+    ) -> None:  # fmt: skip
+        """Add the births of a source to those that were `made` at this instant."""
+        waits, (now, latest) = self._births.balls[k].blocked == "wait", instant
+        while self._next_of(k) <= latest:
+            number = int(self._due[k][self._over[k]])
+            found = self._free(k, number, now, there, made)
+            if found is not None:
+                made.append((number, *found))
+                self._bear(number, *found, now)
+            else:
+                self._blocked[k] += self._counted[k] < number
+                self._counted[k] = number
+                if waits:
+                    self._earliest[k] = now + self._pause(k, number, there)
+                    return
+            self._over[k] += 1
+
+    def _free(
+        self, k: int, number: int, now: float, there: There, made: list[tuple[int, Floats, Floats]]
+    ) -> tuple[Floats, Floats] | None:
+        """A free place for a birth, with a velocity; None where none of a few is free."""
+        mass, radius = self._particles.mass[number], self._particles.radius
+        assert radius is not None
+        centres = np.concatenate([there.position, *(r[:, None] for _n, r, _v in made)], axis=1)
+        reach = _APART * (np.append(there.radius, radius[[n for n, _r, _v in made]]) + radius[number])
+        scale = 1.0 if self._births.balls[k].temperature is None else 1.0 / math.sqrt(mass)
+        for _try in range(_TRIES):
+            position, velocity = self._places[k].at(int(self._tried[k]))
+            self._tried[k] += 1
+            away = centres - position[:, None]
+            for axis, length in enumerate(self._scene.period or ()):
+                if length is not None:
+                    away[axis] -= length * np.rint(away[axis] / length)
+            if ((away * away).sum(axis=0) >= reach * reach).all() and self._is_within(position, radius[number], now):
+                return position, scale * velocity
+        return None
+
+    def _is_within(self, position: Floats, radius: float, now: float) -> bool:
+        """Whether a ball is within the walls that move, or come and go."""
+        if not self._changing:
+            return True
+        depths = self._scene.distances_outside(position[:, None], now, np.array([radius]))
+        return bool((depths[self._changing] <= 0.0).all())
+
+    def _pause(self, k: int, number: int, there: There) -> float:
+        """The time in which a ball may make room [s]: that of its radius, by the fastest of three paces.
+
+        These are the speed of the source, that of a fall by the radius, and that of the balls that are there.
+        """
+        source, n = self._births.balls[k], there.radius.size
+        radius = source.largest()
+        thermal = math.sqrt((source.temperature or 0.0) / self._particles.mass[number])
+        pace = source.speed or math.hypot(*(source.beam or (thermal,)))
+        fall = math.sqrt(2.0 * radius * math.hypot(*(self._scene.gravity or (0.0,))))
+        rms = math.sqrt(float((there.velocity * there.velocity).sum()) / n) if n else 0.0
+        pace = max(pace, fall, rms)
+        return radius / pace if pace > 0.0 else math.inf
+
+    def _bear(self, number: int, position: Floats, velocity: Floats, now: float) -> None:
+        """Note a birth."""
+        particles, pull = self._particles, self._scene.gravity or (0.0, 0.0, 0.0)
+        mass, spin = float(particles.mass[number]), particles.spin
+        self.born_time[number] = now
+        energy = mass * (0.5 * float((velocity * velocity).sum()) - float((np.array(pull) * position).sum()))
+        if spin is not None:
+            assert particles.radius is not None
+            some = slice(number, number + 1)
+            energy += rotational_energy(particles.mass[some], particles.radius[some], spin[:, some])
+        self._energy[number] = energy

@@ -1,0 +1,112 @@
+"""The places at which balls of a source may be born, in blocks that are drawn when they are needed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import SceneError
+from ..particles import Particles
+from ..scene import Scene
+from ..surfaces.area_samples import Floats, Random
+from .births import PLACES, VELOCITIES, from_surface, from_volume, require_beam, require_in_plane, stream
+from .places import PointBatches, changes, place_of
+from .source import Source
+
+# Places of a block; so many rounds of as many places are tried for one.
+_BLOCK, _MOST_ROUNDS = 1024, 256
+# A ball that is born at a wall is so much of its radius away from it.
+_CLEAR = 1e-9
+
+
+class BallPlaces:
+    """Places, each with a velocity, uniform where the largest ball of a source is within all walls that are at rest.
+
+    Args:
+        scene: the vessel.
+        source: of balls.
+        k: the number of the source.
+        seed: of the run.
+
+    Raises:
+        SceneError: there is no such place, or a beam does not lead into the vessel.
+    """
+
+    def __init__(self, scene: Scene, source: Source, k: int, seed: int) -> None:
+        self._scene, self._source, self._name = scene, source, (name := f"sources[{k}]")
+        self._key = seed, k
+        require_in_plane(scene, source, name)
+        self._place = place_of(scene, source, name)
+        self._points = PointBatches(scene, self._place, name)
+        self._radius, self._across = source.largest(), scene.across()
+        # Of those of the scene the ball is inside of, not half of it.
+        is_wall = self._place.number is not None or bool(self._place.walls)
+        self._shift = (1.0 + _CLEAR) * self._radius if is_wall and not self._place.volume else 0.0
+        self._lasting = [i for i, one in enumerate(scene.surfaces) if not changes(one)]
+        self._known = -1
+        self.block(0)
+
+    def block(self, number: int) -> tuple[Floats, Floats]:
+        """The places and the velocities (3, 1024) of a block; a temperature is that of a mass of 1 kg."""
+        if number != self._known:
+            self._known, self._drawn = number, self._draw(number)
+        return self._drawn
+
+    def at(self, k: int) -> tuple[Floats, Floats]:
+        """Place k, and its velocity, (3,) each."""
+        position, velocity = self.block(k // _BLOCK)
+        return position[:, k % _BLOCK], velocity[:, k % _BLOCK]
+
+    def _draw(self, number: int) -> tuple[Floats, Floats]:
+        places, speeds = (stream(*self._key, what, number) for what in (PLACES, VELOCITIES))
+        found: list[Floats] = []
+        count = 0
+        for _round in range(_MOST_ROUNDS):
+            points, normals = self._points.draw(places, _BLOCK)
+            points = points - self._shift * normals
+            if self._scene.period is not None:
+                points, _image = self._scene.wrapped(points)
+            there = np.concatenate([points, normals])[:, self._fits(points)]
+            found.append(there[:, : _BLOCK - count])
+            count += found[-1].shape[1]
+            if count == _BLOCK:
+                break
+        if not count:
+            raise SceneError(
+                f"{self._name}.radius must leave a place within the walls, got {self._radius:g} m, for which none of "
+                f"{_MOST_ROUNDS * _BLOCK} random places is; use smaller balls, or a larger source"
+            )
+        points, normals = np.resize(np.concatenate(found, axis=1).T, (_BLOCK, 6)).T.reshape(2, 3, _BLOCK)
+        velocity = self._velocities(speeds, points, normals)
+        if self._across is not None:
+            points[self._across] = velocity[self._across] = 0.0
+        return points, velocity
+
+    def _fits(self, points: Floats) -> Floats:
+        """Whether the largest ball is within all walls that are at rest."""
+        if not self._lasting:
+            return np.ones(points.shape[1], np.bool_)
+        radius = np.full(points.shape[1], self._radius)
+        return np.asarray((self._scene.distances_outside(points, 0.0, radius)[self._lasting] <= 0.0).all(axis=0))
+
+    def _velocities(self, random: Random, points: Floats, normals: Floats) -> Floats:
+        source = replace(self._source, mass=1.0, density=None)
+        if self._place.volume:
+            return from_volume(source, random, _BLOCK, self._across)
+        require_beam(source, self._name, points, normals)
+        return from_surface(source, random, normals, self._across)
+
+
+def ball_places(scene: Scene, particles: Particles, seed: int) -> list[BallPlaces]:
+    """The places of each source of balls of a run, with this seed."""
+    given = () if particles.births is None else particles.births.balls
+    return [BallPlaces(scene, one, k, seed) for k, one in enumerate(given)]
+
+
+def place_unborn(scene: Scene, particles: Particles, seed: int) -> None:
+    """Give balls that are not yet born a place and a velocity of their source, until they are."""
+    for k, places in enumerate(ball_places(scene, particles, seed)):
+        assert particles.births is not None
+        own = np.flatnonzero(particles.births.source == k)
+        position, velocity = places.block(0)
+        some = np.arange(len(own)) % position.shape[1]
+        particles.position[:, own], particles.velocity[:, own] = position[:, some], velocity[:, some]

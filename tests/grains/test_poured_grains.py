@@ -1,0 +1,217 @@
+"""Soft grains that come from sources during a run."""
+
+import functools
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.grains.grains_run import GrainsRun
+from swarm.run.feeding import _TRIES
+from swarm.run.session import Session
+from swarm.sources.ball_places import BallPlaces
+from swarm.sources.births import with_births
+
+DT = 1e-3
+SOFT = swarm.Penalty(dt=DT, penalty=1e3)
+LID = swarm.Box((0.05, 0.05, 0.01), center=(0.0, 0.0, 0.04))
+ROOM = swarm.Box((0.05, 0.05, 0.05), restitution=0.5, friction=0.3)
+PISTON = swarm.Plane((0, 0, 1), 0.03, motion=swarm.Oscillation((0, 0, 0.02), 5.0))
+DOWN = {"gravity": (0.0, 0.0, -9.81)}
+FALL = {**DOWN, "pairs": swarm.Pairs(restitution=0.5, friction=0.3)}
+BALL = {"radius": 0.012, "mass": 0.007}
+SIZES = {"radius": (0.008, 0.015), "density": 900.0, "spin": 5.0}
+SCENES = {
+    "a box": ([ROOM], FALL, swarm.Source(LID, volume=True, rate=200.0, beam=(0.0, 0.0, -0.3), **BALL)),
+    "sizes": (
+        [swarm.Sphere(0.06, friction=0.2)], DOWN,
+        swarm.Source(LID, volume=True, rate=200.0, even=True, speed=0.2, **SIZES),
+    ),
+    "a piston": (
+        [swarm.Box((0.05, 0.05, 0.05)), PISTON], FALL,
+        swarm.Source(LID, volume=True, times=np.linspace(0.0, 0.07, 11), beam=(0.0, 0.0, -1.0), **BALL),
+    ),
+    "a cell": (
+        [swarm.Slab((0.0, 0.0, 1.0), 0.05)], {"period": (0.1, 0.1, None), **FALL},
+        swarm.Source(0, rate=200.0, temperature=1e-4, **BALL),
+    ),
+    "a plane": ([swarm.Sphere(0.06)], {"plane": "z"}, swarm.Source(0, rate=200.0, speed=0.3, **BALL)),
+}  # fmt: skip
+
+
+def scene_of(name):
+    surfaces, more, source = SCENES[name]
+    return swarm.Scene(surfaces, **more), source
+
+
+@functools.cache
+def start_of(name):
+    if name != "sizes":
+        return None
+    return swarm.Particles([[-0.02, 0.02], [0.0, 0.0], [-0.03, -0.03]], np.zeros((3, 2)), 0.01, radius=[0.01, 0.012])
+
+
+def poured(name, blocked="wait", **more):
+    scene, source = scene_of(name)
+    source = swarm.Source(**{**vars(source), "blocked": blocked})
+    options = {"until": 0.08, "every": 0.02, "compile": "never", "seed": 7, "threads": 1, **more}
+    return swarm.simulate(scene, start_of(name), SOFT, sources=source, **options)
+
+
+def same(one, other):
+    for name, values in one.observables.items():
+        np.testing.assert_array_equal(values, other.observables[name], err_msg=name)
+    for name in ("position", "velocity", "mass", "radius", "spin", "image"):
+        np.testing.assert_array_equal(getattr(one.particles, name), getattr(other.particles, name), err_msg=name)
+    for name in ("impacts_per_particle", "birth_time"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_no_birth_overlaps_and_the_books_balance(name, tmp_path):
+    """By all pairs and all walls, in the frame of each step."""
+    result = poured(name, trajectory=tmp_path / "run.h5", every=DT)
+    scene, seen, came = scene_of(name)[0], result.observables, 0
+    assert seen["energy_error"].max() < 1e-12
+    with swarm.load(tmp_path / "run.h5") as frames:
+        for k, now in enumerate(frames.times):
+            there = frames.born(k)
+            assert int(seen["born"][k].sum()) == (there & (frames.birth_source >= 0)).sum()
+            frame, new = frames.frame(k), np.flatnonzero(there & (abs(result.birth_time - now) < 0.5 * DT))
+            assert np.isnan(frame.position[:, ~there]).all()
+            for i in new[frames.birth_source[new] >= 0]:
+                came += 1
+                here = frame.position[:, [i]]
+                assert (scene.distances_outside(here, now, frame.radius[[i]]) <= 1e-12).all()
+                for j in np.flatnonzero(there):
+                    away = frame.position[:, j] - here[:, 0]
+                    for axis, length in enumerate(scene.period or ()):
+                        away[axis] -= 0.0 if length is None else length * round(away[axis] / length)
+                    assert i == j or math.hypot(*away) >= frame.radius[i] + frame.radius[j]
+            total = frame.mass[there].sum()
+            weighed = frame.born().mass.sum()
+            assert total == weighed
+    assert came == seen["born"][-1].sum() >= 5
+
+
+def test_what_comes_has_the_mass_the_size_and_the_spin_of_its_source():
+    scene, source = scene_of("sizes")
+    made = with_births(scene, None, (swarm.Source(**{**vars(source), "rate": 1e4}),), 1, 1.0)
+    assert 0.008 <= made.radius.min() < 0.0081
+    assert 0.0149 < made.radius.max() <= 0.015
+    # Four standard deviations of the mean.
+    assert abs(made.radius.mean() - 0.0115) < 4 * 0.007 / math.sqrt(12 * len(made))
+    np.testing.assert_allclose(made.mass, 900.0 * 4 / 3 * np.pi * made.radius**3)
+    np.testing.assert_allclose((made.spin**2).sum(axis=0), 25.0)
+    assert abs(made.spin.mean(axis=1)).max() < 4 * 5.0 / math.sqrt(3 * len(made))
+
+
+@pytest.mark.parametrize("blocked", ["wait", "report"])
+def test_a_full_vessel_against_a_loop(blocked, tmp_path):
+    """Which births come, when, at which place, and how many were blocked, by a loop over steps, tries and balls."""
+    scene = swarm.Scene([swarm.Box((0.03, 0.03, 0.03))], gravity=(0.0, 0.0, -9.81))
+    source = swarm.Source(0, rate=400.0, even=True, speed=0.1, radius=0.012, mass=0.007, blocked=blocked)
+    options = {"until": 0.1, "every": DT, "compile": "never", "seed": 2, "trajectory": tmp_path / "run.h5"}
+    result = swarm.simulate(scene, None, SOFT, sources=source, **options)
+    places, due = BallPlaces(scene, source, 0, 2), np.arange(41) / 400.0
+    over, tried, waits, since = 0, 0, 0.0, -1
+    born, counted, blocks = np.full(41, np.nan), [], 0
+    with swarm.load(tmp_path / "run.h5") as frames:
+        for k, now in enumerate(frames.times):
+            frame, before = frames.frame(k), born.copy()
+            held = [tuple(frame.position[:, i]) for i in np.flatnonzero(~np.isnan(before))]
+            rms = math.sqrt(np.mean(np.nansum(frame.velocity[:, ~np.isnan(before)] ** 2, axis=0))) if held else 0.0
+            while over < 41 and max(due[over], waits) <= now + 1e-9:
+                for _try in range(_TRIES):
+                    place = tuple(places.at(tried)[0])
+                    tried += 1
+                    if free := all(math.dist(place, other) > 0.024 for other in held):
+                        break
+                if free:
+                    held.append(place)
+                    born[over] = now
+                    np.testing.assert_array_equal(frame.position[:, over], place)
+                else:
+                    blocks, since = blocks + (since < over), over
+                    if blocked == "wait":
+                        waits = now + 0.012 / max(0.1, math.sqrt(2 * 0.012 * 9.81), rms)
+                        break
+                over += 1
+            counted.append(blocks)
+    np.testing.assert_allclose(result.birth_time, born, atol=1e-12)
+    np.testing.assert_array_equal(result.observables["blocked"][:, 0], counted)
+    assert counted[-1] > 0
+    assert 0 < np.isnan(born).sum() < 41
+    never = np.isnan(result.particles.position[0])
+    np.testing.assert_array_equal(never, np.isnan(born))
+    assert len(result.particles.born()) == result.observables["born"][-1, 0]
+
+
+@pytest.mark.parametrize("name", ["a box", "sizes"])
+def test_threads_halts_and_frames_change_no_bit(name, monkeypatch):
+    one = poured(name)
+    same(one, poured(name, threads=2))
+    many = poured(name, every=DT)
+    np.testing.assert_array_equal(one.particles.position, many.particles.position)
+    np.testing.assert_array_equal(one.birth_time, many.birth_time)
+    advance, halts = GrainsRun.advance, itertools.count()
+
+    def halting(self, *given, **more):
+        next(halts)
+        self.halt(3)
+        return advance(self, *given, **more)
+
+    monkeypatch.setattr(GrainsRun, "advance", halting)
+    same(one, poured(name))
+    assert next(halts) > 20
+
+
+@pytest.mark.parametrize("name", ["sizes", "a cell"])
+def test_resumed_at_any_place(name, tmp_path, monkeypatch):
+    """The lists, which grow with the births, are of another size than at the start."""
+    whole = poured(name, trajectory=tmp_path / "whole.h5")
+    advance, look, sessions = GrainsRun.advance, Session.look, 0
+
+    def stops(self, *given):
+        self.stop()
+        return look(self, *given)
+
+    def halting(self, *given, **more):
+        self.halt(13)
+        return advance(self, *given, **more)
+
+    monkeypatch.setattr(Session, "look", stops)
+    monkeypatch.setattr(GrainsRun, "advance", halting)
+    while sessions < 100:
+        try:
+            parts = poured(name, trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3)
+            break
+        except KeyboardInterrupt:
+            sessions += 1
+    assert sessions > 6
+    same(whole, parts)
+    with swarm.load(tmp_path / "whole.h5") as one, swarm.load(tmp_path / "parts.h5") as other:
+        for k in range(len(one)):
+            np.testing.assert_array_equal(one.frame(k).position, other.frame(k).position)
+            np.testing.assert_array_equal(one.born(k), other.born(k))
+
+
+def test_arguments():
+    bad = {
+        "low <= high": {"radius": (0.02, 0.01)},
+        "must be left out without a radius": {"density": 1.0},
+        "one of mass and density": {"radius": 0.01, "density": 1.0, "mass": 2.0},
+        "blocked": {"radius": 0.01, "blocked": "never"},
+    }
+    for sentence, given in bad.items():
+        with pytest.raises(swarm.SceneError, match=sentence):
+            swarm.Source(0, rate=1.0, speed=1.0, **given)
+    scene, source = swarm.Scene([ROOM]), scene_of("a box")[1]
+    points = swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    with pytest.raises(swarm.SceneError, match=r"sources\[0\].radius must be left out where the other particles"):
+        swarm.simulate(scene, points, swarm.Impact(), until=1.0, sources=source)
+    wide = swarm.Source(LID, volume=True, rate=10.0, speed=0.0, radius=0.049)
+    with pytest.raises(swarm.SceneError, match=r"sources\[0\].radius must leave a place within the walls"):
+        swarm.simulate(scene, None, SOFT, until=1.0, sources=wide)
