@@ -77,8 +77,11 @@ class Numbering:
             [np.array(pieces.owners, np.int64)[self.pieces_of_walls], part_of[self.pieces_of_walls]]
         )
         # The walls of fields come first.
-        of_fields = [member for i in order.fields for member in pieces.each[i].numbers()]  # type: ignore[attr-defined]
-        self.members[1, : len(of_fields)] = of_fields
+        first = 0
+        for i in order.fields:
+            count, numbers = pieces.each[i].wall_count(order.of_balls), pieces.each[i].numbers()
+            self.members[1, first : first + count] = np.repeat(numbers, count // len(numbers))
+            first += count
 
     def split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
         """The values of the members of each surface, from (..., members) of all surfaces one after the other."""
@@ -108,7 +111,7 @@ class CompiledScene:
     def __init__(self, scene: "Scene", largest: float | None = None, apart: str | None = None) -> None:
         self.scene, self.largest, self._apart = scene, largest, apart
         self.pieces = scene.pieces if largest is None else scene.pieces_of_balls(largest)
-        self.order = order_of(self.pieces.each, apart is None, self.pieces.rooms())
+        self.order = order_of(self.pieces.each, apart is None, self.pieces.rooms(), largest is not None)
         walls = len(self._spans)
         if walls > MOST_WALLS:
             why = "" if largest is None else f" with balls of a radius of {largest:g} m"

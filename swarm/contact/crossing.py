@@ -75,7 +75,7 @@ def _meets_one(field, ends, number, active, path, near):
 
 def _meets_body(found, m, field, ends, number, active, path, near):
     m = float(m)
-    if isinstance(field, Patched) and not field.is_near(m, path.r1, _reach(path) + near):
+    if isinstance(field, Patched) and not field.is_ahead(m, path.r0, path.r1, _reach(path) + near):
         return found
     return found or ((not _is_held(field, number, m, active)) and _may_meet(field.wall(m), ends.wall(m), path, near))
 

@@ -194,7 +194,8 @@ def _until_out_of_layers(layers, first, last, x, v, pull):
     a, b = 0.5 * abs(pull), 0.5 * select(turned, -v, v)
     ahead, behind = select(turned, x - below, above - x), select(turned, above - x, x - below)
     backwards = (b < 0.0) & (b * b >= a * behind)
-    root = math.sqrt(b * b + a * select(backwards, -behind, ahead))
+    # NaN, and no error in plain Python, of a flight that is outside of these layers, of which nothing is asked.
+    root = np.sqrt(b * b + a * select(backwards, -behind, ahead))
     over = select(backwards, behind, select(b > 0.0, ahead, root - b))
     under = select(backwards, root - b, select(b > 0.0, root + b, a))
     return select(under > 0.0, over / under, math.inf)

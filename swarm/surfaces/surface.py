@@ -274,6 +274,10 @@ class Surface(Validated):
         """The number of bodies of a field, else 0."""
         return 0
 
+    def wall_count(self, of_balls: bool) -> int:
+        """The number of walls that points meet, or balls; of a field with all its members."""
+        return len(self.walls())
+
     def faces_of_balls(self, largest: float) -> tuple[Any, NDArray[Any]]:
         """What soft balls with radii up to the largest one [m] meet, and of each member the number of its face.
 

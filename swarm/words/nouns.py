@@ -90,7 +90,8 @@ def size_of(surface: Surface) -> str:
     if hasattr(surface, "half_angle"):
         texts.append(f"half angle {math.degrees(surface.half_angle):.4g}°")
     if isinstance(surface, Mesh):
-        texts.append(f"{many(len(surface))} triangles, volume {amount(surface.volume(), 'm³')}")
+        volume = "" if surface.open else f", volume {amount(surface.volume(), 'm³')}"
+        texts.append(f"{many(len(surface))} triangles{volume}")
     elif surface.face_noun:
         texts.append(f"{many(len(surface))} {surface.face_noun}s")  # type: ignore[arg-type]
     if hasattr(surface, "formula"):
@@ -162,7 +163,7 @@ def changes_of(surface: Surface) -> list[str]:
         texts.append(counted_in_words(len(doors), "door"))
     if holes := len(surface.openings) - len(doors):
         texts.append(counted_in_words(holes, "opening"))
-    if faces := getattr(surface, "open", ()):
+    if faces := () if isinstance(surface, Mesh) else getattr(surface, "open", ()):
         texts.append(f"open at {listed(list(map(str, faces)))}")
     if surface.present is not None:
         spans = [

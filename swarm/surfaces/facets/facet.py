@@ -10,6 +10,10 @@ from ...kernel.vector import Vec, absolute, dot
 from ..shapes.plane import Flat
 from ..time_of_impact.course import rise_time
 
+# Half of the thickness of a sheet, and how far its sides go on beyond its edges, in units of the round-off of places:
+# far above what a flight ends beside its wall by, and so far that the sides of a fold of 2 degrees meet. A step of a
+# slide ends behind a side by less than the third, so that it is never on the other side.
+THIN, OVERLAP, _BEHIND_SIDE = 32.0, 2048.0, 8.0
 # As deep behind a facet as this many times the round-off of places a step may end that has come through it.
 _BEHIND = 1e4
 
@@ -52,7 +56,15 @@ class FacetNumbers(Flat):
         depth, within = self.inner(r) - self.offset, self.within(r)
         beyond = select(within < 0.0, within, 0.0)
         there = (beyond == 0.0) & (depth <= self.behind())
-        return select(there, depth, -math.sqrt(beyond * beyond + depth * depth))
+        return select(there, depth, self.elsewhere(beyond, depth))
+
+    def is_ahead(self, start, end, near):
+        """Whether what goes from one place to another may come through it: it is nearer to the end than `near`."""
+        return self.distance(end) >= -near
+
+    def elsewhere(self, beyond, depth):
+        """Its distance from where it is not: beyond its edges, or deep behind it."""
+        return -math.sqrt(beyond * beyond + depth * depth)
 
     def behind(self):
         """How deep behind it a place is one that has come through it by a step, and none of another room."""
@@ -94,3 +106,23 @@ class FacetNumbers(Flat):
     def safe_time(self, r, v, pull):
         time, _found = self.falling_hit(r, v, pull)
         return time
+
+
+class SheetSide(FacetNumbers):
+    """One side of a triangle that is a wall from both sides: a facet of a sheet, whose other side is another facet.
+
+    The sides are so far apart that the place of a particle says on which one it is, also where it touches it.
+    """
+
+    def behind(self):
+        return _BEHIND_SIDE * self.room.value
+
+    def is_ahead(self, start, end, near):
+        depth, within = self.phi(end), self.within(end)
+        beyond = select(within < 0.0, within, 0.0)
+        return (self.phi(start) <= self.behind()) & (beyond * beyond + depth * depth <= near * near)
+
+    def elsewhere(self, beyond, depth):
+        # What is behind it is on the other side of the sheet, and does not meet this one.
+        away = -math.sqrt(beyond * beyond + depth * depth)
+        return select(depth > self.behind(), -math.inf, away)

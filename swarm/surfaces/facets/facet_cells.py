@@ -41,15 +41,18 @@ class FacetCells(Record):
     room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
 
 
-def cells_around(like, table: Floats, corners: Floats) -> Grid:
+def cells_around(like, table: Floats, corners: Floats, beyond: float = 0.0) -> Grid:
     """The grid of the facets of a table, without what is free around its cells.
 
     Args:
         like: one of them.
         table: their numbers, one in each row.
         corners: of each its three (T, 3, 3) [m].
+        beyond: how far each goes on beyond the box of these [m].
     """
-    low, high = (np.ascontiguousarray(end(corners, axis=1).T) for end in (np.min, np.max))
+    low, high = (
+        np.ascontiguousarray(end(corners, axis=1).T + way * beyond) for end, way in ((np.min, -1.0), (np.max, 1.0))
+    )
     enter = cache.in_python(enter_bodies) if len(table) <= _SOME else enter_bodies
     cells = _cells(corners, low.min(axis=1), high.max(axis=1))
     grid = filled_grid(*cells, partial(enter, like, table, (low, high)))

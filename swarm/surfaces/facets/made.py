@@ -12,6 +12,7 @@ from ...kernel.vector import Vec
 from ..balls.facet import RoundTriangle
 from ..fields.many import field_of
 from ..fields.members import Members
+from .facet import OVERLAP, THIN
 from .free_room import CLOSED, FREE, KIND, rooms_of, with_blocks
 from .members import Facets
 from .mesh_files import Floats, Soup
@@ -64,7 +65,7 @@ def _whole(name: str, values: Any) -> NDArray[Any]:
 def sorted_by_place(mesh: Closed) -> Closed:
     """The triangles by their groups, those near to each other near: what a cell holds is in few lines of the cache."""
     middles = mesh.vertices[mesh.triangles].mean(axis=1)
-    low, wide = middles.min(axis=0), max(float(np.ptp(middles, axis=0).max()), np.finfo(np.float64).tiny)
+    low, wide = middles.min(axis=0), float(np.ptp(middles, axis=0).max()) or 1.0
     places = ((middles - low) * ((2**_BITS - 1) / wide)).astype(np.int64)
     keys = np.zeros(len(places), np.int64)
     for bit in range(_BITS):
@@ -75,7 +76,7 @@ def sorted_by_place(mesh: Closed) -> Closed:
 
 
 def table_of_facets(corners: Floats, room: float) -> Floats:
-    """The numbers of facets with these corners (T, 3, 3), one in each row."""
+    """The numbers of facets with these corners (T, 3, 3), one in each row, so much larger at each edge [m]."""
     a, b, c = np.moveaxis(corners, 1, 0)
     normal = _normals(a, b, c)
     columns = [normal, (normal * corners.mean(axis=1)).sum(axis=1)[:, None]]
@@ -84,6 +85,14 @@ def table_of_facets(corners: Floats, room: float) -> Floats:
         inwards /= np.linalg.norm(inwards, axis=1)[:, None]
         columns += [inwards, ((inwards * p).sum(axis=1) - room)[:, None]]
     return aligned_copy(np.concatenate(columns, axis=1))
+
+
+def table_of_sides(corners: Floats, room: float) -> Floats:
+    """The numbers of both sides of sheets with these corners (T, 3, 3), side by side; `room` is round-off [m]."""
+    table = aligned_copy(np.repeat(table_of_facets(corners, OVERLAP * room), 2, axis=0))
+    table[1::2, :4] *= -1.0
+    table[:, 3] -= THIN * room
+    return table
 
 
 def triangles_of_balls(corners: Floats, largest: float) -> Members:
@@ -105,7 +114,7 @@ def _normals(a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
-    """The facets with what is free around each cell."""
+    """The facets with what is free around each cell; with no `mesh` all that is empty is."""
     from scipy.ndimage import label
 
     grid = facets.grid
@@ -115,7 +124,9 @@ def with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
     rows = rooms_of(held, normals, starts)
     facets = facets._replace(grid=grid._replace(known=grid.known._replace(room=rows)))
     parts, count = label(~held)
-    if count:
+    if mesh is None:
+        with_blocks(rows, held)
+    elif count:
         # The middle of one cell of each part says on which side it is.
         labels, first = np.unique(parts.ravel(), return_index=True)
         first, labels = first[labels > 0], labels[labels > 0]

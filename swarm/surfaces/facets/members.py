@@ -37,8 +37,8 @@ class Facets(Members, Patched):
         facet = self.wall(number)
         return PlaneNumbers(facet.normal, facet.offset)
 
-    def is_near(self, number, r, near):
-        return self.wall(number).distance(r) >= -near
+    def is_ahead(self, number, start, end, near):
+        return self.wall(number).is_ahead(start, end, near)
 
     def wall_after(self, number, r, near):
         return _on_plane_of(self, number, r, near)

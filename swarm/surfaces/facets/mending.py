@@ -82,15 +82,13 @@ def _without_flat(soup: Soup) -> Soup:
     """The triangles that have an area, where edges are open: one without lies along an edge, and closes nothing."""
     if (edges_of(soup.triangles)[1] == 2).all():
         return soup
-    areas, longest = sizes(soup.vertices, soup.triangles)
-    kept = np.flatnonzero(areas > _NO_AREA * longest**2)
+    kept = have_area(soup.vertices, soup.triangles)
     return soup.of(soup.triangles[kept], kept) if len(kept) else soup
 
 
 def without_flat(soup: Soup) -> Soup:
     """The triangles that have an area, if they are closed without those that have none."""
-    areas, longest = sizes(soup.vertices, soup.triangles)
-    kept = np.flatnonzero(areas > _NO_AREA * longest**2)
+    kept = have_area(soup.vertices, soup.triangles)
     is_closed = len(kept) > 0 and bool((edges_of(soup.triangles[kept])[1] == 2).all())
     return soup.of(soup.triangles[kept], kept) if is_closed else soup
 
@@ -193,6 +191,12 @@ def sizes(vertices: Floats, triangles: Indices) -> tuple[Floats, Floats]:
     sides = np.roll(corners, -1, axis=1) - corners
     areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     return areas, np.linalg.norm(sides, axis=2).max(axis=1)
+
+
+def have_area(vertices: Floats, triangles: Indices) -> Indices:
+    """The triangles, by their numbers, that have an area."""
+    areas, longest = sizes(vertices, triangles)
+    return np.flatnonzero(areas > _NO_AREA * longest**2)
 
 
 def components(pairs: Indices, count: int) -> Indices:

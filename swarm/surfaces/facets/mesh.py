@@ -1,5 +1,6 @@
-"""A closed mesh of triangles, each of which is a wall."""
+"""A mesh of triangles, each of which is a wall: closed, or open, of sheets that have two sides."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -12,24 +13,27 @@ from numpy.typing import ArrayLike, NDArray
 from ...common import checks
 from ...common.checks import Vector
 from ...common.extras import needed_by
-from ...common.validated import Length, Magnitude
+from ...common.validated import Flag, Length, Magnitude
 from ...errors import SceneError
+from ...kernel.arrays import aligned_copy
 from ...kernel.vector import Vec
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region, of_triangles
 from ..fields.members import Members
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
-from .facet import FacetNumbers, Shared
+from .facet import OVERLAP, THIN, FacetNumbers, Shared, SheetSide
 from .facet_cells import cells_around
-from .made import given_arrays, sorted_by_place, table_of_facets, triangles_of_balls, with_room
+from .made import given_arrays, sorted_by_place, table_of_facets, table_of_sides, triangles_of_balls, with_room
 from .members import Facets
+from .mending import sizes
 from .mesh_files import Floats, Indices, read_soup
 from .nearest import boxes_of, nearest, within
-from .triangles import closed
+from .triangles import closed, sheets
 
 # The round-off of places, as a part of the farthest coordinate: far above that of numbers, and of a hit.
 _ROOM = 2.0**-40
+_NOUNS_OF_SHEETS = ("open mesh",) * 4
 # What a group may have of its own.
 _LAWS = ("restitution", "friction", "temperature", "accommodation", "laws")
 
@@ -47,16 +51,21 @@ class _Made(NamedTuple):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Mesh(Surface):
-    """A closed mesh whose triangles are walls, exactly: edges, corners and thin walls are what they are in the file.
+    """A mesh whose triangles are walls, exactly: edges, corners and thin walls are what they are in the file.
+
+    It is closed, or with `open=True` it is of sheets, whose triangles are walls from both sides: chutes, funnels, boxes
+    without a lid. Particles go around their edges; which way a triangle is turned does not matter.
 
     In a scene file: kind = "mesh" and file = "part.stl", relative to the scene file, without a `spacing`; laws of a
     group in a table [surface.groups.NAME]. Files other than STL and OBJ in text need the extra `mesh`.
 
     Args:
         vertices: the path of a file (.stl, .obj, .ply, .3mf, .off, ...), or corners (V, 3) [m].
-        triangles: None with a path, else (T, 3) the numbers of their corners. They must enclose a volume; a part within
-            an odd number of others is a cavity, whichever way its triangles are turned.
-        side: "inside" or "outside" of the mesh, the admissible part.
+        triangles: None with a path, else (T, 3) the numbers of their corners. They must enclose a volume, if not
+            `open`; a part within an odd number of others is a cavity, whichever way its triangles are turned.
+        side: "inside" or "outside" of the mesh, the admissible part; of sheets it is "outside", both sides of them.
+        open: whether the triangles are sheets. Their sides are 3e-11 of the farthest coordinate from them, which tells
+            on which one a point that touches a sheet is; balls touch the triangles themselves.
         center: where the origin of the file is, three numbers [m].
         scale: what a unit of the file is in metres, 0.001 for millimetres.
         weld: corners of open edges this near [m] are one, so that seams close; 0: none are. None: 1e-5 of the diagonal
@@ -70,6 +79,7 @@ class Mesh(Surface):
 
     Mended are: open seams, corners on the edges of others, triangles twice or without an area, and what is turned the
     wrong way; `mesh_weld` is how far a corner was moved at most. The triangles are sorted by their groups and places.
+    Of sheets, edges that are nearer to each other than `weld` are a seam too.
 
     Raises:
         SceneError: the file is missing or holds no mesh, the mesh is not closed (with its holes), its parts intersect,
@@ -95,6 +105,7 @@ class Mesh(Surface):
     group: Any = field(default=None, kw_only=True)
     names: Any = field(default=(), kw_only=True)
     mesh_weld: Magnitude | None = field(default=None, kw_only=True)
+    open: Flag = field(default=False, kw_only=True, metadata={"younger": True})
     _made: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
 
     refused = ("motion", "mass", "inertia")
@@ -102,6 +113,8 @@ class Mesh(Surface):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.open:
+            checks.assign(self, side="outside", nouns=_NOUNS_OF_SHEETS)
         given = self.vertices, self.triangles, self.group, self.names
         if self._made is None or any(a is not b for a, b in zip(self._made.given, given, strict=True)):
             made = self._mended()
@@ -123,7 +136,8 @@ class Mesh(Surface):
             soup = read_soup(path, self.scale)
         else:
             soup = given_arrays(self.vertices, self.triangles, self.group, self.names, self.scale)
-        mesh = sorted_by_place(closed(path, soup, self.weld))
+        made = (sheets if self.open else closed)(path, soup, self.weld)
+        mesh = sorted_by_place(made)
         for values in (mesh.vertices, mesh.triangles, mesh.group):
             values.flags.writeable = False
         return _Made((), mesh.vertices, mesh.triangles, mesh.group, mesh.names, mesh.weld)
@@ -149,7 +163,7 @@ class Mesh(Surface):
 
     def __repr__(self) -> str:
         """The number of triangles, and what is not a default."""
-        own = ("side", "center", "groups", "mesh_weld", *(one.name for one in fields(Surface)))
+        own = ("open" if self.open else "side", "center", "groups", "mesh_weld", *(one.name for one in fields(Surface)))
         changed = [one for one in fields(self) if one.name in own and getattr(self, one.name) != one.default]
         return (
             ", ".join([f"Mesh(<{len(self)} triangles>", *(f"{f.name}={getattr(self, f.name)!r}" for f in changed)])
@@ -168,12 +182,19 @@ class Mesh(Surface):
     def members(self) -> Facets:
         """The facets as kernels take them."""
         corners = self.corners[self.triangles if self.side == "inside" else self.triangles[:, ::-1]]
-        room = _ROOM * float(np.abs(self.corners).max())
-        table = table_of_facets(corners, room)
-        zero = Vec(0.0, 0.0, 0.0)
-        like = FacetNumbers(zero, 0.0, 3 * ((zero, 0.0),), Shared(room))
-        grid = cells_around(like, table, corners)
-        return with_room(Facets(like, table, grid), self._tree, self.is_solid())
+        zero, room = Vec(0.0, 0.0, 0.0), self._room
+        numbers = zero, 0.0, 3 * ((zero, 0.0),), Shared(room)
+        if self.open:
+            like, table = SheetSide(*numbers), table_of_sides(corners, room)
+            grid = cells_around(like, table, np.repeat(corners, 2, axis=0), OVERLAP * room)
+            return with_room(Facets(like, table, grid), None, True)
+        like, table = FacetNumbers(*numbers), table_of_facets(corners, room)
+        return with_room(Facets(like, table, cells_around(like, table, corners)), self._tree, self.is_solid())
+
+    @property
+    def _room(self) -> float:
+        """The round-off of places [m]."""
+        return _ROOM * float(np.abs(self.corners).max())
 
     @cached_property
     def _tree(self) -> tuple[Floats, Indices, Floats]:
@@ -190,18 +211,22 @@ class Mesh(Surface):
 
     def faces_of_balls(self, largest: float) -> tuple[Members, Indices]:
         """As `Many.faces_of_balls`: triangles in one plane, and those of a convex body."""
-        corners, face = faces_of(self.corners, self.triangles, -side_sign(self.side))
+        corners, face = faces_of(self.corners, self.triangles, 0.0 if self.open else -side_sign(self.side))
         return triangles_of_balls(corners, largest), face
 
     def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
-        return np.asarray(side_sign(self.side) * self.phi(points, time) + radius)
+        return np.asarray(side_sign(self.side) * self._nearest(points)[3] + radius)
+
+    def wall_count(self, of_balls: bool) -> int:
+        # Of points the two sides of a sheet are each a wall.
+        return len(self) * (2 if self.open and not of_balls else 1)
 
     def numbers(self) -> list[int]:
         """The number of every triangle."""
         return list(range(len(self)))
 
     def runs(self, walls: int = 0) -> list[tuple[Surface, int]]:
-        counts = np.bincount(self.group, minlength=len(self.names))
+        counts = np.bincount(self.group, minlength=len(self.names)) * (walls // len(self) or 1)
         given = self.groups or {}
         return [
             (replace(self, groups=None, **given.get(name, {})), count)
@@ -211,7 +236,11 @@ class Mesh(Surface):
     # --- For users ---------------------------------------------------------------------------------------
 
     def size(self) -> float:
-        return float(0.5 * np.ptp(self.vertices, axis=0).min())
+        if not self.open:
+            return float(0.5 * np.ptp(self.vertices, axis=0).min())
+        # One sheet has no extent across it.
+        areas, _longest = sizes(self.vertices, self.triangles)
+        return float(0.5 * min(np.ptp(self.vertices, axis=0).max(), math.sqrt(areas.sum())))
 
     def bounds(self) -> Box:
         return UNBOUNDED if self.is_solid() else self.enclosing_box()
@@ -228,12 +257,22 @@ class Mesh(Surface):
         return float(np.linalg.norm(self.corners, axis=1).max())
 
     def volume(self) -> float:
-        """What the triangles enclose [m^3]."""
+        """What the triangles enclose [m^3].
+
+        Raises:
+            SceneError: they are sheets.
+        """
+        if self.open:
+            raise SceneError(
+                f"a mesh must be closed to enclose a volume, got {self!r}, whose sheets have no inside; leave open out"
+            )
         a, b, c = np.moveaxis((self.vertices - self.vertices[0])[self.triangles], 1, 0)
         return float((a * np.cross(b, c)).sum() / 6.0)
 
     def contain(self, points: Floats) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is admissible: cheaper than phi."""
+        if self.open:
+            return np.asarray(self.phi(points) >= 0.0)
         found = np.empty(points.shape[1], np.bool_)
         within(self.members, self._tree, np.ascontiguousarray(points), found)
         return found
@@ -241,8 +280,12 @@ class Mesh(Surface):
     admits = contain
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """The signed distance at points (3, N): below 0 inside, above 0 outside; shape (N,)."""
-        return np.asarray(self._nearest(points)[3])
+        """The signed distance at points (3, N): below 0 inside, above 0 outside; shape (N,).
+
+        Of sheets it is that from the nearest side of one, above 0 but between these.
+        """
+        found = np.asarray(self._nearest(points)[3])
+        return found - THIN * self._room if self.open else found
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gradient of that phi at points (3, N); shape (3, N)."""
@@ -252,5 +295,15 @@ class Mesh(Surface):
         rows = self._own_rows(points, 0.0)
         flat = np.ascontiguousarray(np.array(rows).reshape(3, -1))
         found = np.empty((4, flat.shape[1]))
-        nearest(self.members, self._tree, flat, found)
-        return np.asarray(side_sign(self.side) * found.reshape(4, *np.shape(rows.x)))
+        if not self.open:
+            nearest(self.members, self._tree, flat, found)
+            return np.asarray(side_sign(self.side) * found.reshape(4, *np.shape(rows.x)))
+        # Of each triangle one side
+        members = self.members._replace(table=aligned_copy(self.members.table[::2]))
+        nearest(members, self._tree, flat, found)
+        return (found * np.where(found[3] < 0.0, -1.0, 1.0)).reshape(4, *np.shape(rows.x))
+
+    def admissible(self, phi: float) -> str:
+        if self.open:
+            return f"it is on a sheet, and must be on one side of it, where phi is 0 or more; phi = {phi:.6g} there"
+        return super().admissible(phi)

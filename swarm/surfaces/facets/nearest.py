@@ -65,7 +65,7 @@ def within(facets, mesh, points, found):
 @outlined
 def _nearest(facets, mesh, r):
     """The nearest triangle: through the tree, of two boxes the nearer one first."""
-    boxes, count = mesh[2], facets.table.shape[0]
+    boxes, count = mesh[2], mesh[1].shape[0]
     leaves, waiting, last = boxes.shape[0] // 2, scratch(_DEEPEST, np.int64), 1
     near = NearestTriangle(math.inf, r, 0.0, r)
     waiting[0] = 1

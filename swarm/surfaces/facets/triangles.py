@@ -1,4 +1,4 @@
-"""A closed mesh of triangles from a file: read, its corners joined, its parts turned, or refused with a place."""
+"""A mesh of triangles from a file: read, its corners joined, its parts turned if it is closed, or refused."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -8,7 +8,7 @@ import numpy as np
 from ...common.extras import needed_by
 from ...errors import SceneError
 from ..surface import shown
-from .mending import edges_of, groups_of, joined, neighbours, seams_closed, turned_alike, without_flat
+from .mending import edges_of, groups_of, have_area, joined, neighbours, seams_closed, turned_alike, without_flat
 from .mesh_files import Floats, Indices, Soup, read_soup
 
 # Corners of a part that are looked up in another one, about.
@@ -18,11 +18,11 @@ _LISTED = 5
 
 
 class TriangleMesh(NamedTuple):
-    """Triangles that enclose a volume.
+    """Triangles that enclose a volume, or sheets.
 
     Attributes:
         vertices: (V, 3) [m].
-        triangles: (T, 3) their corners, counter-clockwise seen from outside.
+        triangles: (T, 3) their corners, counter-clockwise seen from outside if they enclose a volume.
         weld: how far a corner was moved at most to close seams [m].
         group: (T,) the number of the group of each triangle.
         names: of the groups.
@@ -67,7 +67,22 @@ def closed(path: Path, soup: Soup, weld: float | None) -> TriangleMesh:
             f"a Klein bottle: neighbours are not at {len(wrong)} edges, one at "
             f"{shown(soup.vertices[wrong[0]].mean(axis=0))}; mend it, for example with MeshLab"
         )
-    soup = _outward(path, soup)
+    return _of_used(_outward(path, soup), moved)
+
+
+def sheets(path: Path, soup: Soup, weld: float | None) -> TriangleMesh:
+    """The sheets that triangles make, each triangle once; their corners are joined as those of a closed mesh are."""
+    soup, moved, _within = seams_closed(joined(soup), weld)
+    _corners, first = np.unique(np.sort(soup.triangles, axis=1), axis=0, return_index=True)
+    kept = np.sort(first)
+    kept = kept[have_area(soup.vertices, soup.triangles[kept])]
+    if not len(kept):
+        raise SceneError(f"the mesh {path} must hold triangles that have an area, got none")
+    return _of_used(soup.of(soup.triangles[kept], kept), moved)
+
+
+def _of_used(soup: Soup, moved: float) -> TriangleMesh:
+    """The triangles with the corners that they use."""
     used, turned = np.unique(soup.triangles, return_inverse=True)
     return TriangleMesh(soup.vertices[used], turned.reshape(-1, 3), moved, soup.group, soup.names)
 
@@ -98,7 +113,7 @@ def _refuse_open(path: Path, vertices: Floats, edges: Indices, counts: Indices, 
     raise SceneError(
         f"the mesh {path} must be closed (watertight), with two triangles at each edge, got {len(rims)} edges of one "
         f"triangle and {len(many)} of more than two: {'; '.join(messages)}; close its holes, for example with "
-        "trimesh.repair or MeshLab"
+        "trimesh.repair or MeshLab, or use swarm.Mesh with open=True, whose triangles are walls from both sides"
     )
 
 

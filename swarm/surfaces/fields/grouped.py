@@ -62,6 +62,7 @@ class Order(NamedTuple):
     others: tuple[int, ...]
     # Of each union its rooms, of each room its surfaces, of which the walls come last.
     unions: tuple[tuple[tuple[int, ...], ...], ...] = ()
+    of_balls: bool = False
 
     def joined(self) -> tuple[int, ...]:
         """The surfaces of unions of several rooms."""
@@ -80,16 +81,19 @@ class Order(NamedTuple):
         return self._listed(surfaces, [(group[0], len(group)) for group in self.groups])
 
     def _listed(self, surfaces: Sequence[Surface], groups: list[tuple[int, int]]) -> list[tuple[int, int]]:
-        fields = [(i, len(surfaces[i])) for i in self.fields]  # type: ignore[arg-type]
+        fields = [(i, surfaces[i].wall_count(self.of_balls)) for i in self.fields]
         return [*fields, *groups, *((i, 1) for i in self.alone() for _wall in surfaces[i].walls())]
 
 
 def order_of(
-    surfaces: Sequence[Surface], together: bool = True, unions: Sequence[tuple[tuple[int, ...], ...]] = ()
+    surfaces: Sequence[Surface],
+    together: bool = True,
+    unions: Sequence[tuple[tuple[int, ...], ...]] = (),
+    of_balls: bool = False,
 ) -> Order:
     """The order of the walls of a scene; where a surface moves, or not `together`, all are walls of their own.
 
-    `unions` are those of surfaces, as of `Order`.
+    `unions` are those of surfaces, as of `Order`; the walls are those of points, or `of_balls`.
     """
     joined = {i for rooms in unions for room in rooms for i in room}
     fields = [i for i, surface in enumerate(surfaces) if isinstance(surface, _FIELDS)]
@@ -123,7 +127,7 @@ def order_of(
     fields.sort(key=lambda i: len(surfaces[i]))  # type: ignore[arg-type]
     groups.sort(key=len)
     fields, others = (by_kind(by_kind(some, volumes), walls) for some in (fields, others))
-    return Order(tuple(fields), tuple(by_kind(groups, body)), tuple(others), tuple(unions))
+    return Order(tuple(fields), tuple(by_kind(groups, body)), tuple(others), tuple(unions), of_balls)
 
 
 def _laws(surface: Surface) -> tuple[Any, ...]:

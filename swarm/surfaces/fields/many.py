@@ -132,6 +132,9 @@ class Many(Surface):
     def body_count(self) -> int:
         return len(self)
 
+    def wall_count(self, of_balls: bool) -> int:
+        return len(self)
+
     def enclosing_box(self) -> Box:
         low, high = self.corners()
         return tuple(low.min(axis=1).tolist()), tuple(high.max(axis=1).tolist())

@@ -13,6 +13,7 @@ from ...common import checks
 from ...common.checks import Vector
 from ...errors import SceneError
 from ...motion import Oscillation, Path, Rotation, Translation, parts_of, unit_axis
+from ..facets.mesh import Mesh
 from ..fields.many import Many
 from ..outlines.outlined import Outlined
 from ..surface import Box, Surface
@@ -51,7 +52,7 @@ def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0
         return [surface]
     if isinstance(surface, Many):
         return [_many_images(surface, period, name, largest)]
-    low, high = body_of(surface).bounds() if surface.is_solid() else surface.bounds()
+    low, high = extent_of(surface)
     shifts: list[list[float]] = [[0.0], [0.0], [0.0]]
     for k, length in enumerate(period):
         if length is not None and not is_same_along(surface, k, period):
@@ -137,9 +138,12 @@ def _shifts(
     return [n * length for n in range(first, last + 1)]
 
 
-def body_of(surface: Surface) -> Surface:
-    """The volume of a solid, as the cavity of the same shape."""
-    return replace(surface, side="inside", motion=None)  # type: ignore[call-arg]
+def extent_of(surface: Surface) -> Box:
+    """The box that a solid is in, or a cavity."""
+    if isinstance(surface, Mesh):
+        return surface.enclosing_box()
+    body = replace(surface, side="inside", motion=None) if surface.is_solid() else surface  # type: ignore[call-arg]
+    return body.bounds()
 
 
 def _shifted(surface: Surface, shift: Sequence[float]) -> Surface:

@@ -40,7 +40,7 @@ from .axes import (
     time_to_leave,
 )  # fmt: skip
 from .gaps import Beside, Gap, Gaps, longer, over_faces
-from .images import Lengths, body_of, is_same_along
+from .images import Lengths, extent_of, is_same_along
 
 Floats = NDArray[np.float64]
 
@@ -220,7 +220,7 @@ def _corners(surface: Surface) -> tuple[Floats, Floats]:
     """The corners (3, n) of boxes around what a surface fills, or around each of its bodies."""
     if isinstance(surface, Many):
         return surface.corners()
-    low, high = (body_of(surface) if surface.is_solid() else surface).bounds()
+    low, high = extent_of(surface)
     return np.array(low)[:, None], np.array(high)[:, None]
 
 

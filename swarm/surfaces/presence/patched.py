@@ -26,8 +26,11 @@ class Patched(Record):
         """A wall without its edges."""
         return self.wall(number)  # type: ignore[attr-defined]
 
-    def is_near(self, number, r, near):
-        """Whether the patch of a wall may be nearer to a point than `near`."""
+    def is_ahead(self, number, start, end, near):
+        """Whether what goes from one place to another may come through the patch of a wall.
+
+        No place on its way is farther from the end than `near`.
+        """
         return True
 
     def wall_after(self, number, r, near):

@@ -1,0 +1,267 @@
+"""Sheets: triangles that are walls from both sides: impacts as at planes, none through, slides to the rim."""
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+from conftest import rarely
+from thorny import aimed, thorny
+
+import swarm
+from swarm import scene_file
+from swarm.serialization import tables
+from swarm.surfaces.facets.facet import OVERLAP, THIN
+
+BOX = trimesh.creation.box((1.0, 1.0, 1.0))
+DOWN = (0.3, -0.2, -1.0)
+G = 9.81
+
+
+def turned(faces, seed=5):
+    """Triangles of which half are turned over."""
+    faces = np.array(faces)
+    over = np.random.default_rng(seed).random(len(faces)) < 0.5
+    faces[over] = faces[over, ::-1]
+    return faces
+
+
+def tray(**given):
+    """A box of 1 m without a lid."""
+    vertices, faces = np.array(BOX.vertices), turned(BOX.faces)
+    return swarm.Mesh(vertices, faces[~(vertices[faces][:, :, 2] == 0.5).all(axis=1)], open=True, **given)
+
+
+def triangle(**given):
+    return swarm.Mesh([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.5, 0.0]], [[0, 1, 2]], open=True, **given)
+
+
+def plate(tilt, **given):
+    """Two triangles of 2 m by 2 m that fall along x."""
+    ends = (-1.0, 1.0)
+    corners = np.array([[x * math.cos(tilt), y, -x * math.sin(tilt)] for x in ends for y in ends])
+    return swarm.Mesh(corners, [[0, 1, 2], [2, 3, 1]], open=True, **given)
+
+
+def gap(mesh):
+    """How far the sides of a sheet are from it."""
+    return THIN * mesh._room
+
+
+def run(mesh, position, velocity, gravity=None, until=2.0, **given):
+    scene = swarm.Scene([mesh], gravity)
+    start = swarm.Particles(np.array(position, float), np.array(velocity, float))
+    return swarm.simulate(scene, start, swarm.Impact(), **{"until": until, "compile": "never", **given})
+
+
+# --- The description -------------------------------------------------------------------------------------
+
+
+def test_phi_is_the_distance():
+    mesh, box = tray(), swarm.Box((0.5, 0.5, 0.5), open=("+z",))
+    points = np.random.default_rng(1).uniform(-0.5, 0.5, (3, 300))
+    exact = -box.phi(points)
+    assert np.abs(mesh.phi(points) + gap(mesh) - exact).max() < 1e-15
+    step = 1e-6
+    differences = [(mesh.phi(points + e) - mesh.phi(points - e)) / (2.0 * step) for e in step * np.eye(3)[:, :, None]]
+    assert np.median(np.abs(mesh.gradient(points) - differences)) < 1e-9
+    assert mesh.contain(points).all()
+    assert (mesh.phi(np.array(BOX.vertices)[:4].T) < 0.0).all()
+    assert gap(mesh) < 2e-11
+
+
+def test_a_scene_of_sheets_is_open():
+    scene = swarm.Scene([tray()])
+    assert scene.is_open()
+    assert not np.isfinite(scene.bounds()).any()
+    assert tray().size() == 0.5
+    assert plate(0.2).size() == pytest.approx(1.0)
+
+
+def test_what_has_no_inside_is_refused():
+    with pytest.raises(swarm.SceneError, match="must be closed to enclose a volume"):
+        tray().volume()
+    with pytest.raises(swarm.SceneError, match="open to infinity"):
+        swarm.fill(swarm.Scene([tray()]), 10, speed=1.0)
+    with pytest.raises(swarm.SceneError, match="on a sheet, and must be on one side of it"):
+        run(triangle(), [[0.0], [0.0], [0.0]], [[0.0], [0.0], [1.0]])
+    with pytest.raises(swarm.SceneError, match=r"motion must be None for Mesh"):
+        tray(motion=swarm.Translation((1.0, 0.0, 0.0)))
+    with pytest.raises(swarm.SceneError, match="triangles that have an area, got none"):
+        swarm.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], open=True)
+
+
+def test_a_file_that_is_not_watertight(tmp_path):
+    mesh = tray()
+    path = tmp_path / "tray.stl"
+    trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False).export(path)
+    with pytest.raises(swarm.SceneError, match="open=True"):
+        swarm.Mesh(path)
+    read = swarm.Mesh(path, open=True)
+    assert len(read) == 10
+    assert len(read.vertices) == 8
+    text = '[[surface]]\nkind = "mesh"\nfile = "tray.stl"\nopen = true\n[particles]\ncount = 1\nspeed = 1.0\n'
+    (tmp_path / "scene.toml").write_text(text + "within = { kind = 'sphere', radius = 0.1 }\n")
+    (tmp_path / "scene.toml").write_text(
+        '[[surface]]\nkind = "sphere"\nradius = 2.0\n' + text + '[method]\nkind = "impact"\n[run]\nuntil = 1.0\n'
+    )
+    sheet = scene_file.read(tmp_path / "scene.toml").scene.surfaces[1]
+    assert sheet.open
+    assert np.array_equal(sheet.vertices, read.vertices)
+    again = tables.scene_of([tables.table_of(sheet)], None).surfaces[0]
+    assert again.open
+    assert np.array_equal(again.triangles, sheet.triangles)
+    assert "open" not in tables.table_of(swarm.Mesh(np.array(BOX.vertices), np.array(BOX.faces)))
+
+
+def test_a_triangle_is_one_whichever_way_it_is_turned():
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.5, 0.5, 1.0]]
+    mesh = swarm.Mesh(corners, [[0, 1, 2], [2, 1, 0], [1, 3, 2], [1, 4, 2], [1, 2, 2]], open=True)
+    assert len(mesh) == 3
+
+
+# --- Flights ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -0.5)])
+def test_a_box_of_sheets_has_the_impacts_of_planes(gravity):
+    """Until a particle leaves through the open top."""
+    random = np.random.default_rng(2)
+    n = 40
+    position, velocity = random.uniform(-0.4, 0.3, (3, n)), random.normal(0.0, 1.0, (3, n))
+    velocity[2] *= 0.1
+    mesh = tray()
+    end = run(mesh, position, velocity, gravity, until=4.0)
+    half = 0.5 - gap(mesh)
+    box = swarm.Scene([swarm.Box((half, half, half), open=("+z",))], gravity)
+    same = swarm.simulate(box, swarm.Particles(position, velocity), swarm.Impact(), until=4.0, compile="never")
+    stay = same.particles.position[2] < half
+    assert stay.sum() > 20
+    assert np.abs(end.particles.position - same.particles.position)[:, stay].max() < 1e-11
+    assert np.array_equal(end.impacts_per_particle[stay], same.impacts_per_particle[stay])
+    assert end.observables["energy_error"].max() < 1e-12
+
+
+def test_a_triangle_is_met_from_both_sides():
+    position = np.array([[0.1, 0.1, 0.1, 0.95], [0.0, 0.0, 0.0, 0.9], [0.3, -0.3, 0.4, 0.3]])
+    velocity = np.array([[0.02, 0.02, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [-0.5, 0.5, -1.0, -1.0]])
+    mesh = triangle()
+    end = run(mesh, position, velocity, until=1.0)
+    away = gap(mesh)
+    assert end.impacts_per_particle.tolist() == [1, 1, 1, 0]
+    expected = [0.2 + 2.0 * away, -0.2 - 2.0 * away, 0.6 + 2.0 * away, -0.7]
+    assert np.abs(end.particles.position[2] - expected).max() < 1e-15
+    falls = run(mesh, position, velocity, (0.0, 0.0, -G), until=3.0)
+    # What is below falls away, what is above never comes below the triangle while it is over it.
+    assert falls.particles.position[2, 1] < -10.0
+    assert (falls.particles.position[2, [0, 2]] > 0.0).all()
+    assert falls.observables["energy_error"].max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("shape", "gravity"), [("box", DOWN), rarely("thorny", None), rarely("box", None), rarely("thorny", DOWN)]
+)
+def test_no_particle_passes_a_closed_sheet(shape, gravity):
+    """The first flights go exactly to corners and edges, from inside and from outside."""
+    vertices, faces = (BOX.vertices, BOX.faces) if shape == "box" else thorny()
+    closed = swarm.Mesh(np.array(vertices), np.array(faces))
+    mesh = swarm.Mesh(np.array(vertices), turned(faces), open=True)
+    scene = swarm.Scene([mesh, swarm.Sphere(1.3)], gravity)
+    start = aimed(mesh, swarm.fill(scene, 2000, speed=1.0, seed=2), gravity)
+    within = closed.contain(start.position)
+    assert 150 < within.sum() < 800
+    end = swarm.simulate(scene, start, swarm.Impact(), until=24.0 if shape == "box" else 12.0, compile="always")
+    assert np.array_equal(closed.contain(end.particles.position), within)
+    assert end.impacts_per_particle.sum() > 1e5
+    assert end.observables["energy_error"].max() < 1e-12
+    assert end.observables["max_penetration"].max() < 1e-12
+
+
+@pytest.mark.parametrize("fold", [0.05, 0.3, 1.2, 2.5, 3.1])
+def test_no_particle_passes_the_edge_of_a_fold(fold):
+    """Two sheets at any angle, and a third one between them; flights go exactly to the edge from all around."""
+    ways = [np.array([math.cos(a), math.sin(a), 0.0]) for a in (0.0, fold, 0.4 * fold)]
+    z = np.array([0.0, 0.0, 1.0])
+    corners = np.concatenate([[-z, z], *([w - z, w + z] for w in ways)])
+    faces = [[0, 1, k] for k in (2, 4, 6)] + [[1, k + 1, k] for k in (2, 4, 6)]
+    mesh = swarm.Mesh(corners, faces, open=True)
+    random, n = np.random.default_rng(3), 80
+    angle = random.uniform(0.0, 2.0 * np.pi, n)
+    angle = angle[np.abs(angle[:, None] - [0.0, fold, 0.4 * fold, 2.0 * np.pi]).min(axis=1) > 1e-3]
+    place = np.stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), random.uniform(-0.2, 0.2, len(angle))])
+    target = np.stack([0.0 * angle, 0.0 * angle, random.uniform(-0.5, 0.5, len(angle))])
+    end = run(mesh, place, target - place, until=1.3)
+    after = np.arctan2(end.particles.position[1], end.particles.position[0]) % (2.0 * np.pi)
+    sectors = np.sort([0.0, 0.4 * fold, fold])
+    assert np.array_equal(np.searchsorted(sectors, after), np.searchsorted(sectors, angle))
+    assert (end.impacts_per_particle > 0).all()
+
+
+# --- Lasting contact -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_slide_down_a_sheet_and_off_its_rim(friction, side):
+    """On either side, over the diagonal, as on an incline; then it falls freely."""
+    tilt, height, until = 0.3, 1e-3, 1.4
+    sine, cosine = math.sin(tilt), math.cos(tilt)
+    along, normal = np.array([cosine, 0.0, -sine]), np.array([sine, 0.0, cosine])
+    mesh = plate(tilt, restitution=0.0, friction=friction)
+    away = gap(mesh)
+    # Gravity is turned over with the side, and so is the way down.
+    start = side * (-0.5 * along + (height + away) * normal) + (0.0, 0.2, 0.0)
+    end = run(mesh, start[:, None], np.zeros((3, 1)), (0.0, 0.0, -side * G), until=until)
+    # It falls onto the sheet, and the impact takes the normal velocity, and friction of the tangential one.
+    fall = math.sqrt(2.0 * height / (G * cosine))
+    place, speed = -0.5 + 0.5 * G * sine * fall**2, G * sine * fall - friction * G * cosine * fall
+    pull = G * (sine - friction * cosine)
+    # Sheets are so much larger at their edges.
+    way = 1.0 + OVERLAP * mesh._room - place
+    slide = (-speed + math.sqrt(speed**2 + 2.0 * pull * way)) / pull
+    left = until - fall - slide
+    rim, pace = (place + way) * along + away * normal, (speed + pull * slide) * along
+    expected = side * (rim + pace * left - np.array([0.0, 0.0, 0.5 * G * left**2])) + (0.0, 0.2, 0.0)
+    assert left > 0.1
+    assert np.abs(end.particles.position[:, 0] - expected).max() < 1e-11
+    assert end.observables["sliding_time"][-1] == pytest.approx(slide, rel=1e-8)
+    assert end.observables["energy_error"].max() < 1e-12
+
+
+def test_grooves_hold_what_slides_in_them():
+    """Three sheets at one edge: particles come to slide in a groove, on either side of the middle sheet, to its end."""
+    low, high = np.array([1.0, 0.0, -0.3]), np.array([-1.0, 0.0, 0.3])
+    ways = [np.array(w) for w in ((0.0, 1.0, 1.0), (0.0, -1.0, 0.7), (0.0, 0.05, 1.0))]
+    corners = np.concatenate([[high, low], *([high + w, low + w] for w in ways)])
+    faces = [[0, 1, k] for k in (2, 4, 6)] + [[1, k + 1, k] for k in (2, 4, 6)]
+    mesh = swarm.Mesh(corners, faces, open=True, restitution=0.0, friction=0.05)
+    random, n = np.random.default_rng(4), 3
+    place = np.stack([random.uniform(-0.8, 0.0, n), random.uniform(-0.5, 0.5, n), random.uniform(0.9, 1.1, n)])
+    end = run(mesh, place, np.zeros((3, n)), (0.0, 0.0, -G), until=0.8, every=0.2)
+    seen = end.observables
+    assert seen["sliding"][-1] == n
+    assert seen["max_penetration"].max() < 1e-12
+    total = seen["total_energy"] + seen["dissipated_energy"]
+    assert np.abs(total - total[0]).max() < 1e-12 * np.abs(total[0])
+    sides = [p[1] - 0.05 * (p[2] + 0.3 * p[0]) > 0.0 for p in (place, end.particles.position)]
+    assert np.array_equal(*sides)
+    assert 0 < sides[0].sum() < n
+
+
+# --- Laws ------------------------------------------------------------------------------------------------
+
+
+def test_groups_and_times_of_sheets():
+    corners = [[-1, -1, 0], [1, -1, 0], [0, 1, 0], [-1, -1, 1], [1, -1, 1], [0, 1, 1]]
+    mesh = swarm.Mesh(
+        corners, [[0, 1, 2], [3, 5, 4]], open=True, group=[0, 1], names=("low", "high"),
+        groups={"high": {"restitution": 0.5}}, present=[(0.0, 0.7)],
+    )  # fmt: skip
+    position = np.array([[0.0] * 4, [0.0] * 4, [0.2, 0.8, -0.3, 1.4]])
+    velocity = np.array([[0.0] * 4, [0.0] * 4, [-1.0, 1.0, 1.0, -1.0]])
+    end = run(mesh, position, velocity, until=1.0, member_impacts=True)
+    assert end.particles.velocity[2].tolist() == [1.0, -0.5, -1.0, 0.5]
+    assert [one.tolist() for one in end.member_impacts] == [[2, 2]]
+    # After 0.7 s none is there.
+    later = run(mesh, [[0.0], [0.0], [0.8]], [[0.0], [0.0], [-1.0]], until=1.0)
+    assert later.particles.position[2, 0] == pytest.approx(-0.2)
