@@ -329,6 +329,7 @@ ENGINES: dict[str, Engine] = {
 }
 _OF_SINGLES = ("points, Impact", "points, Penalty", "points, AugmentedLagrangian", "bodies, Impact")
 _OF_BALLS_APART = ("field", "listed solids")
+_OF_BALLS = ("balls, Impact", "grains, Penalty", "balls, heavy wall")
 _OF_POINTS = ("points, Impact", "points, Penalty", "points, AugmentedLagrangian", "points, heavy wall")
 
 
