@@ -26,7 +26,7 @@ from ..files import marks, paths
 from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import Births, Particles
-from ..run.machine import RunEnd, birth_times
+from ..run.machine import RunEnd
 from ..run.options import RunOptions, Task
 from ..run.tally import scales_of
 from ..state import Absorbed, Multipliers
@@ -47,6 +47,7 @@ class Whole(NamedTuple):
     start: str
     scales: tuple[float, float]
     volume: float | None  # that the particles were filled into [m^3]
+    balls: tuple[Any, ...]  # the sources, where they are of balls
 
 
 def folder_of(trajectory: Path) -> Path:
@@ -85,15 +86,16 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     sent_modules.send_code()
     body = None if task.bodies is None else task.bodies.body
     options = dataclasses.replace(task.options, progress=False, cluster=None, shards=None, observables=None)
-    volume = task.particles.volume
-    whole = Whole(task.compiled, task.method, options, body, bounds, start, scales_of(task), volume)
+    births, volume = task.particles.births, task.particles.volume
+    balls = () if births is None else births.balls
+    whole = Whole(task.compiled, task.method, options, body, bounds, start, scales_of(task), volume, balls)
     _replace(folder / "whole.pickle", lambda file: cloudpickle.dump(whole, file))
     for name in _ARRAYS:
         array = getattr(task.particles, name)
         if array is not None and not (name == "mass" and body):
             _replace(folder / f"{name}.npy", functools.partial(_save, array))
-    if task.particles.births is not None:
-        for name, array in zip(_BIRTHS, task.particles.births, strict=False):
+    if births is not None:
+        for name, array in zip(_BIRTHS, births, strict=False):
             _replace(folder / f"{name}.npy", functools.partial(_save, array))
 
 
@@ -166,7 +168,7 @@ def task_of(folder: Path, k: int) -> Task:
         particles = Particles(**some)
         particles.volume = whole.volume
         if born:
-            particles.births = Births(born[0], born[1], len(whole.options.sources))
+            particles.births = Births(born[0], born[1], len(whole.options.sources), whole.balls)
     else:
         shape = 3, len(whole.body), -1
         position, velocity = (np.array(arrays[name].reshape(shape)[..., first:last], order="C") for name in _ARRAYS[:2])
@@ -186,6 +188,7 @@ def write_end(path: Path, end: RunEnd) -> None:
     if end.absorbed is not None:
         arrays |= {f"absorbed.{name}": array for name, array in end.absorbed._asdict().items()}
     own = {"image": end.particles.image, "spin": end.particles.spin, "collisions": end.collisions}
+    own["birth_time"] = end.birth_time
     arrays |= {name: array for name, array in own.items() if array is not None}
     if end.multipliers is not None:
         arrays |= {f"multipliers.{name}": array for name, array in end.multipliers._asdict().items()}
@@ -216,5 +219,5 @@ def joined_end(folder: Path, task: Task, bounds: list[int]) -> RunEnd:
     gone = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("absorbed.")}
     return RunEnd(
         particles, {}, 0.0, Multipliers(**loops) if loops else None, flat["impacts"], flat["escape_time"],
-        Absorbed(**gone) if gone else None, birth_times(particles), flat.get("collisions"),
+        Absorbed(**gone) if gone else None, flat["birth_time"], flat.get("collisions"),
     )  # fmt: skip
