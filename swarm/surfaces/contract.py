@@ -232,6 +232,13 @@ class Smooth(AtRest):
     # Whether its `course` may be one from afar.
     may_be_far = True
 
+    # How many numbers of the steps of a straight flight lanes keep, if those are a `PolynomialFlight`.
+    kept = 0
+
+    def refined(self, r, v, time):
+        """The time to which these steps lead, by what the level is there: its coefficients have the round-off of r."""
+        raise NotImplementedError
+
     def near(self, gravity, r, v):
         """A polynomial of time that is nowhere below the level of a flight from here on, and touches it here.
 

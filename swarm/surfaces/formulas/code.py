@@ -23,8 +23,15 @@ Function = Callable[..., Any]
 _classes: dict[str, Any] = {}
 
 
-def class_of(parameters: Any, phi: Function, gradient: Function, hessian: Function | None = None) -> Any:
-    """The class of numbers whose kernels call these functions.
+def class_of(
+    parameters: Any,
+    phi: Function,
+    gradient: Function,
+    hessian: Function | None = None,
+    along: Function | None = None,
+    base: Any = OwnNumbers,
+) -> Any:
+    """The class of numbers whose kernels call these functions; with `along`, the coefficients of phi along a flight.
 
     Raises:
         SceneError: they are not functions of (parameters, x, y, z), or the parameters are no NamedTuple of numbers.
@@ -41,10 +48,13 @@ def class_of(parameters: Any, phi: Function, gradient: Function, hessian: Functi
         if function is not None:
             _check_function(name, function)
             copies.append(frozen.function(function))
+    if along is not None:
+        frozen.value(base.__name__)
+        copies.append(frozen.function(along))
     name = f"Own_{frozen.digest()}"
     if name not in _classes:
         made: Any = type(OwnNumbers)(  # type: ignore[misc]
-            name, (OwnNumbers,), {"__module__": __name__, **_methods(names, *copies)}
+            name, (base,), {"__module__": __name__, **_methods(names, *copies)}
         )
         # Two threads that ask at the same time get the same class.
         _classes.setdefault(name, made)
@@ -61,7 +71,11 @@ def _check_function(name: str, function: Any) -> None:
 
 
 def _methods(
-    names: tuple[str, ...], phi: Function, gradient: Function, hessian: Function | None = None
+    names: tuple[str, ...],
+    phi: Function,
+    gradient: Function,
+    hessian: Function | None = None,
+    along: Function | None = None,
 ) -> dict[str, Function]:
     """The methods of the class of numbers."""
     value, slope = _taking_arrays(phi, 1), _taking_arrays(gradient, 3)
@@ -85,8 +99,13 @@ def _methods(
         d = r - self.center
         return Symmetric(*hessian(own(self), d.x, d.y, d.z))  # type: ignore[misc]
 
+    def along_of(self, r, v):
+        d = r - self.center
+        return along(own(self), d.x, d.y, d.z, v.x, v.y, v.z)  # type: ignore[misc]
+
     methods = {"phi": phi_of, "gradient": gradient_of}
-    return methods if hessian is None else {**methods, "hessian": hessian_of}
+    methods |= {} if hessian is None else {"hessian": hessian_of}
+    return methods if along is None else {**methods, "along": along_of}
 
 
 # --- Arrays of points in plain Python --------------------------------------------------------------------

@@ -16,6 +16,7 @@ from .expression import COORDINATES, NonSmoothTerm, parse
 from .form import Form
 from .interval import IntervalBoxes, check_constants, check_smooth
 from .numbers import Bend
+from .series import DEGREE, VELOCITY, LevelSeries
 
 # Operations of the derivatives: beyond, deriving and compiling them would take minutes.
 _MOST_OPERATIONS = 4000
@@ -44,7 +45,7 @@ def derived(text: str, names: tuple[str, ...]) -> "Derived":
     hessian = tuple(sympy.diff(gradient[i], axis) / 2 for i, axis in pairs)
     _check_length(hessian)
     functions = (_function("phi", (phi,)), _function("gradient", gradient), _function("hessian", hessian))
-    return Derived(phi, gradient, hessian, tuple(pieces), axes, functions)
+    return Derived(phi, gradient, hessian, tuple(pieces), axes, functions, _along(phi))
 
 
 def _check_length(rows: Sequence[Any]) -> None:
@@ -64,6 +65,7 @@ class Derived(NamedTuple):
     pieces: tuple[NonSmoothTerm, ...]
     axes: tuple[Any, ...]
     functions: tuple[Any, ...]
+    along: Any  # the function of the coefficients of a polynomial along a straight flight, or None
 
     def with_values(self, values: tuple[float, ...]) -> "Derived":
         """The expressions with numbers in place of the parameters."""
@@ -73,7 +75,7 @@ class Derived(NamedTuple):
         pieces = tuple(one._replace(argument=one.argument.subs(numbers)) for one in self.pieces)
         check_constants(pieces)
         gradient, hessian = (tuple(one.subs(numbers) for one in rows) for rows in (self.gradient, self.hessian))
-        return Derived(self.phi.subs(numbers), gradient, hessian, pieces, self.axes, self.functions)
+        return Derived(self.phi.subs(numbers), gradient, hessian, pieces, self.axes, self.functions, self.along)
 
     def found_box(self) -> Box | None:
         """A box that surely holds all of phi <= 0 up to the largest cube; None if that is open.
@@ -170,8 +172,24 @@ def _function(name: str, rows: Sequence[Any]) -> Any:
     writer = _DerivativeWriter()
     for symbol, expression in shared:
         writer.known[symbol] = writer.name_of(expression)
-    results = ", ".join(map(writer.name_of, rows))
-    lines = [f"def {name}(p, x, y, z):", *writer.lines, f"return {results}"]
+    return _made(name, COORDINATES, writer, list(map(writer.name_of, rows)))
+
+
+def _along(phi: Any) -> Any:
+    """A function (p, x, y, z, u, v, w) of the coefficients of phi along a flight, None if it is no such polynomial."""
+    writer = _DerivativeWriter()
+    found = LevelSeries(writer).of(phi)
+    if found is None:
+        return None
+    coefficients = found + ["0.0"] * ((2 if len(found) <= 3 else DEGREE) + 1 - len(found))
+    function = _made("along", (*COORDINATES, *VELOCITY), writer, coefficients)
+    function.degree = len(coefficients) - 1
+    return function
+
+
+def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", results: list[str]) -> Any:
+    """The function of what is written."""
+    lines = [f"def {name}(p, {', '.join(arguments)}):", *writer.lines, f"return {', '.join(results)}"]
     scope: dict[str, Any] = {"np": np, "__name__": __name__}
     text = "\n    ".join(lines)
     file = f"<{name} {hashlib.sha256(text.encode()).hexdigest()}>"
@@ -194,7 +212,7 @@ class _DerivativeWriter:
             self.known[expression] = self._written(expression)
         return self.known[expression]
 
-    def _assign(self, text: str) -> str:
+    def assign(self, text: str) -> str:
         self.lines.append(f"t{len(self.lines)} = {text}")
         return f"t{len(self.lines) - 1}"
 
@@ -203,15 +221,15 @@ class _DerivativeWriter:
             return _literal(expression)
         if expression.is_Symbol:
             name = str(expression.name)
-            return self._assign(f"p[{int(name[1:])}]") if name.startswith("p") else name
+            return self.assign(f"p[{int(name[1:])}]") if name.startswith("p") else name
         if expression.is_Add:
-            return self._assign(" + ".join(map(self.name_of, expression.args)))
+            return self.assign(" + ".join(map(self.name_of, expression.args)))
         if expression.is_Mul:
             return self._product(expression)
         if expression.is_Pow:
             return self._power(self.name_of(expression.base), expression.exp)
         self.same_in_python = False
-        return self._assign(f"np.{expression.func.__name__}({self.name_of(expression.args[0])})")
+        return self.assign(f"np.{expression.func.__name__}({self.name_of(expression.args[0])})")
 
     def _product(self, expression: Any) -> str:
         above: list[str] = []
@@ -220,23 +238,23 @@ class _DerivativeWriter:
             divides = factor.is_Pow and factor.exp.is_number and factor.exp < 0
             (below if divides else above).append(self.name_of(1 / factor if divides else factor))
         top = " * ".join(above) or "1.0"
-        return self._assign(f"({top}) / ({' * '.join(below)})" if below else top)
+        return self.assign(f"({top}) / ({' * '.join(below)})" if below else top)
 
     def _power(self, base: str, exponent: Any) -> str:
         if exponent < 0:
-            return self._assign(f"1.0 / {self._power(base, -exponent)}")
+            return self.assign(f"1.0 / {self._power(base, -exponent)}")
         if not (2 * exponent).is_Integer:
             self.same_in_python = False
-            return self._assign(f"{base} ** {_literal(exponent)}")
-        factors = [self._assign(f"np.sqrt({base})")] if not exponent.is_Integer else []
+            return self.assign(f"{base} ** {_literal(exponent)}")
+        factors = [self.assign(f"np.sqrt({base})")] if not exponent.is_Integer else []
         n, square = int(exponent), base
         while n:
             if n % 2:
                 factors.append(square)
             n //= 2
             if n:
-                square = self._assign(f"{square} * {square}")
-        return self._assign(" * ".join(factors)) if len(factors) > 1 else factors[0]
+                square = self.assign(f"{square} * {square}")
+        return self.assign(" * ".join(factors)) if len(factors) > 1 else factors[0]
 
 
 def _literal(number: Any) -> str:

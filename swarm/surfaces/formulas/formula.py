@@ -18,6 +18,7 @@ from .derivatives import derived
 from .expression import COORDINATES, FUNCTIONS
 from .form import Form, FormSurface
 from .numbers import Bend
+from .polynomial import base_of
 
 
 @dataclass(frozen=True, repr=False, init=False)
@@ -80,7 +81,9 @@ class Formula(FormSurface):
         if size is None:
             size = math.inf if box is None else min(b - a for a, b in zip(*box, strict=True)) / 2.0
         make: Any = collections.namedtuple("Parameters", [f"p{i}" for i in range(len(values))])  # type: ignore[misc]
-        kind = class_of(make(*values), *code.functions)
+        base = base_of(code.along, self.side == "outside" and box is not None)
+        phi, gradient, hessian = code.functions
+        kind = class_of(make(*values), phi, gradient, hessian, code.along, base)
         kind.same_in_python = all(part.same_in_python for part in code.functions)
         form = Form(kind, values, box, size, self.side)
         if box is not None:

@@ -9,7 +9,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, dot, largest, square, total
 from .. import contract
-from ..time_of_impact.course import rise_time
+from ..time_of_impact.course import positive, rise_time
 from ..time_of_impact.march import SafeStep, Search, first_met
 
 # Points this close, relative to the size, are joined by Gauss's rule, whose error is the 7th power; its outer node.
@@ -51,13 +51,18 @@ def _quadratic(v, high, low):
     return sum + select(yz > 0.0, high.yz, low.yz) * yz + select(zx > 0.0, high.zx, low.zx) * zx
 
 
+def _larger(a, b):
+    return select(a > b, a, b)
+
+
 def _between(low, high, x, v):
     """When a flight is between two planes: (from, until)."""
-    if v == 0.0:
-        within = low <= x <= high
-        return select(within, -math.inf, math.inf), select(within, math.inf, -math.inf)
-    a, b = (low - x) / v, (high - x) / v
-    return min(a, b), max(a, b)
+    still, within = v == 0.0, (low <= x) & (x <= high)
+    speed = select(still, 1.0, v)
+    a, b = (low - x) / speed, (high - x) / speed
+    before, after = select(a < b, a, b), select(a < b, b, a)
+    always = select(within, math.inf, -math.inf)
+    return select(still, -always, before), select(still, always, after)
 
 
 class OwnNumbers(contract.Smooth):
@@ -148,7 +153,8 @@ class OwnNumbers(contract.Smooth):
         from_x, until_x = _between(low.x, high.x, d.x, v.x)
         from_y, until_y = _between(low.y, high.y, d.y, v.y)
         from_z, until_z = _between(low.z, high.z, d.z, v.z)
-        return max(from_x, from_y, from_z, 0.0), min(until_x, until_y, until_z)
+        start = positive(_larger(from_x, _larger(from_y, from_z)))
+        return start, -_larger(-until_x, _larger(-until_y, -until_z))
 
 
 class Straight(Search):

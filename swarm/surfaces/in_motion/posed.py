@@ -155,7 +155,7 @@ class Posed(Framed):
         """When a straight flight may meet another body of a field."""
         return safe.until_next_cell(self.body.grid, self.sees(None, r, v), self.remaining)
 
-    is_quartic, may_be_far, has_levels, in_steps, leaves_once = False, True, False, False, False
+    is_quartic, may_be_far, has_levels, in_steps, kept, leaves_once = False, True, False, False, 0, False
 
     def safe_time(self, r, v, pull):
         return 0.0

@@ -8,6 +8,7 @@ from ...kernel.jit import select
 from ..presence.rooms import leaving
 from ..walls import Field
 from .course import Fall, Quartic
+from .polynomial import PolynomialFlight
 
 
 class Hit(NamedTuple):
@@ -88,6 +89,8 @@ def sooner(time, found, number, later):
 # A flight in lanes: what the safe steps of each wall know, in this many rows a wall.
 COURSE = 9
 _WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
+# Of a polynomial all but its window
+_OF_POLYNOMIAL = 0, 1, 2, 3, 4, 5, 8
 
 
 def begin(walls, gravity, course, row, lane, r, v):
@@ -102,6 +105,10 @@ def begin(walls, gravity, course, row, lane, r, v):
             for i, number in enumerate(steps.level):
                 course[at + i, lane] = number
             course[at + _CLOSE, lane] = steps.nearly
+        elif isinstance(steps, PolynomialFlight):
+            for i, number in zip(_OF_POLYNOMIAL, steps, strict=False):
+                if number is not None:
+                    course[at + i, lane] = number
         course[at + _TIME, lane], course[at + _LAST, lane] = steps.first_step()
 
 
@@ -112,6 +119,8 @@ def step(walls, gravity, course, row, lane, r, v):
         if gravity is not None and wall.is_quartic:
             level = Quartic(*(course[at + i, lane] for i in range(_WINDOW + 1)))
             steps = Fall(level, course[at + _CLOSE, lane], wall.may_be_far)
+        elif gravity is None and wall.kept > 0:
+            steps = PolynomialFlight(*(course[at + i, lane] for i in _OF_POLYNOMIAL[: wall.kept]))
         else:
             steps = wall.steps(gravity, r, v)
         if steps is not None:
@@ -122,22 +131,30 @@ def step(walls, gravity, course, row, lane, r, v):
 def end(walls, gravity, course, row, lane, flight, stops=False):
     """`first_hit` from the course of a flight (r, v); if it `stops` with none that goes on in another room."""
     first, k = NEVER, len(walls.shared())
+    # A flight that stops is only asked whether it needs more steps.
+    asked = None if stops or gravity is not None else flight
     for rooms in walls.joined():
         hits: Any = ()
         for room in rooms:
-            hits = (*hits, tuple(_known(course, row, k + i, lane) for i in range(len(room))))
+            hits = (
+                *hits,
+                tuple(_known(wall, course, row, k + i, lane, asked) for i, (_n, wall, _g) in enumerate(room)),
+            )
             k += len(room)
         first = soonest(union_hit(walls, rooms, hits, gravity, flight, stops), 0.0, first)
-    for k, _wall in reversed(tuple(enumerate(walls.shared()))):
-        time, found = _known(course, row, k, lane)
+    for k, (_number, wall) in reversed(tuple(enumerate(walls.shared()))):
+        time, found = _known(wall, course, row, k, lane, asked)
         first = sooner(time, found, float(k), first)
     return first
 
 
-def _known(course, row, k, lane):
-    """What the course knows of the hit with wall k: (time, whether it is one)."""
+def _known(wall, course, row, k, lane, flight):
+    """What the course knows of the hit of a straight flight, or None, with wall k: (time, whether it is one)."""
     at = row + k * COURSE
-    return course[at + _TIME, lane], course[at + _LAST, lane] == 0.0
+    time, found = course[at + _TIME, lane], course[at + _LAST, lane] == 0.0
+    if flight is not None and wall.kept > 0:
+        time = wall.refined(*flight, time)
+    return time, found
 
 
 # --- Of one wall, and of all but one ---------------------------------------------------------------------

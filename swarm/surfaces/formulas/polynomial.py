@@ -1,0 +1,111 @@
+"""Formulas that are polynomials of degree 4 at most, as kernels take them: straight flights by exact coefficients."""
+
+import math
+from typing import Any
+
+from ...kernel.gravity import rise_time_by
+from ...kernel.jit import select
+from ...kernel.vector import absolute, total
+from ..time_of_impact.polynomial import PolynomialFlight
+from .numbers import OwnNumbers
+
+# A root at the start is divided out of a level up to this part of the other terms: it is round-off.
+_ROUND_OFF = 1e-13
+# What a step of Newton's method may change of a time that is known to round-off, which is more where a flight grazes.
+_REFINED = 1e-8
+# b^2 - a c has lost digits where it is less than this part of b^2.
+_CANCELS = 1.0 / 64.0
+
+
+class PolynomialNumbers(OwnNumbers):
+    """phi is a polynomial of degree 4 at most. Subclasses are a cavity, or a solid with a box that holds it."""
+
+    is_solid = False
+
+    def along(self, r, v):
+        """The coefficients of phi(r + v t) by powers of t: three, or five."""
+        raise NotImplementedError
+
+    def level_from(self, r, v):
+        """(start, end, the level's coefficients from the start on) of the part of a straight flight that is near."""
+        side = self.side
+        if not self.is_solid:
+            return None, None, tuple(side * one for one in self.along(r, v))
+        start, end = self._in_box(r, v)
+        here = select(start < math.inf, start, 0.0)
+        return start, end, tuple(side * one for one in self.along(r + here * v, v))
+
+    def refined(self, r, v, time):
+        # One step of Newton's method
+        c, twice_b = self.along(r + select(time < math.inf, time, 0.0) * v, v)[:2]
+        change = c / select(twice_b == 0.0, 1.0, twice_b)
+        return time - select(abs(change) <= _REFINED * time, change, 0.0)
+
+
+class QuadraticCavity(PolynomialNumbers):
+    """A polynomial of degree 2."""
+
+    def first_hit(self, r, v):
+        start, end, (c, twice_b, a) = self.level_from(r, v)
+        b = 0.5 * twice_b
+        d = b * b - a * c
+        if self.is_solid:
+            time = start + rise_time_by(c, b, a, d)
+            return self.refined(r, v, select((start <= end) & (time <= end), time, math.inf)), True
+        # From afar little is left of it; the level half way between both roots is -d/a.
+        middle = -b / select(a < 0.0, a, 1.0)
+        far = (a < 0.0) & (abs(d) < _CANCELS * b * b) & (middle < math.inf)
+        there = self.side * self.phi(r + select(far, middle, 0.0) * v)
+        return self.refined(r, v, rise_time_by(c, b, a, select(far, -a * there, d))), True
+
+
+class QuadraticSolid(QuadraticCavity):
+    """The same of a solid."""
+
+    is_solid = True
+
+
+class QuarticCavity(PolynomialNumbers):
+    """A polynomial of degree 3 or 4."""
+
+    in_steps = True
+    kept = 5
+
+    def first_hit(self, r, v):
+        time, found = self.hit_by_steps(None, r, v)
+        return self.refined(r, v, time), found
+
+    def steps(self, gravity, r, v):
+        if gravity is not None:
+            return None
+        start, end, (c, twice_b, a2, a3, a4) = self.level_from(r, v)
+        speed = total(absolute(v))
+        window = 3.0 * self.size / select(speed > 0.0, speed, 1.0)
+        # From the wall inwards
+        rest = window * (abs(twice_b) + window * (abs(a2) + window * (abs(a3) + window * abs(a4))))
+        leaves = (twice_b < 0.0) & (c >= -_ROUND_OFF * rest)
+        return PolynomialFlight(
+            select(leaves, twice_b, c),
+            0.5 * select(leaves, a2, twice_b),
+            select(leaves, a3, a2),
+            select(leaves, a4, a3),
+            select(leaves, 0.0, a4),
+            start,
+            end,
+            window,
+        )
+
+
+class QuarticSolid(QuarticCavity):
+    """The same of a solid."""
+
+    is_solid = True
+    kept = 7
+
+
+def base_of(along: Any, is_solid: bool) -> Any:
+    """The class of numbers of a formula with these coefficients along a flight, None if it is no polynomial."""
+    if along is None:
+        return OwnNumbers
+    cavity, solid = (QuadraticCavity, QuadraticSolid) if along.degree <= 2 else (QuarticCavity, QuarticSolid)
+    return solid if is_solid else cavity

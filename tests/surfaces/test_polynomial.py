@@ -1,0 +1,165 @@
+"""Formulas that are polynomials: the first root along straight flights, judged in exact arithmetic."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+import sympy
+from exact import EXACT, TOUCHED, Flight
+
+import swarm
+from swarm.kernel.vector import vec
+from swarm.surfaces.formulas.derivatives import derived
+from swarm.surfaces.formulas.numbers import OwnNumbers
+from swarm.surfaces.formulas.polynomial import QuadraticCavity, QuadraticSolid, QuarticCavity, QuarticSolid
+
+EPSILON = 2.0**-52
+QUARTIC = "x**4/0.09 + y**4/0.09 + z**4/0.13 - 1"
+RING = "(x**2 + y**2 + z**2 + 0.21)**2 - (x**2 + y**2)"
+MONOMIALS = [(i, j, k) for i in range(5) for j in range(5 - i) for k in range(5 - i - j)]
+BOX = ((-2.0, -2.0, -2.0), (2.0, 2.0, 2.0))
+
+
+def _sum(random, count, scales):
+    """A random sum of so many monomials."""
+    chosen = [MONOMIALS[i] for i in random.choice(len(MONOMIALS), count, replace=False)]
+    factors = random.normal(size=count) * 10.0 ** random.choice(scales, count)
+    return " + ".join(f"({a!r})*x**{i}*y**{j}*z**{k}" for a, (i, j, k) in zip(factors.tolist(), chosen, strict=True))
+
+
+def _any(random):
+    return _sum(random, 14, [0])
+
+
+def _of_all_magnitudes(random):
+    return _sum(random, 14, range(-12, 1))
+
+
+def _bounded(random):
+    a, b, c, d = np.exp(random.normal(size=4)).tolist()
+    return f"{a!r}*x**4 + {b!r}*y**4 + {c!r}*z**4 - {d!r} + 0.3*({_sum(random, 8, [0])})"
+
+
+def _nearly_quadratic(random):
+    tiny = float(random.choice([-1.0, 1.0]) * 10.0 ** random.integers(-18, -2))
+    return f"x**2/0.09 + y**2/0.16 + z**2/0.25 - 1 + ({tiny!r})*(x**4 + y**4 + z**4) + {abs(tiny) ** 0.5!r}*x*y*z"
+
+
+def _sheets(random):
+    """Two surfaces that touch each other, or nearly: double roots."""
+    apart = float(random.choice([0.1, 1e-4, 1e-8, 0.0]))
+    return f"(x**2 + y**2 + z**2 - 1)*(x**2 + y**2 + (z - 0.3)**2 - {0.49 + apart!r})"
+
+
+def _flights(random, wall, count):
+    """Starts inside, and on the wall along it, next to it and away from it: (position, velocity)."""
+    while count:
+        place, velocity = vec(random.uniform(-1.0, 1.0, 3).tolist()), random.normal(size=3)
+        if random.integers(3):
+            for _step in range(50):
+                place = wall.project(place)
+            if not (abs(wall.phi(place)) < 1e-12 and max(map(abs, place)) < 1.9):
+                return
+            normal = np.array(wall.unit_normal(place))
+            along = velocity - (velocity @ normal) * normal
+            lean = random.choice([-random.random(), -1e-3, -1e-6, -1e-9, 0.0, 1e-12])
+            velocity = lean * normal + math.sqrt(1.0 - lean * lean) * along / np.linalg.norm(along)
+        elif wall.side * wall.phi(place) > 0.0:
+            continue
+        count -= 1
+        yield place, vec((velocity * random.choice([1e-6, 1.0, 1e6])).tolist())
+
+
+def _require_first_roots(family, seed, flights=8):
+    random = np.random.default_rng(seed)
+    side = str(random.choice(["inside", "outside"]))
+    try:
+        surface = swarm.Formula(family(random), side=side, bounds=BOX, curvature=1.0, center=(0.2, -0.1, 0.1))
+    except swarm.SceneError:
+        return  # without a surface, or with a tip
+    wall = surface.numbers()
+    for place, velocity in _flights(random, wall, flights):
+        time, found = wall.first_hit(place, velocity)
+        exact = Flight([wall], tuple(place), tuple(velocity))
+        if math.isinf(time) and wall.is_solid:
+            # What is beyond the bounds of a solid is no wall.
+            start, end = wall._in_box(place, velocity)
+            time, found = end * (1.0 - 1e-9) if start <= end else 0.0, False
+        verdict = exact.judge(time, found, 0.0, 4.0 * EPSILON)
+        assert verdict in (EXACT, TOUCHED), (verdict, surface, place, velocity)
+
+
+FAMILIES = [_any, _of_all_magnitudes, _bounded, _nearly_quadratic, _sheets]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_no_root_is_missed(family, seed):
+    _require_first_roots(family, seed)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("seed", range(100, 150))
+def test_no_root_is_missed_of_many(family, seed):
+    _require_first_roots(family, seed)
+
+
+@pytest.mark.parametrize(
+    ("text", "side", "kind"),
+    [
+        (QUARTIC, "inside", QuarticCavity),
+        (RING, "outside", QuarticSolid),
+        ("x**2/p + y**2 + z*x + z**2 - sqrt(p)", "inside", QuadraticCavity),
+        ("x**2 + y**2 + z**2 - 1", "outside", QuadraticSolid),
+        ("x**6 + y**2 + z**2 - 1", "inside", OwnNumbers),
+        ("x**2 + y**2 + sin(z)**2 + z**2 - 1", "inside", OwnNumbers),
+        ("x**2/(1 + y**2) + y**2 + z**2 - 1", "inside", OwnNumbers),
+    ],
+)
+def test_what_is_a_polynomial_is_recognised(text, side, kind):
+    surface = swarm.Formula(text, side=side, parameters={"p": 0.25} if "p" in text else None)
+    assert type(surface.numbers()).__mro__[1] is kind
+
+
+@pytest.mark.parametrize("text", [QUARTIC, RING, "x*y*z - x**3/3 + 2*y - 1", "(x + 2*y)**3*z - (x - z)**2 + x"])
+def test_the_coefficients_are_the_derivatives_along_the_flight(text):
+    code = derived(text, ())
+    t, start, velocity = sympy.Symbol("t"), [0.3, -0.2, 0.7], [0.5, 1.0, -0.25]
+    path = {
+        axis: sympy.Rational(a) + t * sympy.Rational(v) for axis, a, v in zip(code.axes, start, velocity, strict=True)
+    }
+    expected = sympy.Poly(code.phi.subs(path), t).all_coeffs()[::-1]
+    expected = [float(one) for one in expected] + [0.0] * (5 - len(expected))
+    np.testing.assert_allclose(code.along((), *start, *velocity), expected, rtol=0.0, atol=1e-14)
+
+
+@functools.cache
+def _wall(text):
+    return swarm.Formula(text).numbers()
+
+
+@pytest.mark.parametrize(
+    ("text", "phi"),
+    [
+        (QUARTIC, lambda x, y, z: 100 * (x**4 + y**4) / 9 + 100 * z**4 / 13 - 1),
+        (RING, lambda x, y, z: (x**2 + y**2 + z**2 + sympy.Rational(21, 100)) ** 2 - x**2 - y**2),
+        ("9*x**2 + 6*y**2 + 4*z**2 + 2*x*y - 1", lambda x, y, z: 9 * x**2 + 6 * y**2 + 4 * z**2 + 2 * x * y - 1),
+    ],
+)
+def test_a_place_of_impact_is_on_the_wall_to_four_roundings(text, phi):
+    """Of the farthest coordinate that the flight goes over, across the wall, in exact arithmetic."""
+    wall = _wall(text)
+    particles = swarm.fill(swarm.Scene([swarm.Formula(text)]), 20, speed=0.5, seed=1)
+    for r, v in zip(particles.position.T, particles.velocity.T, strict=True):
+        r, v = vec(r.tolist()), vec(v.tolist())
+        for _impact in range(3):
+            time, found = wall.first_hit(r, v)
+            assert found
+            exact = [sympy.Rational(a) + sympy.Rational(time) * sympy.Rational(b) for a, b in zip(r, v, strict=True)]
+            end, normal = r + time * v, wall.unit_normal(r + time * v)
+            slope = math.hypot(*wall.gradient(end))
+            assert abs(float(phi(*exact))) <= 4.0 * EPSILON * max(map(abs, (*r, *end))) * slope
+            out = sum(a * b for a, b in zip(normal, v, strict=True))
+            r, v = end, v - (2.0 * out) * normal
