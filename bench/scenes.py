@@ -45,6 +45,14 @@ SCENES: dict[str, tuple[list[Surface], tuple[float, float, float] | None, str]] 
     "torus": ([swarm.Torus(0.5, 0.2)], None, "40"),
     "torus, gravity": ([swarm.Torus(0.5, 0.2)], GRAVITY, "150"),
     "formula of the ellipsoid": ([swarm.Formula("x**2/0.09 + y**2/0.09 + z**2/0.36 - 1")], None, "12 x 8"),
+    "formula of degree 4": ([swarm.Formula("x**4/0.09 + y**4/0.09 + z**4/0.13 - 1")], None, ""),
+    "formula of the torus": ([swarm.Formula("(x**2 + y**2 + z**2 + 0.21)**2 - (x**2 + y**2)")], None, ""),
+    "formula of the quadric": ([swarm.Formula("9*x**2 + 6*y**2 + 4*z**2 + 2*x*y - 1")], None, ""),
+    "formula with sines": (
+        [swarm.Formula("x**2/0.09 + y**2/0.09 + z**2/0.16 - 1 + 0.1*sin(10*x)*sin(10*y)")],
+        None,
+        "",
+    ),
     "sphere, box, cylinder, capsule, torus, gravity": (
         [
             swarm.Sphere(0.5),
@@ -59,8 +67,16 @@ SCENES: dict[str, tuple[list[Surface], tuple[float, float, float] | None, str]] 
 }
 
 
+# (a formula, a shape, how many times as long as the shape it may take)
+FORMULAS = (
+    ("formula of degree 4", "sphere", 4.0),
+    ("formula of the torus", "torus", 1.3),
+    ("formula of the quadric", "general quadric", 1.3),
+    ("formula with sines", "sphere", 40.0),
+)
+
 # Every scene compiles kernels of its own: a quick run takes one of each kind of flight.
-QUICK = ("sphere", "capped cylinder", "sphere, gravity", "formula of the ellipsoid")
+QUICK = ("sphere", "capped cylinder", "sphere, gravity", "formula of the ellipsoid", "formula of degree 4")
 
 
 def main(quick: bool) -> None:
@@ -75,6 +91,10 @@ def main(quick: bool) -> None:
     rows = [
         Row(name, best, median, "ns/impact", SCENES[name][2], best / first) for name, (best, median) in figures.items()
     ]
+    for formula, shape, bar in FORMULAS:
+        if formula in figures:
+            best, median = (mine / its for mine, its in zip(figures[formula], figures[shape], strict=True))
+            rows.append(Row(f"{formula} / {shape}", best, median, "times", f"{bar:g}"))
     show(rows)
     if not quick:
         write(rows, "scenes")
