@@ -139,6 +139,8 @@ class State(NamedTuple):
     # Where balls come during the run:
     born_time: Floats | None = None  # (N,) when each was born [s], NaN of those that are not
     balls: Balls | None = None  # where particles have a radius
+    # Where particles come during the run, and no contact lasts from pass to pass:
+    late: Floats | None = None  # (N,) what is left of the frame, in the method's unit, of those that start within it
 
     @property
     def absorbed(self) -> Any:

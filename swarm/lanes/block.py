@@ -144,6 +144,8 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
             lane, wall = lanes.given(method, i), methods.HARD - lanes.wall[i]
             contact, status = method.hard_pass(walls, gravity, lane, wall, lanes, i)
             _put_contact(method, lanes, i, contact)
+            if share.counters is not None and method.contacts_take_time:
+                share.counters.count_contact(method, share, lanes, i)
             if share.counts is not None:
                 share.counts.add(wall, contact.hits)
             if lanes.lane(i).hits > hard.most_hits:
@@ -161,10 +163,10 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
     """A flight and a contact of every lane: whether one reached the end of the frame, is hard, was sent off wrong."""
     state, watches, counters = share.state, share.watchers.of_impacts(), share.counters
     if counters is not None:
-        counters.keep_before(gravity, lanes, live)
+        counters.keep_before(method, gravity, lanes, live)
     go(method, walls, gravity, lanes, live)
     if counters is not None:
-        counters.count_flights(gravity, share, lanes, live)
+        counters.count_flights(method, gravity, share, lanes, live)
     if lanes.period is not None:
         return_lanes(lanes.period, state, lanes, live)
     if state.openings is not None:
@@ -177,7 +179,12 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
     some_wrong = False
     if method.laws.send_off:
         some_wrong = send_off(method, walls, gravity, share, lanes, picked, live)
+    if counters is not None and method.contacts_take_time:
+        counters.keep_before(method, gravity, lanes, live)
     some_arrived, some_hard = _make_contacts(method, walls, gravity, watches, lanes, picked, live)
+    if counters is not None and method.contacts_take_time:
+        for i in range(index(live)):
+            counters.count_contact(method, share, lanes, i)
     for watch in watches:
         watch.add_rows(method, walls, state, lanes, live)
     return some_arrived, some_hard, some_wrong

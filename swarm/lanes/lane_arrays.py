@@ -81,6 +81,9 @@ class Lanes(NamedTuple):
             # Where nothing lasts none of these arrays is written: their memory is not even there.
             if remaining > 0.0:
                 state.contacts.remaining[i] = 0.0
+        if state.late is not None:
+            remaining = state.late[i]
+            state.late[i] = 0.0
         if share.halted.particle.size > 0 and not remaining > 0.0 and self._pick_up(share.halted, i, k):
             return
         i = index(i)

@@ -3,6 +3,9 @@
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..common.validated import Count, Flag, Positive, choice
 from ..contact import uzawa
 from ..contact.discrete_gradient import form_of, reaction_needs
@@ -152,6 +155,12 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
 
     def instant(self, moment: float) -> float:
         return moment if self.adaptive else super().instant(moment)
+
+    def birth_times(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        return times if self.adaptive else super().birth_times(times)
+
+    def parts(self, durations: NDArray[np.float64]) -> NDArray[np.float64]:
+        return durations if self.adaptive else super().parts(durations)
 
     def seldom_hard(self, scene: Scene) -> bool:
         return False

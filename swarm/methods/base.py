@@ -4,6 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..common.validated import Validated, choice
 from ..errors import SceneError
 from ..kernel.jit import select
@@ -46,6 +49,14 @@ class Method(Validated):
     def span(self, name: str, duration: float) -> float:
         """`duration` [s] in the unit in which the kernel counts a frame down; `name` is for the error."""
         return duration
+
+    def birth_times(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The times at which particles come that sources give at these times [s]."""
+        return times
+
+    def parts(self, durations: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Durations from such a time to the end of a frame [s] in the unit in which the kernel counts it down."""
+        return durations
 
     def instant(self, moment: float) -> float:
         """The time of the method when a frame ends at `moment` [s]: where walls that move are then."""

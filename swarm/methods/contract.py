@@ -129,6 +129,13 @@ class MethodNumbers(Record):
         """A time [s] in which a particle of this velocity gets nowhere; 0 where the method does not say."""
         return 0.0
 
+    # Whether a particle moves during a contact: then counters look at contacts too. A constant for the compiler.
+    contacts_take_time = False
+
+    def seconds(self, remaining):
+        """A part of a frame [s], given in the method's unit."""
+        return remaining
+
     @property
     def laws(self):
         """The `Laws` of its walls."""

@@ -6,6 +6,7 @@ from functools import partial
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..common import checks
 from ..common.status import Status
@@ -60,6 +61,13 @@ class SoftWalls(base.Method):
 
     def instant(self, moment: float) -> float:
         return whole_time(moment, self.dt)
+
+    def birth_times(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        # Steps begin and end together for all.
+        return np.ceil(times / self.dt - _WHOLE) * self.dt
+
+    def parts(self, durations: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.round(durations / self.dt)
 
     def seldom_hard(self, scene: Scene) -> bool:
         return len(_of_rows(scene)) == 1 and not scene.surfaces[0].is_solid()
@@ -180,6 +188,10 @@ class Steps(contract.MethodNumbers):
     """A method of steps, with the fields `dt`, `longest`, `factor` and `moving`: the walls of a step, and its ends."""
 
     point = 1.0  # the part of a step after which it takes its force
+    contacts_take_time = True
+
+    def seconds(self: Any, remaining):
+        return remaining * self.dt
 
     def constants(self, mass, energy, scale2):
         return 2.0 * energy, self.factor / mass, 0.0

@@ -219,6 +219,9 @@ class FixedSteps(StepNumbers):
 class CutSteps(StepNumbers):
     """The method with steps that begin at the impact, without gravity."""
 
+    def seconds(self, remaining):
+        return remaining
+
     def cut(self, remaining):
         # The loop's rate depends on alpha h^2, its fixed point does not: a step cut short by the frame gets a larger
         # alpha.

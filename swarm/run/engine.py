@@ -60,9 +60,10 @@ class Run(BaseRun):
         n, scene = len(particles), compiled.scene
         self._numbers, self._law = method.numbers(scene), method.law()
         self._walls = compiled.walls()
+        takes_time = self._numbers.contacts_take_time
         tier, counters = Tier(compile, (self._numbers, self._law, self._walls), n), watched.counters
         super().__init__(compiled, method, n, threads, tier, seeding, watched)
-        self._counters = counters_of(scene, counters, self._impacts is not None)
+        self._counters = counters_of(scene, counters, self._impacts is not None or takes_time)
         self._booked = lanes.booked(self._walls)
         self.state = state_of(compiled, particles, method, self._booked)
         self.state = with_counters(self.state, self._counters, counters, scene)
@@ -85,7 +86,7 @@ class Run(BaseRun):
     def _prepare(self, span: float, moment: float) -> None:
         self._reach(moment)
         if not self._cut_short:
-            begin(self.state, self._present.of(self._phase), (span, self._moment), bool(self._kinds))
+            begin(self.state, self._present.of(self._phase), (span, self._moment), bool(self._kinds), self._method)
             if self._tally is not None and self._kinds:
                 self._tally.rest(holders_of_resting(self.state.contacts), span)
 

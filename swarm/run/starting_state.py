@@ -54,6 +54,7 @@ def state_of(compiled: CompiledScene, particles: Particles, method: Method, book
         _starts(particles, ends),
         np.full(n, math.nan) if ends else None,
         np.full(n, -1, np.int32) if ends else None,
+        late=np.zeros(n) if particles.births is not None and not method.may_slide() else None,
     )
 
 
@@ -64,7 +65,7 @@ def _starts(particles: Particles, wait: bool) -> Floats | None:
     return np.full(len(particles), -math.inf) if wait else None
 
 
-def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], lasts: bool) -> None:
+def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], lasts: bool, method: Method) -> None:
     """Set whether each particle begins a frame in flight, along its walls or at rest; `lasts`: a contact has lasted.
 
     The frame is (its length, in the method's unit, its end [s]). Particles that are not born yet have no phase.
@@ -84,20 +85,20 @@ def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], las
     if state.escape_time is not None or state.absorbed is not None:
         phase[state.gone()[: len(phase)]] = ARRIVED
     if state.starts is not None:
-        _begin_late(state.starts[: len(phase)], state.contacts, phase, span, end)
+        left = method.parts(end - state.starts[: len(phase)])
+        _begin_late(left, state.late if state.contacts is None else state.contacts.remaining, phase, span)
 
 
-def _begin_late(starts: Floats, contacts: Contacts | None, phase: NDArray[np.int8], span: float, end: float) -> None:
-    """Mark particles that start at or after the frame's end as ARRIVED.
+def _begin_late(left: Floats, remaining: Floats | None, phase: NDArray[np.int8], span: float) -> None:
+    """Mark particles that start at or after the frame's end, with so much of it left, as ARRIVED.
 
-    Particles that start within the frame fly for the time left after their start.
+    Particles that start within the frame fly for what is left after their start.
     """
-    left = end - starts
     phase[left <= 0.0] = ARRIVED
     late = np.flatnonzero((left < span) & (phase == FLYING))
     if late.size:
-        assert contacts is not None
-        contacts.remaining[late] = left[late]
+        assert remaining is not None
+        remaining[late] = left[late]
 
 
 def holders_of_resting(contacts: Contacts | None) -> NDArray[np.int64]:

@@ -1,6 +1,7 @@
 """All births of a run, drawn before it from its seed: each source has streams of its own."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -32,9 +33,16 @@ _BATCH = 4096
 
 
 def with_births(
-    scene: Scene, particles: Particles | None, sources: tuple[Source, ...], seed: int, until: float
+    scene: Scene,
+    particles: Particles | None,
+    sources: tuple[Source, ...],
+    seed: int,
+    until: float,
+    times_taken: Callable[[Floats], Floats] = lambda times: times,
 ) -> Particles:
     """The particles of a run with sources: those of the start, and behind them those that come, in order of time.
+
+    `times_taken` are the times at which a method has particles come that are born at these times.
 
     Raises:
         SceneError: a source does not fit the scene, too many particles come, or the run has no particles at all.
@@ -51,7 +59,7 @@ def with_births(
                 f"sources[{k}].radius {must} where the other particles of the run {got}, got {one.radius}: balls and "
                 "points do not meet"
             )
-    drawn = [_drawn(scene, one, f"sources[{k}]", k, seed, until) for k, one in enumerate(sources)]
+    drawn = [_drawn(scene, one, f"sources[{k}]", k, seed, until, times_taken) for k, one in enumerate(sources)]
     times = np.concatenate([time for time, _r, _v in drawn])
     if not len(times) + given:
         raise SceneError(
@@ -143,12 +151,15 @@ def stream(seed: int, k: int, *what: int) -> Random:
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(k, *what))))
 
 
-def _drawn(scene: Scene, source: Source, name: str, k: int, seed: int, until: float) -> tuple[Floats, Floats, Floats]:
+def _drawn(
+    scene: Scene, source: Source, name: str, k: int, seed: int, until: float, times_taken: Callable[[Floats], Floats]
+) -> tuple[Floats, Floats, Floats]:
     """Times (n,), positions and velocities (3, n) of the births of a source."""
     times = times_of(source, stream(seed, k, _TIMES), until)
     if source.radius is not None:
         # Where balls are born is known when they are: see ball_places.py.
         return times, *np.zeros((2, 3, len(times)))
+    times = times_taken(times)
     place = place_of(scene, source, name)
     points, across = PointBatches(scene, place, name), scene.across()
     require_in_plane(scene, source, name)

@@ -57,7 +57,8 @@ class Source(Validated):
 
     Births are in the half-open interval from `start`, included, to `stop`, excluded, as walls are `present`: of two
     sources of which one begins when the other stops, no birth is of both. The end of a run is no end of a source: a
-    frame has all births up to its time, and at it, so it is the same whenever the run ends.
+    frame has all births up to its time, and at it, so it is the same whenever the run ends. With a method of fixed
+    steps particles come at the end of the step in which their birth falls.
 
     Args:
         where: a surface of the scene, or its number: births on it, uniform in its area, into the vessel. Or one of the

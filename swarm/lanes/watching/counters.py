@@ -89,15 +89,15 @@ class Counters(Record):
         """A lane into another."""
         copy_lane(lanes.began, source, lanes.began, target, self.rows())
 
-    def keep_before(self, gravity, lanes, live):
-        """Keep every lane as it is before its flight."""
+    def keep_before(self, method, gravity, lanes, live):
+        """Keep every lane as it is before its flight, or its contact."""
         for i in range(index(live)):
             lane, began = lanes.lane(i), Began(lanes.began, i)
-            began.r, began.remaining = lane.r, lane.remaining
-            if gravity is not None:
+            began.r, began.remaining = lane.r, method.seconds(lane.remaining)
+            if gravity is not None or method.contacts_take_time:
                 began.v = lane.v
 
-    def count_flights(self, gravity, share, lanes, live):
+    def count_flights(self, method, gravity, share, lanes, live):
         """Count what the flights of all lanes have crossed."""
         marks = False
         for c, one in enumerate(self.each):
@@ -106,29 +106,30 @@ class Counters(Record):
             else:
                 marks = True
         if marks:
-            self._look_at_lanes(gravity, share, lanes, live)
+            self._look_at_lanes(method, gravity, share, lanes, live)
 
-    def _look_at_lanes(self, gravity, share, lanes, live):
+    def _look_at_lanes(self, method, gravity, share, lanes, live):
         """The lanes that may cross a counter, one by one."""
         # A fall may leave a cell and come back into it.
         all_of_them = lanes.period is not None and gravity is not None
         for i in range(index(live)):
             lane, began = lanes.lane(i), Began(lanes.began, i)
             v = velocity_before(gravity, lane, began)
-            time = began.remaining - lane.remaining
+            time = began.remaining - method.seconds(lane.remaining)
             found = (time > 0.0) if all_of_them else has_left(lanes.period, lane.r)
             for c, one in enumerate(self.each):
                 if not self.is_in_lanes(one):
                     found = one.may_cross(lanes.began[row_of_counter(c), i], gravity, began.r, v, time) | found
             lanes.marked[i] = found
         for k in range(marked_lanes(lanes, live)):
-            self._look_at_lane(gravity, share, lanes, index(lanes.order[k]))
+            self._look_at_lane(method, gravity, share, lanes, index(lanes.order[k]))
 
     @outlined
-    def _look_at_lane(self, gravity, share, lanes, i):
+    def _look_at_lane(self, method, gravity, share, lanes, i):
         lane, began, p = lanes.lane(i), Began(lanes.began, i), index(lanes.particle[i])
         v = velocity_before(gravity, lane, began)
-        flown = Flown(began.r, v, began.remaining - lane.remaining, began.remaining, lane.r, ZERO)
+        time = began.remaining - method.seconds(lane.remaining)
+        flown = Flown(began.r, v, time, began.remaining, lane.r, ZERO)
         if lanes.period is None:
             self.look_at(gravity, share, p, flown)
         else:
@@ -182,6 +183,18 @@ class Counters(Record):
                 return
 
     # --- Steps, and ends ---
+
+    def count_contact(self, method, share, lanes, i):
+        """Count what lane i has crossed in a contact that takes time, since `keep_before`."""
+        lane, began, p = lanes.lane(i), Began(lanes.began, i), index(lanes.particle[i])
+        found = False
+        for c, one in enumerate(self.each):
+            found = found | (lanes.began[row_of_counter(c), i] * one.distance(lane.r) > one.near)
+        if found:
+            before = ParticleMoment(began.r, began.v, began.remaining)
+            self.count_step(share, p, before, ParticleMoment(lane.r, lane.v, method.seconds(lane.remaining)))
+            for c in range(len(self.each)):
+                lanes.began[row_of_counter(c), i] = sign_of_side(share.state, c, p)
 
     @outlined
     def count_step(self, share, p, before, after):

@@ -61,8 +61,10 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
         for surface in [*walls, *counters]:
             surface.require_compiled()
     _require_motions(scene, times.until)
-    particles = with_births(scene, start, options.sources, options.seed, times.until) if balls is None else balls
-    if balls is not None:
+    if balls is None:
+        particles = with_births(scene, start, options.sources, options.seed, times.until, method.birth_times)
+    else:
+        particles = balls
         place_unborn(scene, balls, options.seed)
     _require_logged(particles, options)
     if options.keeps_float32():

@@ -395,7 +395,7 @@ CAPABILITIES = (
         _RIGID_BALLS: Refusal(
             "sources must be left out where particles have a radius, got {count}", f"{_TO_POINTS}, and Impact()"
         ),
-        (CHORDS, *_FIXED_STEPS, OTHER_POINTS): Refusal(
+        (CHORDS, OTHER_POINTS): Refusal(
             "sources must be left out with {whole!r:.200}, got {count}: particles are born at any time, not at the end "
             "of a step", _TO_EXACT,
         ),
@@ -411,7 +411,7 @@ CAPABILITIES = (
     }),
     Capability("counter", _option("counters"), {
         _EVERY_BODY: Refusal("counters must be left out with bodies, got {count}", "use particles"),
-        (*_FIXED_STEPS, GRAINS, OTHER_POINTS): Refusal(
+        (GRAINS, OTHER_POINTS): Refusal(
             "counters must be left out with {method}, got {count}: a counter follows flights, not steps", "use Impact()"
         ),
         (CHORDS,): Refusal("counters must be left out with a contact_step of {step:g}, got {count}", _NO_STEP),
