@@ -177,18 +177,27 @@ def _until_next_layer(layers, place, x, v, pull):
 def until_out(gravity, grid, first, last, r, v):
     """When a flight among the cells from one place to another one has left these."""
     layers = zip(grid.low, grid.width, grid.margin, strict=True)
-    pulls = (None, None, None) if gravity is None else gravity
+    pulls = 3 * (gravity,) if gravity is None or isinstance(gravity, Bounds) else gravity
     x, y, z = (_until_out_of_layers(*one) for one in zip(layers, first, last, r, v, pulls, strict=True))
     sooner = select(y < x, y, x)
     return select(z < sooner, z, sooner)
 
 
 def _until_out_of_layers(layers, first, last, x, v, pull):
-    """When a flight leaves layers of cells, and a margin. Branch-free, and with one root only."""
+    """When a flight leaves layers of cells, and a margin. Branch-free, and with one root only.
+
+    Where of its acceleration there is only a bound, at the soonest.
+    """
     low, width, margin = layers
     if pull is None:
         return _until_edge(layers, first, last, x, v)
     below, above = low + first * width - margin, low + (last + 1.0) * width + margin
+    if isinstance(pull, Bounds):
+        up, down = (
+            rise_time(x - above, 0.5 * v, 0.5 * pull.acceleration),
+            rise_time(below - x, -0.5 * v, 0.5 * pull.acceleration),
+        )
+        return select(down < up, down, up)
     # Towards the side to which it is pulled it leaves, unless it leaves before through the other one.
     turned = pull < 0.0
     a, b = 0.5 * abs(pull), 0.5 * select(turned, -v, v)

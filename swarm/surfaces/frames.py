@@ -59,6 +59,7 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("deepest_in_cell", ("place",), None),
     ("is_there", (None, "place", None), None),
     ("wall_after", (None, "place", None), None),
+    ("goes_on", (None, None), None),
 )
 _CONSTANTS = (
     "side",
@@ -92,11 +93,14 @@ class Framed(Smooth):
 
     def seen_in(self, seen):
         """A particle as the wall sees it, in the frame of the body."""
-        return seen._replace(r=self.place_in(seen.r), v=self.vector_in(seen.v), a=self.vector_in(seen.a))
+        return self._flight_in(seen)
+
+    def _flight_in(self, flight):
+        return flight._replace(r=self.place_in(flight.r), v=self.vector_in(flight.v), a=self.vector_in(flight.a))
 
     def lease_in(self, lease):
         """A `Lease` in the frame of the body."""
-        return self.seen_in(lease)._replace(axis=None if lease.axis is None else self.vector_in(lease.axis))
+        return self._flight_in(lease)._replace(axis=None if lease.axis is None else self.vector_in(lease.axis))
 
 
 def _forwarded(name: str, roles: tuple[str | None, ...], result: str | None) -> Any:

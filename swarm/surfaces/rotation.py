@@ -11,7 +11,7 @@ from ..common.checks import Vector, number, parts_of, shown, vector
 from ..errors import SceneError
 from ..kernel.gravity import Gravity, as_vector
 from ..kernel.limits import UNIT_LENGTH
-from ..kernel.vector import Vec, dot, vec
+from ..kernel.vector import Vec, absolute, dot, vec
 from ..motion.wall import product as product
 from .frames import Framed
 
@@ -136,6 +136,15 @@ class Rotated(Framed):
 
     place_in = end_in = velocity_in = way_in = vector_in
     place_out = end_out = normal_out = vector_out
+
+    def seen_in(self, seen):
+        # What bounds the flight along a direction, too, is of the motion in the frame of the body.
+        drive = seen.drive
+        jerks = drive.jerks.x * absolute(self.x) + drive.jerks.y * absolute(self.y) + drive.jerks.z * absolute(self.z)
+        turn = drive.turn
+        if turn is not None:
+            turn = turn._replace(axis=self.vector_in(turn.axis))
+        return self._flight_in(seen)._replace(drive=drive._replace(jerks=jerks, turn=turn))
 
     def flat_normal(self):
         n = self.body.flat_normal()

@@ -85,7 +85,7 @@ def test_what_has_no_inside_is_refused():
         swarm.fill(swarm.Scene([tray()]), 10, speed=1.0)
     with pytest.raises(swarm.SceneError, match="on a sheet, and must be on one side of it"):
         run(triangle(), [[0.0], [0.0], [0.0]], [[0.0], [0.0], [1.0]])
-    with pytest.raises(swarm.SceneError, match=r"motion must be None for Mesh"):
+    with pytest.raises(swarm.SceneError, match=r"motion must be None for a Mesh with open=True"):
         tray(motion=swarm.Translation((1.0, 0.0, 0.0)))
     with pytest.raises(swarm.SceneError, match="triangles that have an area, got none"):
         swarm.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], open=True)

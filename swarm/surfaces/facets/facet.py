@@ -4,12 +4,15 @@ import math
 from typing import Any
 
 from ...kernel.gravity import displacement
-from ...kernel.jit import select
+from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot
-from ..shapes.plane import Flat
+from ..shapes.plane import Flat, PlaneNumbers
 from ..time_of_impact.course import rise_time
+from ..time_of_impact.rising import patch_step
 
+# The round-off of places, as a part of the farthest coordinate: far above that of numbers, and of a hit.
+ROOM = 2.0**-40
 # Half of the thickness of a sheet, and how far its sides go on beyond its edges, in units of the round-off of places:
 # far above what a flight ends beside its wall by, and so far that the sides of a fold of 2 degrees meet. A step of a
 # slide ends behind a side by less than the third, so that it is never on the other side.
@@ -34,18 +37,18 @@ class FacetNumbers(Flat):
 
     normal: Vec
     offset: float
-    edges: tuple[Any, ...]  # of each the unit vector in the plane into the triangle, and the least place along it
+    edges: tuple[Any, ...]  # of each the unit vector in the plane into the triangle, and its place along that
     room: Shared
 
     # --- Its part of the plane ---
 
     def within(self, r):
-        """How far a place is from the nearest edge inwards, below 0 where it is beyond one."""
+        """How far a place is from the nearest edge inwards, with the room; below 0 where it is beyond one."""
         least = math.inf
         for inwards, place in reversed(self.edges):
             here = dot(inwards, r) - place
             least = select(here < least, here, least)
-        return least
+        return least + self.room.value
 
     def is_there(self, r, near):
         """Whether the facet reaches as near as this to a point on its plane: to one deep behind it, it does not."""
@@ -76,7 +79,7 @@ class FacetNumbers(Flat):
         reach = dot(absolute(self.normal), half) + self.room.value
         found = abs(dot(self.normal, middle) - self.offset) <= reach
         for inwards, place in reversed(self.edges):
-            found = (dot(inwards, middle) + dot(absolute(inwards), half) >= place) & found
+            found = (dot(inwards, middle) + dot(absolute(inwards), half) >= place - self.room.value) & found
         return found
 
     # --- Flight ---
@@ -107,6 +110,9 @@ class FacetNumbers(Flat):
         time, _found = self.falling_hit(r, v, pull)
         return time
 
+    def moving_step(self, seen, longest):
+        return _moving_step(self, seen, longest)
+
 
 class SheetSide(FacetNumbers):
     """One side of a triangle that is a wall from both sides: a facet of a sheet, whose other side is another facet.
@@ -126,3 +132,12 @@ class SheetSide(FacetNumbers):
         # What is behind it is on the other side of the sheet, and does not meet this one.
         away = -math.sqrt(beyond * beyond + depth * depth)
         return select(depth > self.behind(), -math.inf, away)
+
+
+@outlined
+def _moving_step(facet, seen, longest):
+    is_behind = facet.phi(seen.r) > facet.room.value
+    sign = select(is_behind, -1.0, 1.0)
+    plane = PlaneNumbers(sign * facet.normal, sign * facet.offset)
+    edges = tuple(PlaneNumbers(inwards, place - facet.room.value) for inwards, place in facet.edges)
+    return patch_step(plane, is_behind, edges, seen, longest)

@@ -161,5 +161,43 @@ def passes(cells, k, here):
     return not square(away - _row(cells.known.planes, k, 4, scale)) > beside * beside
 
 
+class WayInCell(Record):
+    """A flight of which the acceleration has a bound, in a cell: how far it comes at most."""
+
+    from_middle: Vec
+    v: Vec
+    span: float
+    bent: float  # what it may come farther than by its velocity
+    way: float
+    near: float
+    slow: float
+
+
+def way_in(cells, place, r, v, bound):
+    """A flight at r in the cell at this place, with a bound of its acceleration, and how long it is there."""
+    w, (acceleration, span) = cells.width, bound
+    middle = cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z)
+    bent, near = 0.5 * acceleration * span * span, _OFF * math.sqrt(square(w))
+    slow = _OFF_SPEED * total(absolute(v))
+    return WayInCell(r - middle, v, span, bent, math.sqrt(square(v)) * span + bent, near, slow)
+
+
+def may_pass(cells, k, way):
+    """As `passes` of such a flight."""
+    normal = _row(cells.known.planes, k, 0, 1.0 / _FULL)
+    depth = dot(normal, way.from_middle) - float(cells.known.planes[k, 3]) * (way.near * (1.0 / (_FULL * _OFF)))
+    rate = dot(normal, way.v)
+    rises, falls = (rate + way.slow) * way.span + way.bent, (way.slow - rate) * way.span + way.bent
+    # What is behind the plane comes back first.
+    meets = (depth + select(rises > 0.0, rises, 0.0) >= -way.near) & (
+        depth - select(falls > 0.0, falls, 0.0) <= way.near
+    )
+    radius, scale = float(cells.known.planes[k, 7]), way.near * (_REACH / (_FULL * _OFF))
+    if not meets or radius == _FULL:
+        return meets
+    reach = radius * scale + way.way + way.near
+    return square(way.from_middle - _row(cells.known.planes, k, 4, scale)) <= reach * reach
+
+
 def _row(rows, k, first, scale):
     return Vec(float(rows[k, first]), float(rows[k, first + 1]), float(rows[k, first + 2])) * scale

@@ -75,7 +75,7 @@ def sorted_by_place(mesh: Closed) -> Closed:
     return mesh._replace(triangles=np.ascontiguousarray(mesh.triangles[order]), group=mesh.group[order])
 
 
-def table_of_facets(corners: Floats, room: float) -> Floats:
+def table_of_facets(corners: Floats, beyond: float = 0.0) -> Floats:
     """The numbers of facets with these corners (T, 3, 3), one in each row, so much larger at each edge [m]."""
     a, b, c = np.moveaxis(corners, 1, 0)
     normal = _normals(a, b, c)
@@ -83,13 +83,13 @@ def table_of_facets(corners: Floats, room: float) -> Floats:
     for p, q in ((a, b), (b, c), (c, a)):
         inwards = np.cross(normal, q - p)
         inwards /= np.linalg.norm(inwards, axis=1)[:, None]
-        columns += [inwards, ((inwards * p).sum(axis=1) - room)[:, None]]
+        columns += [inwards, ((inwards * p).sum(axis=1) - beyond)[:, None]]
     return aligned_copy(np.concatenate(columns, axis=1))
 
 
 def table_of_sides(corners: Floats, room: float) -> Floats:
     """The numbers of both sides of sheets with these corners (T, 3, 3), side by side; `room` is round-off [m]."""
-    table = aligned_copy(np.repeat(table_of_facets(corners, OVERLAP * room), 2, axis=0))
+    table = aligned_copy(np.repeat(table_of_facets(corners, (OVERLAP - 1.0) * room), 2, axis=0))
     table[1::2, :4] *= -1.0
     table[:, 3] -= THIN * room
     return table

@@ -11,7 +11,8 @@ from ..fields.members import Members, member
 from ..presence.patched import Patched
 from ..shapes.plane import PlaneNumbers
 from ..time_of_impact import flights
-from .facet_cells import here_in, passes
+from .facet import ROOM, Shared
+from .facet_cells import here_in, may_pass, passes, way_in
 from .free_room import FULL, KIND, room_of
 
 # So many cells and blocks of cells are crossed before a flight is said to be free so far.
@@ -29,6 +30,22 @@ class Facets(Members, Patched):
 
     def is_in_another(self, number, r):
         return _is_behind_another(self, number, r)
+
+    def loosened(self, reach):
+        room = self.like.room.value + ROOM * reach
+        return self._replace(like=self.like._replace(room=Shared(room)))
+
+    def until_out(self, cell, gravity, r, v):
+        cells = self.grid
+        room = room_of(cells.known.room, index(cell.number))
+        until = until_out(gravity, cells, cell.place - room.back, cell.place + room.ahead, r, v)
+        return until if cell.inside else until_next(gravity, cells, cell, r, v)
+
+    def way_in_cell(self, cell, seen, span):
+        return way_in(self.grid, cell.place, seen.r, seen.v, (seen.bounds(span).acceleration, span))
+
+    def may_meet(self, k, here):
+        return may_pass(self.grid, k, here)
 
     def is_there(self, number, r, near):
         return self.wall(number).is_there(r, near)

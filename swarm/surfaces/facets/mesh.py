@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ... import motion as motions
 from ...common import checks
 from ...common.checks import Vector
 from ...common.extras import needed_by
@@ -22,7 +23,7 @@ from ..area_samples import AreaSample, Region, of_triangles
 from ..fields.members import Members
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
-from .facet import OVERLAP, THIN, FacetNumbers, Shared, SheetSide
+from .facet import OVERLAP, ROOM, THIN, FacetNumbers, Shared, SheetSide
 from .facet_cells import cells_around
 from .made import given_arrays, sorted_by_place, table_of_facets, table_of_sides, triangles_of_balls, with_room
 from .members import Facets
@@ -31,8 +32,6 @@ from .mesh_files import Floats, Indices, read_soup
 from .nearest import boxes_of, nearest, within
 from .triangles import closed, sheets
 
-# The round-off of places, as a part of the farthest coordinate: far above that of numbers, and of a hit.
-_ROOM = 2.0**-40
 _NOUNS_OF_SHEETS = ("open mesh",) * 4
 # What a group may have of its own.
 _LAWS = ("restitution", "friction", "temperature", "accommodation", "laws")
@@ -108,12 +107,17 @@ class Mesh(Surface):
     open: Flag = field(default=False, kw_only=True, metadata={"younger": True})
     _made: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
 
-    refused = ("motion", "mass", "inertia")
-    instead = "its triangles are at rest: move the other surfaces"
+    refused = ("mass", "inertia")
+    instead = "impacts move no mesh: give it a motion"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.open:
+            if self.motion is not None:
+                raise SceneError(
+                    f"motion must be None for a Mesh with open=True, got {self.motion!r:.200}; give its sheets a "
+                    "thickness, as a closed mesh, or leave the motion out"
+                )
             checks.assign(self, side="outside", nouns=_NOUNS_OF_SHEETS)
         given = self.vertices, self.triangles, self.group, self.names
         if self._made is None or any(a is not b for a, b in zip(self._made.given, given, strict=True)):
@@ -188,13 +192,13 @@ class Mesh(Surface):
             like, table = SheetSide(*numbers), table_of_sides(corners, room)
             grid = cells_around(like, table, np.repeat(corners, 2, axis=0), OVERLAP * room)
             return with_room(Facets(like, table, grid), None, True)
-        like, table = FacetNumbers(*numbers), table_of_facets(corners, room)
+        like, table = FacetNumbers(*numbers), table_of_facets(corners)
         return with_room(Facets(like, table, cells_around(like, table, corners)), self._tree, self.is_solid())
 
     @property
     def _room(self) -> float:
         """The round-off of places [m]."""
-        return _ROOM * float(np.abs(self.corners).max())
+        return ROOM * float(np.abs(self.corners).max())
 
     @cached_property
     def _tree(self) -> tuple[Floats, Indices, Floats]:
@@ -215,7 +219,7 @@ class Mesh(Surface):
         return triangles_of_balls(corners, largest), face
 
     def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
-        return np.asarray(side_sign(self.side) * self._nearest(points)[3] + radius)
+        return np.asarray(side_sign(self.side) * self._nearest(points, time)[3] + radius)
 
     def wall_count(self, of_balls: bool) -> int:
         # Of points the two sides of a sheet are each a wall.
@@ -284,15 +288,16 @@ class Mesh(Surface):
 
         Of sheets it is that from the nearest side of one, above 0 but between these.
         """
-        found = np.asarray(self._nearest(points)[3])
+        found = np.asarray(self._nearest(points, time)[3])
         return found - THIN * self._room if self.open else found
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gradient of that phi at points (3, N); shape (3, N)."""
-        return self._nearest(points)[:3]
+        found = self._nearest(points, time)[:3]
+        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
 
-    def _nearest(self, points: ArrayLike) -> NDArray[np.float64]:
-        rows = self._own_rows(points, 0.0)
+    def _nearest(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
+        rows = self._own_rows(points, time)
         flat = np.ascontiguousarray(np.array(rows).reshape(3, -1))
         found = np.empty((4, flat.shape[1]))
         if not self.open:

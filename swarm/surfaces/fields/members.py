@@ -100,6 +100,24 @@ class Members(Record):
         """The first `Hit` of a free flight, or how far it is surely free."""
         return _first_hit(self, gravity, r, v)
 
+    # --- Of a field that moves: see safe.py ---
+
+    def loosened(self, reach):
+        """The field where places in its frame have round-off of so much more than its own size [m]."""
+        return self
+
+    def until_out(self, cell, gravity, r, v):
+        """When a flight is beyond a cell, or the free cells around it; of its acceleration there may be `Bounds`."""
+        return until_next(gravity, self.grid, cell, r, v)
+
+    def way_in_cell(self, cell, seen, span):
+        """What `may_meet` asks of a flight that is so long in a cell [s]."""
+        return
+
+    def may_meet(self, k, here):
+        """Whether that flight may meet the body of an entry."""
+        return True
+
     # --- Of those in the cell of a point ---
 
     def count_in_cell(self, r):

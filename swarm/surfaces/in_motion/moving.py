@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...kernel.record import Record
+from ...kernel.vector import norm
 from ...motion import Guide
+from ..fields.members import Members
 from ..presence.doors import walls_then
 from ..surface import Surface
 from ..walls import Field, Following, Walls
@@ -121,6 +123,8 @@ def walls_of(surface: Surface, moment: float, largest: float | None = None) -> l
     if surface.motion is None:
         return [first, *others]
     drive = drive_of(surface, moment)
+    if isinstance(first, Members):
+        first = first.loosened(drive.late + norm(drive.shift) + norm(drive.center))
     return [(Translated if _is_uniform(drive) else Moving)(first, drive), *map(Following, others)]
 
 

@@ -153,7 +153,7 @@ class Posed(Framed):
 
     def until_next_cell(self, r, v):
         """When a straight flight may meet another body of a field."""
-        return safe.until_next_cell(self.body.grid, self.sees(None, r, v), self.remaining)
+        return safe.until_next_cell(self.body, self.sees(None, r, v), self.remaining)
 
     is_quartic, may_be_far, has_levels, in_steps, kept, leaves_once = False, True, False, False, 0, False
 

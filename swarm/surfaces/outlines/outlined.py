@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ... import motion as motions
 from ...common.checks import Vector
 from ...kernel.grid import one_cell
 from ...kernel.limits import ON_OUTLINE
@@ -46,8 +47,8 @@ class Outlined(Many):
     center: Vector
     side: str
     height: Any = None
-    refused = ("motion", "mass", "inertia")
-    instead = "its walls end at its corners: move the other surfaces, or build it of surfaces without edges"
+    refused = ("mass", "inertia")
+    instead = "its walls end at its corners: give it a motion, or build it of surfaces without edges"
     face_noun: ClassVar[str] = "side"
     # The argument that gives the outline.
     given: ClassVar[str] = "outline"
@@ -114,14 +115,15 @@ class Outlined(Many):
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """The signed distance of points (3, N): below 0 inside, 0 on the surface, above 0 outside; shape (N,)."""
-        return self._at(points)[0]
+        return self._at(points, time)[0]
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gradient of phi at points (3, N); shape (3, N). At a corner it is that of one of its sides."""
-        return self._at(points)[1]
+        found = self._at(points, time)[1]
+        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
 
-    def _at(self, points: ArrayLike) -> tuple[Floats, Floats]:
-        rows = np.array(self._own_rows(points, 0.0))
+    def _at(self, points: ArrayLike, time: float) -> tuple[Floats, Floats]:
+        rows = np.array(self._own_rows(points, time))
         own = self.in_plane(rows.reshape(3, -1))
         level, slope = self.boundary.nearest(own[:2])
         slope = self.frame[:, :2] @ slope

@@ -10,6 +10,7 @@ from .. import contract
 from ..balls.tube import Tube
 from ..rotation import Rotated
 from ..time_of_impact.course import ball_rise_time
+from ..time_of_impact.rising import LevelStep
 from .sides import Side
 
 # What an arc bends away from within this part of its radius is a point.
@@ -122,6 +123,25 @@ class RoundSide(contract.Smooth):
 
     def safe_time(self, r, v, pull):
         return self.falling_hit(r, v, pull)[0]
+
+    def moving_step(self, seen, longest):
+        return _moving_step(self, seen, longest)
+
+
+@outlined
+def _moving_step(side, seen, longest):
+    """The `LevelStep` of the parallel curve and both circles."""
+    fits, parallel = side.parallel()
+    found = LevelStep(0.0, 0.0, longest)
+    if fits:
+        found = parallel.moving_step(seen, longest)
+    if side.has_ends():
+        for circle in side.ends():
+            step = circle.moving_step(seen, found.time)
+            is_past = (step.level > 0.0) & (step.half > 0.0)
+            level, half = select(is_past, step.level, found.level), select(is_past, step.half, found.half)
+            found = LevelStep(level, half, select(step.time < found.time, step.time, found.time))
+    return found
 
 
 def _whole(part):

@@ -10,8 +10,10 @@ from ..fields.members import Members, member
 from ..frames import Unturned
 from ..presence.patched import Patched
 from ..rotation import Rotated
+from ..shapes.plane import PlaneNumbers
 from ..shapes.quadratic import QuadricNumbers, form
 from ..time_of_impact.course import Fall, Quartic, close, rise_time, under_way
+from ..time_of_impact.rising import patch_step
 
 # How often a fall may cross the whole of a round wall, and how often it may need more steps between.
 _CROSSINGS = 12
@@ -85,6 +87,15 @@ class Side(Unturned):
         window = 2.0 / (norm(v) / self.extent + math.sqrt(norm(pull) / self.extent))
         c = select((c > 0.0) & (c <= self.slack), 0.0, c)
         return Quartic(c, b, a2, a3, a4, select((a3 == 0.0) & (a4 == 0.0), math.inf, window))
+
+    def edges(self):
+        """The planes across its ends, admissible beyond it; none of a wall without ends."""
+        body, t, u = self.body, self.ahead, self.behind
+        start, end = dot(t, body.center), dot(u, body.center + self.end)
+        return PlaneNumbers(t, start - self.slack), PlaneNumbers(-1.0 * u, -end - self.slack)
+
+    def moving_step(self, seen, longest):
+        return _moving_step(self, seen, longest)
 
     # --- The distance from the side ---
 
@@ -169,6 +180,14 @@ class FewSides(Sides):
 
     def in_cells(self):
         return Sides(*self)
+
+
+@outlined
+def _moving_step(side, seen, longest):
+    body = side.body
+    is_behind = body.phi(seen.r) > side.slack
+    whole = body._replace(side=select(is_behind, -1.0, 1.0))
+    return patch_step(whole, is_behind, side.edges(), seen, longest)
 
 
 @outlined

@@ -232,6 +232,23 @@ def level_step(body, seen, level, longest):
     return LevelStep(level.c, level.b, ThirdDerivativeBound(body, seen, level).longest(min(level.own_rise(), longest)))
 
 
+def patch_step(wall, is_behind, edges, seen, longest):
+    """The `LevelStep` of a part of a wall, until the wall is met and until the place is between all edges of the part.
+
+    From behind the wall, where a particle has come to beyond an edge, it meets the part only after it has come back.
+    The wall is then given as seen from there; the edges are planes, whose admissible side is beyond them.
+    """
+    step, is_there = level_step(wall, seen, wall.level_along(seen), longest), not is_behind
+    time = step.time
+    for edge in edges:
+        level = edge.level_along(seen)
+        if level.c < 0.0:
+            is_there = False
+            if time < longest:
+                time = max(level_step(edge, seen, level, longest).time, time)
+    return LevelStep(select(is_there, step.level, 0.0), select(is_there, step.half, 0.0), time)
+
+
 def bent_step(body, seen, longest):
     """The `LevelStep` of a wall that bounds its bend."""
     n, level = body.inner_gradient(seen.r), body.level_of(body.inner(seen.r))

@@ -5,7 +5,7 @@ from typing import Any
 
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated
-from ...kernel.grid import cell_of, entries_at, until_next
+from ...kernel.grid import cell_of, entries_of
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.record import Record
@@ -71,23 +71,30 @@ def _nearest_in_cell(field, number, found, flight, t, longest):
     To leave the cell ends a step, but is no hit.
     """
     grid, seen = field.body.grid, field.seen(flight, t)
-    until = until_next_cell(grid, seen, min(found.time, longest))
+    until = until_next_cell(field.body, seen, min(found.time, longest))
     if until < found.time:
         found = ShortestStep(until, -1.0, math.inf, 0.0, found.past, found.depth)
-    first, stop = entries_at(grid, seen.r)
+    cell = cell_of(grid, seen.r)
+    first, stop = entries_of(grid, cell.number)
+    here = field.body.way_in_cell(cell, seen, min(found.time, longest))
     for k in range(first, stop):
-        m = grid.entries[k]
-        found = _nearer(seen, member(field.body, index(m)), number + m, found, min(found.time, longest))
+        if field.body.may_meet(index(k), here):
+            m = grid.entries[k]
+            found = _nearer(seen, member(field.body, index(m)), number + m, found, min(found.time, longest))
     return found
 
 
 @outlined
-def until_next_cell(grid, seen, longest):
-    """A time up to the longest during which a particle, seen in the frame of a field, is surely near its cell."""
+def until_next_cell(members, seen, longest):
+    """A time up to the longest during which a particle, seen in the frame of a field, is surely near its cell.
+
+    Or near the block of free cells around it, if these are known.
+    """
+    grid = members.grid
     cell, time, within = cell_of(grid, seen.r), 0.0, longest
     # The bound of the acceleration grows with the time that it holds for.
     for _k in range(_TRIALS):
-        until = until_next(seen.bounds(within), grid, cell, seen.r, seen.v)
+        until = members.until_out(cell, seen.bounds(within), seen.r, seen.v)
         time = max(time, min(until, within))
         if not _CLOSE * time < within:
             break

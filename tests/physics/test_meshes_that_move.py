@@ -1,0 +1,183 @@
+"""Meshes and outlines that move are the closed shapes that they are of, and no particle leaves them."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.kernel.vector import Vec, vec
+from swarm.observables import drift
+from swarm.surfaces.in_motion.drive import drive_of
+from swarm.surfaces.rotation import Rotated
+from swarm.surfaces.shapes.plane import PlaneNumbers
+from swarm.surfaces.time_of_impact.rising import InWallFrame
+
+DOWN = (0.0, 0.0, -9.81)
+SHIFTED = swarm.Translation((0.05, 0.02, -0.03))
+SHAKEN = swarm.Oscillation((0.05, 0.02, 0.0), 1.0)
+TURNED = swarm.Rotation((0.2, 0.1, 1.0), 2.0, (0.02, 0.0, 0.0))
+LED = swarm.Path([0.0, 0.5, 1.0, 2.5], [(0, 0, 0), (0.05, 0, 0), (0, 0.05, 0), (0, 0, 0.05)])
+MOTIONS = {"shifted": SHIFTED, "shaken": SHAKEN, "led": LED, "turned": TURNED, "all": TURNED + SHAKEN + LED}
+HALF = 0.3
+# Of a cube, its corners in the order of binary numbers, and of each face two triangles that turn to the left outside.
+CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+SQUARES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+TRIANGLES = [part for a, b, c, d in SQUARES for part in ((a, b, c), (a, c, d))]
+
+
+def cube(side="inside", **how):
+    return swarm.Mesh(HALF * CUBE, TRIANGLES, side, **how)
+
+
+def regular(corners=5, radius=0.4, height=0.8, axis=(0.0, 0.0, 1.0), **how):
+    """A prism on a regular polygon, and the planes that it is between."""
+    angles = 2.0 * np.pi * np.arange(corners) / corners
+    rows = [(radius * np.cos(a), radius * np.sin(a)) for a in angles]
+    prism = swarm.Prism(rows, height, axis=axis, **how)
+    between = angles + np.pi / corners
+    normals = prism.frame @ np.array([np.cos(between), np.sin(between), np.zeros(corners)])
+    sides = [swarm.Plane(tuple(n), radius * np.cos(np.pi / corners), **how) for n in normals.T.tolist()]
+    return prism, [*sides, swarm.Slab(tuple(prism.frame[:, 2].tolist()), 0.5 * height, **how)]
+
+
+def start(beside=(0.0, 0.0, 0.0), radius=None, seed=2):
+    v = np.random.default_rng(seed).standard_normal((3, 4))
+    places = 0.1 * CUBE[[0, 3, 5, 6]].T + np.array(beside)[:, None]
+    return swarm.Particles(places, v / np.linalg.norm(v, axis=0), radius=radius)
+
+
+def run(surfaces, particles, until, gravity=None, **options):
+    scene = swarm.Scene(surfaces, gravity)
+    return swarm.simulate(scene, particles, swarm.Impact(), until=until, compile="never", **options)
+
+
+def same(one, other, impacts):
+    """Whether two runs are one, to round-off that grows from impact to impact."""
+    assert one.particles.position == pytest.approx(other.particles.position, abs=1e-11)
+    assert one.particles.velocity == pytest.approx(other.particles.velocity, abs=1e-10)
+    seen, wanted = one.observables, other.observables
+    assert seen["impacts"][-1] == wanted["impacts"][-1] >= impacts
+    for name in ("wall_work", "impulse"):
+        assert seen[name][-1].sum(axis=0) == pytest.approx(wanted[name][-1].sum(axis=0), abs=1e-10)
+    assert drift(seen) <= 1e-13
+    assert seen["max_penetration"].max() <= 1e-14
+
+
+@pytest.mark.parametrize("gravity", [None, DOWN], ids=["straight", "falling"])
+@pytest.mark.parametrize("motion", list(MOTIONS))
+def test_in_a_mesh_of_a_box_as_in_the_box(motion, gravity):
+    moved = MOTIONS[motion]
+    box = swarm.Box(3 * (HALF,), motion=moved)
+    same(*(run([one], start(), 0.8, gravity) for one in (cube(motion=moved), box)), 5)
+
+
+@pytest.mark.parametrize("gravity", [None, DOWN], ids=["straight", "falling"])
+@pytest.mark.parametrize("motion", ["led", "turned"])
+def test_beside_a_mesh_of_a_box_as_beside_the_box(motion, gravity):
+    moved, beside = MOTIONS[motion], (0.55, 0.0, 0.0)
+    solids = cube("outside", motion=moved), swarm.Box(3 * (HALF,), side="outside", motion=moved)
+    same(*(run([swarm.Sphere(0.9), one], start(beside), 0.8, gravity) for one in solids), 2)
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+@pytest.mark.parametrize("motion", ["shaken", "turned"])
+def test_balls_at_a_mesh_of_a_box_as_at_the_box(motion, side):
+    moved, vessel = MOTIONS[motion], [] if side == "inside" else [swarm.Sphere(0.9)]
+    particles = start((0.0 if side == "inside" else 0.55, 0.0, 0.0), 0.04)
+    solids = cube(side, motion=moved), swarm.Box(3 * (HALF,), side=side, motion=moved)
+    same(*(run([*vessel, one], particles, 0.4, DOWN) for one in solids), 2)
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (0.2, -0.3, 1.0)], ids=["upright", "tilted"])
+@pytest.mark.parametrize("motion", list(MOTIONS))
+def test_in_a_prism_as_between_its_planes(motion, axis):
+    prism, planes = regular(axis=axis, motion=MOTIONS[motion])
+    for radius in (None, 0.04):
+        same(*(run(walls, start(radius=radius), 0.8, DOWN) for walls in ([prism], planes)), 5)
+
+
+@pytest.mark.parametrize("radius", [None, 0.05])
+def test_in_a_stadium_that_moves(radius):
+    """In uniform translation it is the stadium at rest, seen from a frame that moves."""
+    shift = np.array([[0.3], [-0.2], [0.1]])
+    lids, particles = swarm.Slab((0.0, 0.0, 1.0), 0.5), start(radius=radius)
+    still = run([swarm.Stadium(0.3, 0.4), lids], particles, 1.0)
+    moved = swarm.Translation(tuple(shift[:, 0].tolist()))
+    carried = swarm.Particles(particles.position, particles.velocity + shift, radius=radius)
+    walls = swarm.Stadium(0.3, 0.4, motion=moved), swarm.Slab((0.0, 0.0, 1.0), 0.5, motion=moved)
+    one = run(walls, carried, 1.0)
+    assert one.particles.position - 1.0 * shift == pytest.approx(still.particles.position, abs=1e-11)
+    spun = swarm.Stadium(0.3, 0.4, motion=swarm.Rotation((0.0, 0.0, 1.0), 7.0))
+    seen = run([spun, lids], particles, 1.0, every=0.1).observables
+    assert seen["impacts"][-1] >= 5
+    assert drift(seen) <= 1e-13
+    assert seen["max_penetration"].max() <= 1e-14
+
+
+@pytest.mark.parametrize("made", ["mesh", "prism"])
+def test_none_leaves_through_the_edges_of_what_turns_fast(made):
+    """Particles start in its corners, and fly along its faces."""
+    spin = swarm.Rotation((0.3, 0.2, 1.0), 40.0, (0.02, 0.0, 0.0))
+    corners = (HALF - 1e-9) * CUBE
+    along = np.roll(CUBE, 1, axis=1) - CUBE
+    particles = swarm.Particles(corners.T, along.T)
+    square = [(-HALF, -HALF), (HALF, -HALF), (HALF, HALF), (-HALF, HALF)]
+    wall = cube(motion=spin) if made == "mesh" else swarm.Prism(square, 2.0 * HALF, motion=spin)
+    ran = run([wall], particles, 0.08, every=0.02)
+    seen, box = ran.observables, swarm.Box(3 * (HALF,), motion=spin)
+    assert seen["impacts"][-1] >= 40
+    assert box.phi(ran.particles.position, 0.08).max() <= 1e-14
+    assert drift(seen) <= 1e-13
+
+
+@pytest.mark.parametrize("laws", [{"restitution": 0.9, "friction": 0.2}, {"temperature": 1.0}], ids=["rough", "hot"])
+def test_its_laws_act_in_its_frame(laws):
+    pair = cube(motion=TURNED, **laws), swarm.Box(3 * (HALF,), motion=TURNED, **laws)
+    one, other = (run([wall], start(), 0.4) for wall in pair)
+    assert drift(one.observables) <= 1e-13
+    assert one.observables["wall_work"][-1].sum() != 0.0
+    if "temperature" not in laws:
+        assert one.particles.position == pytest.approx(other.particles.position, abs=1e-11)
+
+
+def test_its_distance_is_that_of_a_time():
+    points = np.random.default_rng(6).uniform(-0.5, 0.5, (3, 40))
+    box, square = swarm.Box(3 * (HALF,), motion=TURNED), [(-HALF, -HALF), (HALF, -HALF), (HALF, HALF), (-HALF, HALF)]
+    inside = box.phi(points, 0.7) < 0.0
+    for one in (cube(motion=TURNED), swarm.Prism(square, 2.0 * HALF, motion=TURNED)):
+        assert one.phi(points, 0.7)[inside] == pytest.approx(box.phi(points, 0.7)[inside])
+        assert one.gradient(points, 0.7)[:, inside] == pytest.approx(box.gradient(points, 0.7)[:, inside])
+    assert inside.sum() > 3
+
+
+def test_the_bound_of_a_jerk_along_a_normal_does_not_depend_on_the_frame_of_a_body():
+    """Of the cap of a tilted cylinder, whose normal is along the axis of its own frame."""
+    motion = swarm.Oscillation((0.1, 0.0, 0.0), 3.0) + swarm.Rotation((1.0, 0.0, 0.0), 2.0, (0.0, 0.5, 0.0))
+    drive = drive_of(cube(motion=motion), 0.0)
+    r, v, a = vec([0.1, 0.2, 0.3]), vec([1.0, 0.5, 0.2]), vec([0.0, 0.1, -1.0])
+    seen = InWallFrame(drive, r, v, a, 1.2, 0.4, 9.81, 1.0)
+    # The own z axis is along x, x along y, y along z.
+    turned = Rotated(PlaneNumbers(Vec(0.0, 0.0, 1.0), 0.5), Vec(0.0, 0.0, 1.0), Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0))
+    wanted = PlaneNumbers(Vec(1.0, 0.0, 0.0), 0.5).moving_step(seen, 1.0)
+    assert turned.moving_step(seen, 1.0) == pytest.approx(wanted, rel=1e-14)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("side", ["inside", "outside"])
+@pytest.mark.parametrize("gravity", [None, DOWN], ids=["straight", "falling"])
+@pytest.mark.parametrize("rate", [8.0, 40.0, 200.0])
+def test_none_leaves_through_thousands_of_impacts(rate, gravity, side):
+    spin = swarm.Rotation((0.3, 0.2, 1.0), rate, (0.05, 0.0, 0.0))
+    random = np.random.default_rng(3)
+    places = 0.25 * random.uniform(-1.0, 1.0, (3, 64))
+    places[:, :8] = (HALF - 1e-9) * CUBE.T
+    if side == "outside":
+        places = 0.4 * places + np.array([[0.9], [0.2], [0.0]])
+    vessel = [] if side == "inside" else [swarm.Sphere(1.2)]
+    scene = swarm.Scene([*vessel, cube(side, motion=spin)], gravity)
+    ran = swarm.simulate(scene, swarm.Particles(places, random.standard_normal((3, 64))), until=4.0, every=0.1)
+    sign = 1.0 if side == "inside" else -1.0
+    assert (sign * swarm.Box(3 * (HALF,), motion=spin).phi(ran.particles.position, 4.0)).max() <= 1e-13
+    assert drift(ran.observables) <= 1e-13
+    assert ran.observables["impacts"][-1] >= 500
