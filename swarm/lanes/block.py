@@ -144,8 +144,7 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
             lane, wall = lanes.given(method, i), methods.HARD - lanes.wall[i]
             contact, status = method.hard_pass(walls, gravity, lane, wall, lanes, i)
             _put_contact(method, lanes, i, contact)
-            if share.counters is not None and method.contacts_take_time:
-                share.counters.count_contact(method, share, lanes, i)
+            _count_contacts(method, share, lanes, i, i + 1)
             if share.counts is not None:
                 share.counts.add(wall, contact.hits)
             if lanes.lane(i).hits > hard.most_hits:
@@ -182,12 +181,17 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
     if counters is not None and method.contacts_take_time:
         counters.keep_before(method, gravity, lanes, live)
     some_arrived, some_hard = _make_contacts(method, walls, gravity, watches, lanes, picked, live)
-    if counters is not None and method.contacts_take_time:
-        for i in range(index(live)):
-            counters.count_contact(method, share, lanes, i)
+    _count_contacts(method, share, lanes, 0, live)
     for watch in watches:
         watch.add_rows(method, walls, state, lanes, live)
     return some_arrived, some_hard, some_wrong
+
+
+def _count_contacts(method, share, lanes, first, after):
+    """Count what these lanes have crossed in their contacts, where contacts take time."""
+    if share.counters is not None and method.contacts_take_time:
+        for i in range(index(first), index(after)):
+            share.counters.count_contact(method, share, lanes, i)
 
 
 def _make_contacts(method, walls, gravity, watches, lanes, picked, live):

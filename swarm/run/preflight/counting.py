@@ -59,8 +59,9 @@ def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) 
 
 
 def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) -> Counters | None:
-    """The counters as kernels take them, or None if none is given; `logs`: their crossings are logged, or
-    those of steps.
+    """The counters as kernels take them, or None if none is given; `logs`: their crossings are logged.
+
+    `logs` is true of crossings by steps too, which are counted one by one.
 
     Raises:
         SceneError: a surface cannot be a counter in this scene.
