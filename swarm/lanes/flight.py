@@ -6,6 +6,7 @@ from ..surfaces.periodic.period import cut
 from ..surfaces.presence.rooms import at_the_end, inside_of
 from ..surfaces.time_of_impact import flights, safe, strides
 from ..surfaces.time_of_impact.course import MORE_STEPS, SAFE_STEPS
+from ..surfaces.time_of_impact.polynomial import POLYNOMIAL_STEPS
 from .field_hits import hit_of_lane, keep_hit, seek
 from .table import marked_lanes
 
@@ -90,7 +91,7 @@ def _go_by_steps(walls, gravity, lanes, live):
     for i in range(index(live)):
         lane = lanes.lane(i)
         flights.begin(walls.at(lane.remaining), gravity, course, 0, i, lane.r, lane.v)
-    for _step in range(SAFE_STEPS):
+    for _step in range(POLYNOMIAL_STEPS if gravity is None and walls.are_polynomial() else SAFE_STEPS):
         for i in range(index(live)):
             _step_on(walls, gravity, lanes, i)
     # The few that need more, one by one: a flight in two parts would look like a short one.

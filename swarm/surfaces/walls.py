@@ -87,6 +87,10 @@ class Walls(Record):
         """Whether a straight flight to any wall takes steps in lanes: a constant for the compiler."""
         return any(wall.in_steps for wall in self.each)
 
+    def are_polynomial(self):
+        """Whether all of these walls are asked for the level along a straight flight once."""
+        return all(wall.kept > 0 for wall in self.each if wall.in_steps)
+
     # --- Their numbers and rows ---
 
     def numbered(self):

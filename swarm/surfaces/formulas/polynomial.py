@@ -11,8 +11,8 @@ from .numbers import OwnNumbers
 
 # A root at the start is divided out of a level up to this part of the other terms: it is round-off.
 _ROUND_OFF = 1e-13
-# What a step of Newton's method may change of a time that is known to round-off, which is more where a flight grazes.
-_REFINED = 1e-8
+# A step of Newton's method is taken where it changes the slope, and the time, by at most this part of them.
+_REFINED = 1e-4
 # b^2 - a c has lost digits where it is less than this part of b^2.
 _CANCELS = 1.0 / 64.0
 
@@ -37,9 +37,10 @@ class PolynomialNumbers(OwnNumbers):
 
     def refined(self, r, v, time):
         # One step of Newton's method
-        c, twice_b = self.along(r + select(time < math.inf, time, 0.0) * v, v)[:2]
+        c, twice_b, a2 = self.along(r + select(time < math.inf, time, 0.0) * v, v)[:3]
         change = c / select(twice_b == 0.0, 1.0, twice_b)
-        return time - select(abs(change) <= _REFINED * time, change, 0.0)
+        small = (abs(change * a2) <= _REFINED * abs(twice_b)) & (abs(change) <= _REFINED * time)
+        return time - select(small, change, 0.0)
 
 
 class QuadraticCavity(PolynomialNumbers):
@@ -80,7 +81,7 @@ class QuarticCavity(PolynomialNumbers):
             return None
         start, end, (c, twice_b, a2, a3, a4) = self.level_from(r, v)
         speed = total(absolute(v))
-        window = 3.0 * self.size / select(speed > 0.0, speed, 1.0)
+        window = 2.8 * self.size / select(speed > 0.0, speed, 1.0)
         # From the wall inwards
         rest = window * (abs(twice_b) + window * (abs(a2) + window * (abs(a3) + window * abs(a4))))
         leaves = (twice_b < 0.0) & (c >= -_ROUND_OFF * rest)
