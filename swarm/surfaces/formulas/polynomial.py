@@ -4,8 +4,9 @@ import math
 from typing import Any
 
 from ...kernel.gravity import rise_time_by
-from ...kernel.jit import select
+from ...kernel.jit import outlined, select
 from ...kernel.vector import absolute, total
+from ..time_of_impact.course import first_rise
 from ..time_of_impact.polynomial import PolynomialFlight
 from .numbers import OwnNumbers
 
@@ -72,8 +73,9 @@ class QuarticCavity(PolynomialNumbers):
     in_steps = True
     kept = 5
 
+    @outlined
     def first_hit(self, r, v):
-        time, found = self.hit_by_steps(None, r, v)
+        time, found = first_rise(self.steps(None, r, v))
         return self.refined(r, v, time), found
 
     def steps(self, gravity, r, v):
