@@ -10,6 +10,8 @@ from ..time_of_impact.course import first_rise
 from ..time_of_impact.polynomial import PolynomialFlight
 from .numbers import OwnNumbers
 
+# The first step goes at most so many sizes, by the sum of the components of the velocity: about the longest chord.
+_WINDOW = 2.8
 # A root at the start is divided out of a level up to this part of the other terms: it is round-off.
 _ROUND_OFF = 1e-13
 # A step of Newton's method is taken where it changes the slope, and the time, by at most this part of them.
@@ -83,7 +85,7 @@ class QuarticCavity(PolynomialNumbers):
             return None
         start, end, (c, twice_b, a2, a3, a4) = self.level_from(r, v)
         speed = total(absolute(v))
-        window = 2.8 * self.size / select(speed > 0.0, speed, 1.0)
+        window = _WINDOW * self.size / select(speed > 0.0, speed, 1.0)
         # From the wall inwards
         rest = window * (abs(twice_b) + window * (abs(a2) + window * (abs(a3) + window * abs(a4))))
         leaves = (twice_b < 0.0) & (c >= -_ROUND_OFF * rest)
