@@ -2,6 +2,7 @@
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 import trimesh
@@ -87,6 +88,8 @@ def test_what_has_no_inside_is_refused():
         run(triangle(), [[0.0], [0.0], [0.0]], [[0.0], [0.0], [1.0]])
     with pytest.raises(swarm.SceneError, match=r"motion must be None for a Mesh with open=True"):
         tray(motion=swarm.Translation((1.0, 0.0, 0.0)))
+    with pytest.raises(swarm.SceneError, match="openings must be left out for an open mesh"):
+        tray(openings=[swarm.Sphere(0.1, (0.0, 0.0, -0.5))])
     with pytest.raises(swarm.SceneError, match="triangles that have an area, got none"):
         swarm.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], open=True)
 
@@ -265,3 +268,129 @@ def test_groups_and_times_of_sheets():
     # After 0.7 s none is there.
     later = run(mesh, [[0.0], [0.0], [0.8]], [[0.0], [0.0], [-1.0]], until=1.0)
     assert later.particles.position[2, 0] == pytest.approx(-0.2)
+
+
+# --- Balls and grains ------------------------------------------------------------------------------------
+
+R = 0.1
+
+
+def roots_of(d, v, along):
+    """When a ball comes to a line, or with none to a point: the sooner root in 50 digits, and the place along it."""
+    a, b, c = v @ v, d @ v, d @ d - mpmath.mpf(R) ** 2
+    if along is not None:
+        length = along @ along
+        a, b, c = a - (v @ along) ** 2 / length, b - (d @ along) * (v @ along) / length, c - (d @ along) ** 2 / length
+    if b * b - a * c <= 0 or a == 0:
+        return None, None
+    t = (-b - mpmath.sqrt(b * b - a * c)) / a
+    return t, (None if along is None else ((d + t * v) @ along) / length)
+
+
+def hit_in_digits(corners, r, v):
+    """When a ball first meets a triangle, by its plane, its edges and its corners; and the normal there."""
+    found = []
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal = normal / mpmath.sqrt(normal @ normal)
+    height = (r - corners[0]) @ normal
+    sign = 1 if height > 0 else -1
+    if v @ normal != 0:
+        t = (sign * mpmath.mpf(R) - height) / (v @ normal)
+        p = r + t * v
+        sides = [np.cross(corners[(k + 1) % 3] - corners[k], p - corners[k]) @ normal for k in range(3)]
+        if t > 0 and min(sides) > 0:
+            found.append((t, normal))
+    for k in range(3):
+        along = corners[(k + 1) % 3] - corners[k]
+        t, part = roots_of(r - corners[k], v, along)
+        if t is not None and t > 0 and 0 < part < 1:
+            found.append((t, (r + t * v - corners[k] - part * along) / R))
+        t, _part = roots_of(r - corners[k], v, None)
+        if t is not None and t > 0:
+            found.append((t, (r + t * v - corners[k]) / R))
+    return min(found, key=lambda one: one[0], default=(None, None))
+
+
+def test_balls_bounce_off_the_rim_as_in_50_digits():
+    mpmath.mp.dps = 50
+    exact = np.vectorize(mpmath.mpf, otypes=[object])
+    mesh, random, n = triangle(), np.random.default_rng(7), 24
+    corners = exact(mesh.corners[mesh.triangles[0]])
+    # At places on the rim, passed at less than the radius, from all around.
+    part, k = random.random(n), random.integers(0, 3, n)
+    rim = mesh.corners[mesh.triangles[0]]
+    target = rim[k] + part[:, None] * (rim[(k + 1) % 3] - rim[k]) + random.uniform(-0.08, 0.08, (n, 3))
+    way = random.normal(0.0, 1.0, (n, 3))
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    start = target - 0.6 * way
+    free = mesh.phi(start.T) > R + 0.01
+    start, way, count = start[free], way[free], 0
+    for r, v in zip(start, way, strict=True):
+        scene = swarm.Scene([mesh])
+        given = swarm.Particles(r[:, None], v[:, None], radius=R)
+        end = swarm.simulate(scene, given, swarm.Impact(), until=1.0, compile="never")
+        x, w = exact(r), exact(v)
+        t, normal = hit_in_digits(corners, x, w)
+        if t is None or t > 1:
+            assert end.observables["impacts"][-1] == 0
+            continue
+        count += 1
+        after = w - 2 * (w @ normal) * normal / (normal @ normal)
+        expected = (x + t * w + (1 - t) * after).astype(float)
+        assert end.observables["impacts"][-1] == 1
+        assert np.abs(end.particles.position[:, 0] - expected).max() < 2e-13
+        assert end.observables["energy_error"].max() < 1e-15
+    assert count > 10
+
+
+def test_balls_stay_on_their_side_of_a_closed_sheet():
+    vertices, faces = np.array(BOX.vertices), turned(BOX.faces)
+    scene = swarm.Scene([swarm.Mesh(vertices, faces, open=True), swarm.Sphere(1.2)], (0.0, 0.0, -1.0))
+    ticks = np.linspace(-0.84, 0.84, 7)
+    grid = np.array(np.meshgrid(ticks, ticks, ticks)).reshape(3, -1)
+    away = np.abs(np.abs(grid).max(axis=0) - 0.5) > 0.06
+    grid = grid[:, away & (np.linalg.norm(grid, axis=0) < 1.1)]
+    within = np.abs(grid).max(axis=0) < 0.5
+    start = swarm.Particles(grid, np.random.default_rng(1).normal(0.0, 1.0, grid.shape), radius=0.05)
+    end = swarm.simulate(scene, start, swarm.Impact(), until=2.5, compile="always")
+    assert np.array_equal(np.abs(end.particles.position).max(axis=0) < 0.5, within)
+    assert within.any()
+    assert not within.all()
+    seen = end.observables
+    assert seen["impacts"][-1] > 1000
+    assert seen["energy_error"].max() < 1e-12
+    assert seen["max_penetration"].max() < 1e-12
+
+
+def test_faces_of_sheets_are_flat():
+    """Whichever way they are turned, and in whichever order: the diagonal of a square joins, a fold does not."""
+    corners, face = tray().faces_of_balls(0.1)
+    assert len(np.unique(face)) == 5
+    assert np.bincount(face).tolist() == [2] * 5
+    assert len(corners.table) == 10
+
+
+def test_grains_in_a_tray_as_in_planes():
+    """Soft balls that stay below the rim: the same contacts as with the planes of a box, and the energy is kept."""
+    ticks = (-0.3, 0.05)
+    grid = np.array(np.meshgrid(ticks, ticks, (-0.38, -0.15))).reshape(3, -1)
+    velocity = np.random.default_rng(3).normal(0.0, 0.5, grid.shape)
+    ends = []
+    for surface in (tray(friction=0.2), swarm.Box((0.5, 0.5, 0.5), open=("+z",), friction=0.2)):
+        scene = swarm.Scene([surface], (0.0, 0.0, -G))
+        start = swarm.Particles(grid, velocity, radius=R)
+        end = swarm.simulate(scene, start, swarm.Penalty(dt=2e-3, penalty=5e4), until=0.24, compile="never")
+        assert end.observables["energy_error"].max() < 1e-12
+        ends.append(end)
+    assert ends[0].observables["impacts"][-1] > 5
+    assert np.abs(ends[0].particles.position - ends[1].particles.position).max() < 1e-9
+
+
+def test_grains_meet_a_sheet_from_both_sides():
+    position, velocity = np.array([[0.0] * 2, [0.0, 0.4], [0.3, -0.3]]), np.array([[0.0] * 2, [0.0] * 2, [-1.0, 1.0]])
+    start = swarm.Particles(position, velocity, radius=R)
+    end = swarm.simulate(
+        swarm.Scene([triangle()]), start, swarm.Penalty(dt=1e-3, penalty=1e5), until=0.5, compile="never"
+    )
+    assert end.particles.velocity[2] == pytest.approx([1.0, -1.0], abs=1e-12)
+    assert end.particles.position[2, 0] == pytest.approx(-end.particles.position[2, 1], abs=1e-15)

@@ -5,6 +5,8 @@ place of what is convex goes on without a jump of the normal. Triangles in one p
 put into that plane: from one to the next neither the distance nor the normal changes.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,10 +38,10 @@ def faces_of(vertices: Floats, triangles: Indices, side: float) -> tuple[Floats,
     Args:
         vertices: (V, 3) [m].
         triangles: (T, 3), which turn to the left seen from outside.
-        side: 1 where balls are outside, -1 inside.
+        side: 1 where balls are outside, -1 inside, 0 on both sides of sheets, where no corner is one of a convex body.
     """
-    corners = vertices[triangles]
-    crossed = side * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    corners, of_sheets = vertices[triangles], side == 0.0
+    crossed = (side or 1.0) * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = crossed / np.linalg.norm(crossed, axis=1)[:, None]
     pairs, bends = _joints(corners, triangles, normals)
     flat = np.abs(bends) <= _FLAT
@@ -47,10 +49,14 @@ def faces_of(vertices: Floats, triangles: Indices, side: float) -> tuple[Floats,
     for one, other in pairs[flat].tolist():
         groups.parent[groups.root(one)] = groups.root(other)
     planes = np.array([groups.root(i) for i in range(len(triangles))])
+    if of_sheets:
+        # Those of one plane may be turned either way.
+        crossed = np.where((normals * normals[planes]).sum(axis=1)[:, None] < 0.0, -crossed, crossed)
     corners = _in_planes(corners, crossed, planes)
     groups = _Groups(len(triangles))
     _join_flat(groups, planes, corners, normals, pairs[flat])
-    edges = pairs[bends < -_FLAT][np.argsort(-bends[bends < -_FLAT], kind="stable")]
+    around = bends < (-math.inf if of_sheets else -_FLAT)
+    edges = pairs[around][np.argsort(-bends[around], kind="stable")]
     _join_edges(groups, planes, corners, normals, edges)
     faces = np.array([groups.root(i) for i in range(len(triangles))])
     return corners, np.unique(faces, return_inverse=True)[1]

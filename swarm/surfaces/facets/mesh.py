@@ -119,6 +119,11 @@ class Mesh(Surface):
                     "thickness, as a closed mesh, or leave the motion out"
                 )
             checks.assign(self, side="outside", nouns=_NOUNS_OF_SHEETS)
+            if self.openings:
+                raise SceneError(
+                    f"openings must be left out for an open mesh, got {len(self.openings)}: particles go around its "
+                    "edges; leave the triangles out that are open, or give them as a mesh of their own with present"
+                )
         given = self.vertices, self.triangles, self.group, self.names
         if self._made is None or any(a is not b for a, b in zip(self._made.given, given, strict=True)):
             made = self._mended()
