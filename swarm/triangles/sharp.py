@@ -102,8 +102,21 @@ def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
         edges = [run for edge in fine for run in curves.runs(edge, level(edge) <= 0.0)]
         points, triangles, rims = cut(wall, points, triangles, level)
         edges += curves.joined(points, rims)
+    if surface.open:
+        return _both_sides(points, triangles), edges
     # Triangles go round the normals out of the mesh.
     return given.shaded(points, triangles if part.solid else triangles[:, ::-1]), edges
+
+
+def _both_sides(points: Floats, triangles: Indices) -> tuple[Floats, Indices, Floats]:
+    """The triangles of sheets, each seen from both sides."""
+    sides = [given.shaded(points, turned) for turned in (triangles, triangles[:, ::-1])]
+    (here, cells, normals), (there, others, opposite) = sides
+    return (
+        np.concatenate([here, there]),
+        np.concatenate([cells, others + len(here)]),
+        np.concatenate([normals, opposite]),
+    )
 
 
 def _pieces(placed: _Placed) -> Iterator[tuple[Any, SmoothSurface]]:

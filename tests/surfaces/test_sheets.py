@@ -123,6 +123,13 @@ def test_a_triangle_is_one_whichever_way_it_is_turned():
     assert len(mesh) == 3
 
 
+def test_pictures_show_both_sides():
+    """As often as a triangle goes round a normal it goes round the opposite one."""
+    shapes = pytest.importorskip("swarm.triangles.shapes")
+    (shape,) = shapes.shapes_of(swarm.Scene([tray()]), np.zeros((3, 1)))
+    assert shape.area() == pytest.approx(2.0 * 5.0)
+
+
 # --- Flights ---------------------------------------------------------------------------------------------
 
 
