@@ -83,11 +83,36 @@ def test_a_foam_settles_under_gravity():
     assert kept == pytest.approx(kept[0], abs=1e-10 * np.abs(kept).max())
 
 
+@pytest.mark.parametrize(
+    ("gravity", "opening"),
+    [
+        (None, swarm.Sphere(0.2, (0.7, 0.0, 0.0))),
+        ((0.0, 0.0, -2.0), swarm.Opening(swarm.Sphere(0.25, (0.25, 0.0, -0.5)), times=[(0.8, 1.5)])),
+    ],
+    ids=["opening", "door"],
+)
+def test_openings_of_a_foam_are_those_of_the_union_of_its_cavities(gravity, opening):
+    """Also those into which particles slide, and only while a door is open."""
+    places, radii, laws = [(-0.25, 0.0, 0.0), (0.25, 0.0, 0.0)], [0.45, 0.5], {"restitution": 0.3, "friction": 0.1}
+    laws = {} if gravity is None else laws
+    cavities = swarm.Spheres(places, radii, side="inside", openings=[opening], **laws)
+    parts = [swarm.Sphere(radius, place, **laws) for radius, place in zip(radii, places, strict=True)]
+    start = swarm.fill(swarm.Scene([cavities]), 12 if gravity is None else 3, speed=1.0, seed=3)
+    one, other = (
+        swarm.simulate(swarm.Scene([walls], gravity), start, swarm.Impact(), until=1.5, compile="never")
+        for walls in (cavities, swarm.Union(parts, openings=[opening]))
+    )
+    assert one.observables["escaped"][-1] > 0
+    assert np.array_equal(np.isfinite(one.escape_time), np.isfinite(other.escape_time))
+    assert np.abs(one.particles.position - other.particles.position).max() < 1e-11
+    assert one.observables["energy_error"].max() < 1e-12
+
+
 def test_what_does_not_go_with_a_foam_is_a_sentence():
     cavities = foam(5)
     with pytest.raises(swarm.SceneError, match="must be the only surface of a scene without a period"):
         swarm.Scene([cavities, swarm.Plane((0.0, 0.0, 1.0), 0.5)])
-    with pytest.raises(swarm.SceneError, match="motion and openings must be left out for Spheres with side"):
+    with pytest.raises(swarm.SceneError, match="motion must be left out for Spheres with side"):
         foam(5, motion=swarm.Translation((1.0, 0.0, 0.0)))
     with pytest.raises(swarm.SceneError, match='side must be "outside" for Capsules'):
         swarm.Capsules([[0.0, 0.0, 0.0]], 0.1, 0.2, side="inside")

@@ -70,8 +70,8 @@ class Many(Surface):
         side, name = getattr(self, "side", "outside"), type(self).__name__
         if side != "outside" and not (self.may_be_foam and side == "inside"):
             raise SceneError(f'side must be "outside" for {name}, which are solids, got {side!r}')
-        if self.is_foam() and (self.motion is not None or self.openings):
-            raise SceneError(f'motion and openings must be left out for {name} with side="inside", got {self}')
+        if self.is_foam() and self.motion is not None:
+            raise SceneError(f'motion must be left out for {name} with side="inside", got {self}')
         object.__setattr__(self, "centers", (balls if self.kind is Sphere else bodies)("centers", self.centers))
         for what in [field.name for field in fields(self) if field.name in _ROWS and field.name != "centers"]:
             if (value := getattr(self, what)) is not None:
