@@ -17,8 +17,9 @@ from ..particles import Particles
 from ..run import failures
 from ..run.base import Arrays, BaseRun, named
 from ..run.doors import comers, require_free
+from ..run.feeding import Feed, There
 from ..run.impacts import ThreadLog
-from ..run.preflight.counting import counters_of, with_counters
+from ..run.preflight.counting import counters_of, crossed_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -27,7 +28,7 @@ from .colliding import events
 from .colliding.bounce import Gates
 from .colliding.box import CollisionRule, CollisionTotals
 from .colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
-from .colliding.described import described, epoch_of, reach_of, with_room
+from .colliding.described import described, epoch_of, put_in, reach_of, there_at, with_room
 from .colliding.queue import FIRST
 from .colliding.window import END
 from .resting import warn_of_rest
@@ -65,15 +66,19 @@ class CollidingRun(BaseRun):
             absorbed_wall=np.full(n, -1, np.int32) if laws.may_end else None,
         )  # fmt: skip
         state, self._balls, gates = self.state, balls, None
-        if openings is not None or laws.may_end:
+        feed = None if particles.births is None else Feed(scene, particles, seeding.seed)
+        if openings is not None or laws.may_end or feed is not None:
             gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
         self._box = self._with_heavy(compiled, box)._replace(
             window=None if self._windows is None else self._windows.numbers,
             gates=gates, source=RandomSource(seeding.signed(), seeding.first) if laws.send_off else None,
         )  # fmt: skip
         super().__init__(compiled, method, n, threads, Tier(compile, self._box, n), seeding, watched)
+        if feed is not None:
+            self._feed, self.state = feed, self.state._replace(born_time=feed.born_time)
+        self._counted = watched.counters
         counters = counters_of(scene, watched.counters, logs=True)
-        self.state = state = with_counters(state, counters, watched.counters, scene)
+        self.state = state = with_counters(self.state, counters, watched.counters, scene)
         self._box = self._box._replace(watchers=self._watchers(counters))
         if counters is not None:
             self._flock = self._flock._replace(followed=np.zeros(n))
@@ -96,9 +101,10 @@ class CollidingRun(BaseRun):
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
         page = self._open_page(moment)
-        rule = CollisionRule(moment, self._watch.passes)
         status = ball = int(Status.LEASE_ENDED)
         while status in (Status.LEASE_ENDED, Status.LOG_FULL):
+            stop = moment if self._feed is None else min(moment, self._feed.next())
+            rule = CollisionRule(stop, self._watch.passes)
             status, ball = self._call(
                 events.take, self._with_log(page), self._flock, self._books, self._clock, rule, latest=latest
             )
@@ -108,6 +114,9 @@ class CollidingRun(BaseRun):
                 self._make_room()
             elif status == Status.LEASE_ENDED:
                 self._next_window()
+            elif status == Status.DONE and self._feed is not None and self._feed.next() <= moment:
+                self._feed_in(stop)
+                status = Status.LEASE_ENDED
         if status == Status.DONE and self._box.watchers.counters is not None:
             self._follow(moment, page)
         if page is not None:
@@ -128,6 +137,20 @@ class CollidingRun(BaseRun):
             )
             if page is not None and followed < self.state.mass.size:
                 page.turn()
+
+    def _feed_in(self, moment: float) -> None:
+        """Let those come that are due at a moment [s]."""
+        assert self._feed is not None
+        now = self._since(moment)
+        born = self._feed.come(moment, There(*there_at(self._flock, self._box.pull, now)))
+        for i, position, velocity in zip(born.number.tolist(), born.position.T, born.velocity.T, strict=True):
+            self.state.position[:, i], self.state.velocity[:, i] = position, velocity
+            if not put_in(self._flock, self._box.grid, i, now, position, velocity):
+                self._make_room()
+            if (crossed := self.state.crossed) is not None:
+                counters = self._box.watchers.counters
+                crossed.side[:, i] = crossed_of(counters, self._counted, self._scene, position[:, None]).side[:, 0]
+            self._call(events.welcome, self._box, self._flock, i, now)
 
     def _make_room(self) -> None:
         """More room in the cells."""
@@ -158,7 +181,7 @@ class CollidingRun(BaseRun):
         self._set_window()
         if instant is not None and (came := comers(self._scene, instant)).any():
             self._show_at(now)
-            require_free(self._scene, self.state, came, self._deepest, instant, self._first)
+            require_free(self._scene, self._seen_state(), came, self._deepest, instant, self._first)
         self._look_anew(now)
 
     def _look_anew(self, now: float) -> None:
@@ -195,6 +218,8 @@ class CollidingRun(BaseRun):
         yield events.mark, (box, self._radius, *part)
         yield events.begin, (box, flock, -1.0, *part)
         yield events.order, (flock,)
+        if self._feed is not None:
+            yield events.welcome, (box, flock, 0, 0.0)
         yield events.take, (box, flock, self._books, self._clock, CollisionRule(0.0, self._watch.passes))
         yield events.show, (box, flock, self.state, 0.0, *part)
         if box.watchers.counters is not None:
@@ -212,6 +237,8 @@ class CollidingRun(BaseRun):
             self._windows.begin(0.0)
         self._set_window()
         self._look_anew(-1.0)
+        if self._feed is not None and self._feed.next() <= 0.0:
+            self._feed_in(0.0)
 
     def _scale_of(self, seen: dict[str, Any]) -> float:
         turning = seen.get("rotational_energy", 0.0)

@@ -238,7 +238,7 @@ class GrainsRun(BaseRun):
             return
         if (came := comers(self._scene, instant)).any():
             deepest = OUTSIDE * self._scene.finite_size()
-            require_free(self._scene, self.state, came, deepest, instant, self._first)
+            require_free(self._scene, self._seen_state(), came, deepest, instant, self._first)
         self._stored_before = self._stored_at(self._fields.walls(instant, float(self._clock[SKIN])), 0.0)
 
     def _switch_walls(self, span: float) -> None:

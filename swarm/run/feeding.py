@@ -119,7 +119,7 @@ class Feed:
                 self._blocked[k] += self._counted[k] < number
                 self._counted[k] = number
                 if waits:
-                    self._earliest[k] = now + self._pause(k, number, there)
+                    self._earliest[k] = max(now + self._pause(k, number, there), np.nextafter(now, np.inf))
                     return
             self._over[k] += 1
 

@@ -85,7 +85,7 @@ class Source(Validated):
             neither balls nor walls, each at up to 16 random places. On a wall balls touch it with their surface, on
             another surface and in a volume their centres are there, everywhere as far as the largest one fits.
         density: of balls [kg/m^3], in a plane [kg/m^2], in place of a mass.
-        spin: of balls by Penalty: the angular speed about random axes, or three numbers, the angular velocity [rad/s].
+        spin: of balls: the angular speed about random axes, or three numbers, the angular velocity [rad/s].
         blocked: of balls, what becomes of a birth that finds no free place: "wait", it and those after it come when it
             finds one, tried again in the time that a ball needs for its radius; "report", it never comes. Both count in
             the observable `blocked`.

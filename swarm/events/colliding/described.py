@@ -20,9 +20,9 @@ from .cells import Axis, BallGrid
 from .meet import Loss
 from .queue import FIRST, SPARE
 from .resting import repose_of
-from .rows import CELL, FLOATS, NOBODY, RADIUS, WALL, WHOLES, Flock, Kept
+from .rows import CELL, FLOATS, NOBODY, PARTNER, RADIUS, STAMP, TIME, WALL, WHOLES, Flock, Kept
 from .rubbing import Turning
-from .window import OUT
+from .window import OUT, UNKNOWN
 
 Floats = NDArray[np.float64]
 
@@ -58,6 +58,10 @@ def flock_of(particles: Particles, grid: BallGrid, loses: bool, walled: bool) ->
         whole[:, CELL + k] = where + 1
     key, item = np.full(n + SPARE, math.inf), np.zeros(n + SPARE, np.int32)
     item[FIRST : FIRST + n] = np.arange(n)
+    if particles.births is not None:
+        # In no cell, and nothing is next for them.
+        late = particles.births.source >= 0
+        event.reshape(n, FLOATS)[late, WALL], whole[late, PARTNER] = OUT, NOBODY
     last = np.full(n, -math.inf) if loses else None
     kept = Kept(np.zeros(n), np.full(n, NOBODY, np.int32)) if walled else None
     node = np.arange(FIRST, FIRST + n, dtype=np.int32)
@@ -81,6 +85,37 @@ def with_room(flock: Flock, grid: BallGrid) -> tuple[Flock, BallGrid]:
     place = np.arange(len(order)) - np.repeat(first, counts)
     room[np.repeat(numbers, counts), 1 + place] = order
     return flock._replace(room=aligned_copy(room.ravel())), grid._replace(stride=stride)
+
+
+def put_in(flock: Flock, grid: BallGrid, i: int, now: float, position: Floats, velocity: Floats) -> bool:
+    """Put a ball that is born at a time of the epoch [s] into its cell: whether that has room for it."""
+    n = flock.number()
+    row, whole = flock.flight.reshape(n, FLOATS)[i], flock.tag.reshape(n, WHOLES)[i]
+    row[:3], row[3:6], row[TIME] = position, velocity, now
+    whole[STAMP] += 1
+    flock.event.reshape(n, FLOATS)[i, WALL] = UNKNOWN
+    if flock.followed is not None:
+        flock.followed[i] = now
+    cell = 0
+    for k, axis in enumerate(grid.axes()):
+        whole[CELL + k] = 1 + int(np.clip(math.floor((position[k] - axis.low) / axis.width), 0, axis.count - 1))
+        cell += int(axis.offset[whole[CELL + k]])
+    room = flock.room.reshape(-1, grid.stride)[cell]
+    if room[0] + 1 >= grid.stride:
+        return False
+    room[0] += 1
+    room[room[0]] = i
+    return True
+
+
+def there_at(flock: Flock, pull: Any, now: float) -> tuple[Floats, Floats, Floats]:
+    """The balls that are in the vessel at a time of the epoch [s]: places and velocities (3, n), radii (n,)."""
+    n = flock.number()
+    rows = flock.flight.reshape(n, FLOATS)[flock.event.reshape(n, FLOATS)[:, WALL] != OUT]
+    way = now - rows[:, TIME]
+    fall = np.zeros((3, 1)) if pull is None else np.array([tuple(pull)]).T
+    position = rows[:, :3].T + rows[:, 3:6].T * way + 0.5 * fall * way * way
+    return position, rows[:, 3:6].T + fall * way, rows[:, RADIUS]
 
 
 def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Flock]:

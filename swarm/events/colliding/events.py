@@ -175,13 +175,21 @@ def begin(box, flock, now, first, last):
     At the start this is the next event of each ball. Later, where a window begins, it is only the next wall of each.
     """
     for i in range(first, last):
+        if flock.event[index(FLOATS * i + WALL)] == OUT:
+            continue
         if box.window is not None and now >= 0.0:
-            if flock.event[index(FLOATS * i + WALL)] != OUT:
-                forget_wall(box, flock, i)
-                find_wall(box, flock, i, now)
+            forget_wall(box, flock, i)
+            find_wall(box, flock, i, now)
         else:
             aim_again(box, flock, i, 0.0)
             tell_partner(flock, i)
+
+
+@long_kernel
+def welcome(box, flock, i, now):
+    """Find what is next for a ball that is born at a time of the epoch [s]."""
+    aim_again(box, flock, i, now)
+    queue_both(flock, i)
 
 
 @long_kernel

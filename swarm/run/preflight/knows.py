@@ -220,7 +220,6 @@ def _duration(asked: Asked) -> Found:
 def _spins(asked: Asked) -> Found:
     if isinstance(asked.particles, Particles) and asked.particles.spin is not None:
         yield {}
-    yield from ({} for one in asked.options.sources if one.spin != 0.0)
 
 
 def _any(_asked: Asked) -> Found:
@@ -392,14 +391,11 @@ CAPABILITIES = (
     Capability("no step", _no_step, {(BODIES,): _NO_METHOD}, True),
     Capability("source", _option("sources"), {
         _EVERY_BODY: Refusal("sources must be left out with bodies, got {count}", "use particles"),
-        _RIGID_BALLS: Refusal(
-            "sources must be left out where particles have a radius, got {count}", f"{_TO_POINTS}, and Impact()"
-        ),
         (CHORDS, OTHER_POINTS): Refusal(
             "sources must be left out with {whole!r:.200}, got {count}: particles are born at any time, not at the end "
             "of a step", _TO_EXACT,
         ),
-        (MASSIVE,): Refusal("sources must be left out where a wall has a mass, got {count}", _TO_MOTION),
+        (MASSIVE, HEAVY): Refusal("sources must be left out where a wall has a mass, got {count}", _TO_MOTION),
     }),
     Capability("log of impacts", _option("impacts"), {
         _EVERY_BODY: Refusal(
