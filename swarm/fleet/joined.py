@@ -49,7 +49,9 @@ def seen_of(
                 joined = _joined(task, [{name: values[k] for name, values in part.items()} for part in parts])
                 read = functools.partial(_gathered, of_shards, task, begin + k)
                 moment, births = float(times[begin + k]), task.particles.births
-                there = None if births is None else births.there(moment)
+                there: Any = None if births is None else births.there(moment)
+                if births is not None and births.balls:
+                    there = np.concatenate([one.born(begin + k) for one in of_shards])
                 particles = Snapshot(read, task.scene.gravity, task.scene.period, there, copies=True)
                 yield len(times), {"time": moment, **joined}, particles
                 particles.end()
