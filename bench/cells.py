@@ -457,7 +457,7 @@ def _counters(draft: Draft) -> None:
 
 def _source(draft: Draft) -> None:
     inlet = swarm.Sphere(0.1, draft.spot())
-    size = {"radius": RADIUS} if ENGINES[draft.cell.engine].start is _balls else {}
+    size = {"radius": RADIUS} if draft.cell.engine in _OF_BALLS else {}
     draft.options["sources"] = [swarm.Source(inlet, volume=True, times=[0.1, 0.2], speed=1.0, mass=MASS, **size)]
 
 

@@ -1,10 +1,14 @@
 """Soft balls for long: exact balances of ten thousand, a pile at rest, Beverloo's law of silos."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import swarm
+from swarm.scene_file import read
 
+SCENES = Path(__file__).parents[2] / "examples" / "scenes"
 pytestmark = pytest.mark.long
 LAWS = {"restitution": 0.5, "friction": 0.5}
 G, DIAMETER = 9.81, 0.01
@@ -87,6 +91,28 @@ def silo(width, is_shut=False):
     floor = [swarm.Box(widths, (*place, -thick), side="outside", **LAWS) for widths, place in boxes]
     vessel = swarm.Box((side, side, 0.45), (0.0, 0.0, 0.15), **LAWS)
     return swarm.Scene([vessel, *floor], gravity=(0.0, 0.0, -G), pairs=swarm.Pairs(**LAWS))
+
+
+def test_a_silo_that_a_source_fills_runs_out_as_beverloo_says():
+    """With C = 0.58 and k = 1.4 of the literature, in the form for the area of an orifice: 4 C/pi rho sqrt(g D) A."""
+    job = read(SCENES / "poured_silo.toml")
+    numbers = {
+        "below": lambda snapshot: float((snapshot.position[2] < -0.05).sum()),
+        "bed": lambda snapshot: float(
+            ((abs(snapshot.position[:2]) < 0.04).all(axis=0) & (abs(snapshot.position[2] + 0.0225) < 0.0125)).sum()
+        ),
+    }
+    options = {"until": 1.6, "every": 0.02, "sources": job.run.sources, "seed": 1, "observables": numbers}
+    result = swarm.simulate(job.scene, None, job.method, **options)
+    seen, there = result.observables, result.particles.born().position
+    above, below = (there[2] > -0.05).sum(), (there[2] <= -0.05).sum()
+    assert above + below == seen["born"][-1, 0] == len(there[0])
+    assert seen["energy_error"].max() < 1e-12
+    ball, size = 4.0 / 3.0 * np.pi * 0.005**3, 0.04 - 1.4 * 0.01
+    flows, shut = seen["time"] >= 1.0, (seen["time"] > 0.8) & (seen["time"] < 0.9)
+    packing = seen["bed"][shut].mean() * ball / (0.08 * 0.08 * 0.025)
+    rate = 4.0 * 0.58 / np.pi * packing / ball * np.sqrt(9.81 * size) * size**2
+    assert np.polyfit(seen["time"][flows], seen["below"][flows], 1)[0] == pytest.approx(rate, rel=0.1)
 
 
 def test_a_silo_runs_out_as_beverloo_says():
