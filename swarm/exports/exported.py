@@ -26,6 +26,7 @@ class ExportedFrame(NamedTuple):
     more: dict[str, NDArray[Any]]
     ids: NDArray[np.int64]  # (n,) numbers of the particles
     mass: NDArray[np.float64]  # (n,) [kg]
+    radius: NDArray[np.float64] | None  # (n,) of balls [m]
 
 
 class Exported:
@@ -86,7 +87,8 @@ class Exported:
             if not there.all():
                 held = {name: column[there] for name, column in held.items()}
             position, velocity = held.pop("position"), held.pop("velocity")
-            yield ExportedFrame(number, time, position, velocity, held, self.ids[there], self.mass[there])
+            radius = None if self.radius is None else self.radius[there]
+            yield ExportedFrame(number, time, position, velocity, held, self.ids[there], self.mass[there], radius)
             if self._progress is not None:
                 self._progress(done + 1, len(self.numbers))
 

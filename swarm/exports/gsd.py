@@ -50,8 +50,8 @@ def _frame(
     # Rounded to float32 what is at the edge of the cell may be beyond it.
     of.position, of.velocity = position.clip(-0.5 * edges, 0.5 * edges), moment.velocity.astype(np.float32)
     of.mass = moment.mass.astype(np.float32)
-    if chosen.radius is not None:
-        of.diameter = (2.0 * chosen.radius).astype(np.float32)
+    if moment.radius is not None:
+        of.diameter = (2.0 * moment.radius).astype(np.float32)
     if "image" in moment.more:
         of.image = _in_32_bits(moment.more["image"], moment.number)
     if len(bonds):

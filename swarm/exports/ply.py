@@ -124,8 +124,8 @@ class _PlyWriter:
             "colour": np.stack([packed >> shift & 0xFF for shift in (24, 16, 8)], axis=1).astype(np.uint8),
             "particle": ids, **held,
         }  # fmt: skip
-        if self._chosen.radius is not None:
-            columns["radius"] = self._chosen.radius
+        if moment.radius is not None:
+            columns["radius"] = moment.radius
         for name, what in (("escape_time", "escaped"), ("absorbed_time", "absorbed")):
             if name in moment.more:
                 columns[what] = (~np.isnan(moment.more[name])).astype(np.uint8)

@@ -27,7 +27,7 @@ def write(chosen: Exported, path: Path) -> None:
         for moment in chosen.moments():
             columns: dict[str, Any] = {"id": moment.ids, "position": moment.position, "velocity": moment.velocity}
             columns["mass"] = moment.mass
-            columns |= {} if chosen.radius is None else {"radius": chosen.radius}
+            columns |= {} if moment.radius is None else {"radius": moment.radius}
             columns |= {"spin": moment.more["spin"]} if "spin" in moment.more else {}
             columns |= {"body": moment.ids % copies} if copies else {}
             columns |= moment.more

@@ -32,12 +32,16 @@ def write(chosen: Exported, path: Path) -> None:
     # Where particles come each step has a part of its own. Those that are there come first, so the parts share what
     # does not change, and their cells.
     parts = counts if len(set(counts)) > 1 else counts[:1]
+    # Of balls any may be there: a birth that is blocked comes later than others, or never.
+    feeds = chosen.radius is not None and chosen.trajectory.has_births()
     with h5py.File(path, "w") as file:
         root = begin(file, {"Vertices": np.arange(n)[:, None], "Lines": chosen.bonds}, parts)
         steps = timed(root, chosen, firsts[:-1])
         values: dict[str, Any] = {}
         for done, moment in enumerate(chosen.moments()):
             columns = {"position": moment.position, "velocity": moment.velocity, **moment.more}
+            if feeds:
+                columns |= {"id": moment.ids, "mass": moment.mass, "radius": moment.radius}
             for name, column in columns.items():
                 if name not in values:
                     where = "Points" if name == "position" else f"PointData/{name}"
@@ -46,7 +50,7 @@ def write(chosen: Exported, path: Path) -> None:
                         steps[f"PointDataOffsets/{name}"] = firsts[:-1]
                 values[name][firsts[done] : firsts[done + 1]] = column
         balls = {} if chosen.radius is None else {"radius": chosen.radius}
-        for name, constant in {"id": chosen.ids, "mass": chosen.mass, **balls}.items():
+        for name, constant in {} if feeds else {"id": chosen.ids, "mass": chosen.mass, **balls}.items():
             root[f"PointData/{name}"], steps[f"PointDataOffsets/{name}"] = constant, np.zeros(frames, np.int64)
 
 

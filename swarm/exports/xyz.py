@@ -36,7 +36,7 @@ def write(chosen: Exported, path: Path) -> None:
                 **moment.more,
             }
             columns |= {} if alike else {"mass": moment.mass}
-            columns |= {} if chosen.radius is None else {"radius": chosen.radius}
+            columns |= {} if moment.radius is None else {"radius": moment.radius}
             about = [cell, "Properties=species:S:1"]
             for name, column in columns.items():
                 about[1] += f":{_NAMES.get(name, name)}:{_KINDS[column.dtype.kind]}:{math.prod(column.shape[1:])}"

@@ -4,6 +4,7 @@ import functools
 import itertools
 import math
 
+import h5py
 import numpy as np
 import pytest
 
@@ -196,6 +197,29 @@ def test_resumed_at_any_place(name, tmp_path, monkeypatch):
         for k in range(len(one)):
             np.testing.assert_array_equal(one.frame(k).position, other.frame(k).position)
             np.testing.assert_array_equal(one.born(k), other.born(k))
+
+
+def test_exports_hold_those_that_were_born(tmp_path):
+    """Of two sources of which one is blocked, so that those that are there are not the first ones."""
+    scene = swarm.Scene([swarm.Box((0.05, 0.05, 0.05))])
+    nook = swarm.Sphere(1e-6, center=(0.0, 0.0, -0.03))
+    often = swarm.Source(nook, volume=True, times=[0.0, 0.001, 0.002], speed=0.0, blocked="report", **BALL)
+    sources = [often, swarm.Source(LID, volume=True, times=[0.003, 0.005], speed=0.0, radius=0.01, mass=0.01)]
+    file = tmp_path / "run.h5"
+    swarm.simulate(scene, None, SOFT, until=0.006, every=DT, sources=sources, trajectory=file, compile="never", seed=1)
+    with swarm.load(file) as frames:
+        assert [frames.born(k).sum() for k in range(7)] == [1, 1, 1, 2, 2, 3, 3]
+        frames.export(tmp_path / "run.csv")
+        frames.export(tmp_path / "run.vtkhdf")
+        rows = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True)
+        with h5py.File(tmp_path / "run.vtkhdf") as written:
+            ids, radius = (written[f"VTKHDF/PointData/{name}"][:] for name in ("id", "radius"))
+        held = np.concatenate([np.flatnonzero(frames.born(k)) for k in range(7)])
+        np.testing.assert_array_equal(rows["id"], held)
+        np.testing.assert_array_equal(ids, held)
+        np.testing.assert_array_equal(radius, frames.radius[held])
+        np.testing.assert_allclose(rows["radius"], frames.radius[held])
+    assert set(held) == {0, 3, 4}
 
 
 def test_arguments():
