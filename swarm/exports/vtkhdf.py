@@ -40,7 +40,7 @@ def write(chosen: Exported, path: Path) -> None:
         values: dict[str, Any] = {}
         for done, moment in enumerate(chosen.moments()):
             columns = {"position": moment.position, "velocity": moment.velocity, **moment.more}
-            if feeds:
+            if feeds and moment.radius is not None:
                 columns |= {"id": moment.ids, "mass": moment.mass, "radius": moment.radius}
             for name, column in columns.items():
                 if name not in values:
