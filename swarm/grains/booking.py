@@ -1,6 +1,6 @@
 """Sums over the contacts of a step: impulses on walls and their works, the virial, dissipated energy, and meetings."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
@@ -24,6 +24,7 @@ class ContactTotals(NamedTuple):
     lagging: Array  # (1,) int64, steps whose friction, or a damper, was not solved to its tolerance
     overlap: Array  # (1,) the largest overlap since the frame before [m]
     failed: Array  # (4,) what a step was refused for, see overlaps.py
+    escape_time: Any = None  # (N,) [s], of a scene with openings
 
 
 def _lost(matter, work, gap, change):

@@ -60,6 +60,7 @@ class Matter(Record):
     walls: Any  # of each wall the same
     period: Any  # `Lengths`, or None
     limits: Any  # `Limits` of overlaps.py
+    openings: Any  # of all walls, or None
 
     @property
     def rubs(self):

@@ -14,6 +14,8 @@ def store_at_walls(matter, walls, remaining, grains, near, into):
     place = grains.place
     for number, wall in enumerate(walls.at(remaining).each):
         for k in range(near.wall_first[number], near.wall_first[number + 1]):
+            if near.wall_is_open is not None and near.wall_is_open[index(k)]:
+                continue
             i = index(near.slot[index(k)])
             own = met(wall, near.listed, near.spans, index(k), place[i, RADIUS])
             into[index(grains.number[i])] += matter.law.stored_energy(own.gap_of(own.inner(vector_at(place, i, X))))

@@ -66,6 +66,8 @@ class Neighbours(NamedTuple):
     spans: Any = None  # (room of walls, 3) int32, what of a field is near
     listed: Any = None  # (room of members,) int32, its members
     used: Any = None  # (1,) how many of these there are, listed or not
+    # Of a scene with openings, else None
+    wall_is_open: Any = None  # (room of walls,) bool, whether the wall is open to the ball
 
 
 class Touches(NamedTuple):
@@ -110,14 +112,17 @@ def beside(grains: Grains, more: Grains) -> Grains:
 
 
 def near_of(
-    n: int, walls: int, pairs: int, touching: int, has_friction: bool = False, members: int | None = None
-) -> Neighbours:
+    n: int, walls: int, pairs: int, touching: int, has_friction: bool = False, members: int | None = None,
+    opens: bool = False,
+) -> Neighbours:  # fmt: skip
     """Room for so many pairs, for so many balls at walls, and so many members of fields, where there are any."""
     drags = (np.zeros((pairs, 3)), np.zeros((touching, 3))) if has_friction else (None, None)
     made = Neighbours(
         np.zeros(n + 1, np.int64), np.zeros(pairs, np.int32), np.zeros(pairs, np.bool_),
         np.zeros(walls + 1, np.int64), np.zeros(touching, np.int32), np.zeros(touching, np.bool_), *drags,
     )  # fmt: skip
+    if opens:
+        made = made._replace(wall_is_open=np.zeros(touching, np.bool_))
     if members is None:
         return made
     spans, listed = np.zeros((touching, 3), np.int32), np.zeros(members, np.int32)

@@ -27,6 +27,7 @@ from . import energy, lists, refused
 from . import grain_arrays as arrays
 from .booking import ContactTotals
 from .drags import Drags, kept_drags, set_drags
+from .exits import stored_with_others
 from .faces import Fields
 from .grain_arrays import BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X
 from .matter import matter_of
@@ -61,10 +62,12 @@ class GrainsRun(BaseRun):
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
         loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
         # What contacts store with a wall that goes is lost.
-        loses = loses or scene.has_doors()
+        openings = self._matter.openings
+        loses = loses or scene.has_doors() or openings is not None
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
             np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None, balls=balls,
+            escape_time=None if openings is None else np.full(n, math.nan), openings=openings,
         )  # fmt: skip
         if particles.image is not None:
             self.state = self.state._replace(image=particles.image, period=compiled.cell())
@@ -75,7 +78,7 @@ class GrainsRun(BaseRun):
         self._instants = scene.instants if scene.has_doors() else None
         # What contacts with walls stored before the instant that has come, and the length of a step [s].
         self._stored_before: NDArray[np.float64] | None = None
-        self._step = self._matter.h
+        self._step, self._span = self._matter.h, 0.0
         state = self.state
         books = ContactTotals(
             balls.collisions,
@@ -87,6 +90,7 @@ class GrainsRun(BaseRun):
             np.zeros(1, np.int64),
             np.zeros(1),
             np.zeros(COLUMNS),
+            state.escape_time,
         )
         if feed is not None:
             self._feed, self.state = feed, state._replace(born_time=feed.born_time)
@@ -161,20 +165,39 @@ class GrainsRun(BaseRun):
 
     def _list_with(self, kept: Drags | None) -> None:
         """The same, with these impulses of friction of before."""
-        matter, clock, grains, kernel = self._matter, self._clock, self._world.grains, self._tier.kernel
+        matter, clock, kernel = self._matter, self._clock, self._tier.kernel
         self._wrap()
+        self._drop_escaped()
+        grains, near = self._world.grains, self._world.near
+        if near.wall_is_open is not None:
+            near.wall_is_open[:] = False
         skin = float(clock[SKIN])
         reach = 2.0 * float(grains.place[:, arrays.RADIUS].max(initial=0.0)) + skin
         cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, matter.period)
         for rows in (grains.number, grains.place, grains.speed, grains.spin):
             if rows is not None:
                 rows[:] = rows[order]
-        near = self._world.near
         while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:
             near = self._make_room(pairs, near.slot.size)
         self._list_walls(kernel, near, skin)
         set_drags(self._world, kept)
         clock[SINCE] = 0.0
+
+    def _drop_escaped(self) -> None:
+        """Take what has escaped out of the world, and lose what its contacts store."""
+        world, time = self._world, self.state.escape_time
+        if time is None or not (gone := ~np.isnan(time[world.grains.number])).any():
+            return
+        left = (self._steps_in(self._span) - self._clock[DONE]) * self._matter.h
+        lost = self._stored_at(self._walls, left)[world.grains.number] * gone
+        lost += stored_with_others(self._matter, world, gone)
+        self.state.dissipated[world.grains.number] += lost
+        # There it stays.
+        self._tier.kernel(energy.show)(world.grains, self.state)
+        rest, near = arrays.Grains(*(None if rows is None else rows[~gone] for rows in world.grains)), world.near
+        members = None if near.listed is None else near.listed.size
+        near, touches = self._room(len(rest.number), near.mate.size, near.slot.size, members)
+        self._world = world._replace(grains=rest, near=near, touches=touches)
 
     def _list_walls(self, kernel: Any, near: arrays.Neighbours, skin: float) -> None:
         """List what of the walls is near."""
@@ -204,7 +227,7 @@ class GrainsRun(BaseRun):
     def _room(self, n: int, pairs: int, touching: int, members: int | None) -> tuple[arrays.Neighbours, arrays.Touches]:
         """Arrays for n balls, so many pairs, balls at walls, and members of fields near them, None without fields."""
         walls, rubs = len(self._owners), self._matter.rubs
-        near = arrays.near_of(n, walls, pairs, touching, rubs, members)
+        near = arrays.near_of(n, walls, pairs, touching, rubs, members, self._matter.openings is not None)
         return near, arrays.touches_of(walls, pairs, touching, rubs, near.listed)
 
     def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Neighbours:
@@ -261,10 +284,13 @@ class GrainsRun(BaseRun):
         self._feed_in(0.0, 0.0)
 
     def _prepare(self, span: float, moment: float) -> None:
+        self._span = span
         self._walls = self._fields.walls(self._moment, float(self._clock[SKIN]))
         if self._instants is not None:
             # Steps of equal lengths, so that the last one ends at the instant.
-            self._matter = self._matter._replace(h=span / self._steps_in(span))
+            openings = self._compiled.openings(moment)
+            self._matter = self._matter._replace(h=span / self._steps_in(span), openings=openings)
+            self.state = self.state._replace(openings=openings)
             self._switch_walls(span)
         if not self._cut_short:
             self._clock[DONE] = 0.0
@@ -280,7 +306,7 @@ class GrainsRun(BaseRun):
         status, stop, steps = Status.LEASE_ENDED.value, -1.0, self._steps_in(span)
         while status == Status.LEASE_ENDED or (status == Status.DONE and stop < steps):
             self._feed_in(span, moment)
-            rule = MarchRule(steps, stop := self._stop(span, moment), self._watch.passes)
+            rule = MarchRule(steps, stop := self._stop(span, moment), self._watch.passes, moment)
             status = self._call(march, self._matter, self._walls, self._world, self._clock, rule, latest=latest)
             if status == Status.LEASE_ENDED:
                 self._list_again()
@@ -302,9 +328,9 @@ class GrainsRun(BaseRun):
         cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
         yield lists.list_pairs, (matter.period, world.grains, world.near, cells, 0.0)
         yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0)
-        yield march, (matter, self._walls, world, self._clock, MarchRule(0.0, 0.0, self._watch.passes))
+        yield march, (matter, self._walls, world, self._clock, MarchRule(0.0, 0.0, self._watch.passes, 0.0))
         yield energy.stored, (matter, self._walls, world.grains, world.near)
-        if self._instants is not None:
+        if self._instants is not None or matter.openings is not None:
             into = self.state.dissipated
             yield energy.store_at_walls, (matter, self._walls, 0.0, world.grains, world.near, into)
         yield energy.show, (world.grains, self.state)
@@ -353,6 +379,10 @@ class GrainsRun(BaseRun):
         kept = {"clock": self._clock, "image": self._image}
         for name in ("grains", "near", "books"):
             kept |= named(name, getattr(self._world, name))
+        if self.state.escape_time is not None:
+            # Where those are that have escaped, and how fast.
+            kept |= {"position": self.state.position, "velocity": self.state.velocity}
+            kept |= {} if self.state.spin is None else {"spin": self.state.spin}
         return kept
 
     def may_grow(self, name: str) -> bool:

@@ -36,7 +36,7 @@ class Limits(Record):
     longest: Any  # the longest move that jumps over no solid [m], or None in a scene without solids
 
 
-def _move(matter, grains, i):
+def move_of(matter, grains, i):
     """The move of a ball in the step."""
     return 0.5 * matter.h * (vector_at(grains.speed, i, BEFORE) + vector_at(grains.speed, i, AFTER))
 
@@ -51,10 +51,10 @@ def look_at_pairs(matter, grains, near, failed):
     place, status, deepest = grains.place, Status.DONE.value, 0.0
     for a in range(place.shape[0]):
         i = index(a)
-        mine = _move(matter, grains, i)
+        mine = move_of(matter, grains, i)
         for k in range(near.first[i], near.first[i + 1]):
             j = index(near.mate[index(k)])
-            s, move = apart(matter, place, i, j), mine - _move(matter, grains, j)
+            s, move = apart(matter, place, i, j), mine - move_of(matter, grains, j)
             reach, least = place[i, RADIUS] + place[j, RADIUS], min(place[i, RADIUS], place[j, RADIUS])
             overlap = reach - norm(s + part_within(-1.0 * s, move) * move)
             if overlap > deepest:
@@ -87,8 +87,10 @@ def look_at_wall(matter, wall, grains, near, failed, number):
     place, status, deepest, longest = grains.place, Status.DONE.value, -math.inf, matter.limits.longest
     for k in range(near.wall_first[number], near.wall_first[number + 1]):
         c = index(k)
+        if near.wall_is_open is not None and near.wall_is_open[c]:
+            continue
         i = index(near.slot[c])
-        r, move, radius = vector_at(place, i, X), _move(matter, grains, i), place[i, RADIUS]
+        r, move, radius = vector_at(place, i, X), move_of(matter, grains, i), place[i, RADIUS]
         own = met(wall, near.listed, near.spans, c, radius)
         overlap = max(own.gap_of(own.inner(r)), own.gap_of(own.end_inner(r + move)))
         if not isinstance(wall, Posed):

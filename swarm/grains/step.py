@@ -16,6 +16,7 @@ from ..kernel.vector import square
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall
 from .contacts import gather_pairs, push_pairs, sweep_pairs, worse
+from .exits import let_out, open_wall
 from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
 from .grain_arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
 from .overlaps import look_at_pairs, look_at_wall
@@ -33,11 +34,12 @@ _STALLED, _BETTER, _LEAST_SHARE = 20, 0.7, 1.0 / 64.0
 
 
 class MarchRule(NamedTuple):
-    """The length of the frame in steps, before which of them to stop, and after how many."""
+    """The length of the frame in steps, before which of them to stop, and after how many; the end of the frame [s]."""
 
     span: float
     stop: float
     halt: Array  # (1,)
+    moment: float
 
 
 class World(NamedTuple):
@@ -232,11 +234,27 @@ def _look(matter, walls, world):
     return status
 
 
+def _open(matter, walls, world):
+    """Decide which walls are open to which balls in a step."""
+    for k, (first, wall) in enumerate(walls.numbered()):
+        open_wall(matter, wall, (k, first), world.grains, world.near)
+
+
+def _let_out(matter, walls, world, time):
+    """Let balls escape in a step that ends at a time; how many do."""
+    found = 0
+    for k, wall in enumerate(walls.each):
+        found += let_out(matter, wall, world.grains, world.near, world.books, (k, time))
+    return found
+
+
 def _step(matter, walls, world, skin):
-    """One step: its `Status`; LEASE_ENDED where the lists do not hold over it, and nothing has changed."""
+    """One step but for its end: its `Status`; LEASE_ENDED where the lists do not hold over it, nothing has changed."""
     grains = world.grains
     if not _begin(matter, grains, skin):
         return Status.LEASE_ENDED.value
+    if matter.openings is not None:
+        _open(matter, walls, world)
     _forget(walls, world)
     _gather(matter, walls, world)
     more = 1
@@ -254,7 +272,6 @@ def _step(matter, walls, world, skin):
         status = _look(matter, walls, world)
         if status != Status.DONE.value:
             return status
-    _arrive(matter, grains)
     return Status.DONE.value
 
 
@@ -265,17 +282,22 @@ def _step(matter, walls, world, skin):
 def march(matter, walls, world, clock, rule):
     """Take step after step until the end of the frame, or the stop before it: the `Status`.
 
-    LEASE_ENDED where lists are to be made anew: then call this again. INTERRUPTED after so many steps as the rule says;
-    it goes on with the same bits.
+    LEASE_ENDED where lists are to be made anew, also where balls have escaped: then call this again. INTERRUPTED after
+    so many steps as the rule says; it goes on with the same bits.
     """
     while clock[DONE] < rule.stop:
         if clock[TAKEN] >= rule.halt[0]:
             return Status.INTERRUPTED.value
         left = (rule.span - clock[DONE]) * matter.h
-        status = _step(matter, walls.during(left, left - matter.h), world, clock[SKIN])
+        now = walls.during(left, left - matter.h)
+        status = _step(matter, now, world, clock[SKIN])
         if status != Status.DONE.value:
             return status
+        escaped = 0 if matter.openings is None else _let_out(matter, now, world, rule.moment - (left - matter.h))
+        _arrive(matter, world.grains)
         clock[DONE] += 1.0
         clock[TAKEN] += 1.0
         clock[SINCE] += 1.0
+        if matter.openings is not None and escaped > 0:
+            return Status.LEASE_ENDED.value
     return Status.DONE.value

@@ -111,7 +111,6 @@ def test_a_cell_is_as_good_as_its_images():
         (swarm.Scene(ROOM.surfaces, pairs=swarm.Pairs(restitution=0.001)), "pairs.restitution must be 0.01"),
         (swarm.Scene([swarm.Sphere(9.0, temperature=1.0)]), "temperature"),
         (swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 5.0, mass=1.0)]), "mass"),
-        (swarm.Scene([swarm.Sphere(9.0, openings=[swarm.Sphere(1.0, (0.0, 0.0, 9.0))])]), "openings"),
     ],
 )
 def test_what_soft_balls_do_not_know_is_refused(scene, words):

@@ -331,10 +331,6 @@ _LOSES = Refusal(
 _CHANGES = Refusal(
     "contact_step must be 0 where a wall is present, or an opening open, for some times only, got {step:g}", _NO_STEP
 )
-_CLOSES = Refusal(
-    f"surfaces[{{i}}].openings must be left out with {_WITH_PENALTY}, got {{count}}",
-    "use Impact, or build the wall of parts that leave the opening free, such as solid boxes",
-)
 
 
 def _with_method(name: str, without: str, got: str = "got") -> Refusal:
@@ -602,7 +598,6 @@ CAPABILITIES = (
     Capability("opening", _of_walls("openings", ()), {
         (SOFT_BODIES, PAPER_BODIES): _with_method("openings", "left out", "count"),
         _FIXED_STEPS: _with_method("openings", "left out", "count"),
-        (GRAINS,): _CLOSES,
         (MASSIVE, HEAVY): Refusal(
             "surfaces[{i}].openings must be left out where a wall has a mass, got {count}",
             "give the wall a motion instead of a mass",

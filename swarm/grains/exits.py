@@ -1,0 +1,64 @@
+"""Openings of walls for soft balls, and balls that have left through one.
+
+As for balls with `Impact` an opening has no rim: whether a wall is open to a ball is decided by the ball's foot on it
+at the start of each step, and a ball that then reaches into the wall has escaped, and stays where it is. What its
+contacts have stored is lost: with the wall, if the ball has pressed on it, and with others.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
+from ..kernel.vector import norm
+from ..surfaces.presence.openings import is_open
+from .contacts import apart
+from .grain_arrays import RADIUS, X, vector_at
+from .overlaps import move_of
+from .vessel import met
+
+
+@outlined
+def open_wall(matter, wall, numbers, grains, near):
+    """Find to which of the balls near a wall it is open in the step; `numbers` are its own, and of its first row."""
+    place, (number, first) = grains.place, numbers
+    for k in range(near.wall_first[number], near.wall_first[number + 1]):
+        c = index(k)
+        i = index(near.slot[c])
+        r, radius = vector_at(place, i, X), place[i, RADIUS]
+        foot = r + radius * met(wall, near.listed, near.spans, c, radius).unit_normal(r)
+        near.wall_is_open[c] = is_open(matter.openings, first, foot, 0.0)
+
+
+@outlined
+def let_out(matter, wall, grains, near, books, given):
+    """Let balls escape that reach into an open wall at the end of the step, at a time [s]; how many do."""
+    place, found, (number, time) = grains.place, 0, given
+    for k in range(near.wall_first[number], near.wall_first[number + 1]):
+        c = index(k)
+        if near.wall_is_open[c]:
+            i = index(near.slot[c])
+            one, r = index(grains.number[i]), vector_at(place, i, X)
+            own = met(wall, near.listed, near.spans, c, place[i, RADIUS])
+            books.dissipated[one] += matter.law.stored_energy(own.gap_of(own.inner(r)))
+            reaches = own.level_of(own.end_inner(r + move_of(matter, grains, i))) > 0.0
+            if reaches and math.isnan(books.escape_time[one]):
+                books.escape_time[one] = time
+                found += 1
+    return found
+
+
+def stored_with_others(matter: Any, world: Any, gone: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """What the contacts of some balls with others store, in the order of cells [J]; of two such balls half each."""
+    near, place, found = world.near, world.grains.place, np.zeros(len(gone))
+    first = near.first[: len(gone) + 1]
+    one, other = np.repeat(np.arange(len(gone)), np.diff(first)), near.mate[: int(first[-1])]
+    for k in np.flatnonzero(gone[one] | gone[other]):
+        i, j = int(one[k]), int(other[k])
+        gap = place[i, RADIUS] + place[j, RADIUS] - norm(apart(matter, place, i, j))
+        ends = [end for end in (i, j) if gone[end]]
+        found[ends] += matter.law.stored_energy(gap) / len(ends)
+    return found
