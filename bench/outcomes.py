@@ -128,7 +128,8 @@ def _ignored(cell: Cell, done: Ran) -> str:
         return f"ignored: the log has {done.rows} of {int(seen['impacts'][-1])} impacts"
     if cell.capability == "member impacts" and seen["member_impacts"][-1].sum() != seen["impacts"][-1]:
         return f"members have {seen['member_impacts'][-1].sum()} of {int(seen['impacts'][-1])} impacts"
-    if not seen["impacts"][-1] and not seen.get("collisions", [0])[-1]:
+    # A particle that escaped has passed through the capability.
+    if not seen["impacts"][-1] and not seen.get("collisions", [0])[-1] and shown != "escaped":
         return "ignored: there is no impact"
     if cell.capability in ("plain", "counters", "log", "member impacts", "cluster"):
         return ""
