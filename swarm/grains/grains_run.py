@@ -194,7 +194,8 @@ class GrainsRun(BaseRun):
         self.state.dissipated[world.grains.number] += lost
         # There it stays.
         self._tier.kernel(energy.show)(world.grains, self.state)
-        rest, near = arrays.Grains(*(None if rows is None else rows[~gone] for rows in world.grains)), world.near
+        stay = {name: rows[~gone] for name, rows in world.grains._asdict().items() if rows is not None}
+        rest, near = world.grains._replace(**stay), world.near
         members = None if near.listed is None else near.listed.size
         near, touches = self._room(len(rest.number), near.mate.size, near.slot.size, members)
         self._world = world._replace(grains=rest, near=near, touches=touches)
