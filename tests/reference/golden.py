@@ -13,6 +13,8 @@ marches. Ten chords in walls whose steps are found by Newton's method were writt
 round-off: 1.5e-13 at their ends.
 Eleven cells of points and walls with a mass were written again when a strike restored its energy as that of a ball
 does, `with_energy`: 1e-16 of the scene at their ends; the energy of 186 464 impacts is 8e-16 off, 1.2e-15 before.
+Seven runs of formulas of degree 4 or less were written again when straight flights to them took the coefficients of a
+polynomial: places of impact are within 4 roundings of 50 digits.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,
