@@ -5,11 +5,10 @@ from typing import Any, NamedTuple
 from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
 from ..kernel.vector import dot, norm
-from ..surfaces.in_motion.posed import Posed
 from .at_walls import rising
 from .contacts import closing
 from .grain_arrays import AFTER, COAST, GAP, IMPULSE, PUSH, RADIUS, SIZE, START, vector_at
-from .vessel import met
+from .vessel import met, moves
 
 
 class ContactTotals(NamedTuple):
@@ -75,7 +74,7 @@ def book_wall(matter, law, wall, grains, touches, books, number):
         impulse = vector_at(rows, c, IMPULSE)
         books.impulse[index(number), one] += norm(impulse)
         work = dot(impulse, move)
-        if isinstance(wall, Posed):
+        if moves(wall):
             # What it gives is what the ball gains and the contact stores or loses.
             given = work + push * way.change
             books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given / matter.h

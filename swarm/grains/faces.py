@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled_scene import CompiledScene
+from ..surfaces.in_motion.moving import Moving
 from ..surfaces.presence.doors import was_there
 from ..surfaces.upright import upright
 from ..surfaces.walls import Field, Walls
@@ -35,6 +36,11 @@ class Fields:
             faces.append(face.astype(np.int32))
         self._known, self._each, self.faces = skin, tuple(made), tuple(faces)
 
+    def any_moves(self) -> bool:
+        """Whether any of the fields moves."""
+        pieces = self._compiled.pieces.each
+        return any(pieces[i].motion is not None for i in self._compiled.order.fields)
+
     def reaches(self, skin: float) -> bool:
         """Whether a skin is too wide for the fields that are known; then these are made anew."""
         if not self.faces or self._compiled.scene.period is None or skin <= self._known:
@@ -53,5 +59,9 @@ class Fields:
         each = [
             one if is_there else one._replace(members=one.members.gone())
             for one, is_there in zip(self._each, there, strict=True)
+        ]
+        each = [
+            one._replace(members=of.members._replace(body=one.members)) if isinstance(of.members, Moving) else one
+            for one, of in zip(each, walls.each, strict=False)
         ]
         return walls._replace(each=(*each, *walls.each[len(each) :]))

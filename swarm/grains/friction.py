@@ -35,7 +35,7 @@ from .grain_arrays import (
     set_vector,
     vector_at,
 )
-from .vessel import met
+from .vessel import met, moves
 
 # 1/(2/5), of the moment of inertia of a ball.
 _ROUNDNESS = 2.5
@@ -192,7 +192,7 @@ def book_rubbing(matter, wall, grains, near, touches, books, number):
         gained = dot(drag, move) / matter.h - 0.5 * grains.place[i, RADIUS] * dot(cross(n, drag), turned)
         given = 0.5 * dot(drag, both)
         books.dissipated[one] += given - gained
-        if isinstance(wall, Posed):
+        if moves(wall):
             books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given
 
 

@@ -188,8 +188,7 @@ class GrainsRun(BaseRun):
         world, time = self._world, self.state.escape_time
         if time is None or not (gone := ~np.isnan(time[world.grains.number])).any():
             return
-        left = (self._steps_in(self._span) - self._clock[DONE]) * self._matter.h
-        lost = self._stored_at(self._walls, left)[world.grains.number] * gone
+        lost = self._stored_at(self._walls, self._left())[world.grains.number] * gone
         lost += stored_with_others(self._matter, world, gone)
         self.state.dissipated[world.grains.number] += lost
         # There it stays.
@@ -200,13 +199,17 @@ class GrainsRun(BaseRun):
         near, touches = self._room(len(rest.number), near.mate.size, near.slot.size, members)
         self._world = world._replace(grains=rest, near=near, touches=touches)
 
+    def _left(self) -> float:
+        """What is left of the frame, or of the piece of one, under way [s]."""
+        return (self._steps_in(self._span) - float(self._clock[DONE])) * self._matter.h
+
     def _list_walls(self, kernel: Any, near: arrays.Neighbours, skin: float) -> None:
         """List what of the walls is near."""
         if self._fields.reaches(skin):
-            self._walls = self._fields.walls(0.0, skin)
+            self._walls = self._fields.walls(self._moment, skin)
         faces, grains = self._fields.faces, self._world.grains
         while True:
-            at = kernel(lists.list_walls)(self._walls, faces, grains, near, skin)
+            at = kernel(lists.list_walls)(self._walls, faces, grains, near, skin, self._left())
             members = 0 if near.used is None else int(near.used[0])
             if at <= near.slot.size and (near.listed is None or members <= near.listed.size):
                 return
@@ -287,16 +290,19 @@ class GrainsRun(BaseRun):
     def _prepare(self, span: float, moment: float) -> None:
         self._span = span
         self._walls = self._fields.walls(self._moment, float(self._clock[SKIN]))
+        if not self._cut_short:
+            self._clock[DONE] = 0.0
         if self._instants is not None:
             # Steps of equal lengths, so that the last one ends at the instant.
             openings = self._compiled.openings(moment)
             self._matter = self._matter._replace(h=span / self._steps_in(span), openings=openings)
             self.state = self.state._replace(openings=openings)
             self._switch_walls(span)
-        if not self._cut_short:
-            self._clock[DONE] = 0.0
-            if self._done[0] == 0:
-                self._world.books.overlap[0] = 0.0
+            if not self._cut_short and self._fields.any_moves():
+                # How long ago they were listed is known in steps.
+                self._list()
+        if not self._cut_short and self._done[0] == 0:
+            self._world.books.overlap[0] = 0.0
         self._clock[TAKEN] = 0.0
 
     def _steps_in(self, span: float) -> float:
@@ -328,7 +334,7 @@ class GrainsRun(BaseRun):
         world, matter = self._world, self._matter
         cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
         yield lists.list_pairs, (matter.period, world.grains, world.near, cells, 0.0)
-        yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0)
+        yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0, 0.0)
         yield march, (matter, self._walls, world, self._clock, MarchRule(0.0, 0.0, self._watch.passes, 0.0))
         yield energy.stored, (matter, self._walls, world.grains, world.near)
         if self._instants is not None or matter.openings is not None:

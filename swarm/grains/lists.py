@@ -138,15 +138,15 @@ def _list_at_wall(wall, grains, near, skin, found):
 
 
 @long_kernel
-def list_walls(walls, faces, grains, near, skin):
-    """List the balls near each wall; how many there are, listed or not.
+def list_walls(walls, faces, grains, near, skin, remaining):
+    """List the balls near each wall when so much of the frame is left [s]; how many there are, listed or not.
 
     `faces` are, of each field, of each member the number of its face, or of the body that it is.
     """
     found = 0
     if near.used is not None:
         near.used[0] = 0
-    for k, wall in enumerate(walls.at(0.0).each):
+    for k, wall in enumerate(walls.at(remaining).each):
         near.wall_first[k] = found
         if isinstance(wall, Field):
             found = list_in_field(wall, faces[k], grains, near, skin, found)

@@ -10,18 +10,18 @@ import math
 from typing import Any
 
 from ..common.status import Status
+from ..contact.path import members_of
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import norm, square
 from ..surfaces.balls.rounded import part_within
 from ..surfaces.fields.members import member
-from ..surfaces.in_motion.posed import Posed
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
 from .contacts import apart
 from .grain_arrays import AFTER, BEFORE, BEGIN, END, RADIUS, X, vector_at
-from .vessel import is_of_faces, met
+from .vessel import is_of_faces, met, moves
 
 # Columns of the failure of a step: the place of a ball in the order of cells, that of the other one or -1, the wall or
 # -1, and the overlap [m], or the length of the move if the step is too long.
@@ -77,7 +77,7 @@ def _passed_any(wall, near, k, r, move):
     """The same of all that are listed in row k."""
     most = -1.0
     for m in range(near.spans[k, BEGIN], near.spans[k, END]):
-        most = max(most, _passed(member(wall.members, index(near.listed[index(m)])), r, move))
+        most = max(most, _passed(member(members_of(wall.members), index(near.listed[index(m)])), r, move))
     return most
 
 
@@ -93,11 +93,14 @@ def look_at_wall(matter, wall, grains, near, failed, number):
         r, move, radius = vector_at(place, i, X), move_of(matter, grains, i), place[i, RADIUS]
         own = met(wall, near.listed, near.spans, c, radius)
         overlap = max(own.gap_of(own.inner(r)), own.gap_of(own.end_inner(r + move)))
-        if not isinstance(wall, Posed):
+        if isinstance(wall, Field) and moves(wall):
+            start = wall.members.own_place(r)
+            r, move = start, wall.members.own_end(r + move) - start
+        if not moves(wall):
             # A step over an edge
             overlap = max(overlap, own.gap_of(own.inner(r + 0.5 * move)))
         is_through = overlap > radius
-        if isinstance(wall, Field) and is_of_faces(wall.members.like):
+        if isinstance(wall, Field) and is_of_faces(members_of(wall.members).like):
             # Far behind a part of a face its distance does not tell the sides apart.
             depth = _passed_any(wall, near, c, r, move)
             is_through = is_through | (depth >= 0.0)

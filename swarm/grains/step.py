@@ -20,6 +20,7 @@ from .exits import let_out, open_wall
 from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
 from .grain_arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
 from .overlaps import look_at_pairs, look_at_wall
+from .vessel import Sweep, moves, sweep_of
 
 # A sweep that changes no impulse by more than this part is the last one; also one that gains no more than half of the
 # one before, if that is round-off of what many large impulses leave of one another.
@@ -248,10 +249,22 @@ def _let_out(matter, walls, world, time):
     return found
 
 
-def _step(matter, walls, world, skin):
+def _swept(matter, walls, listed, grains, skin):
+    """The `Sweep` of all fields that move, which were `listed` so."""
+    found = Sweep(0.0, 0.0)
+    for (_number, field), (_first, then) in zip(walls.fields(), listed.fields(), strict=True):
+        if moves(field):
+            one = sweep_of(field.members, then.members, matter, grains, skin)
+            found = Sweep(worse(one.farthest, found.farthest), worse(one.longest, found.longest))
+    return found
+
+
+def _step(matter, walls, listed, world, skin):
     """One step but for its end: its `Status`; LEASE_ENDED where the lists do not hold over it, nothing has changed."""
     grains = world.grains
     if not _begin(matter, grains, skin):
+        return Status.LEASE_ENDED.value
+    if not _swept(matter, walls, listed, grains, skin).farthest <= 0.25 * skin * skin:
         return Status.LEASE_ENDED.value
     if matter.openings is not None:
         _open(matter, walls, world)
@@ -265,6 +278,8 @@ def _step(matter, walls, world, skin):
         _push(matter, walls, world)
         more = _gather(matter, walls, world)
     farthest, longest = _moved(matter, grains)
+    sweep = _swept(matter, walls, listed, grains, skin)
+    farthest, longest = worse(sweep.farthest, farthest), worse(sweep.longest, longest)
     if not farthest <= 0.25 * skin * skin:
         return Status.LEASE_ENDED.value
     deepest, limits = _book(matter, walls, world), matter.limits
@@ -290,7 +305,8 @@ def march(matter, walls, world, clock, rule):
             return Status.INTERRUPTED.value
         left = (rule.span - clock[DONE]) * matter.h
         now = walls.during(left, left - matter.h)
-        status = _step(matter, now, world, clock[SKIN])
+        listed = walls.at(left + clock[SINCE] * matter.h)
+        status = _step(matter, now, listed, world, clock[SKIN])
         if status != Status.DONE.value:
             return status
         escaped = 0 if matter.openings is None else _let_out(matter, now, world, rule.moment - (left - matter.h))

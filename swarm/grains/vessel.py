@@ -10,17 +10,20 @@ held by both. So what contacts store depends on the place of the ball alone, and
 import math
 from typing import Any
 
+from ..contact.path import members_of
 from ..kernel.arrays import index
 from ..kernel.grid import block_of, over_entries
 from ..kernel.jit import outlined
-from ..kernel.vector import Vec
+from ..kernel.record import Record
+from ..kernel.vector import Vec, square
 from ..surfaces.balls.facet import RoundTriangle
 from ..surfaces.contract import Smooth
 from ..surfaces.fields.members import GrownLike, member
+from ..surfaces.in_motion.posed import Posed
 from ..surfaces.outlines.round_side import RoundSide
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
-from .grain_arrays import BEGIN, END, FACE, RADIUS, X, vector_at
+from .grain_arrays import AFTER, BEFORE, BEGIN, END, FACE, RADIUS, X, vector_at
 
 
 class NearestMembers(Smooth):
@@ -72,9 +75,17 @@ def met(wall, listed, spans, k, radius):
     grown = wall.grown(radius)
     if not isinstance(wall, Field):
         return grown
-    if is_of_faces(wall.members.like):
-        return NearestMembers(grown.members, listed, spans[k, BEGIN], spans[k, END])
-    return member(grown.members, index(listed[index(spans[k, BEGIN])]))
+    members = members_of(grown.members)
+    if is_of_faces(members.like):
+        own = NearestMembers(members, listed, spans[k, BEGIN], spans[k, END])
+    else:
+        own = member(members, index(listed[index(spans[k, BEGIN])]))
+    return grown.members._replace(body=own) if moves(wall) else own
+
+
+def moves(wall):
+    """Whether a wall or a field moves: a constant for the compiler."""
+    return isinstance(wall.members if isinstance(wall, Field) else wall, Posed)
 
 
 # --- Lists -----------------------------------------------------------------------------------------------
@@ -106,13 +117,14 @@ def _enter(end, m, given):
 @outlined
 def list_in_field(wall, face, grains, near, skin, found):
     """List the balls near each face, or each body, of a field; how many are listed then."""
-    place, grid = grains.place, wall.members.grid
+    place, grid = grains.place, members_of(wall.members).grid
     for a in range(place.shape[0]):
         i = index(a)
         r, radius, begin = vector_at(place, i, X), place[i, RADIUS], near.used[0]
+        r = wall.members.own_place(r) if moves(wall) else r
         reach = radius + 2.0 * skin
         corner = Vec(reach, reach, reach)
-        block, members = block_of(grid, r - corner, r + corner), wall.grown(radius).members
+        block, members = block_of(grid, r - corner, r + corner), members_of(wall.grown(radius).members)
         given = members, face, near, (r, skin, begin)
         end = over_entries(grid, block, begin, _enter, given)
         near.used[0] = end
@@ -126,4 +138,33 @@ def list_in_field(wall, face, grains, near, skin, found):
                     c = index(found)
                     near.slot[c], near.spans[c, BEGIN], near.spans[c, END], near.spans[c, FACE] = a, first, k, own
                 found += 1
+    return found
+
+
+class Sweep(Record):
+    """How far a ball near a field that moves is from where it was listed, and how far a step leads, in its frame."""
+
+    farthest: Any  # their squares, at most [m^2]
+    longest: Any
+
+
+@outlined
+def sweep_of(field, listed, matter, grains, skin):
+    """The `Sweep` of all balls near a field that moves, `listed` as it was then, by a step."""
+    place, speed, half, grid, found = (
+        grains.place,
+        grains.speed,
+        0.5 * matter.h,
+        members_of(field).grid,
+        Sweep(0.0, 0.0),
+    )
+    for k in range(place.shape[0]):
+        i = index(k)
+        r, reach = vector_at(place, i, X), place[i, RADIUS] + 2.0 * skin
+        end = field.own_end(r + half * (vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)))
+        corner = Vec(reach, reach, reach)
+        along = block_of(grid, end - corner, end + corner).along
+        if (along.x > 0) & (along.y > 0) & (along.z > 0):
+            way, step = end - listed.own_place(vector_at(grains.listed, i, 0)), end - field.own_place(r)
+            found = Sweep(max(square(way), found.farthest), max(square(step), found.longest))
     return found

@@ -16,7 +16,6 @@ SIDES = np.array([
 ])  # fmt: skip
 SOFT = swarm.Penalty(0.002, 1e4)
 GROUPED = swarm.Mesh(CUBE, SIDES, group=[0] * 12, names=("a",), groups={"a": {"friction": 0.2}})
-LID = swarm.Plane((0.0, 0.0, 1.0), motion=swarm.Oscillation((0.0, 0.0, 0.1), 1.0))
 
 
 def one(place, velocity, radius=0.12):
@@ -130,7 +129,6 @@ def test_friction_at_faces_survives_new_lists():
 @pytest.mark.parametrize(
     ("surfaces", "wrong"),
     [
-        ([swarm.Spheres([(0.0, 0.0, 0.0)], 0.3), LID], "must not move beside a field"),
         ([GROUPED], "groups must be None"),
     ],
 )  # fmt: skip

@@ -181,3 +181,97 @@ def test_none_leaves_through_thousands_of_impacts(rate, gravity, side):
     assert (sign * swarm.Box(3 * (HALF,), motion=spin).phi(ran.particles.position, 4.0)).max() <= 1e-13
     assert drift(ran.observables) <= 1e-13
     assert ran.observables["impacts"][-1] >= 500
+
+
+# --- Soft grains -----------------------------------------------------------------------------------------
+
+
+def grains(surfaces, until, particles, dt=1e-3, **options):
+    scene, method = swarm.Scene(surfaces, DOWN), swarm.Penalty(dt=dt, penalty=1e5)
+    return swarm.simulate(scene, particles, method, until=until, every=0.5 * until, compile="never", **options)
+
+
+def soft(side="inside"):
+    return start((0.0, 0.0, -0.12) if side == "inside" else (0.46, 0.0, 0.0), 0.04)
+
+
+@pytest.mark.parametrize("laws", [{}, {"restitution": 0.7}], ids=["elastic", "damped"])
+@pytest.mark.parametrize("motion", list(MOTIONS))
+def test_grains_in_a_mesh_as_in_the_box(motion, laws):
+    how = {"motion": MOTIONS[motion], **laws}
+    one, other = (grains([wall], 0.15, soft()) for wall in (cube(**how), swarm.Box(3 * (HALF,), **how)))
+    assert one.particles.position == pytest.approx(other.particles.position, abs=1e-11)
+    seen, wanted = one.observables, other.observables
+    assert seen["impacts"][-1] == wanted["impacts"][-1] >= 2
+    assert seen["wall_work"][-1].sum() == pytest.approx(wanted["wall_work"][-1].sum(), abs=1e-10)
+    assert drift(seen) <= 1e-13
+
+
+@pytest.mark.parametrize("made", ["mesh", "boxes"])
+def test_grains_beside_a_field_that_turns_as_beside_the_box(made):
+    field = cube("outside", motion=TURNED) if made == "mesh" else swarm.Boxes([3 * [0.0]], 3 * (HALF,), motion=TURNED)
+    box = swarm.Box(3 * (HALF,), side="outside", motion=TURNED)
+    thrown = swarm.Particles(
+        [[0.4, 0.05], [0.1, 0.45], [0.0, 0.05]], [[-2.0, 0.2], [0.1, -2.5], [1.0, 0.5]], radius=0.04
+    )
+    one, other = (grains([swarm.Sphere(0.9), wall], 0.1, thrown) for wall in (field, box))
+    assert one.particles.position == pytest.approx(other.particles.position, abs=1e-11)
+    assert one.observables["wall_work"][-1].sum() != 0.0
+    assert drift(one.observables) <= 1e-13
+
+
+def test_grains_in_a_prism_as_between_its_planes():
+    prism, planes = regular(motion=TURNED + SHAKEN)
+    one, other = (grains(walls, 0.2, soft()) for walls in ([prism], planes))
+    assert one.particles.position == pytest.approx(other.particles.position, abs=1e-11)
+    assert drift(one.observables) <= 1e-13
+
+
+def test_grains_beside_a_field_at_rest_in_a_vessel_that_moves():
+    """The field is the same as in a run where nothing moves, in uniform translation of all."""
+    pegs = np.array([[0.0, 0.0, -0.25], [0.2, 0.0, -0.2]])
+    particles, shift = soft(), np.array([[0.3], [-0.2], [0.0]])
+    drift_on = swarm.Translation(tuple(shift[:, 0].tolist()))
+    still = grains([swarm.Box(3 * (HALF,)), swarm.Spheres(pegs, 0.05)], 0.2, particles)
+    carried = swarm.Particles(particles.position, particles.velocity + shift, radius=0.04)
+    field = swarm.Spheres(pegs, 0.05, motion=drift_on)
+    one = grains([swarm.Box(3 * (HALF,), motion=drift_on), field], 0.2, carried)
+    assert one.particles.position - 0.2 * shift == pytest.approx(still.particles.position, abs=1e-10)
+    shaken = grains([swarm.Box(3 * (HALF,), motion=SHAKEN), swarm.Spheres(pegs, 0.05)], 0.2, particles)
+    assert shaken.observables["wall_work"][-1, 1] == 0.0
+    assert drift(shaken.observables) <= 1e-13
+
+
+def test_lists_hold_for_a_wall_that_comes_from_far():
+    """A paddle strikes a ball at rest which was nowhere near it when it was listed, as the box does."""
+    spin = swarm.Rotation((0.0, 0.0, 1.0), 8.0)
+    paddle = HALF * CUBE * (1.0, 0.1, 0.3)
+    mesh = swarm.Mesh(paddle, TRIANGLES, "outside", motion=spin)
+    box = swarm.Box((HALF, 0.1 * HALF, 0.3 * HALF), side="outside", motion=spin)
+    still = swarm.Particles([0.0, 0.25, 0.0], [0.0, 0.0, 0.0], radius=0.03)
+    scenes = [swarm.Scene([swarm.Sphere(0.9), wall]) for wall in (mesh, box)]
+    method = swarm.Penalty(dt=5e-4, penalty=1e5)
+    one, other = (swarm.simulate(one, still, method, until=0.25, every=0.05, compile="never") for one in scenes)
+    assert one.observables["impacts"][-1] == 1
+    assert one.particles.position == pytest.approx(other.particles.position, abs=1e-11)
+
+
+def test_a_paddle_that_jumps_over_a_ball_in_one_step_is_refused():
+    spin = swarm.Rotation((0.0, 0.0, 1.0), 100.0)
+    mesh = swarm.Mesh(HALF * CUBE * (1.0, 0.02, 0.3), TRIANGLES, "outside", motion=spin)
+    still = swarm.Particles([0.0, 0.25, 0.0], [0.0, 0.0, 0.0], radius=0.01)
+    with pytest.raises(swarm.RunError, match=r"the step at .* failed at particle 0"):
+        swarm.simulate(
+            swarm.Scene([swarm.Sphere(0.9), mesh]), still, swarm.Penalty(dt=1e-3, penalty=1e3), until=0.1,
+            compile="never",
+        )  # fmt: skip
+
+
+def test_a_mesh_that_turns_and_comes_for_a_time():
+    """Steps are of another length in each piece of a frame, and lists are of each."""
+    how = {"motion": TURNED, "present": [(0.0313, 0.1)]}
+    one, other = (
+        grains([swarm.Sphere(0.9), wall], 0.2, soft("outside"))
+        for wall in (cube("outside", **how), swarm.Boxes([3 * [0.0]], 3 * (HALF,), **how))
+    )
+    assert one.particles.position == pytest.approx(other.particles.position, abs=1e-11)

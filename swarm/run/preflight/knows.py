@@ -184,12 +184,6 @@ def _fields(asked: Asked) -> Found:
     yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().fields())
 
 
-def _fields_that_rest(asked: Asked) -> Found:
-    scene = asked.scene
-    for i in scene.compiled().order.fields if scene.moves() else ():
-        yield {"i": scene.pieces.owners[i], "got": scene.pieces.each[i]}
-
-
 def _faces(asked: Asked) -> Found:
     yield from ({"i": i, "got": one} for i, one in _walls(asked) if one.face_noun)
 
@@ -630,12 +624,6 @@ CAPABILITIES = (
             "surfaces[{i}].motion must not turn the surface with {method}, got {got}: its step has no closed form in "
             "the frame of a wall that turns",
             "use Impact, a Translation, Oscillation or Path, or a rotation that leaves the surface as it is",
-        ),
-    }, within="motion"),
-    Capability("motion beside a field", _fields_that_rest, {
-        (GRAINS,): Refusal(
-            f"surfaces must not move beside a field or a mesh with {_WITH_PENALTY}, got a motion beside "
-            "surfaces[{i}] ({kind})", "use Impact, or build the field or mesh of single surfaces",
         ),
     }, within="motion"),
     Capability("gravity at cut steps", _gravity_at_impacts, {
