@@ -5,9 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from swarm.kernel.gravity import Bounds, Gravity
+from swarm.kernel.gravity import Gravity
 from swarm.kernel.grid import (
     MARGIN,
+    MostPull,
     block_of,
     cell_of,
     entries_of,
@@ -87,8 +88,12 @@ def test_a_flight_passes_every_cell_of_its_way(gravity):
             time = until_next(gravity, GRID, cell, vec(r), vec(v))
             assert until_out(gravity, GRID, cell.place, cell.place, vec(r), vec(v)) == pytest.approx(time, rel=1e-9)
             # Of an acceleration of any direction it is known to be there for a shorter time.
-            bounds = Bounds(*np.array([0.0, np.linalg.norm(pull), 0.0]))
+            bounds = 3 * (MostPull(*np.array(2 * [np.linalg.norm(pull)])),)
             assert until_next(bounds, GRID, cell, vec(r), vec(v)) <= time * (1.0 + 1e-9)
+            # Of one that is known, for just that time.
+            known = tuple(MostPull(a, -a) for a in pull)
+            assert until_next(known, GRID, cell, vec(r), vec(v)) == pytest.approx(time, rel=1e-9)
+            assert until_out(known, GRID, cell.place, cell.place, vec(r), vec(v)) == pytest.approx(time, rel=1e-9)
             r, v = r + time * (v + 0.5 * time * pull), v + time * pull
             before, cell = cell, cell_of(GRID, vec(r))
             assert sum(map(abs, before.place - cell.place)) == 1.0

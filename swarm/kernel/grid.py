@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import index
-from .gravity import Bounds, rise_time
+from .gravity import rise_time
 from .jit import Array, select
 from .record import Record
 from .vector import Vec, vec
@@ -44,6 +44,13 @@ class GridCell(Record):
     number: int
     place: Vec
     inside: bool
+
+
+class MostPull(Record):
+    """Of an acceleration along an axis the most that it is, and that it is the other way."""
+
+    up: Any
+    down: Any
 
 
 # --- The cell of a point ---------------------------------------------------------------------------------
@@ -131,9 +138,9 @@ def over_entries(grid, block, found, ask, *given):
 def until_next(gravity, grid, cell, r, v):
     """When a flight is beyond the wall of its cell; from outside, until when it surely does not come into the grid.
 
-    Of its acceleration there may be `Bounds` only.
+    Of its acceleration along each axis there may be a `MostPull` only.
     """
-    pulls = 3 * (gravity,) if gravity is None or isinstance(gravity, Bounds) else gravity
+    pulls = 3 * (None,) if gravity is None else gravity
     layers = zip(grid.low, grid.width, grid.margin, grid.shape, strict=True)
     flight = zip(layers, cell.place, r, v, pulls, strict=True)
     x, y, z = (_until_next_layer(*one) for one in flight)
@@ -160,9 +167,9 @@ def _until_next_layer(layers, place, x, v, pull):
     among, below = (place >= 0.0) & (place < count), place < 0.0
     sign, face = select(below, 1.0, -1.0), select(below, low + margin, low + count * width - margin)
     b = 0.5 * v
-    if isinstance(pull, Bounds):
-        # Whatever its direction
-        ahead = towards = back = 0.5 * pull.acceleration
+    if isinstance(pull, MostPull):
+        ahead, back = 0.5 * pull.up, 0.5 * pull.down
+        towards = select(below, ahead, back)
     else:
         ahead, towards, back = 0.5 * pull, sign * (0.5 * pull), -(0.5 * pull)
     up = rise_time(
@@ -177,7 +184,7 @@ def _until_next_layer(layers, place, x, v, pull):
 def until_out(gravity, grid, first, last, r, v):
     """When a flight among the cells from one place to another one has left these."""
     layers = zip(grid.low, grid.width, grid.margin, strict=True)
-    pulls = 3 * (gravity,) if gravity is None or isinstance(gravity, Bounds) else gravity
+    pulls = 3 * (None,) if gravity is None else gravity
     x, y, z = (_until_out_of_layers(*one) for one in zip(layers, first, last, r, v, pulls, strict=True))
     sooner = select(y < x, y, x)
     return select(z < sooner, z, sooner)
@@ -192,11 +199,8 @@ def _until_out_of_layers(layers, first, last, x, v, pull):
     if pull is None:
         return _until_edge(layers, first, last, x, v)
     below, above = low + first * width - margin, low + (last + 1.0) * width + margin
-    if isinstance(pull, Bounds):
-        up, down = (
-            rise_time(x - above, 0.5 * v, 0.5 * pull.acceleration),
-            rise_time(below - x, -0.5 * v, 0.5 * pull.acceleration),
-        )
+    if isinstance(pull, MostPull):
+        up, down = rise_time(x - above, 0.5 * v, 0.5 * pull.up), rise_time(below - x, -0.5 * v, 0.5 * pull.down)
         return select(down < up, down, up)
     # Towards the side to which it is pulled it leaves, unless it leaves before through the other one.
     turned = pull < 0.0

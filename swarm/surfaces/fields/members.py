@@ -107,7 +107,7 @@ class Members(Record):
         return self
 
     def until_out(self, cell, gravity, r, v):
-        """When a flight is beyond a cell, or the free cells around it; of its acceleration there may be `Bounds`."""
+        """When a flight is beyond a cell, or the free cells around it; of its acceleration there may be bounds."""
         return until_next(gravity, self.grid, cell, r, v)
 
     def way_in_cell(self, cell, seen, span):

@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 from ...kernel.gravity import Bounds as Bounds
+from ...kernel.grid import MostPull
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, norm, times, total
@@ -75,6 +76,13 @@ class InWallFrame(Record):
             hard + spin * (2.0 * speed + spin * arm),
             drive.jerk + spin * (3.0 * hard + spin * (3.0 * speed + spin * arm)),
         )
+
+    def pulls(self, within):
+        """The `MostPull` along each axis that bounds its places for so long [s]."""
+        bounds = self.bounds(within)
+        # x <= v t + a t^2/2 + J t^3/6
+        more, most = bounds.jerk * within * (1.0 / 3.0), bounds.acceleration
+        return tuple(MostPull(min(a + more, most), min(more - a, most)) for a in self.a)
 
 
 def flight_of(r, v, pull, remaining):

@@ -91,10 +91,11 @@ def until_next_cell(members, seen, longest):
     Or near the block of free cells around it, if these are known.
     """
     grid = members.grid
-    cell, time, within = cell_of(grid, seen.r), 0.0, longest
-    # The bound of the acceleration grows with the time that it holds for.
+    cell, time = cell_of(grid, seen.r), 0.0
+    # The bound of the acceleration grows with the time that it holds for: begin without it.
+    within = min(members.until_out(cell, seen.pulls(0.0), seen.r, seen.v), longest)
     for _k in range(_TRIALS):
-        until = members.until_out(cell, seen.bounds(within), seen.r, seen.v)
+        until = members.until_out(cell, seen.pulls(within), seen.r, seen.v)
         time = max(time, min(until, within))
         if not _CLOSE * time < within:
             break
