@@ -69,9 +69,11 @@ def test_a_bad_start_is_one_sentence(scene, particles, method, options, sentence
     assert "\n" not in str(error.value)
 
 
-def test_sources_give_points():
+def test_sources_of_points_do_not_go_with_balls():
     source = swarm.Source(0, rate=1.0, speed=1.0)
-    with pytest.raises(swarm.SceneError, match="sources must be left out where particles have a radius"):
+    with pytest.raises(
+        swarm.SceneError, match=r"sources\[0\].radius must be given where the other particles of the run have a radius"
+    ):
         admitted(VESSEL, balls(), sources=[source])
 
 

@@ -9,7 +9,6 @@ from conftest import rarely
 from test_sessions import stopped_at
 
 import swarm
-from swarm.methods import Penalty
 from swarm.run.engine import Run
 from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched
@@ -422,12 +421,9 @@ def test_a_volume_must_be_one():
 
 def test_methods_without_counters_are_refused():
     start = swarm.fill(SPHERE, 3, speed=1.0, seed=1)
-    for method, sentence in (
-        (Penalty(dt=1e-2, penalty=1e4), r"Penalty, got 1: a counter follows flights, not steps; use Impact\(\)"),
-        (swarm.Impact(contact_step=1e-3), "a contact_step of 0.001, got 1; leave contact_step out"),
-    ):
-        with pytest.raises(swarm.SceneError, match=rf"counters must be left out with {sentence}"):
-            swarm.simulate(SPHERE, start, method, until=1.0, counters=[swarm.Sphere(0.1)])
+    sentence = "a contact_step of 0.001, got 1; leave contact_step out"
+    with pytest.raises(swarm.SceneError, match=rf"counters must be left out with {sentence}"):
+        swarm.simulate(SPHERE, start, swarm.Impact(contact_step=1e-3), until=1.0, counters=[swarm.Sphere(0.1)])
     bodies = swarm.place(SPHERE, swarm.dumbbell(length=0.1, mass=1.0), 2, seed=1)
     with pytest.raises(swarm.SceneError, match=r"counters must be left out with bodies, got 1; use particles"):
         swarm.simulate(SPHERE, bodies, swarm.Impact(dt=1e-2), until=1.0, counters=[swarm.Sphere(0.1)])

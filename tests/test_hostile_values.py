@@ -172,6 +172,7 @@ def test_every_kth_particle_by_an_array_of_one_number(tmp_path):
 NO_BOOLEAN = ["no", "false", "", math.nan, 0, 1, 1.0, None, [], {}, object(), np.array(True), np.array([True])]
 RESULT = swarm.simulate(**CALLS["simulate"])
 FLAGS = {
+    "Mesh.open": lambda value: swarm.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[0, 1, 2]], open=value),
     "AugmentedLagrangian.adaptive": lambda value: swarm.AugmentedLagrangian(1e-3, 1e3, adaptive=value),
     "Bodies.project": lambda value: swarm.Bodies(
         swarm.dumbbell(1.0, 1.0),

@@ -183,12 +183,11 @@ SUPPORTED = {
     "Sticky": "wait", "counters": "counter", "source": "source", "log": "log of impacts", "opening": "opening",
     "timed opening": "opening for a time", "present": "present", "period": "period", "plane": "plane", "spin": "spin",
     "translation": "motion", "turning": "rotation", "mass": "mass of a wall", "member impacts": "impacts on members",
-    "pair restitution": "law of pairs", "pair friction": "friction of pairs", "contact duration": "contact duration",
-    "cluster": "cluster",
+    "pair restitution": "law of pairs", "pair friction": "law of pairs", "contact duration": "contact duration",
 }  # fmt: skip
 OF_WALLS = {"union": "union", "field": "field", "mesh": "mesh or outline", "prism": "mesh or outline"}
 # A wall with a mass has none of these; the walls beside it do.
-NOT_OF_HEAVY_WALLS = ("friction", "turning", "temperature", "Lambert")
+NOT_OF_HEAVY_WALLS = ("friction", "turning", "temperature", "Lambert", "spin")
 
 
 @pytest.mark.parametrize("engine", cells.ENGINES)

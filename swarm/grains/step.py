@@ -20,7 +20,7 @@ from .exits import let_out, open_wall
 from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
 from .grain_arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
 from .overlaps import look_at_pairs, look_at_wall
-from .vessel import Sweep, moves, sweep_of
+from .vessel import SweptWall, moves, sweep_of
 
 # A sweep that changes no impulse by more than this part is the last one; also one that gains no more than half of the
 # one before, if that is round-off of what many large impulses leave of one another.
@@ -250,12 +250,12 @@ def _let_out(matter, walls, world, time):
 
 
 def _swept(matter, walls, listed, grains, skin):
-    """The `Sweep` of all fields that move, which were `listed` so."""
-    found = Sweep(0.0, 0.0)
+    """The `SweptWall` of all fields that move, which were `listed` so."""
+    found = SweptWall(0.0, 0.0)
     for (_number, field), (_first, then) in zip(walls.fields(), listed.fields(), strict=True):
         if moves(field):
             one = sweep_of(field.members, then.members, matter, grains, skin)
-            found = Sweep(worse(one.farthest, found.farthest), worse(one.longest, found.longest))
+            found = SweptWall(worse(one.farthest, found.farthest), worse(one.longest, found.longest))
     return found
 
 

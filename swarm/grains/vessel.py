@@ -141,7 +141,7 @@ def list_in_field(wall, face, grains, near, skin, found):
     return found
 
 
-class Sweep(Record):
+class SweptWall(Record):
     """How far a ball near a field that moves is from where it was listed, and how far a step leads, in its frame."""
 
     farthest: Any  # their squares, at most [m^2]
@@ -150,13 +150,13 @@ class Sweep(Record):
 
 @outlined
 def sweep_of(field, listed, matter, grains, skin):
-    """The `Sweep` of all balls near a field that moves, `listed` as it was then, by a step."""
+    """The `SweptWall` of all balls near a field that moves, `listed` as it was then, by a step."""
     place, speed, half, grid, found = (
         grains.place,
         grains.speed,
         0.5 * matter.h,
         members_of(field).grid,
-        Sweep(0.0, 0.0),
+        SweptWall(0.0, 0.0),
     )
     for k in range(place.shape[0]):
         i = index(k)
@@ -166,5 +166,5 @@ def sweep_of(field, listed, matter, grains, skin):
         along = block_of(grid, end - corner, end + corner).along
         if (along.x > 0) & (along.y > 0) & (along.z > 0):
             way, step = end - listed.own_place(vector_at(grains.listed, i, 0)), end - field.own_place(r)
-            found = Sweep(max(square(way), found.farthest), max(square(step), found.longest))
+            found = SweptWall(max(square(way), found.farthest), max(square(step), found.longest))
     return found

@@ -178,11 +178,6 @@ HOLE = swarm.Sphere(0.2, (0.0, 0.0, 0.5))
 OPEN_ROOM = swarm.Intersection([swarm.Box((0.5, 0.5, 0.5), openings=[HOLE])])
 
 
-def _with_bodies():
-    bodies = swarm.place(swarm.Scene([swarm.Box((0.5, 0.5, 0.5))]), swarm.dumbbell(0.1, 1.0), 2, seed=1)
-    swarm.simulate(swarm.Scene([OPEN_ROOM]), bodies, swarm.Impact(dt=1e-2), until=0.01, compile="never")
-
-
 def _one_contact_step():
     ball = swarm.Intersection([swarm.Sphere(0.5, motion=swarm.Translation((1.0, 0.0, 0.0)))])
     method = swarm.AugmentedLagrangian(dt=0.025, penalty=1e4)
@@ -209,7 +204,6 @@ def _beside_a_wall_with_a_mass():
 @pytest.mark.parametrize(
     ("run", "message"),
     [
-        (_with_bodies, r"surfaces\[0\].openings must be left out with bodies"),
         (_one_contact_step, r"surfaces\[0\] must be at rest, without motion"),
         (_cut_steps, r"surfaces\[0\].motion must be None with adaptive = True"),
         (_out_of_the_plane, r"surfaces\[0\].motion must stay in the plane"),

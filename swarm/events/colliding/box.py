@@ -25,7 +25,7 @@ class Domain(Record):
     heavy: Any = None  # None, or `Heavy` where walls have a mass
     source: Any = None  # None, or `RandomSource` where walls send them off
     repose: Any = None  # None, or `Repose` where balls may come to rest
-    turning: Any = None  # None, or `Turning` of balls that have a spin
+    turning: Any = None  # None, or `BallSpins` of balls that have a spin
     owners: Any = None  # the number in the scene of each wall without a mass; None where none has one
 
     def owner(self, wall):

@@ -21,7 +21,7 @@ from .meet import Loss
 from .queue import FIRST, SPARE
 from .resting import repose_of
 from .rows import CELL, FLOATS, NOBODY, PARTNER, RADIUS, STAMP, TIME, WALL, WHOLES, Flock, Kept
-from .rubbing import Turning
+from .rubbing import BallSpins
 from .window import OUT, UNKNOWN
 
 Floats = NDArray[np.float64]
@@ -127,7 +127,7 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     pairs = scene.pairs or Pairs()
     loss, turning = None, None
     if particles.spin is not None:
-        turning = Turning(particles.spin, pairs.friction or None)
+        turning = BallSpins(particles.spin, pairs.friction or None)
     heavy_loses = any(surface.reacts() and surface.restitution < 1.0 for surface in scene.surfaces)
     if pairs.restitution < 1.0 or laws.restitution is not None or heavy_loses:
         loss = Loss(pairs.restitution, duration_of(scene, pairs, particles))

@@ -23,7 +23,7 @@ from ...kernel.vector import Vec, cross, dot, square
 _STOP, _TURN = INERTIA / (1.0 + INERTIA), 1.0 / (1.0 + INERTIA)
 
 
-class Turning(Record):
+class BallSpins(Record):
     """The spins of balls, and the friction of their collisions."""
 
     spin: Array  # (3, N) [rad/s]
