@@ -56,7 +56,7 @@ BY_ITSELF = (
     "spin must be None without a radius, .*", r"(mass|inertia|motion|rotation) must be None for \w+, .*",
     r"mass must be None where an inertia is given to a \w+, .*",
     "motion must be None, a Translation or a Guide where a mass is given, .*", "openings must be of a wall at rest, .*",
-    "motion and openings must be left out for Spheres with side=.*", 'side must be "(inside|outside)" for .*',
+    "motion must be left out for Spheres with side=.*", 'side must be "(inside|outside)" for .*',
     r"surfaces\[0\].mass and inertia must be None where the scene has a period, .*",
     r"surfaces\[0\] must be the only surface of a scene without a period, .*",
     r"surfaces\[\d\]( \(\w+\))? must (stand upright on the plane|be bounded along) .*",
