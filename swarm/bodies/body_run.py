@@ -263,8 +263,7 @@ class BodyRun(BaseRun):
             )
 
     def _arrays(self) -> Arrays:
-        pieces = {} if self._instants is None else {"piece.begun": self._begun, "piece.done": self._done}
-        return {name: array for name, array in self._bodies._asdict().items() if array is not None} | pieces
+        return {name: array for name, array in self._bodies._asdict().items() if array is not None}
 
 
 def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:

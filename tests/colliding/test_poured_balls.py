@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from cut_short import in_sessions
 
 import swarm
 from swarm.events.balls_run import CollidingRun
-from swarm.run.session import Session
 
 LID = swarm.Box((0.05, 0.05, 0.01), center=(0.0, 0.0, 0.04))
 DOWN = {"gravity": (0.0, 0.0, -9.81), "pairs": swarm.Pairs(restitution=0.9)}
@@ -99,24 +99,12 @@ def test_threads_frames_halts_and_resumes_change_no_bit(name, tmp_path, monkeypa
     same(one, poured(name, threads=2))
     many = poured(name, every=0.01)
     np.testing.assert_array_equal(one.particles.position, many.particles.position)
-    advance, look, sessions = CollidingRun.advance, Session.look, 0
-
-    def stops(self, *given):
-        self.stop()
-        return look(self, *given)
-
-    def halting(self, *given, **more):
-        self.halt(12)
-        return advance(self, *given, **more)
-
-    monkeypatch.setattr(Session, "look", stops)
-    monkeypatch.setattr(CollidingRun, "advance", halting)
-    while sessions < 100:
-        try:
-            parts = poured(name, trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3)
-            break
-        except KeyboardInterrupt:
-            sessions += 1
+    parts, sessions = in_sessions(
+        monkeypatch,
+        CollidingRun,
+        12,
+        lambda: poured(name, trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3),
+    )
     assert sessions > 5
     same(one, parts)
 

@@ -7,11 +7,11 @@ import math
 import h5py
 import numpy as np
 import pytest
+from cut_short import in_sessions
 
 import swarm
 from swarm.grains.grains_run import GrainsRun
 from swarm.run.feeding import _TRIES
-from swarm.run.session import Session
 from swarm.sources.ball_places import BallPlaces
 from swarm.sources.births import with_births
 
@@ -173,24 +173,9 @@ def test_threads_halts_and_frames_change_no_bit(name, monkeypatch):
 def test_resumed_at_any_place(name, tmp_path, monkeypatch):
     """The lists, which grow with the births, are of another size than at the start."""
     whole = poured(name, trajectory=tmp_path / "whole.h5")
-    advance, look, sessions = GrainsRun.advance, Session.look, 0
-
-    def stops(self, *given):
-        self.stop()
-        return look(self, *given)
-
-    def halting(self, *given, **more):
-        self.halt(13)
-        return advance(self, *given, **more)
-
-    monkeypatch.setattr(Session, "look", stops)
-    monkeypatch.setattr(GrainsRun, "advance", halting)
-    while sessions < 100:
-        try:
-            parts = poured(name, trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3)
-            break
-        except KeyboardInterrupt:
-            sessions += 1
+    parts, sessions = in_sessions(
+        monkeypatch, GrainsRun, 13, lambda: poured(name, trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3)
+    )
     assert sessions > 6
     same(whole, parts)
     with swarm.load(tmp_path / "whole.h5") as one, swarm.load(tmp_path / "parts.h5") as other:

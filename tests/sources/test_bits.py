@@ -5,6 +5,7 @@ import functools
 
 import numpy as np
 import pytest
+from cut_short import in_sessions
 
 import swarm
 from swarm.run.engine import Run
@@ -107,25 +108,12 @@ def test_compiled_and_in_plain_python(name):
 def test_resumed_at_any_place(name, tmp_path, monkeypatch):
     """Each session ends within a frame, or at one, and the next one begins with its checkpoint."""
     whole = run(name, compile="never", trajectory=tmp_path / "whole.h5")
-    advance, look, sessions = Run.advance, Session.look, 0
-
-    def stops(self, *given):
-        self.stop()
-        return look(self, *given)
-
-    def halting(self, *given, **more):
-        self.halt(2)
-        return advance(self, *given, **more)
-
-    monkeypatch.setattr(Session, "look", stops)
-    monkeypatch.setattr(Run, "advance", halting)
-    while True:
-        try:
-            parts = run(name, compile="never", trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3)
-            break
-        except KeyboardInterrupt:
-            sessions += 1
-            assert sessions < 300
+    parts, sessions = in_sessions(
+        monkeypatch,
+        Run,
+        2,
+        lambda: run(name, compile="never", trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3),
+    )
     assert sessions > 12
     same(whole, parts)
     with swarm.load(tmp_path / "whole.h5") as one, swarm.load(tmp_path / "parts.h5") as other:
