@@ -53,6 +53,12 @@ def test_a_class_name_stands_once():
     assert {name: places for name, places in found.items() if len(places) > 1} == {}
 
 
+def test_a_name_of_a_file_of_tests_stands_once():
+    """pytest imports a file of tests by its name alone, for their folders are no packages."""
+    found = Counter(path.name for path in (ROOT.parent / "tests").rglob("test_*.py"))
+    assert {name: count for name, count in found.items() if count > 1} == {}
+
+
 def test_a_file_name_stands_at_most_twice():
     """But for those that Python gives."""
     found = Counter(path.name for path in ROOT.rglob("*.py") if not path.name.startswith("__"))
