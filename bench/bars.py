@@ -98,7 +98,7 @@ def impacts(n: int, until: float, repeats: int) -> list[Row]:
 
 
 def multipliers(n: int, until: float, repeats: int) -> list[Row]:
-    """The augmented Lagrangian in State I: particles through the centre of a sphere, whose contacts are all alike."""
+    """The augmented Lagrangian in State I: particles through the centre of a sphere: their contacts are all alike."""
     random = np.random.default_rng(1)
     directions = random.standard_normal((3, n))
     directions /= np.sqrt((directions**2).sum(axis=0))

@@ -203,7 +203,7 @@ WALLS: dict[str, Wall] = {
     "polygon": Wall(_of(lambda **k: swarm.Polygon(_outline(), **k))),
     "stadium": Wall(_of(lambda **k: swarm.Stadium(0.35, 0.3, **k))),
     "prism": Wall(_of(lambda **k: swarm.Prism(_outline(), 0.9, **k))),
-    # With every capability, whose results are compared with those of one process.
+    # With every capability: its results are compared with those of one process.
     ON_A_CLUSTER: Wall(_box, options=shards.OPTIONS),
 }
 SHAPES = [name for name, wall in WALLS.items() if not wall.options]

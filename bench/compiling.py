@@ -41,7 +41,7 @@ Start = tuple[swarm.Scene, swarm.Particles | swarm.Bodies, Method]
 
 
 class Case(NamedTuple):
-    """A scene whose first call is measured."""
+    """A scene: its first call is measured."""
 
     what: str
     start: Callable[[], Start]
@@ -141,7 +141,7 @@ class Heard(event.Listener):  # type: ignore[misc]
 
 
 def call(case: Case, began: float) -> Call:
-    """The call of a case in this process, whose processor time was `began` when it had imported swarm."""
+    """The call of a case in this process; its processor time was `began` when it had imported swarm."""
     scene, start, method = case.start()
 
     def seconds() -> float:
@@ -189,7 +189,7 @@ def rows_of(case: Case, calls: list[tuple[Call, Call]]) -> list[Row]:
 
 
 def failed(case: Case, error: subprocess.CalledProcessError) -> Row:
-    """Instead of the rows of a scene whose process ended: the last that it said, or its exit code."""
+    """Instead of the rows of a scene, if its process ended: the last that it said, or its exit code."""
     said = (error.stderr.strip() or f"exit code {error.returncode}").splitlines()[-1]
     return Row(f"{case.what}: {said}"[:100], math.nan, math.nan, "s", f"{case.bar:g}")
 

@@ -164,7 +164,7 @@ def at_rest(quick: bool) -> list[Row]:
 
 
 def wedges(quick: bool) -> list[Row]:
-    """Galperin's billiard: two masses and a wall are a point in a wedge, whose impacts are the digits of pi."""
+    """Galperin's billiard: two masses and a wall are a point in a wedge; its impacts are the digits of pi."""
     rows = []
     for n, exact in enumerate(_PI_DIGITS[: 3 if quick else None]):
         angle = math.atan(10.0**-n)

@@ -203,7 +203,7 @@ def _fails_alone(tree: Tree, fault: Fault, arguments: list[str]) -> bool:
 
 
 def again(folder: Path, table: Path) -> Iterator[tuple[int, Fault, str]]:
-    """Number, fault and test of each row of a table, whose lines may be elsewhere or in another module by now."""
+    """Number, fault and test of each row of a table; its lines may be elsewhere or in another module by now."""
     modules = {
         path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted((folder / "swarm").rglob("*.py"))
     }

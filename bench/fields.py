@@ -102,7 +102,7 @@ def _plain(position, velocity, until, first, entries, places, radius, cells):
 
 
 def plain(side: int, start: swarm.Particles, until: float) -> Callable[[], float]:
-    """Nanoseconds an impact of that loop, whose balls are each in a cell of their own."""
+    """Nanoseconds an impact of that loop, with each ball in a cell of its own."""
     places, radius = lattice(side)
     first, entries = np.arange(side**3 + 1), np.arange(side**3)
 

@@ -1,4 +1,4 @@
-"""Meshes whose triangles are walls: seconds for the scene, bytes a triangle, nanoseconds an impact, the first call."""
+"""Meshes of triangles that are walls: seconds for the scene, bytes a triangle, nanoseconds an impact, first call."""
 
 import os
 import subprocess
@@ -44,7 +44,7 @@ def vessel(count: int) -> tuple[Any, Any]:
 
 
 def _rings(rings: int, columns: int) -> Any:
-    """Triangles between rings of corners, and two fans at the ends, whose middles are the last two corners."""
+    """Triangles between rings of corners, and two fans at the ends: their middles are the last two corners."""
     i, j = np.meshgrid(np.arange(rings - 1), np.arange(columns), indexing="ij")
     a, b, c, d = (p * columns + q % columns for p, q in ((i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)))
     sides = np.concatenate([np.stack([a, c, b], axis=-1).reshape(-1, 3), np.stack([b, c, d], axis=-1).reshape(-1, 3)])

@@ -50,7 +50,7 @@ def impact(h: float, start: str) -> Method:
 
 
 def uzawa(h: float, start: str) -> Method:
-    """`AugmentedLagrangian` whose loops end at round-off; the penalty grows as 1/h^2."""
+    """`AugmentedLagrangian` with loops that end at round-off; the penalty grows as 1/h^2."""
     stiff = {"penalty": 9.0 / (h * h), "tolerance": 1e-28, "max_sweeps": 500}
     return swarm.AugmentedLagrangian(dt=h, adaptive=True, acceleration="reflection", contact_start=start, **stiff)
 

@@ -1,4 +1,4 @@
-"""A run on a cluster whose shards are carried out here, one after the other: the same files, and no scheduler."""
+"""A run on a cluster with shards that are carried out here, one after the other: the same files, and no scheduler."""
 
 import contextlib
 import dataclasses

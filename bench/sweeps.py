@@ -56,7 +56,7 @@ print(cold - own[0], sum(own))
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """That of a process whose kernels are in a folder."""
+    """That of a process with its kernels in a folder."""
     found = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
     return {**os.environ, "NUMBA_CACHE_DIR": str(folder), "PYTHONPATH": found}
 

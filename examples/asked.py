@@ -15,7 +15,7 @@ class Asked(argparse.ArgumentParser):
     """Arguments of an example, with `-o`, its picture.
 
     Args:
-        doc: of the module, whose first line is shown.
+        doc: of the module; its first line is shown.
         name: of the picture.
         extras: of pyproject.toml, which it needs.
     """

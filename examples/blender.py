@@ -46,7 +46,7 @@ class Stirred(NamedTuple):
 
 
 def blade() -> list[np.ndarray]:
-    """The triangles of the blade: a bar along x, whose section turns about x, so that both of its arms lift."""
+    """The triangles of the blade: a bar along x with a section that turns about x, so that both of its arms lift."""
     section = np.array([[-0.5 * THICK, -TALL], [0.5 * THICK, -TALL], [0.5 * THICK, TALL], [-0.5 * THICK, TALL]])
     rings = []
     for x in np.linspace(-HALF, HALF, STATIONS):

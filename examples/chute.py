@@ -23,7 +23,7 @@ from .bottle_from_stl import write_stl
 from .page import law, page, vessel
 
 GRAVITY, ANGLE, RADIUS, DENSITY = 9.81, math.radians(20.0), 0.01, 2500.0
-# The length of the chute along its slope and the height of its lip, whose x is 0; widths and heights of walls [m].
+# The length of the chute along its slope and the height of its lip, at x = 0; widths and heights of walls [m].
 LENGTH, LIP, WIDTH, WALL = 0.6, 0.3, 0.14, 0.04
 TRAY, DEPTH = (0.06, 0.42, 0.12), 0.1
 STIFFNESS, STEP = 2e4, 2e-4

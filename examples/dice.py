@@ -2,7 +2,7 @@
 
     python examples/dice.py
 
-A rigid body is four points whose mass, centre and inertia are those of the solid; its eight corners touch the walls.
+A rigid body is four points with the mass, centre and inertia of the solid; its eight corners touch the walls.
 At the start all energy is that of translation. Walls without friction or losses share it out over the six freedoms.
 """
 

@@ -1,4 +1,4 @@
-"""Storage of a gas whose particles are lost at impacts: an exponential, a tail 1/t^3, and a bottle of neutrons.
+"""Storage of a gas of particles that are lost at impacts: an exponential, a tail 1/t^3, and a bottle of neutrons.
 
     python -m examples.neutron_bottle
 

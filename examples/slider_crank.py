@@ -1,4 +1,4 @@
-"""A slider-crank mechanism whose pin has a clearance: the paper's fig. 2, for hundreds of revolutions.
+"""A slider-crank mechanism with a clearance at its pin: the paper's fig. 2, for hundreds of revolutions.
 
     python -m examples.slider_crank
 

@@ -2,9 +2,10 @@
 
     python -m examples.stadium
 
-A neighbour at a distance x across the path, whose direction differs by y, is at x + t y after a time t of unit speed. A
-mirror of curvature k, hit at an angle a to its normal, turns (x, y) into (-x, -y + 2 k x/cos a). The log of impacts
-says where and how each particle hits, so the exponent is the growth of ln |(x, y)| along the paths of one run.
+A neighbour at a distance x across the path, in a direction that differs by y, is at x + t y after a time t of unit
+speed. A mirror of curvature k, hit at an angle a to its normal, turns (x, y) into (-x, -y + 2 k x/cos a). The log
+of impacts says where and how each particle hits, so the exponent is the growth of ln |(x, y)| along the paths of one
+run.
 
 Lines alone part neighbours linearly with time, and a circle alone does too; both together exponentially.
 """
@@ -28,7 +29,7 @@ RATIOS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0)
 
 
 def table(ratio: float) -> swarm.Scene:
-    """The stadium of radius 1 m whose lines are `ratio` long."""
+    """The stadium of radius 1 m with lines that are `ratio` long."""
     return swarm.Scene([swarm.Stadium(radius=1.0, length=ratio)], plane="z")
 
 

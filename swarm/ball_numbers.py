@@ -51,7 +51,7 @@ class BallNumbers:
     """The observables of balls from frame to frame: an engine tells it each frame once, when it is done.
 
     Args:
-        scene: whose volume it is, of three dimensions or of two.
+        scene: the balls' scene, with its volume of three dimensions or of two.
         particles: at the start.
 
     >>> import swarm

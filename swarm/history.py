@@ -72,7 +72,7 @@ def contact_history(
         position: r0, three numbers [m].
         velocity: v0, three numbers [m/s].
         mass: m > 0 [kg].
-        method: AugmentedLagrangian; or Penalty, or Impact with a contact_step, whose one solve is one sweep. With
+        method: AugmentedLagrangian; or Penalty, or Impact with a contact_step, with one solve as its one sweep. With
             adaptive=True, and for Impact, the particle first flies to its next impact; or to half a step before it with
             contact_start = "centred", where Phi is that of the gap less the one there.
 

@@ -28,7 +28,7 @@ from .surfaces.presence.openings import require_few
 from .surfaces.surface import UNBOUNDED, Box, Surface
 from .surfaces.union import Place
 
-# Points whose gaps are found at once.
+# The number of points with gaps found at once.
 _BATCH = 4096
 # A slot thinner than this part of the scene's extent does not set the length of steps, which would be lost in the
 # round-off of times.
@@ -61,7 +61,7 @@ def _surfaces(value: Any) -> tuple[Surface, ...]:
 
 @dataclass(frozen=True, init=False, repr=False)
 class Scene:
-    """Rigid surfaces, whose admissible sides intersect in the volume that holds the particles, and gravity.
+    """Rigid surfaces, with admissible sides that intersect in the volume that holds the particles, and gravity.
 
     Args:
         surfaces: at least one surface; none where the cell repeats in every direction, for balls.
@@ -71,7 +71,7 @@ class Scene:
             solid that reaches over a face is there on the other side too; a cavity is within the cell; and any other
             surface is the same all along the period, as a plane or an endless cylinder along it, and may move along
             it. Flights go on over any number of cells where no wall that repeats is in the way.
-        plane: None, or "x", "y" or "z": a billiard of two dimensions, whose particles stay in the plane x, y or z = 0.
+        plane: None, or "x", "y" or "z": a billiard of two dimensions, with particles in the plane x, y or z = 0.
             Walls stand upright on it. `fill` and all pictures are of the plane, and what is said of volumes and areas
             holds for areas and lengths: `Particles.volume` is an area [m^2], pressures are per length [N/m].
         pairs: None, or `Pairs`, what particles that have a radius do to one another; None: they keep the energy.
@@ -122,7 +122,7 @@ class Scene:
         if not self._has_volume():
             why = required.apart_of(surfaces) or "check their `side`, and that solids are smaller than their cavity"
             raise SceneError(
-                f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces whose admissible sides "
+                f"surfaces must leave a volume for particles, got {len(surfaces)} surfaces; their admissible sides "
                 f"have no point in common; {why}"
             )
 
@@ -422,7 +422,7 @@ class Scene:
         return CompiledScene(self)
 
     def placed(self, positions: ArrayLike, orientations: ArrayLike) -> "Scene":
-        """The scene whose walls that react stay where `wall_position` and `wall_orientation` of a frame say."""
+        """The scene with walls that react kept where `wall_position` and `wall_orientation` of a frame say."""
         surfaces = list(self.surfaces)
         for i, surface in enumerate(surfaces):
             if surface.reacts():

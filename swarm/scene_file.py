@@ -176,7 +176,7 @@ def read(path: str | Path, plugins: Iterable[str] = ()) -> Job:
 
     Args:
         path: the file.
-        plugins: the modules whose code it may name, as "module:Name", for laws, surfaces, methods and observables.
+        plugins: the modules with code that it may name, as "module:Name", for laws, surfaces, methods and observables.
 
     Raises:
         SceneError: the file cannot be read, is not TOML, a key is unknown, missing or out of its range, or it names

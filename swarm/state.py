@@ -15,7 +15,7 @@ class Multipliers(NamedTuple):
     Attributes:
         sweeps: (N,) sweeps of all its contact steps together.
         contacts: (N,) contact steps.
-        unconverged: (N,) contact steps whose loop did not reach the tolerance.
+        unconverged: (N,) contact steps with a loop that did not reach the tolerance.
         stored_energy: (N,) the largest V that a loop left [J].
         remaining: (N,) the rest of the frame, in the method's unit, where a loop failed.
     """

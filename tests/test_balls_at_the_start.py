@@ -39,7 +39,7 @@ def test_balls_that_are_apart_are_admitted(method):
         (CELL, balls(((0.05, 0.95), (0.1, 0.1), (0.1, 0.1)), 0.06), None, {}, "1 pairs that do, .*, by 0.02 m"),
         (VESSEL, balls(((0.0, 0.45), (0.0, 0.0), (0.0, 0.0))), None, {},
          "particles must start inside their walls, got 1 of 2 outside; the first is particle 1 at .0.45, 0.0, 0.0., "
-         r"whose radius of 0.1 m reaches 0.05 m beyond surfaces\[0\] \(Box\)"),
+         r"and its radius of 0.1 m reaches 0.05 m beyond surfaces\[0\] \(Box\)"),
         (VESSEL, balls(((0.0, 0.45), (0.0, 0.0), (0.0, 0.0))), SOFT, {}, "reaches 0.05 m beyond"),
         (VESSEL, balls(radius=(0.6, 0.1)), None, {},
          "radius must leave a place within the walls, which are 1 m apart along x, got 0.6 m of particle 0"),

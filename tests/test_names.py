@@ -19,6 +19,15 @@ NAMES = re.compile(r"(^|_)(who|whom|told|said)(_|$)", re.IGNORECASE)
 TURNS = re.compile(
     r"\b([Ww]ho|[Ww]hom|[Ww]hoever|[Nn]obody|[Kk]nows? no|of one's own|(is|are) none|ha(s|ve) gone)\b(?![/|])",
 )
+STRINGS = (tokenize.STRING, getattr(tokenize, "FSTRING_MIDDLE", tokenize.STRING))  # the second from Python 3.12 on
+# Of what users read, --help among it, and of what explains the code, also "whose" of things.
+PLAIN = re.compile(TURNS.pattern + r"|\b[Ww]hose\b")
+PAGES = [
+    path
+    for pattern in ("README.md", "bench/README.md", "examples/**/*.md", "examples/**/*.ipynb", "examples/**/*.toml")
+    for path in ROOT.parent.glob(pattern)
+    if ".ipynb_checkpoints" not in path.parts
+]
 
 
 def definitions(package):
@@ -68,12 +77,22 @@ def test_a_file_name_stands_at_most_twice():
 def test_texts_are_in_plain_words():
     """Docstrings, comments, messages and captions."""
     found = []
-    for path in (path for path in FILES if TURNS.search(path.read_text("utf-8"))):
+    for path in FILES:
+        turns = TURNS if path.is_relative_to(ROOT.parent / "tests") else PLAIN
+        if not turns.search(path.read_text("utf-8")):
+            continue
         with path.open("rb") as file:
             tokens = list(tokenize.tokenize(file.readline))
-        texts = [one for one in tokens if one.type in (tokenize.COMMENT, tokenize.STRING)]
-        found += [f"{path}:{one.start[0]}: {turn[0]}" for one in texts for turn in TURNS.finditer(one.string)]
+        texts = [one for one in tokens if one.type in (tokenize.COMMENT, *STRINGS)]
+        found += [f"{path}:{one.start[0]}: {turn[0]}" for one in texts for turn in turns.finditer(one.string)]
     assert found == []
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT.parent)))
+def test_pages_are_in_plain_words(path):
+    """Those that users read: README, the guide, examples, scene files and notebooks."""
+    lines = enumerate(path.read_text("utf-8").splitlines(), 1)
+    assert [f"{number}: {turn[0]}" for number, line in lines for turn in PLAIN.finditer(line)] == []
 
 
 def test_names_say_what_they_hold():

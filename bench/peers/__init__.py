@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Job:
-    """Points of mass 1 in a sphere about the origin, whose wall pushes back with alpha times the depth."""
+    """Points of mass 1 in a sphere about the origin: its wall pushes back with alpha times the depth."""
 
     position: Floats  # (n, 3) [m]
     velocity: Floats  # (n, 3) [m/s]

@@ -1,4 +1,4 @@
-"""LAMMPS: atoms that do not see each other, in a region whose surface pushes back (fix wall/region harmonic)."""
+"""LAMMPS: atoms that do not see each other, in a region with a surface that pushes back (fix wall/region harmonic)."""
 
 import ctypes
 import sys

@@ -13,7 +13,7 @@ import swarm
 
 
 def run(workers: int, path: Path, count: int = 5000) -> tuple[swarm.Result, swarm.Result]:
-    """The result of the workers, whose trajectory is at `path`, and that of this process."""
+    """The result of the workers, with their trajectory at `path`, and that of this process."""
     scene = swarm.Scene([swarm.Sphere(radius=0.5, restitution=0.99)])
     start = swarm.fill(scene, count, speed=1.0, seed=1)
     far = swarm.simulate(

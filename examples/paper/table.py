@@ -18,7 +18,7 @@ HEAD = Row("quantity", "paper", "swarm")
 
 
 def markdown(title: str, rows: Sequence[Row]) -> str:
-    """A Markdown table whose columns are aligned, so that a terminal can show it too."""
+    """A Markdown table with aligned columns, so that a terminal can show it too."""
     lines = [HEAD, *rows]
     widths = [max(len(line[column]) for line in lines) for column in range(len(HEAD))]
     lines.insert(1, Row(*("-" * width for width in widths)))

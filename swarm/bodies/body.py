@@ -80,7 +80,7 @@ class Body:
         points: (P, 3) base points, as they are at rest [m].
         mass: one number or (P,) [kg], above 0; or
         mass_matrix: (P, P) [kg], symmetric and positive definite.
-        links: pairs (i, j) of points whose distance never changes; no link may follow from the others.
+        links: pairs (i, j) of points at a distance that never changes; no link may follow from the others.
         springs: (i, j, stiffness above 0 [N/m], rest length 0 or more [m]).
         contacts: what can touch a wall: numbers of points, or rows (K, P) of coefficients that add up to 1; None: every
             point that is not anchored.

@@ -41,7 +41,7 @@ STAGES = {2: (1.0,), 4: (_OUTER, _OUTER, 1.0 - 4.0 * _OUTER, _OUTER, _OUTER)}
 
 
 class BodyRun(BaseRun):
-    """The run of copies of a body; with them come all their points, whose arrays become a part of its state."""
+    """The run of copies of a body; with them come all their points: the arrays of these are a part of its state."""
 
     def __init__(
         self, compiled: CompiledScene, copies: tuple[Bodies, Particles], method: Method, threads: int,

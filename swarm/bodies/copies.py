@@ -200,7 +200,7 @@ def require_agreed(body: Body, position: Floats, velocity: Floats, projected: bo
             )
             raise SceneError(
                 f"velocity must agree with links and guides to {_AGREED:g} of the fastest point, got "
-                f"{speeds[copy]:.6g} m/s {where}, in copy {copy} ({off.sum()} such), whose fastest point has "
+                f"{speeds[copy]:.6g} m/s {where}, in copy {copy} ({off.sum()} such); its fastest point has "
                 f"{fastest[copy]:.6g} m/s; {hint}"
             )
 

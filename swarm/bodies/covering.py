@@ -88,7 +88,7 @@ def _from_corners(corners: Floats) -> Floats:
 
 @functools.cache
 def _lattice(parts: int) -> Floats:
-    """(Q, 3) weights of the corners of a triangle whose sides are cut into so many parts."""
+    """(Q, 3) weights of the corners of a triangle with sides cut into so many parts."""
     return np.array([(a, b, parts - a - b) for a in range(parts + 1) for b in range(parts + 1 - a)]) / parts
 
 

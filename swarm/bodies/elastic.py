@@ -1,4 +1,4 @@
-"""Elastic bodies: tetrahedra of Saint Venant and Kirchhoff, whose energy is a quadratic form of squared lengths.
+"""Elastic bodies: tetrahedra of Saint Venant and Kirchhoff. Their energy is a quadratic form of squared lengths.
 
 Of an element with edges X_a at rest and x_a now, s_a - s_a0 = |x_a|^2 - |X_a|^2 = 2 X_a.E X_a for the strain
 E = (F^T F - 1)/2. Six edges give the six components of E, so its energy V = volume (lambda/2 tr(E)^2 + mu E:E) is
@@ -22,7 +22,7 @@ from .checked import Pairs
 _EDGES = np.array(list(itertools.combinations(range(4), 2)))
 # The sides of a positively oriented tetrahedron, anticlockwise seen from outside.
 _SIDES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
-# An element whose volume is less than this times that of a cube of its longest edge has no digits left.
+# An element with a volume of less than this times that of a cube of its longest edge has no digits left.
 _FLAT = 1e-9
 # E_xx, E_yy, E_zz, E_yz, E_xz, E_xy: where they are in E, and how often they count in E:E.
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)
@@ -117,7 +117,7 @@ def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Floats, Pairs, Floats]:
     longest = (_edge_vectors(corners) ** 2).sum(axis=2).max(axis=1) ** 1.5
     for k in np.flatnonzero(np.abs(volumes) <= _FLAT * longest)[:1]:
         raise SceneError(
-            f"elements[{k}] must be a solid tetrahedron, got {elements[k].tolist()}, whose corners lie in a plane: its "
+            f"elements[{k}] must be a solid tetrahedron, got {elements[k].tolist()}: its corners lie in a plane, its "
             f"volume is {volumes[k]:.3g} m^3"
         )
     for k in np.flatnonzero(volumes < 0.0)[:1]:

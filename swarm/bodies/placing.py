@@ -10,7 +10,7 @@ from ..state import Floats
 from .body import Body
 from .copies import Bodies
 
-# Points whose gaps are found at once.
+# The number of points with gaps found at once.
 _BATCH = 1 << 19
 # The search ends after this many points if fewer than one body in a million was admissible.
 _TRIES = 20_000_000
@@ -88,7 +88,7 @@ def _places(scene: Scene, probes: Floats, n: int, random: np.random.Generator) -
         trial, turn = low + (high - low) * random.random((3, size)), _rotations(random, size)
         inside = np.ones(size, bool)
         for arm in arms:
-            # Each point only of those copies whose points before it are within.
+            # Each point only of those copies that have the points before it within.
             left = np.flatnonzero(inside)
             places = trial[:, left] + _turned(turn[:, :, left], arm[None])[:, 0]
             inside[left] = scene.admits(places)
@@ -122,7 +122,7 @@ def _rotations(random: np.random.Generator, n: int) -> Floats:
 def _turned(turns: Floats, arms: Floats) -> Floats:
     """(3, P, n) the points (P, 3) in n orientations."""
     x, y, z = arms.T[:, :, None]
-    # Not by BLAS, whose last bit depends on the processor.
+    # Not by BLAS: its last bit depends on the processor.
     return np.asarray(turns[:, 0, None] * x + turns[:, 1, None] * y + turns[:, 2, None] * z)
 
 

@@ -25,6 +25,6 @@ def require(points: int, ties: int = 0, contacts: int = 0, edges: int = 0) -> No
         held = {"points": p, "ties": t, "contact points": k}
         parts = ", ".join(f"{count:.6g} {name}" for name, count in held.items() if count)
         raise SceneError(
-            f"a body must fit in {checks.in_bytes(most)}, got {parts}, whose matrices of masses, ties and contacts are "
+            f"a body must fit in {checks.in_bytes(most)}, got {parts}: the matrices of masses, ties and contacts are "
             f"full and take {checks.in_bytes(size)}; use fewer points, or several bodies"
         )

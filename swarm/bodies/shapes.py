@@ -169,7 +169,7 @@ def _hull(corners: Floats) -> Pairs:
 
 
 def _closed(corners: Floats, faces: ArrayLike) -> Pairs:
-    """`faces` as triangles, each of whose sides is run through once in both directions."""
+    """`faces` as triangles: each of their sides is run through once in both directions."""
     triangles = checked.numbers("faces", faces, 3, len(corners))  # type: ignore[arg-type]
     if not len(triangles):
         raise SceneError(

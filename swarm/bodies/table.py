@@ -64,7 +64,7 @@ class Made(Validated):
 
 
 def _made_by(maker: Callable[..., Body]) -> type[Made]:
-    """The keys of a kind whose own are the arguments of a function."""
+    """The keys of a kind that has for its own the arguments of a function."""
     own = [(one.name, one.annotation) for one in inspect.signature(maker).parameters.values()]
     name, known = maker.__name__, {"maker": maker}
     return dataclasses.make_dataclass(name, own, bases=(Made,), namespace=known, frozen=True, kw_only=True)

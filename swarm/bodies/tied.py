@@ -51,7 +51,7 @@ class Tie(NamedTuple):
 
 
 def ties(links: Pairs, guides: Sequence[tuple[int, Surface]], position: Floats) -> Iterator[Tie]:
-    """The links and guides of n copies whose points are at `position` (3, P, n)."""
+    """The links and guides of n copies with points at `position` (3, P, n)."""
     # One at a time: of many copies each is large.
     for k, (i, j) in enumerate(links.tolist()):
         yield Tie(f"links[{k}]", (i, j), _unit(position[:, i] - position[:, j]))
@@ -85,7 +85,7 @@ def require_independent(
     moved = list(ties(links, guides, elsewhere.T[:, :, None]))
     if _dependences([moved[k] for k in left], anchors).shape[1] < excess:
         raise SceneError(
-            f"links and guides must be independent, got {listing}, whose directions depend on each other where the "
+            f"links and guides must be independent, got {listing}: their directions depend on each other where the "
             "points are (in a line or in a plane, say): their forces are not determined; leave out "
             f"{excess} of them, or move a point"
         )
@@ -97,7 +97,7 @@ def require_independent(
 
 
 def _left(given: Sequence[Tie], anchors: Mapping[int, Any], count: int) -> list[int]:
-    """The ties of one body whose independence is not seen point by point: of a chain or a tree none.
+    """The ties of one body with an independence that is not seen point by point: of a chain or a tree none.
 
     Where those at a point, at most three, are clearly independent of each other, no others can be combined to cancel
     them there: they take part in no dependence, and are left out, with what that frees at their other ends.

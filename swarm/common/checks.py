@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SceneError
 
 Vector = tuple[float, float, float]
-# Magnitudes whose squares and inverse squares are finite.
+# Magnitudes with squares and inverse squares that are finite.
 SMALLEST, LARGEST = 1e-100, 1e100
 # Bytes of a particle in a run (`python -m bench bars`); and a number of particles that fits on every machine.
 _PARTICLE, FEW = 146, 1_000_000
@@ -84,7 +84,7 @@ def at_least(name: str, value: Any, bound: float) -> float:
 
 
 def length(name: str, value: Any) -> float:
-    """`value` as a length [m] above zero whose square is finite and not zero."""
+    """`value` as a length [m] above zero; its square is finite and not zero."""
     result = positive(name, value)
     if not SMALLEST <= result <= LARGEST:
         raise SceneError(f"{name} must be between {SMALLEST:g} and {LARGEST:g} m, got {result:g}")
@@ -92,7 +92,7 @@ def length(name: str, value: Any) -> float:
 
 
 def magnitude(name: str, value: Any) -> float:
-    """`value` as a number, 0 or more, whose square is finite."""
+    """`value` as a number, 0 or more, with a finite square."""
     result = at_least(name, value, 0.0)
     if result > LARGEST:
         raise SceneError(f"{name} must be at most {LARGEST:g}, got {result:g}")
@@ -100,7 +100,7 @@ def magnitude(name: str, value: Any) -> float:
 
 
 def positive_magnitude(name: str, value: Any) -> float:
-    """`value` as a number above zero whose square is finite."""
+    """`value` as a number above zero with a finite square."""
     return magnitude(name, positive(name, value))
 
 
@@ -113,7 +113,7 @@ def part(name: str, value: Any) -> float:
 
 
 def bounded(name: str, value: Any) -> float:
-    """`value` as a number of either sign, whose square is finite."""
+    """`value` as a number of either sign, with a finite square."""
     result = number(name, value)
     magnitude(f"|{name}|", abs(result))
     return result

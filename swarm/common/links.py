@@ -19,7 +19,7 @@ def require_none(file: Any, path: Path, joined: Sequence[str] = ()) -> None:
     Args:
         file: the file, open.
         path: its path, for the sentence.
-        joined: the datasets whose values may be in the shards of a trajectory.
+        joined: the datasets with values that may be in the shards of a trajectory.
 
     Raises:
         SceneError: it has an external link, external storage, or a virtual dataset of another file.
@@ -36,10 +36,10 @@ def require_none(file: Any, path: Path, joined: Sequence[str] = ()) -> None:
     def look_at(name: str, one: Any) -> bool | None:
         if isinstance(one, h5py.Dataset):
             if one.external is not None:
-                found.append(f"{name}, whose values are in {one.external[0][0]!r:.200}")
+                found.append(f"{name}, its values are in {one.external[0][0]!r:.200}")
             elif one.is_virtual:
                 wrong = (source.file_name for source in one.virtual_sources() if not _is_within(source, name in joined))
-                found.extend(f"{name}, whose values are in {source!r:.200}" for source in list(wrong)[:1])
+                found.extend(f"{name}, its values are in {source!r:.200}" for source in list(wrong)[:1])
         return True if found else None
 
     file.id.links.visit(look_at_link, info=True)

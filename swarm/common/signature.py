@@ -19,7 +19,7 @@ _ARRAY = inspect.formatannotation(ArrayLike)
 
 
 class Lined(inspect.Signature):
-    """A signature whose text has a line for each parameter where one line would be too long."""
+    """A signature: its text has a line for each parameter where one line would be too long."""
 
     def __str__(self) -> str:
         return self.format()

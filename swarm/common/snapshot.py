@@ -75,7 +75,7 @@ class Snapshot:
         return _locked(np.asarray(mass * energy))
 
     def let_go(self) -> list[str]:
-        """Give up all views. Returns the names of views still in use, whose values the next frame would change."""
+        """Give up all views. Returns the names of views still in use: their values the next frame would change."""
         views = {name: weakref.ref(view) for name, view in self._views.items()}
         self._views.clear()
         if all(view() is None for view in views.values()):

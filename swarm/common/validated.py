@@ -1,4 +1,4 @@
-"""Dataclasses whose fields are checked as their annotations declare it: `radius: Length`."""
+"""Dataclasses with fields that are checked as their annotations declare: `radius: Length`."""
 
 import functools
 import operator

@@ -1,7 +1,7 @@
 """One step against all walls of a scene at once: Gauss-Seidel over the walls that hold the particle.
 
 Each wall is solved with the reactions of the others held, until the end of the step no longer moves. Every equation is
-that of a soft wall, whose reaction follows from the gap. Rigid walls, projection.py, take none of these sweeps: nearly
+that of a soft wall: its reaction follows from the gap. Rigid walls, projection.py, take none of these sweeps: nearly
 opposite ones, as in a cusp, would take next to nothing one after the other, so that all sets of up to three walls are
 looked at for the one that carries. Uzawa's loop, uzawa.py, is around these sweeps, with one multiplier a wall.
 """

@@ -130,7 +130,7 @@ def _level(surface, r, v):
 
 
 def _on_line(surface, end, r0, r1):
-    """Whether a straight way meets a wall whose level along it is no polynomial: a cubic may miss it."""
+    """Whether a straight way meets a wall with a level along it that is no polynomial: a cubic may miss it."""
     if surface.is_quartic or surface.flat:
         return False
     time, _found = surface.straight_hit(end, r0, r1)

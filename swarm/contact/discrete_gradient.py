@@ -107,7 +107,7 @@ class Composite(NamedTuple):
 
 
 class MeanValue(NamedTuple):
-    """The mean-value form, whose nested solves are too long for lanes."""
+    """The mean-value form: its nested solves are too long for lanes."""
 
     def reaction(self, law, multiplier, surface, step):
         """`Reaction` of a surface."""

@@ -158,7 +158,7 @@ def mean_drift(moving, active, walls, r0, r1, h):
 
 def given_by_second(drift, taken):
     """Twice the work per mass of the second wall in a step that takes so much of w0."""
-    # w1 - w0 = -2 (b n + c m), whose work is that times the velocity of the wall.
+    # w1 - w0 = -2 (b n + c m); its work is that times the velocity of the wall.
     return 0.0 if drift is None else -4.0 * taken.c * dot(drift.second, taken.m)
 
 
@@ -166,7 +166,7 @@ def given_by_second(drift, taken):
 
 
 def _towards(drift, w, n):
-    """The speed of a particle into the first wall, whose normal is n."""
+    """The speed of a particle into the first wall, with the normal n."""
     return dot(relative(None if drift is None else drift.first, w), n)
 
 

@@ -27,7 +27,7 @@ _NEAR = 1.0 - 1e-12
 # Doublings of a bracket: from the smallest number to the largest.
 _DOUBLINGS = 2100
 _EPSILON = 2.220446049250313e-16
-# A point whose coordinates would be on the surface within this part of themselves is on it.
+# A point is on the surface if a change of its coordinates by this part of themselves brings it there.
 _ON_SURFACE = 8.0 * _EPSILON
 # The equation and its energy need these of every wall; multipliers need `gap_scale` too.
 NEEDS = (
@@ -130,8 +130,8 @@ class Equation(Record):
     def newton(self, kappa):
         """The `Newton` step of kappa.
 
-        What must be small is the step of the gap g1, relative to the gap whose square is the energy: in a stiff wall g1
-        is a small difference, and a kappa right to 1e-12 can leave an energy wrong by 1e-8.
+        What must be small is the step of the gap g1, relative to the gap of which the energy is the square: in a stiff
+        wall g1 is a small difference, and a kappa right to 1e-12 can leave an energy wrong by 1e-8.
         """
         start, f = self.start, self.residual(kappa)
         change = f.value / f.slope

@@ -66,7 +66,7 @@ class Laws(Record):
         return any(may_end(law) for one in self.own or () for some in one.each for law in some.laws)
 
     def in_plane(self, across):
-        """These laws in a scene whose plane is across the axis of this number, None where it has none."""
+        """These laws in a scene with a plane across the axis of this number, None where it has none."""
         return self if across is None or not self.send_off else self._replace(across=AXES[across](1.0))
 
     def restitution_of(self, wall):
@@ -106,7 +106,7 @@ class Some(Record):
 
 
 class Owned(Record):
-    """The laws of walls whose lists of laws differ in their numbers only."""
+    """The laws of walls with lists of laws that differ in their numbers only."""
 
     each: Any
 
@@ -173,7 +173,7 @@ class Moves(Record):
 
 
 class Thermal(Record):
-    """A thermal wall, or one that is not, whose accommodation is 0."""
+    """A thermal wall, or one that is not, with the accommodation 0."""
 
     energy: float  # k_B T [J]
     accommodation: float

@@ -23,8 +23,8 @@ def leaving(walls, spans, active, path, near, remaining):
     for span in spans:
         nearest = min(nearest, _deepest(walls, span, active, path, remaining, 0.0)[0])
         held = held or _holds(active, span)
-    # It begins in the room whose wall holds it, or in the nearest one; in another one if it is inside of that by more
-    # than `near`: rooms that touch are apart.
+    # It begins in the room with the wall that holds it, or in the nearest one; in another one if it is inside that by
+    # more than `near`: rooms that touch are apart.
     _enter(walls, spans, active, path, remaining, 0.0, -near if held else max(near, nearest), inside)
     for k, span in enumerate(spans):
         inside[k] = inside[k] or _holds(active, span)

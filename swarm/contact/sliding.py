@@ -238,7 +238,7 @@ def error(h, start, end, allowed):
 
 
 def next_step(h, ratio):
-    """The length of the next step after one whose error is so much of what is allowed."""
+    """The length of the next step after one with an error of so much of what is allowed."""
     some = ratio > 0.0
     # The error over the time that it took is of fourth order.
     factor = _SAFE / math.sqrt(math.sqrt(select(some, ratio, 1.0)))

@@ -27,7 +27,7 @@ _WIDER = 1e-9
 
 
 class GrowingRun(CollidingRun):
-    """A part of the growth of balls whose radii are those of the end."""
+    """A part of the growth of balls given with their final radii."""
 
     def __init__(self, scene: Scene, particles: Particles, growth: Growth, seeding: Seeding) -> None:
         assert particles.radius is not None

@@ -166,7 +166,7 @@ def _places(scene: Scene, radius: Floats, room: VolumeBox, random: np.random.Gen
 
 
 def _at_rest(scene: Scene) -> Scene:
-    """The scene without gravity, whose walls are smooth and stay as they are at 0 s."""
+    """The scene without gravity, with walls that are smooth and stay as they are at 0 s."""
     surfaces = []
     for i, one in enumerate(scene.surfaces):
         for piece in one.surfaces():

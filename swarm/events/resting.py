@@ -24,7 +24,7 @@ def warn_of_rest(box: Any, clock: Any) -> bool:
         remedy = f"give these walls a restitution in place of a law or a temperature, with {longer} or with Penalty"
     else:
         remedy = (
-            f"use Penalty, whose contacts last, or a longer contact_duration, such as {longer}, "
+            f"use Penalty (its contacts last), or a longer contact_duration, such as {longer}, "
             f"in place of {box.loss.duration:.2g} s"
         )
     _LOG.warning(

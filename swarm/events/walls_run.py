@@ -93,7 +93,7 @@ class ReactingRun(BaseRun):
         return status, particle
 
     def _arrive(self, rule: ReactionRule, page: ThreadLog | None) -> None:
-        """Bring all particles to the end of the frame; those whose rows are in one log in one thread."""
+        """Bring all particles to the end of the frame; those with rows in one log in one thread."""
         last, first = len(self.state.mass), 0
         if page is None:
             self._in_parts(events.arrive, self._scenery, self._queue, rule, last=last)

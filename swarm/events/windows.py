@@ -12,7 +12,7 @@ from .reacting.described import scenery_of
 
 
 class Windows:
-    """The windows of a scene whose walls move, come or go: each is an epoch, or a part of one between two instants.
+    """The windows of a scene with walls that move, come or go: each is an epoch, or a part of one between two instants.
 
     Attributes:
         numbers: of the window, as kernels take them.

@@ -2,7 +2,7 @@
 
 Its numbers are float32, and its box is around the origin. Where the scene repeats, that is its cell: positions are less
 the center of the cell, which is log/center. In a direction in which it does not, the box is as wide as the scene, or as
-the particles need, and nothing is shifted but a scene that is far from the origin, whose center is log/center too: the
+the particles need, and nothing is shifted but a scene that is far from the origin; its center is log/center too. The
 schema has no box that does not repeat. Frames have the step number, and log/time [s], log/particles/id,
 log/particles/impacts, and log/particles/escape_time where there are openings, absorbed_time
 where walls absorb; balls have diameters, log/particles/collisions, and log/particles/spin where they turn. Images are

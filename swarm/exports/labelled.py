@@ -1,4 +1,4 @@
-"""A trajectory as a Dataset of xarray, whose particles are read from the file when they are used."""
+"""A trajectory as a Dataset of xarray: its particles are read from the file when they are used."""
 
 from typing import Any
 

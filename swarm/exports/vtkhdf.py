@@ -2,7 +2,7 @@
 
 https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/vtkhdf_specifications.html: the points of all steps
 follow one another, and Steps says where those of each begin; what does not change is there once. Read by VTK 9.3 and
-9.7; ParaView was not tried. The walls are a file of their own (walls.py): blocks of one file need VTK 9.4, whose reader
+9.7; ParaView was not tried. The walls are a file of their own (walls.py): blocks of one file need VTK 9.4; its reader
 fails if steps are also at its root, while that of VTK 9.7 shows the first step for ever if they are not.
 """
 

@@ -164,8 +164,8 @@ def require_owners(path: Path, arrays: Arrays, owners: NDArray[np.int64]) -> Non
     saved = arrays.pop(_OWNERS, None)
     if saved is None:
         raise SceneError(
-            f"{path} does not say which surface each of its rows is of: an older version of swarm wrote it, whose "
-            f"walls may be in another order; {_ANEW}"
+            f"{path} does not say which surface each of its rows is of: an older version of swarm wrote it, and "
+            f"its walls may be in another order; {_ANEW}"
         )
     if not np.array_equal(saved, owners):
         raise SceneError(

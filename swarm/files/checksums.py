@@ -129,7 +129,7 @@ def checksum_of_attribute(group: Any, name: str) -> int:
 
 
 def _attributes(file: Any) -> dict[str, int]:
-    """The checksums of the attributes whose texts are in the heap, by GROUP@NAME."""
+    """The checksums of the attributes with texts in the heap, by GROUP@NAME."""
     found = {}
 
     def look(name: str, one: Any) -> None:

@@ -86,7 +86,7 @@ class ImpactLog(Stored):
         layout.dataset(file, "walls/member", "iu", layout.dataset(file, "walls/surface", "iu", (None,)).shape)
         walls = (self._checked.constant(f"walls/{name}").astype(np.int32) for name in ("surface", "member"))
         self._surface, self._member = walls
-        # How many, whose rows have walls below 0.
+        # How many there are; their rows have walls below 0.
         self._counters = len(self.counters)
 
     def __len__(self) -> int:
@@ -103,7 +103,7 @@ class ImpactLog(Stored):
 
     @property
     def kept(self) -> int | list[int]:
-        """The particles whose impacts are kept: k is every k-th one, or their numbers."""
+        """The particles with impacts that are kept: k is every k-th one, or their numbers."""
         with self._reading("which particles it keeps"):
             kept = parsed(self._text("kept"))["particles"]
             if kept == "all":

@@ -68,7 +68,7 @@ class ImpactWriter(AppendedFile):
         self._columns, self._ends, self._about = columns, ends, about
         self._frames, self._rows = start or (0, 0)
         self._few: list[Rows] = []
-        # Of the rows of the frame under way, by columns; of frames whose rows are all there; None in an older file.
+        # Of the rows of the frame under way, by columns; of frames with all rows; None in an older file.
         self._sums: checksums.RowSums | None = None
         self._running = dict.fromkeys(columns, 0)
         self._whole: list[dict[str, int]] = []
@@ -123,7 +123,7 @@ class ImpactWriter(AppendedFile):
         self._flush()
 
     def add(self, rows: Rows) -> None:
-        """Add rows, whose arrays may be changed when it returns."""
+        """Add rows; their arrays may be changed when it returns."""
         if len(rows["time"]) < _SOME and sum(len(few["time"]) for few in self._few) < _SOME:
             self._few.append({name: array.copy() for name, array in rows.items()})
             return

@@ -32,7 +32,7 @@ UNIT = "swarm_unit"
 UNITS = {
     name: np.bytes_(unit) for name, unit in (("position", "m"), ("velocity", "m/s"), ("mass", "kg"), ("time", "s"))
 }
-# Those whose values may be in shards.
+# Those with values that may be in shards.
 JOINED = tuple(f"particles/all/{name}/value" for name in KEPT)
 # Of each particle of a run with sources: when it came [s], and the number of its source, -1 of those of the start.
 BIRTHS = "birth_time", "birth_source"

@@ -1,4 +1,4 @@
-"""The origin of files whose numbers are float32: with seven digits, particles far from 0 would be at one place."""
+"""The origin of files with float32 numbers: with seven digits, particles far from 0 would be at one place."""
 
 import numpy as np
 

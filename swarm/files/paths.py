@@ -50,7 +50,7 @@ def is_temporary(name: str) -> bool:
 
 
 def lock_of(path: Path) -> Path:
-    """The file whose lock a run holds while it writes another."""
+    """The file of the lock that a run holds while it writes another."""
     return path.with_name(f".{path.name}.{_OURS}lock")
 
 

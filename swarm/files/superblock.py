@@ -3,7 +3,7 @@
 In the mode for one writer and many readers (SWMR) HDF5 orders its writes so that every prefix of them is a valid file:
 a file that a killed run leaves can be read. (In the ordinary mode it cannot: a kill while a node of a B-tree is split
 loses half of it.) But HDF5 marks the file, and readers that do not ask for SWMR refuse a marked one, even after the
-writer has ended. The mark is a byte of the superblock, whose layout is fixed: HDF5 File Format Specification, II.A,
+writer has ended. The mark is a byte of the superblock. Its layout is fixed: HDF5 File Format Specification, II.A,
 superblock version 3.
 """
 

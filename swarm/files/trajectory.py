@@ -52,7 +52,7 @@ class Trajectory(Stored):
         observables: name -> array, one entry a frame.
         scene, method: as they were run.
         scene_text: the scene file's text, or None.
-        body, copies: the body whose copies were run, and their number; None and 0 for particles.
+        body, copies: the body that was run in copies, and their number; None and 0 for particles.
 
     A file that is being written, or that a killed run left, can be read: the frames that are complete when it is
     opened. Inconsistent content raises a SceneError that names the damaged part.
@@ -283,7 +283,7 @@ class Trajectory(Stored):
         return np.asarray(times)
 
     def _number(self, k: int) -> int:
-        """The number of a frame whose particles are kept, from 0 on."""
+        """The number of a frame with particles, from 0 on."""
         k = self._number_of(k)
         self._require_particles()
         return k
@@ -410,7 +410,7 @@ class Trajectory(Stored):
 
     @functools.cached_property
     def body(self) -> "Body | None":
-        """The body whose copies were run; None for particles."""
+        """The body that was run in copies; None for particles."""
         if not self._has("parameters/body"):
             return None
         with self._reading("its body"):

@@ -92,7 +92,7 @@ def _wait_for_workers(client: Any, workers: int, stop: jobs.Stop) -> None:
 
 
 def require_same_versions(client: Any) -> None:
-    """Raise a SceneError that names the worker whose Python, swarm, Numba or NumPy is another one."""
+    """Raise a SceneError that names the worker with another Python, swarm, Numba or NumPy."""
     found = client.get_versions(packages=list(_PACKAGES))
     here = _versions(found["client"])
     for address, versions in sorted(found["workers"].items()):

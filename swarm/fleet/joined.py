@@ -115,7 +115,7 @@ def _added(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 class JoinedWriter(TrajectoryWriter):
-    """A writer whose particles are those of the shards; it writes only what is not of particles.
+    """A writer with the particles of the shards; it writes only what is not of particles.
 
     Its file takes its name when it is whole: to a session after a kill in between, a part of the frames would be a run
     that cannot go on. The checkpoint, which holds the shards, is left to the session.

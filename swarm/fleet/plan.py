@@ -29,7 +29,7 @@ STEM = re.compile(rf"[0-9a-f]{{{_DIGITS}}}")
 _COMBINE, _WAYS = "combine", ("product", "zip")
 # Keys of a document that make its scene.
 _SCENE = ("surface", "gravity", "period", "plane", "pairs")
-# Keys of a document that name files, whose content is part of what is computed.
+# Keys of a document that name files; their content is part of what is computed.
 _FILES = ("from", "file")
 
 Document = dict[str, Any]
@@ -56,7 +56,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Plan:
-    """The file of a sweep, its tables but [sweep], its runs, the modules whose code it may name, the files it names."""
+    """The file of a sweep, its tables but [sweep], its runs, modules with code that it may name, and files it names."""
 
     path: Path
     document: Document

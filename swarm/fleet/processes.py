@@ -21,7 +21,7 @@ from typing import Any
 from ..errors import RunError
 from . import jobs
 
-# The exit code of a worker whose parent is gone.
+# The exit code of a worker without a parent.
 _ORPHANED = 3
 # Of what a process printed before it died, a sentence has so many bytes.
 _LAST = 2000
@@ -102,7 +102,7 @@ class _Place:
         return made
 
     def _start(self) -> None:
-        """Make the executor, whose process begins with its first job."""
+        """Make the executor; its process begins with its first job."""
         from multiprocessing import resource_tracker
 
         import loky

@@ -80,7 +80,7 @@ def page_of(source: Path, target: Path | None) -> "Page":
 
 
 def of_folder(folder: Path, place: Path) -> "Page":
-    """The report of the folder of a sweep, whose links are as of a file in the folder `place`."""
+    """The report of the folder of a sweep: its links are as of a file in the folder `place`."""
     from ..pages.html import Page, filled
     from . import curves
     from .folder import found

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..run.progress import Pace, ProgressListener, progress_listener
 
-# Seconds whose pace gives the ETA: several runs.
+# Seconds of which the pace gives the ETA: several runs.
 _WINDOW = 120.0
 
 

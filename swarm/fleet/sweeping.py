@@ -104,7 +104,7 @@ def sweep(  # noqa: PLR0913  the keywords are the public interface
         path: the sweep file.
         folder: of all files, made if it is not there; None: the name of the file without .toml, in the current folder.
         processes: number of worker processes; None: the cores that this process may use.
-        threads: of each run whose file does not say how many; None: the cores for each process, and one on a cluster.
+        threads: of each run, unless its file says how many; None: the cores for each process, and one on a cluster.
             Results do not depend on it, nor on `processes`.
         resume: go on with what the folder holds: runs that are done are not run again, others go on from their
             checkpoint or begin anew, also those that have failed.
@@ -112,11 +112,11 @@ def sweep(  # noqa: PLR0913  the keywords are the public interface
         progress: True for one progress bar of all runs.
         table: the file results.csv or results.parquet in the folder, "csv" or "parquet". It is replaced now and then
             during the sweep, and at its end.
-        plugins: the modules whose code the file may name, as "module:Name": laws, surfaces, methods, observables.
+        plugins: the modules with code that the file may name, as "module:Name": laws, surfaces, methods, observables.
         cluster: where to run, as of `simulate`: None for processes of this machine; "local:N"; the address of a
             scheduler of Dask; or a `distributed.Client`. A worker carries out a run for each of its threads. The
             folder, and the files that the scene names, must be on storage that all workers share. The files are the
-            same as without; a run whose worker died is carried out again, from its checkpoint.
+            same as without; a run on a worker that died is carried out again, from its checkpoint.
 
     Returns:
         The table, a row for each run in the order of the file (of a product the last key changes first): file,

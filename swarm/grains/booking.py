@@ -20,7 +20,7 @@ class ContactTotals(NamedTuple):
     dissipated: Array  # (N,) [J]
     virial: Array  # (1,) [J s]
     sweeps: Array  # (1,) int64
-    lagging: Array  # (1,) int64, steps whose friction, or a damper, was not solved to its tolerance
+    lagging: Array  # (1,) int64, steps in which friction, or a damper, was not solved to its tolerance
     overlap: Array  # (1,) the largest overlap since the frame before [m]
     failed: Array  # (4,) what a step was refused for, see overlaps.py
     escape_time: Any = None  # (N,) [s], of a scene with openings

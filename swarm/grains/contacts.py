@@ -72,7 +72,7 @@ class Matter(Record):
 
 
 def pressed(matter, damping, gap, change):
-    """The impulse at a contact whose gap changes so in a step, 0 or more, and its derivative by the change."""
+    """The impulse at a contact with a gap that changes so in a step, 0 or more, and its derivative by the change."""
     h = matter.h
     force, stiffness = matter.law.energy_slope(gap, gap + change)
     if damping is not None:
@@ -148,7 +148,7 @@ class Closing(Record):
 
 
 def closing(s0, size, move):
-    """The `Closing` of two balls at s0, of that size, whose s changes by `move`."""
+    """The `Closing` of two balls at s0, of that size; their s changes by `move`."""
     both = s0 + s0 + move
     risen = dot(move, both)
     q1 = size * size + risen

@@ -96,7 +96,7 @@ def rub_pairs(matter, grains, touches, share):
 
 @outlined
 def twist_pairs(matter, grains, touches):
-    """Add the twists of all pairs to the spins at the end of the step, whose velocities there are final."""
+    """Add the twists of all pairs to the spins at the end of the step; the velocities there are final."""
     rows, place, speed, spin, half = touches.rows, grains.place, grains.speed, grains.spin, 0.5 * matter.h
     for k in range(touches.used[0]):
         c = index(k)
@@ -109,7 +109,7 @@ def twist_pairs(matter, grains, touches):
 
 
 def twist_of(rows, c, move, reach):
-    """s x J/R of a pair, whose s changes by `move`: with all of J, so that no angular momentum is lost at all."""
+    """s x J/R of a pair; its s changes by `move`: with all of J, so that no angular momentum is lost at all."""
     s = vector_at(rows, c, START) + 0.5 * move
     return cross(s * (1.0 / reach), vector_at(rows, c, IMPULSE) + vector_at(rows, c, DRAG))
 
@@ -164,7 +164,7 @@ def rub_wall(matter, law, wall, grains, touches, number, share):
 
 @outlined
 def twist_wall(matter, wall, grains, touches, number):
-    """Add the twists of a wall to the spins at the end of the step, whose velocities there are final."""
+    """Add the twists of a wall to the spins at the end of the step; the velocities there are final."""
     rows, speed, spin, half = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h
     begin = touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):

@@ -306,7 +306,7 @@ class GrainsRun(BaseRun):
         self._clock[TAKEN] = 0.0
 
     def _steps_in(self, span: float) -> float:
-        """The steps of a frame, or of a piece of one, whose span is in the unit of `advance`."""
+        """The steps of a frame, or of a piece of one; its span is in the unit of `advance`."""
         return span if self._instants is None else steps_within(span, self._step)
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:

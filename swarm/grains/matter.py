@@ -17,7 +17,7 @@ from .cell import Lengths
 from .contacts import Losses, Matter
 from .overlaps import Limits
 
-# The least restitution whose damper steps can follow.
+# The least restitution with a damper that steps can follow.
 MOST_DAMPED = 0.01
 
 

@@ -1,4 +1,4 @@
-"""Overlaps that no contact may have: a ball whose centre has passed the surface of what it meets.
+"""Overlaps that no contact may have: a ball with a centre that has passed the surface of what it meets.
 
 From there a contact pushes the wrong way, or pulls the ball through: the step is refused. Most steps are known to be
 far from it by their largest overlap and their longest move; the others are looked at here, every pair and every ball at

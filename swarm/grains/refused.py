@@ -55,9 +55,9 @@ def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, st
             f"dt < {reach / size * method.dt:.2g} s, a smaller speed, or Impact"
         )
     wanted = _penalty(method, matter, grains, (i, j), size, MOST_PRESSED * min(radii))
-    whose = "the radius of the smaller one" if wall < 0 else "its radius"
+    least = "the radius of the smaller one" if wall < 0 else "its radius"
     return (
-        f"{begin}overlaps {met} by {size:.4g} m, more than {whose}, {min(radii):g} m, and what comes after is wrong: "
+        f"{begin}overlaps {met} by {size:.4g} m, more than {least}, {min(radii):g} m, and what comes after is wrong: "
         f"contacts are too soft for the speed; use a penalty of {wanted:.1e} or more, got {method.penalty:g}, with a "
         "dt that fits it, a smaller speed, or Impact"
     )

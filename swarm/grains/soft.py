@@ -31,7 +31,7 @@ def _require_damping(scene: Scene) -> None:
     for name, value in (*named, *(() if scene.pairs is None else [("pairs", scene.pairs.restitution)])):
         if value < MOST_DAMPED:
             raise SceneError(
-                f"{name}.restitution must be {MOST_DAMPED:g} or more with Penalty, whose dampers grow as it "
+                f"{name}.restitution must be {MOST_DAMPED:g} or more with Penalty: its dampers grow as it "
                 f"becomes less, got {value:g}"
             )
 

@@ -28,7 +28,7 @@ _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 # Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them.
 _RUBBED = 1e-2
 _MOST_SWEEPS = 1000
-# So many sweeps for friction; then it is given as it is, and so are dampers whose changes are no larger than that.
+# So many sweeps for friction; then it is given as it is, and so are dampers with changes that are no larger than that.
 _MOST_RUBS, _LAGGING = 200, 2e-6
 # Where so many sweeps have not brought the changes down to that part, only half as large a share of them is made.
 _STALLED, _BETTER, _LEAST_SHARE = 20, 0.7, 1.0 / 64.0

@@ -2,7 +2,7 @@
 
 A face is of sides of an outline that join smoothly or at an edge towards the balls, or of triangles of a mesh that are
 in one plane or of a convex body. Its depth is that below the nearest of them: a ball that comes from one triangle to
-the next in their plane has one contact all the time, whose depth and normal do not change there, and one that goes over
+the next in their plane has one contact all the time; its depth and normal do not change there, and one that goes over
 an edge turns about it. Where faces meet in a corner around the balls each has a contact of its own, so that a ball is
 held by both. So what contacts store depends on the place of the ball alone, and its discrete gradients keep the energy.
 """

@@ -60,7 +60,7 @@ class PartCompiler(Compiler):  # type: ignore[misc]
 
 
 class _Kernel(JITCodeLibrary):  # type: ignore[misc]
-    """A kernel, whose functions are made small before all of them are optimised together.
+    """A kernel; its functions are made small before all of them are optimised together.
 
     Of 10 s for a capped cylinder with restitution, under gravity, Numba spends 1.1 on passes for each function at its
     highest level, before the module has its own; at the lowest it is half of that, and the module takes no longer.

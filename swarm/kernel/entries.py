@@ -53,7 +53,7 @@ def _add(kind: Any, frozen: Frozen, classes: dict[type, None]) -> None:
 
 
 def python_class(kind: Any) -> Any:
-    """The Python class whose values the Numba type `kind` describes, as far as functions are chosen by it."""
+    """The Python class of the values that the Numba type `kind` describes, as far as functions are chosen by it."""
     if isinstance(kind, types.BaseTuple):
         return getattr(kind, "instance_class", tuple)
     if isinstance(kind, types.NoneType):
@@ -62,7 +62,7 @@ def python_class(kind: Any) -> Any:
 
 
 def is_own(function: Any) -> bool:
-    """Whether a function is one of this package, by whose code the folder of kernels is named."""
+    """Whether a function is one of this package, by the code of which the folder of kernels is named."""
     return str(function.__module__).partition(".")[0] == __name__.partition(".")[0]
 
 

@@ -50,8 +50,8 @@ class Frozen:
 
     Args:
         prepared: makes a copy callable in kernels, if needed.
-        package: what stands for objects of this package whose value is not known; None: all of this package is known
-            by its names.
+        package: what stands for objects of this package with an unknown value; None: all of this package is known by
+            its names.
     """
 
     def __init__(

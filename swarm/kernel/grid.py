@@ -85,7 +85,7 @@ def wrapped(layer, count):
 def _place(d, inverse, count):
     """The layer of cells, the outermost ones a little wider: where a flight leaves the grid it goes farther.
 
-    What is before the first is -1, and beyond the last `count`: layers without end, whose other wall is like any other.
+    What is before the first is -1, and beyond the last `count`: layers without end; their other wall is like any other.
     """
     place = d * inverse
     outside = select(place >= count + 0.5 * MARGIN, count, layer_of(place, count))

@@ -32,7 +32,7 @@ def _put(heap, node, item):
 
 
 def _least_child(heap, node):
-    """The child node whose item comes first, or -1 for a node without children."""
+    """The child node with the item that comes first, or -1 for a node without children."""
     first = _CHILDREN * node + 1
     least, end = first, min(first + _CHILDREN, heap.item.size)
     for child in range(first + 1, end):

@@ -22,7 +22,7 @@ PUT_ON_SURFACE = 16.0 * EPSILON
 START_ON_WALL = 64.0 * EPSILON
 # Of a coefficient of a spline, of the largest one of its cell: a smaller one has no sign.
 COEFFICIENT = 64.0 * EPSILON
-# Of the energy of a body over one impact, whose impulses are solved for.
+# Of the energy of a body over one impact: its impulses are solved for.
 ENERGY_OF_IMPACT = 64.0 * EPSILON
 # Of a place on a side of an outline, and on a ball of a foam, of its coordinates.
 ON_OUTLINE, ON_FOAM = 256.0 * EPSILON, 512.0 * EPSILON

@@ -128,7 +128,7 @@ def logarithm(u):
     """ln u for u in [2^-63, 1], to one unit in the last place.
 
     u = 2^e (1 + f) with 1 + f within sqrt(1/2)..sqrt(2), and ln(1 + f) = 2 artanh(s) for s = f/(2 + f): with 2 s =
-    f - s f that is f - s (f - R), R = 2 s^2/3 + 2 s^4/5 + ..., |s| < 0.172, whose rounding is small beside f. What is
+    f - s f that is f - s (f - R), R = 2 s^2/3 + 2 s^4/5 + ..., |s| < 0.172; its rounding is small beside f. What is
     left out is 2 s^22/23 < 2e-18 of R.
     """
     e = 0.0
@@ -148,7 +148,7 @@ def logarithm(u):
 def circle(u):
     """cos(2 pi u) and sin(2 pi u) for u in [0, 1], to two units in the last place.
 
-    4 u = n + y with an integer n and |y| <= 1/2, both exact; Taylor's series at the angle pi y/2, at most pi/4, whose
+    4 u = n + y with an integer n and |y| <= 1/2, both exact; Taylor's series at the angle pi y/2, at most pi/4; its
     next terms are below 2e-18; then a turn by n quarters.
     """
     turns = 4.0 * u

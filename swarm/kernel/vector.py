@@ -111,7 +111,7 @@ def square(a):
 
 @inlined
 def with_square(v, speed2):
-    """A velocity whose square is speed2, from within round-off, without a bias, which 1e8 collisions would show.
+    """A velocity of the square speed2, from within round-off, without a bias, which 1e8 collisions would show.
 
     By one Newton step of the square root, as a sum: a factor 1 + x rounds x up and down by different steps.
     """

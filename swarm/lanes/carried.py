@@ -25,7 +25,7 @@ _NO_SPEED = 1e-13
 # Sweeps until a point is on three walls: one where they are flat.
 _SWEEPS = 20
 _EPSILON = 2.220446049250313e-16
-# A step at whose end a wall does not press is tried again so much shorter; one to another wall is cut so often.
+# A step that ends where a wall does not press is tried again so much shorter; one to another wall is cut so often.
 _RETRY, _MOST_TRIES = 0.25, 100
 
 
@@ -47,7 +47,7 @@ _NOBODY = Three(-1.0, -1.0, -1.0)
 
 
 def _solved(a, b, c, x, y, z):
-    """The vector whose products with a, b and c are x, y and z; infinite or no number where they are in a plane."""
+    """The vector that has the products x, y and z with a, b and c; infinite or no number where they are in a plane."""
     bc = cross(b, c)
     return (x * bc + y * cross(c, a) + z * cross(a, b)) / dot(a, bc)
 
@@ -92,7 +92,7 @@ def _corner(laws, walls, gravity, active, r, least):
 
 @outlined
 def _find(laws, walls, gravity, r, near, least):
-    """Three walls at a point that hold a particle there, and none of whose neighbours comes: `Three`."""
+    """Three walls at a point that hold a particle there, and no neighbour of them comes: `Three`."""
     number = walls.numbers_near(r)
     count = 0
     for i in range(number.size):

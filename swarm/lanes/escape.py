@@ -43,7 +43,7 @@ def detain(share, p, wall, remaining, wait):
 
 
 def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
-    """The lanes whose flight has ended on a wall where it is open, if no closed one is at the same place.
+    """The lanes with a flight that has ended on a wall where it is open, if no closed one is at the same place.
 
     Where another room is on its other side a lane is in that, and its flight goes on in the next pass.
     """

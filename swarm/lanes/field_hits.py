@@ -1,7 +1,7 @@
 """The first hits of all lanes where walls are bodies of a field: each lane looks at the bodies of its cell.
 
 The loops write to arrays on the stack. For any other array the compiler cannot prove that it does not overlap the
-tables, whose rows are looked up, and then it vectorises nothing.
+tables of the bodies, and then it vectorises nothing.
 """
 
 from typing import Any
@@ -33,7 +33,7 @@ _TIME, _WALL = 0, 1
 class LaneFlights(Record):
     """The flights of lanes as far as they are known, and the bodies near them."""
 
-    owner: Array  # int64, whose they are
+    owner: Array  # int64, the body that each belongs to
     time: Array  # when the flight ends
     wall: Array  # where, or -1
     first: Array  # int64, the first entry of the cell
@@ -129,7 +129,7 @@ def _ask_for_each(gravity, members, before, lanes, live):
 
 
 def _look_at_all(members, before, lanes, live):
-    """Every lane, whose flight is straight, at all bodies of a field."""
+    """Every lane with a straight flight, at all bodies of a field."""
     course = lanes.course
     for m in range(members.table.shape[0]):
         body, number = member(members, index(m)), before + m

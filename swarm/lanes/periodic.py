@@ -34,7 +34,7 @@ def return_lanes(period, state, lanes, live):
 def _come_through(period, state, p, images, twice):
     """Count the images that a particle has come through, and change its energy to that in the cell.
 
-    `twice` is twice the energy per mass of a lane, some of whose changes are not in the state yet. Return its value
+    `twice` is twice the energy per mass of a lane; some changes of it are not in the state yet. Return its value
     after this change.
     """
     state.image[0, p] += np.int64(images.x)

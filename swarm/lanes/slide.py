@@ -124,7 +124,7 @@ def _count_step(slide, share, i):
 
 @outlined
 def _count_return(slide, share, i, before, end):
-    """Count what a lane crosses at a face of the cell, whose step has ended beyond that; its next step begins."""
+    """Count what a lane crosses at a face of the cell: its step has ended beyond the face; its next step begins."""
     lane = slide.lanes.lane(i)
     if slide.lanes.period is not None:
         shift = lane.r - end

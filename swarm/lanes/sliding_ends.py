@@ -57,7 +57,7 @@ def set_going(slide, i):
 
 @outlined
 def decide(slide, i):
-    """The phase of a lane whose step may not be taken as it is.
+    """The phase of a lane with a step that may not be taken as it is.
 
     The step is cut where the event is, and taken again, until the event is at its start.
     """
@@ -112,7 +112,7 @@ def _until_gone(slide, event, active, path, remaining):
 
 @outlined
 def _past_ends(slide, now, i):
-    """The phase of a lane whose walls may end where it is: on those that follow, or where it flies."""
+    """The phase of a lane with walls that may end where it is: on those that follow, or where it flies."""
     lane, near = slide.lanes.lane(i), crossing.near(slide.method, slide.lanes.lane(i).r)
     for _wall in range(2):
         ended = ended_wall(now, slide.active(lane), lane.r, near)
@@ -168,7 +168,7 @@ def _give_up(slide, i):
 
 
 def _shorten(slide, i):
-    """A lane whose step has no solution: a shorter one, or none over the edge of a solid, beyond which is no wall."""
+    """A lane, its step without a solution: a shorter one, or none over the edge of a solid, beyond which is no wall."""
     lane, h = slide.lanes.lane(i), slide.lanes.lane(i).h
     lane.step, lane.cut = _RETRY * h, np.inf
     if h > SHORTEST * slide.method.size / math.sqrt(lane.scale2):

@@ -74,7 +74,7 @@ class LaneView(Record):
 
 
 class Advanced(LaneView):
-    """The lane of a particle on its way, whose rows say where it was when all lanes were looked at last."""
+    """The lane of a particle on its way: its rows say where it was when all lanes were looked at last."""
 
     def stands(self, method, p):
         """Whether particle p, of this lane, has not gone on by what it must since a look."""

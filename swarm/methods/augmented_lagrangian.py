@@ -48,7 +48,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     limit. The gap is that from the level of its start, g - g0, in Phi and in V: the step is in State I of the surface
     phi = phi(r0), as it would be in a cavity that much smaller, and D is the discrete gradient of that gap. The limit
     is the reflection about D(r0, r1) with g1 = g0, so energy is kept as from the wall. It is the step of
-    `Impact(contact_step=dt, contact_start="centred")`, whose docstring says where it is exact; also first order in
+    `Impact(contact_step=dt, contact_start="centred")`; its docstring says where it is exact. Also first order in
     general, with an error that is several times smaller. A step without length is the exact reflection.
 
     Of bodies the multipliers hold walls and links together, with exponent 1 and adaptive=True: V is the sum of
@@ -64,11 +64,11 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         max_sweeps: the most sweeps of a loop, 1 or more.
         gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
         adaptive: cut each step at the instant of impact (the paper's recommendation); flights are then exact over any
-            time, and contact steps are dt long. A step on whose way another wall stands is replaced by the exact
+            time, and contact steps are dt long. A step with another wall in its way is replaced by the exact
             reflection. Without gravity only.
         acceleration: "none" is the paper's loop; "secant" replaces (8) by a secant; "reflection" starts the secant from
             the multiplier of the converged step. All have the same fixed point; where it does not exist, all use (8).
-        on_unconverged: what a contact does whose loop ends above the tolerance. "raise" ends the run and names step,
+        on_unconverged: what happens if a loop ends above the tolerance. "raise" ends the run and names step,
             particle, sweeps and V; "count" accepts the step and counts it in the observable "unconverged"; "impact"
             counts it too, and replaces the contact by the exact one (without gravity only).
         contact_start: where contact steps begin: "impact", at the impact, as the paper recommends, or "centred", dt/2

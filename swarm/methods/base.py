@@ -71,7 +71,7 @@ class Method(Validated):
         return False
 
     def has_multipliers(self) -> bool:
-        """Whether contacts run Uzawa's loop, whose sweeps are then counted."""
+        """Whether contacts run Uzawa's loop; its sweeps are then counted."""
         return False
 
     def may_slide(self) -> bool:
@@ -91,7 +91,7 @@ class Method(Validated):
         raise NotImplementedError
 
     def law(self) -> Any:
-        """The regularisation whose stored energy counts as contact energy, or None for rigid walls."""
+        """The regularisation with the stored energy that counts as contact energy, or None for rigid walls."""
         return None
 
 
@@ -126,7 +126,7 @@ def check_crossing(name: str, step: float | None, scene: Scene, particles: Parti
 
 
 def centred_half(longest, lane):
-    """Half the length of a contact step of at most this length whose middle is the end of the flight of a lane.
+    """Half the length of a contact step of at most this length with its middle at the end of the flight of a lane.
 
     It begins no sooner than that flight, which is where the frame begins or the contact before ends, and ends within
     the frame.

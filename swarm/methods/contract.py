@@ -9,7 +9,7 @@ Required are
     constants and own       what a lane keeps of its particle for the whole frame,
     land or flight          the way to the next contact: from the first hit, which is found before, or by itself,
     contact                 the contact in lanes.
-A method whose `flight` or `contact` leaves contacts to it has `hard_pass` too, one whose contact has an unknown
+A method has `hard_pass` too if its `flight` or `contact` leaves contacts to it; one with an unknown in its contact has
 `guess`, `improve` and `most_sweeps`, one that is too long for a loop `turn`, and one with a multiplier the three
 functions of Uzawa's loop. examples/own_method.py is a complete method.
 """
@@ -172,7 +172,7 @@ class MethodNumbers(Record):
         return self.gives("land")
 
     def landed_on(self, walls):
-        """The walls whose first hits `land` takes; None where the method finds its contacts by itself."""
+        """The walls with the first hits that `land` takes; None where the method finds its contacts by itself."""
         return walls if self.lands else None
 
     # --- The unknown of a contact ---

@@ -36,7 +36,7 @@ Gradient = Annotated[str, choice("composite", "mean-value")]
 
 @dataclass(frozen=True)
 class SoftWalls(base.Method):
-    """A method of fixed step whose walls are springs, and nothing else. See the subclasses."""
+    """A method of fixed step with springs for walls, and nothing else. See the subclasses."""
 
     dt: Positive
     penalty: Positive
@@ -224,7 +224,7 @@ class Steps(contract.MethodNumbers):
         return self.before(walls, remaining), self.over(walls, remaining), self.after(walls, remaining)
 
     def reach(self: Any, before, gravity, lane):
-        """From r0 to the point whose force it takes, as if there were no wall."""
+        """From r0 to the point of the force that it takes, as if there were no wall."""
         return displacement(gravity, lane.v, self.dt)
 
     def is_too_fast(self: Any, p):
@@ -232,7 +232,7 @@ class Steps(contract.MethodNumbers):
         return False if self.longest is None else square(p) > self.longest * self.longest
 
     def work_along(self: Any, over, wall, force):
-        """The work of a force of this wall over a step, whose walls these are; 0 where no wall moves."""
+        """The work of a force of this wall over a step with these walls; 0 where no wall moves."""
         return 0.0 if self.moving is None else dot(force, over.displacement(wall))
 
     def flight(self: Any, walls, gravity, lane):

@@ -56,7 +56,7 @@ class Impact(base.Method):
     gravity on spheres and cylinders; of second order in h where |grad phi| is the same all over the wall (a distance:
     torus, capsule); elsewhere of first order, with an error some times smaller than that of a step from the wall. It
     begins at the earliest where the frame begins or the contact before ends, and ends at the latest with the frame;
-    then both of its halves are as much shorter. A step on whose way from r* a wall stands is replaced by the exact
+    then both of its halves are as much shorter. A step from r* with a wall in its way is replaced by the exact
     reflection.
 
     A particle slides along one wall, or the edge of two, by the contact step of the scheme in Suzuki's composition of
@@ -181,7 +181,7 @@ class Reflection(contract.MethodNumbers):
 
     def constants(self, mass, energy, scale2):
         # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow:
-        # not by its velocity at the start of the frame, on whose ends no contact may depend
+        # not by its velocity at the start of the frame: no contact may depend on where frames end
         twice_energy = 2.0 * energy
         moving = twice_energy > 0.0
         half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
@@ -287,7 +287,7 @@ class Chord(Reflection):
 
 
 class Centred(Chord):
-    """The method with a contact step whose middle is the impact; the lane is there, on the wall."""
+    """The method with a contact step that has its middle at the impact; the lane is there, on the wall."""
 
     asks_flown = True
 

@@ -67,7 +67,7 @@ class StepNumbers(penalty.GradientSteps):
         return lane
 
     def held(self, walls, start, wall):
-        """The walls as the step takes them whose lane is this at its start."""
+        """The walls as taken by the step that has this lane at its start."""
         return walls
 
     def ended(self, lane, contact):
@@ -181,7 +181,7 @@ def _first_energy(lane):
 
 
 def _after(r, v, remaining, hits):
-    """The contact, whose impulses were added one by one."""
+    """The contact; its impulses were added one by one."""
     return contract.Contact(r, v, remaining, 0.0, 0.0, hits, 0.0, False)
 
 
@@ -271,7 +271,7 @@ class CutSteps(StepNumbers):
 
 
 class CentredSteps(CutSteps):
-    """The method with steps whose middle is the impact, where a lane is; in State I of the level that they begin on."""
+    """Steps with their middle at the impact, where a lane is; in State I of the level that they begin on."""
 
     asks_flown = True
 

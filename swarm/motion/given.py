@@ -23,7 +23,7 @@ LARGEST_ANGLE = 1e9
 
 
 def vector_of(name: str, value: Vector) -> Vector:
-    """`value` as three numbers whose squares are finite."""
+    """`value` as three numbers with finite squares."""
     x, y, z = (checks.bounded(f"{name}[{i}]", part) for i, part in enumerate(checks.vector(name, value)))
     return x, y, z
 

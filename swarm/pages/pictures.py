@@ -1,4 +1,4 @@
-"""The pictures of a report: graphs as SVG whose colours are those of the page, particles among their walls as PNG."""
+"""The pictures of a report: graphs as SVG in the colours of the page, particles among their walls as PNG."""
 
 import base64
 import hashlib

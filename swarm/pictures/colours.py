@@ -59,11 +59,11 @@ class Scale:
     def colours(self, values: Floats) -> Colours:
         """The colours of values as 0xRRGGBBAA; transparent for NaN, which marks absent particles."""
         steps = (values - self.low) * (_STEPS / (self.high - self.low))
-        nobody = np.isnan(steps)
-        if nobody.any():
-            steps = np.where(nobody, 0.0, steps)
+        absent = np.isnan(steps)
+        if absent.any():
+            steps = np.where(absent, 0.0, steps)
         places: NDArray[np.intp] = np.clip(steps, 0.0, _STEPS - 1.0).astype(np.intp)
-        return np.where(nobody, np.uint32(0), _PACKED[places])
+        return np.where(absent, np.uint32(0), _PACKED[places])
 
 
 def curve_colour(name: str, k: int, total: str = SUM) -> str:

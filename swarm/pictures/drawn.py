@@ -11,7 +11,7 @@ from ..particles import Particles
 from ..state import Floats, State
 from .colours import Colours, Scale, Values
 
-# Triangles whose normals differ by less lie in one face of a polyhedron, without a line between them.
+# Triangles with normals that differ by less lie in one face of a polyhedron, without a line between them.
 _FLAT = 1e-6
 
 

@@ -137,7 +137,7 @@ def _reason(error: Exception) -> str:
 
 
 class _Film:
-    """The picture, whose artists change from frame to frame."""
+    """The picture; its artists change from frame to frame."""
 
     def __init__(self, trajectory: Any, numbers: list[int], pixels: tuple[int, int], most: int) -> None:
         self._trajectory, self._scene = trajectory, trajectory.scene

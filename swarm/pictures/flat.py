@@ -96,7 +96,7 @@ def draw_walls(axes: Any, across: int, shapes: list[Shape], wide: float) -> list
 
 
 def _loops(lines: list[Floats], same: float, opened: float) -> list[Floats]:
-    """The closed curves that lines form whose ends are so near to each other [m], or are those of an opening.
+    """The closed curves of lines with ends so near to each other [m], or with the ends of an opening.
 
     An opening is at most this part of the length of what it joins.
     """

@@ -77,7 +77,7 @@ def lines(axes: Any, graph: series.Graph, drawn: Curves, limit: float | None = R
 
 
 def _labelled(graph: series.Graph, written: str, size: float) -> str:
-    """The label of an axis with its unit. Of molecules it names whose pressure it is: a gas has more than are run."""
+    """The label of an axis with its unit. Of molecules: the pressure is of those that are run, and a gas has more."""
     label = f"{graph.label or graph.quantity} [{written}]" if written else graph.label or graph.quantity
     is_molecular = graph.unit in _PRESSES and 0.0 < size < _MOLECULAR
     return f"{label}\nof the simulated particles" if is_molecular else label

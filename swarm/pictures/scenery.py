@@ -241,6 +241,6 @@ def _glass(normals: Floats) -> Floats:
 
 
 def _runs_of(seen: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
-    """The parts of a curve whose points are kept, two points or more each."""
+    """The parts of a curve with points that are kept, two points or more each."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
     return [seen[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]

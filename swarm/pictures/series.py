@@ -95,7 +95,7 @@ class Line:
     along: tuple[float, ...] | None = None
 
     def values(self, times: Floats, seen: dict[str, Any]) -> Floats:
-        """The values at frames, whose times [s] and observables these are; NaN at the first where they are rates."""
+        """The values at frames with these times [s] and observables; NaN at the first where they are rates."""
         # Files of older versions have no "sliding", and runs of particles no "work".
         column = np.asarray(seen.get(self.observable, np.zeros(len(times))), np.float64)
         if self.surface is not None:

@@ -24,7 +24,7 @@ def _of_facets(shape: Shape, towards: Floats) -> list[Floats]:
     """The sides between a facet that faces the eye and one that does not, where these have corners of their own."""
     corners = towards[shape.triangles]
     if (np.ptp(corners, axis=1) > 1e-12).any():
-        return []  # smooth walls, whose creases are edges
+        return []  # smooth walls: their creases are edges
     points, places = np.unique(shape.vertices, axis=0, return_inverse=True)
     triangles = places.reshape(-1)[shape.triangles]
     return curves.joined(points, curves.turning(points, triangles, corners[:, 0] > 0.0))

@@ -79,7 +79,7 @@ class Vacant:
             return boxes
         middles = np.zeros((3, n))
         middles[self._axes] = self._low[self._axes] + (boxes[self._axes] + 0.5) * self._width[self._axes, None]
-        # In a box whose corners are all nearer to a ball than balls may be, so is every point.
+        # Where all corners of a box are nearer to a ball than balls may be, so is every point in it.
         kept = np.flatnonzero(find_free(self._cells, middles, np.full(n, self.radius - reach)))
         if self._scene.surfaces and kept.size:
             far = self._scene.distances_outside(middles[:, kept], 0.0, np.full(kept.size, self._wide))

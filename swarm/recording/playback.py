@@ -113,7 +113,7 @@ class Playback:
         # A crash may have left more points than rows of the time series.
         self.numbers = sorted(number for number in drawn if number in moments)
         if not self.numbers:
-            raise ValueError("it holds no frame whose time is known")
+            raise ValueError("it holds no frame with a known time")
         self.times = np.array([moments[number] for number in self.numbers])
         self.series = {
             entity: (np.array([moments[number] for number in found]), np.array(list(found.values())))

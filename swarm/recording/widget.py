@@ -29,7 +29,7 @@ def show(trajectory: Any, particles: int, color: str, megabytes: float) -> None:
 
 
 def bring_widget() -> None:
-    """Import the widget, whose module decides when it is imported where browsers get the viewer from.
+    """Import the widget: its module decides when it is imported where browsers get the viewer from.
 
     By default that is Rerun's server. Where this machine does not reach it, browsers get it from here, unless the
     environment says otherwise.

@@ -124,7 +124,7 @@ class RecordingWriter:
                 f"record_color must be 'speed' for bodies, got {settings.color!r}: their points exchange energy"
             )
         self.colour_by(start)
-        # The number, the time and the observables of frames whose time series are still to be sent, and of that before.
+        # The number, the time and the observables of frames with time series still to be sent, and of that before.
         self._rows: list[tuple[int, float, dict[str, Any]]] = []
         self._before: list[tuple[int, float, dict[str, Any]]] = []
         self._due = 0.0

@@ -45,7 +45,7 @@ T = TypeVar("T")
 
 
 class BaseRun:
-    """A run from frame to frame: it times, halts, balances and observes an engine, whose functions come first below.
+    """A run from frame to frame: it times, halts, balances and observes an engine; those functions come first below.
 
     Its threads end with this context.
 
@@ -305,7 +305,7 @@ class BaseRun:
         return self.state if self._feed is None else self._feed.seen(self.state)
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
-        """Raise a RunError that names the first particle whose state is not finite, or that is outside rigid walls."""
+        """Raise a RunError that names the first particle that is not finite, or is outside rigid walls."""
         scene = self._scene
         if scene.reacts() and seen["max_penetration"] > self._deepest:
             scene = scene.placed(seen["wall_position"], seen["wall_orientation"])

@@ -35,7 +35,7 @@ class Impacts:
     Args:
         compiled: what is run.
         n: how many particles.
-        particles: "all", k for every k-th one, or the numbers of those whose impacts are logged.
+        particles: "all", k for every k-th one, or the numbers of those with logged impacts.
         precision: of positions, velocities and impulses; times are float64.
         threads: how many fill logs.
         counts: whether crossings of counters have rows too.

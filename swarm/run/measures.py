@@ -22,7 +22,7 @@ _COLUMN = re.compile("(_([0-9]+|[wxyz]))+$")
 
 
 class _NotYet(dict[str, Any]):
-    """The observables of a frame whose functions are called."""
+    """The observables of a frame for which functions are called."""
 
     def __missing__(self, name: str) -> Any:
         raise KeyError(

@@ -50,7 +50,7 @@ def balance(seen: dict[str, Any]) -> float:
 
 
 def with_walls(seen: dict[str, Any], walls: Observed) -> dict[str, Any]:
-    """The observables with those of walls that react, whose energy is a part of the whole."""
+    """The observables with those of walls that react: their energy is a part of the whole."""
     energy = walls.kinetic + walls.potential
     return {
         **seen,

@@ -151,7 +151,7 @@ class Result:
 
     @property
     def frames(self) -> "Frames":
-        """The frames of the trajectory: a sequence of `Frame`, whose particles are read when they are asked for.
+        """The frames of the trajectory: a sequence of `Frame`, each with its particles read when they are asked for.
 
         Raises:
             SceneError: the run has no trajectory, or it is gone or damaged.

@@ -77,7 +77,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         trajectory: HDF5 file to write; its folder must exist.
         recording: Rerun file to write; its folder must exist. Needs the packages of the extra "record".
         impacts: HDF5 file for a log of every impact, by Impact; see `load_impacts`. Its folder must exist.
-        impact_particles: those whose impacts it has, "all", k for every k-th one, or a list of their numbers.
+        impact_particles: those with impacts in it, "all", k for every k-th one, or a list of particle numbers.
         member_impacts: True to count the impacts on each member of each surface, and how long particles stay there; see
             `Result`.
         observables: user-defined observables, functions by their names. Each is called with every `Frame` and returns a

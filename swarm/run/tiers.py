@@ -31,7 +31,7 @@ class Tier:
     Args:
         choice: "auto": compiled where the kernels are found compiled, else in plain Python until the runs of this
             process have been for about a second; "always" or "never" compiled.
-        numbers: the arguments of the kernels. Where they call library functions, whose last bit may differ between
+        numbers: the arguments of the kernels. Where they call library functions, the last bit may differ between
             the tiers, "auto" compiles at once: the result must not depend on the wall time.
         particles: their number.
     """

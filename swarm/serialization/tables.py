@@ -185,7 +185,7 @@ def convert(table: Any, cls: type[T], where: str) -> T:
 
 
 def of_kind(table: Any, where: str, kinds: Mapping[str, type[T]], base: type[Any] | None = None) -> T:
-    """A dataclass from a table whose kind says which: one of `kinds`, or code derived from `base`."""
+    """A dataclass from a table with a kind that says which: one of `kinds`, or code derived from `base`."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table with a kind, got {table!r}")
     if "kind" not in table:

@@ -35,10 +35,10 @@ class SourcePlace(NamedTuple):
     """The points of a source in a scene.
 
     Attributes:
-        surface: on which particles are born, or in whose volume.
+        surface: on which, or in the volume of which, particles are born.
         number: of that surface in the scene; None if it is not a surface of the scene.
         volume: whether they are born in its volume.
-        only: the surfaces on whose admissible sides births are.
+        only: the surfaces with births on their admissible sides.
         walls: the surfaces of which it is made that births are on, each with the volumes in which they are not; none:
             on all of it.
     """

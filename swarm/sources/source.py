@@ -65,7 +65,7 @@ class Source(Validated):
             openings of a surface, or of a part of it: births on the surface to which it was given, where that is open.
             Or any other surface: births on it as far as it is in the vessel, to its admissible side.
         volume: True: births uniform in the part of the vessel on the admissible side of `where`.
-        within: a surface on whose admissible side births are, so that a part of a wall is a source; None: everywhere.
+        within: a surface with births on its admissible side, so that a part of a wall is a source; None: everywhere.
         rate: births a second, a Poisson process from `start` to `stop`. Or
         times: the times of all births [s], from 0 s on, in any order. Or
         count: alone so many births, at independent times uniform from `start` to `stop`; with `rate` the most of them.

@@ -1,7 +1,7 @@
 """The contract of a surface: every function that kernels ask of one, required or derived, with its definition.
 
 A surface is an implicit function phi(r): below 0 inside, 0 on it, above 0 outside. What kernels take of it is a record,
-derived from `Smooth`, whose field `side` is +1 for a cavity (phi <= 0 is admissible) and -1 for a solid (phi >= 0). The
+derived from `Smooth`. Its field `side` is +1 for a cavity (phi <= 0 is admissible) and -1 for a solid (phi >= 0). The
 *gap* is g = side phi, admissible where g <= 0.
 
 phi is a function of a smooth inner function q(r), phi = phi(q(r)). A divided difference times a discrete gradient of
@@ -39,7 +39,8 @@ class Smooth(AtRest):
         level_along  the level with a bound of its third derivative; the best,
         hessian_bounds.
     Everything else has a definition here, which a surface overrides only where that is faster or more exact. A surface
-    whose inner function is not phi overrides `inner`, `inner_gradient`, `gap_of`, `level_of` and `gap_slope` together.
+    with an inner function other than phi overrides `inner`, `inner_gradient`, `gap_of`, `level_of` and `gap_slope`,
+    all of them.
     What is no method is a constant for the compiler.
     """
 
@@ -142,7 +143,7 @@ class Smooth(AtRest):
     def grown(self, radius):
         """The wall that the centre of a ball meets: the parallel surface, so far in the admissible side.
 
-        A record of its own, whose `distance` is exact there; `radius` is a number of a kernel, 0 or more.
+        A separate record: its `distance` is exact there; `radius` is a number of a kernel, 0 or more.
         """
         raise NotImplementedError
 

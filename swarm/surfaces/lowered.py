@@ -11,7 +11,7 @@ from .frames import Unturned
 
 
 class Lowered(Unturned):
-    """A wall whose gap is less by `level`; flights meet the wall itself."""
+    """A wall with a gap that is less by `level`; flights meet the wall itself."""
 
     body: Any
     level: float

@@ -79,7 +79,7 @@ def pieces_of(surfaces: Sequence[Surface], period: Lengths | None, largest: floa
 
 
 def _with_reach(images: Images) -> Images:
-    """The surfaces of a scene with their images, whose rooms overlap where they have a face in common."""
+    """The surfaces of a scene with their images; their rooms overlap where they have a face in common."""
     several = [one for some in images for one in some if len(one.rooms) > 1]
     reach = _REACH * max((piece.extent() for one in several for piece in one.surfaces()), default=0.0)
     return tuple(tuple(one.reaching(reach) for one in some) for some in images)

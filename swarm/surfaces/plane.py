@@ -117,8 +117,8 @@ def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> Non
             _require_laws(plane, f"surfaces[{i}].laws", piece)
         if isinstance(surface, Mesh):
             raise SceneError(
-                f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got a Mesh, of '
-                "whose triangles none is known to; use swarm.Polygon, with the corners of its section"
+                f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got a Mesh: '
+                "it is not known whether its triangles do; use swarm.Polygon, with the corners of its section"
             )
         if isinstance(surface, Outlined):
             _require_upright(plane, i, surface)
@@ -129,7 +129,7 @@ def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> Non
             k = int(leaning[np.argmax(np.abs(part[leaning]))])
             name = type(surface).__name__
             raise SceneError(
-                f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got {name}, whose '
+                f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got {name}: its '
                 f"normal at {_as_text(places[:, k])} is {_size(part[k])} out of the plane and would send particles out "
                 f"of it; {_mended(surface, across)}"
             )

@@ -78,7 +78,7 @@ def require_description(surfaces: Sequence[Surface], name: str | None = None) ->
 
 
 def _asked_of(wall: Any, asked: tuple[str, ...]) -> Iterator[tuple[Any, tuple[str, ...]]]:
-    """Whose numbers the methods of a wall are asked of, and which: those of a turned body, and of a solid's parts."""
+    """Numbers with methods that a wall needs, and which ones: also those of a turned body, and of a solid's parts."""
     if isinstance(wall, Rotated):
         yield from _asked_of(wall.body, asked)
         return

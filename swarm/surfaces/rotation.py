@@ -159,7 +159,7 @@ class Rotated(Framed):
 
 
 def framed(axes: NDArray[np.float64], body: Any) -> Any:
-    """A surface whose own axes are these columns, as kernels take it."""
+    """A surface with these columns as its own axes, as kernels take it."""
     if np.array_equal(axes, np.eye(3)):
         return body
     right = np.rint(axes)

@@ -76,7 +76,7 @@ class Surface(Validated):
         mass: of a wall that impacts move [kg], above 0; None: nothing does. It moves without turning: along its
             `motion` if that is a `Guide`, else freely, with the velocity of a `Translation` at the start.
         inertia: of a wall that impacts turn about the axis of its `Rotation`, with that rate at the start [kg m^2],
-            above 0. With a mass as well it is a pendulum, whose weight is at its `center`; without, on the axis.
+            above 0. With a mass as well it is a pendulum with its weight at its `center`; without, on the axis.
         openings: surfaces without openings, laws and motion, inside which the wall is not there (with side "outside":
             outside of which; of many bodies, such as `Spheres`: in each of them). A particle that reaches the wall
             there has escaped, and stays as it is then. Of a wall at rest. An `Opening` is open for some times only.
@@ -155,7 +155,7 @@ class Surface(Validated):
         """None where balls may meet the surface, else half a sentence that says why they may not."""
         if all(getattr(wall, "holds_balls", False) for wall in self.walls_of_balls(0.0)):
             return None
-        return "whose parallel surface is not known"
+        return "of which the parallel surface is not known"
 
     def largest_ball(self) -> float:
         """The radius below which balls touch the surface at one point only [m]: its smallest radius of curvature."""
@@ -259,7 +259,7 @@ class Surface(Validated):
         return []
 
     def reaching(self, reach: float) -> "Surface":
-        """The same whose rooms overlap by so much [m] where they have a face in common; itself where none have."""
+        """The same with rooms that overlap by so much [m] where they have a face in common; itself where none have."""
         return self
 
     def runs(self, walls: int) -> list[tuple["Surface", int]]:

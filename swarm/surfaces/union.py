@@ -216,7 +216,7 @@ class Joined(Surface):
         return np.asarray(self._of_gaps.reduce(self._gaps(rows, time)))
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> Floats:
-        """Gradient of that phi, of the part whose gap it is, at points (3, N); shape (3, N)."""
+        """Gradient of that phi, of the part with that gap, at points (3, N); shape (3, N)."""
         rows = self._own_points(points, time)
         gaps = self._gaps(rows, time)
         least = (np.argmin if self._of_gaps is np.minimum else np.argmax)(gaps, axis=0)
@@ -357,7 +357,7 @@ def _require_room(whole: Joined) -> None:
         came = ", ".join(f"{part!r:.80}" for part in whole.parts)
         if whole._of_gaps is np.maximum and not whole.is_solid():
             raise SceneError(
-                f"parts must have a volume in common, got {came}, whose admissible sides have no point in common; "
+                f"parts must have a volume in common, got {came}; their admissible sides have no point in common; "
                 "check their `side`, or leave one out"
             )
         raise SceneError(

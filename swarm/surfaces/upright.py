@@ -1,4 +1,4 @@
-"""Walls that stand upright on a plane: turned ones whose normals are in it to round-off, made to be in it exactly.
+"""Walls that stand upright on a plane: turned ones with normals in it to round-off, made to be in it exactly.
 
 In a scene of two dimensions a wall that leans by round-off would send particles off the plane, and walls that disperse
 them make more of that at every impact.
@@ -12,7 +12,7 @@ from .surface import TILT
 
 
 class Upright(Rotated):
-    """A turned surface, all of whose normals are in the plane across an axis of the scene, here x."""
+    """A turned surface, with all normals in the plane across an axis of the scene, here x."""
 
     across = 0
 
@@ -44,7 +44,7 @@ _KINDS = Upright, UprightY, UprightZ
 
 
 def upright(wall: Any, across: int | None) -> Any:
-    """A wall, or what it is made of, in a scene whose plane is across an axis; None: without a plane."""
+    """A wall, or what it is made of, in a scene with a plane across an axis; None: without a plane."""
     if across is None:
         return wall
     if isinstance(wall, Rotated):

@@ -49,7 +49,7 @@ class Leave(Record):
 class WallLaw(Record):
     """A law of a wall: the velocity with which a particle leaves it, or whether it is absorbed there, or waits.
 
-    Derive a record from it, whose fields are numbers, and give it as `laws=[...]` of a surface. Kernels call `leave`:
+    Derive a record of numbers from it, and give it as `laws=[...]` of a surface. Kernels call `leave`:
     numbers in, numbers out, no lists and no arrays; without branches (`swarm.kernel.jit.select` in their place) it
     costs least. Laws take the place of the elastic reflection at every impact; on a thermal wall, at impacts of the
     particles that the wall does not accommodate. Several laws act in their order: each law gets the velocity that a
@@ -151,7 +151,7 @@ def why_wrong(given: Any, v: Vec, n: Vec, u: Vec, moves: bool = False) -> str:
     after, stays, wait = leave_of(given)
     is_known = isinstance(stays, (bool, np.bool_)) and not wait < 0.0 and not math.isnan(wait)
     if not is_known:
-        return "must return a Leave whose stays is True or False, and whose wait is 0 or more [s]"
+        return "must return a Leave with stays True or False and a wait of 0 or more [s]"
     if moves and stays and wait > 0.0:
         return "must not let particles wait where a wall moves"
     is_finite = isinstance(after, tuple) and len(after) == 3 and all(map(math.isfinite, after))

@@ -80,7 +80,7 @@ class Walls(Record):
         return self
 
     def during(self, remaining, after):
-        """The walls over a step, at whose start and end so much of the frame is left [s]."""
+        """The walls over a step; at its start and end so much of the frame is left [s]."""
         return self
 
     def in_steps(self):

@@ -10,7 +10,7 @@ from ..state import Floats
 
 Indices = NDArray[np.int64]
 
-# Neighbours whose normals differ by more than this angle meet at an edge [rad].
+# Neighbours with normals that differ by more than this angle meet at an edge [rad].
 _EDGE = math.radians(30.0)
 
 
@@ -100,7 +100,7 @@ def joined(points: Floats, pairs: Indices) -> list[Floats]:
 
 
 def runs(curve: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
-    """The parts of a curve whose points are kept, two points or more each."""
+    """The parts of a curve with points that are kept, two points or more each."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
     return [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]
 

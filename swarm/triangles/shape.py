@@ -14,7 +14,7 @@ from . import curves
 # Heights at which levels are drawn, of which a shape has this many, or else its own; triangles of many bodies that are
 # too many for these.
 _LEVELS, _FEW, _MOST = 6, 3, 100_000
-# Triangles whose normals differ from the vertical by less than this lie on a level.
+# Triangles with normals that differ from the vertical by less than this lie on a level.
 _UPRIGHT = 1e-6
 
 
@@ -64,7 +64,7 @@ class Shape:
         return float(0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum())
 
     def moved(self, turn: Floats, way: Floats) -> "Shape":
-        """The shape whose point that was at x is at turn x + way."""
+        """The shape moved so that its point that was at x is at turn x + way."""
         placed = [[curve @ turn.T + way for curve in of] for of in (self.edges, self.levels)]
         return replace(self, vertices=self.vertices @ turn.T + way, normals=self.normals @ turn.T,
                        edges=placed[0], levels=placed[1])  # fmt: skip

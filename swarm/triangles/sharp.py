@@ -186,7 +186,7 @@ def _triangles(placed: _Placed, wall: SmoothSurface, low: Floats, high: Floats) 
 
 
 def _turned_to(points: Floats, triangles: Indices, normals: Floats) -> NDArray[np.int64]:
-    """Triangles whose corners go round their normals."""
+    """Triangles with corners that go round their normals."""
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     wrong = (np.cross(b - a, c - a) * normals[triangles].sum(axis=1)).sum(axis=1) < 0.0
     return np.where(wrong[:, None], triangles[:, ::-1], triangles)

@@ -9,7 +9,7 @@ from colliding.gases import frames, gas, run_of
 
 import swarm
 from swarm.events.colliding.queue import FIRST, SPARE, build, requeue
-from swarm.events.colliding.rows import FLOATS, LEAVES, NOBODY, PARTNER, WHOLES, Flock
+from swarm.events.colliding.rows import FLOATS, LEAVES, NO_PARTNER, PARTNER, WHOLES, Flock
 from swarm.kernel import cache
 
 
@@ -19,7 +19,7 @@ def flock_of(times):
     event = np.full(FLOATS * n, math.inf)
     event[LEAVES::FLOATS] = times
     tag = event.view(np.int32)
-    tag[PARTNER::WHOLES] = NOBODY
+    tag[PARTNER::WHOLES] = NO_PARTNER
     item = np.zeros(n + SPARE, np.int32)
     item[FIRST : FIRST + n] = np.arange(n)
     none = np.zeros(0)

@@ -382,9 +382,7 @@ def test_samples_are_in_their_file(tmp_path):
         'particles = {count = 1, speed = 1.0}\nmethod.kind = "impact"\nrun.until = 1.0\n[[surface]]\nkind = "sampled"\n'
         'file = "a.h5"\nspacing = 1.0\norigin = [0, 0, 0]\n'
     )
-    with pytest.raises(
-        swarm.SceneError, match=r"a\.h5 must hold its own data, got values, whose values are in 'secret"
-    ):
+    with pytest.raises(swarm.SceneError, match=r"a\.h5 must hold its own data, got values, its values are in 'secret"):
         swarm.scene_file.read(tmp_path / "scene.toml")
 
 

@@ -510,7 +510,7 @@ class Waiting(swarm.WallLaw):
 @pytest.mark.parametrize(
     ("time", "motion", "sentence"),
     [
-        (-1.0, None, r"particle 0: .*surfaces\[0\].laws\[0\] must return a Leave whose stays .* wait is 0 or more"),
+        (-1.0, None, r"particle 0: .*surfaces\[0\].laws\[0\] must return a Leave with stays .* wait of 0 or more"),
         (1.0, swarm.Translation((0.0, 0.0, 0.1)), r"surfaces\[0\].laws\[0\] must not let particles wait where a"),
     ],
 )

@@ -129,7 +129,7 @@ def _finish(contacts, state, i):
 
 
 def _begin_step(pace, i):
-    """A lane from whose place the next step begins."""
+    """A lane at the place from which the next step begins."""
     pace.fresh[i], pace.whole[i] = True, False
     pace.trial[i], pace.low[i], pace.high[i], pace.wall[i] = 0.0, 0.0, math.inf, -1
 
@@ -185,7 +185,7 @@ def _try(contacts, state):
         part, ends = rule.stages[stage], stage == stages - 1
         for a in range(lanes.f.shape[0]):
             for i in range(count):
-                # Exact for what grows steadily, and for round-off, whose part alternates from step to step.
+                # Exact for what grows steadily, and for round-off, which alternates from step to step.
                 more = lanes.before[a, i] - lanes.older[a, i]
                 share = 0.5 + 0.5 * pace.step[i] / rule.dt
                 known = (stages == 1) & (more == more)

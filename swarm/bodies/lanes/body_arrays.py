@@ -32,7 +32,7 @@ class Ties(NamedTuple):
     is_diagonal: bool
     is_free: Any  # (P,) whether a point can move
     led: Any  # (P,) the row of its path, -1 for a point that is not led
-    couplings: Any  # (L + K + G + C, the same) b W b of ties, whose b is +1 at a and -1 at b, then of contact points
+    couplings: Any  # (L + K + G + C, the same) b W b of ties, where b is +1 at a and -1 at b, then of contact points
 
 
 class Touching(NamedTuple):
@@ -121,7 +121,7 @@ class BodyState(NamedTuple):
     sliding: Any  # (n,) [s]
     steps: Any  # (n,)
     sweeps: Any  # (n,) of Uzawa's loop
-    unconverged: Any  # (n,) steps whose loop did not
+    unconverged: Any  # (n,) steps with a loop that did not
     energy: Any  # (n,) at the start of the run [J]
     free: Any = None  # (K, n) int8, whether a contact point has passed an opening; None without openings
     escape_time: Any = None  # (n,) when the last one of a body has [s], NaN of bodies that are inside
@@ -186,7 +186,7 @@ class LaneNumbers(NamedTuple):
     solved: Flags  # of all stages
     out: Flags  # a point is outside
     body: Counts  # number of the body, -1 for none
-    point: Counts  # whose impact it is, -1 for none
+    point: Counts  # the point of the impact, -1 for none
     wall: Counts
     stuck: Counts  # trials since the last step
     action: Counts

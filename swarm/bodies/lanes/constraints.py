@@ -219,7 +219,7 @@ class Constrained(Record):
             # In a pass that goes on D has followed twice since: the ratio says too little.
             rate = select(pace.waits[i] == 0, 0.0, error / before)
             rate = select(turn > 0, error / before, select(rate > _AT_FIRST, rate, _AT_FIRST))
-            # Of slow turns what D lags behind is along D, where it does no work, but for ties whose length changes.
+            # Of slow turns what D lags behind is along D, where it does no work, but for ties of a length that changes.
             turned = select((pace.rate[i] < 1.0) & is_rigid, pace.rate[i], 1.0)
             counts = turned * turned * turned * turned
             rate = select(rate > pace.rate[i], rate, pace.rate[i])
@@ -258,7 +258,7 @@ class Constrained(Record):
         for i in range(pace.h.size):
             pace.done[i] = pace.done[i] | pace.last[i]
 
-    # --- Guides, whose rows come after those of ties
+    # --- Guides: their rows come after those of ties
 
     @outlined
     def turn_guides(self, i, r1):

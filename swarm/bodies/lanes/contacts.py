@@ -41,11 +41,11 @@ class BodyContacts(Constrained):
         """Begin Uzawa's loop of a stage in all lanes."""
 
     def again(self):
-        """Update the multipliers of lanes whose loop goes on, and count these; the stage of the others is done."""
+        """Update the multipliers of lanes with a loop that goes on; count these; the stage of the others is done."""
         return 0
 
     def judge(self, i):
-        """The action of a lane whose trial ends outside, has no solution, or looks for the time of an impact."""
+        """The action of a lane with a trial that ends outside, has no solution, or looks for the time of an impact."""
         raise NotImplementedError
 
     def end(self, state, i):
@@ -286,7 +286,7 @@ def sweep(touching, contacts, system, wanted, change, limits):
 
 
 def solve_dense(a, f):
-    """f = a^-1 f of a system whose symmetric part, but for factors of rows, is positive."""
+    """f = a^-1 f of a system with a symmetric part that, but for factors of rows, is positive."""
     rows = f.shape[0]
     for k in range(rows):
         for row in range(k + 1, rows):

@@ -116,7 +116,7 @@ def _blow(bodies, state, name, frame, found, i):
     before = kinetic_of(ties, v, i) if is_led else 0.0
     against = scratch(m, np.float64)
     if not elastic:
-        # Links whose lengths change give their energy away in the next short step, which takes a change back.
+        # Links of lengths that change give their energy away in the next short step, which takes a change back.
         lost += blow.strain(scratch(m, np.float64), against, i)
     blow.give(p, against, i)
     for a in range(found):

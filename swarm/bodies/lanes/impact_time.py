@@ -15,12 +15,12 @@ _NARROW, _SHORTEST = 1e-13, 1e-4
 _CLOSER = 0.25
 # Trials after which the bracket is halved each time.
 _QUICK = 40
-# A step whose ties have no solution is halved this often.
+# A step with ties that have no solution is halved this often.
 _HALVED = 2.0**-20
 
 
 def halve(bodies, i):
-    """A step whose ties have no solution is halved, but not for ever."""
+    """A step with ties that have no solution is halved, but not for ever."""
     pace = bodies.pace
     pace.trial[i] = 0.5 * pace.step[i]
     pace.low[i], pace.high[i], pace.wall[i] = 0.0, math.inf, -1

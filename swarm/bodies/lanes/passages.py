@@ -21,7 +21,7 @@ class Passages(Record):
 
 @outlined
 def look_back(contacts, i):
-    """At the end of a step: points that have come back meet the walls, and a body all of whose points are out ends."""
+    """At the end of a step: points that have come back meet the walls, and a body with all points out ends."""
     touching, pace, passages = contacts.touching, contacts.pace, contacts.passages
     number, out = pace.body[i], 0
     for k in range(touching.points):

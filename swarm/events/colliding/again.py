@@ -6,7 +6,7 @@ from .queue import requeue
 
 
 def aim_again(box, flock, i, now):
-    """Find all that is next for a ball whose velocity has changed."""
+    """Find all that is next for a ball with a velocity that has changed."""
     until_exit(box.grid, box.pull, flock, i, now)
     forget_wall(box, flock, i)
     find_wall(box, flock, i, now)

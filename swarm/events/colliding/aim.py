@@ -16,7 +16,7 @@ from ...kernel.record import Record
 from ...kernel.vector import Vec, dot, square
 from ...surfaces.time_of_impact.flights import Hit
 from .heavy import meet_heavy
-from .rows import DUE, FACE, FLOATS, MEETS, NOBODY, PARTNER, RADIUS, SEEN, STAMP, WALL, WHOLES
+from .rows import DUE, FACE, FLOATS, MEETS, NO_PARTNER, PARTNER, RADIUS, SEEN, STAMP, WALL, WHOLES
 from .window import UNKNOWN, next_hit
 
 # So many balls of a cell are copied without a branch, and so many are looked at at once.
@@ -231,7 +231,7 @@ def _keep(flock, i, known):
 @outlined
 def find_partner(box, flock, i, now):
     """Find the next collision of a ball."""
-    _keep(flock, i, _around(box, flock, i, now, _ANY, NextCollision(math.inf, NOBODY)))
+    _keep(flock, i, _around(box, flock, i, now, _ANY, NextCollision(math.inf, NO_PARTNER)))
 
 
 @outlined
@@ -251,9 +251,9 @@ def look_ahead(box, flock, i, now):
 
 
 def tell_partner(flock, i):
-    """Give the collision of a ball to its partner too, if it is its soonest too. Return the partner or `NOBODY`."""
+    """Give the collision of a ball to its partner too, if it is its soonest too. Return the partner or `NO_PARTNER`."""
     mate, time = flock.tag[index(WHOLES * i + PARTNER)], flock.event[index(FLOATS * i + MEETS)]
-    partner = NOBODY
+    partner = NO_PARTNER
     if mate >= 0 and time < flock.event[index(FLOATS * mate + MEETS)]:
         flock.event[index(FLOATS * mate + MEETS)] = time
         flock.tag[index(WHOLES * mate + PARTNER)] = i

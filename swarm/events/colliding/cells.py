@@ -1,4 +1,4 @@
-"""Cells, each with the balls whose centres are in it: which balls meet before one of them leaves its cell.
+"""Cells, each with the balls that have their centres in it: which balls meet before one of them leaves its cell.
 
 No cell is shorter than the largest diameter, so that balls that touch are in the same cell or in neighbours. Each axis
 has one cell more at either end, which is empty, or stands for the one at the other end where the scene repeats. The

@@ -20,7 +20,7 @@ from .cells import Axis, BallGrid
 from .meet import Loss
 from .queue import FIRST, SPARE
 from .resting import repose_of
-from .rows import CELL, FLOATS, NOBODY, PARTNER, RADIUS, STAMP, TIME, WALL, WHOLES, Flock, Kept
+from .rows import CELL, FLOATS, NO_PARTNER, PARTNER, RADIUS, STAMP, TIME, WALL, WHOLES, Flock, Kept
 from .rubbing import BallSpins
 from .window import OUT, UNKNOWN
 
@@ -61,9 +61,9 @@ def flock_of(particles: Particles, grid: BallGrid, loses: bool, walled: bool) ->
     if particles.births is not None:
         # In no cell, and nothing is next for them.
         late = particles.births.source >= 0
-        event.reshape(n, FLOATS)[late, WALL], whole[late, PARTNER] = OUT, NOBODY
+        event.reshape(n, FLOATS)[late, WALL], whole[late, PARTNER] = OUT, NO_PARTNER
     last = np.full(n, -math.inf) if loses else None
-    kept = Kept(np.zeros(n), np.full(n, NOBODY, np.int32)) if walled else None
+    kept = Kept(np.zeros(n), np.full(n, NO_PARTNER, np.int32)) if walled else None
     node = np.arange(FIRST, FIRST + n, dtype=np.int32)
     return Flock(flight, event, tag, node, aligned_copy(key), item, np.empty(0, np.int32), last, kept)
 

@@ -24,7 +24,7 @@ from .followed import come_over, follow
 from .heavy import first_number
 from .meet import met
 from .queue import FIRST, build, requeue
-from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NOBODY, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
+from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NO_PARTNER, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
 from .striking import renew_ended, shift_leases, strike_heavy
 from .window import END, OUT
 
@@ -84,7 +84,7 @@ def _vanish(box, flock, i):
     for k in (MEETS, LEAVES, DUE):
         flock.event[index(FLOATS * i + k)] = math.inf
     flock.event[index(FLOATS * i + WALL)] = OUT
-    flock.tag[index(WHOLES * i + PARTNER)] = NOBODY
+    flock.tag[index(WHOLES * i + PARTNER)] = NO_PARTNER
     requeue(flock, i)
 
 
@@ -140,7 +140,7 @@ def _enter(box, flock, books, clock, i, now):
             # There it meets other images of the walls.
             forget_wall(box, flock, i)
             if flock.kept is not None:
-                flock.kept.keep(i, NOBODY, 0.0)
+                flock.kept.keep(i, NO_PARTNER, 0.0)
         found = look_ahead(box, flock, i, now)
         until_exit(box.grid, box.pull, flock, i, now)
         find_wall(box, flock, i, now)
@@ -272,7 +272,7 @@ def take(box, flock, books, clock, rule):
         i, now = _first(box, flock, clock, end)
         ended = _is_over(box, end, now)
         if ended >= 0:
-            return ended, NOBODY
+            return ended, NO_PARTNER
         if taken >= rule.halt[0]:
             return Status.INTERRUPTED.value, 0
         taken += 1

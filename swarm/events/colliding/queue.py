@@ -1,4 +1,4 @@
-"""The queue of events: a heap of four children a node, whose nodes hold the times, so that few balls are looked at.
+"""The queue of events: a heap of four children a node; nodes hold the times, so that few balls are looked at.
 
 The order is that of the times; of equal ones that of the smaller ball of a collision, then of the other one (none at a
 wall), so that it does not depend on what was done to the heap before. Nodes are numbered from 3 on, so that children
@@ -9,7 +9,7 @@ import math
 
 from ...kernel.arrays import fetch, index
 from ...kernel.jit import outlined, select
-from .rows import FLOATS, MEETS, NOBODY, PARTNER, WHOLES
+from .rows import FLOATS, MEETS, NO_PARTNER, PARTNER, WHOLES
 
 # The first node, of which the children are those from 4 (node - 2) to 4 (node - 2) + 3.
 FIRST, SPARE = 3, 8
@@ -26,10 +26,10 @@ def _wins(flock, item, other, key):
 
 
 def _pair(flock, item, key):
-    """The balls of an event, the smaller number first. In an event of one ball the second is `NOBODY`."""
+    """The balls of an event, the smaller number first. In an event of one ball the second is `NO_PARTNER`."""
     mate = flock.tag[index(WHOLES * item + PARTNER)]
     meets = (flock.event[index(FLOATS * item + MEETS)] == key) & (mate >= 0)
-    return select(meets & (mate < item), mate, item), select(meets, select(mate < item, item, mate), NOBODY)
+    return select(meets & (mate < item), mate, item), select(meets, select(mate < item, item, mate), NO_PARTNER)
 
 
 def _comes_before(flock, item, key, other, later):
@@ -45,7 +45,7 @@ def _set(flock, node, item, key):
 
 @outlined
 def _first_of_equals(flock, first, soonest):
-    """The child with this time whose event is first, of those from `first` on."""
+    """The child with this time and the event that is first, of those from `first` on."""
     least = first
     for child in range(first, first + _CHILDREN):
         if flock.key[index(child)] == soonest:

@@ -22,7 +22,7 @@ MEETS, LEAVES, DUE, WALL = 0, 1, 2, 3
 # leaves the cell.
 PARTNER, SEEN, STAMP, MET, CELL, FACE = 8, 9, 10, 11, 12, 15
 # Of no ball.
-NOBODY = -1
+NO_PARTNER = -1
 
 
 class Kept(NamedTuple):

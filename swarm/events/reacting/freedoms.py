@@ -91,7 +91,7 @@ class Freedom(Record):
         raise NotImplementedError
 
     def drive(self, walls, t):
-        """Its motion from a time on as that of a wall whose motion is given, whose frame ends then."""
+        """Its motion from a time on as that of a wall with a given motion; its frame ends then."""
         raise NotImplementedError
 
     def posed(self, body, walls, t):

@@ -25,7 +25,7 @@ from ...surfaces.time_of_impact import flights, safe
 from .freedoms import ParticleFlight
 from .strikes import all_stay, first_hit, reach_of_all, strike, with_energy
 
-# What is next for a particle besides the impact on a wall that reacts, whose number is 0 or more: nothing that was
+# What is next for a particle besides the impact on a wall that reacts (its number is 0 or more): nothing that was
 # found, so that it is looked at again.
 NONE = -1.0
 # Of a clock: the time in the frame; of the run, the time before the frame and the strikes of walls that react; how many

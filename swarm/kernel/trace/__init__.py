@@ -17,11 +17,11 @@ all of its users, would have to be written so, and plain Python would pay for th
     decisions   branches and returns of one call
     frame       its loops
     source      the syntax tree of a function
-    expressions, twins   the same function, whose calls and control flow go through a frame
+    expressions, twins   the same function; its calls and control flow go through a frame
     calls       what a call means: an operation, or a function that is traced in its turn
     emit        a helper as a function of its own in a kernel, and notes as instructions
     helpers     the bridge to Numba
 
-What cannot be traced (`try`, `with`, lists, a function whose source is not known) is compiled by Numba as before;
+What cannot be traced (`try`, `with`, lists, a function without a known source) is compiled by Numba as before;
 `helpers.left_to_numba` says why.
 """

@@ -156,7 +156,7 @@ def _operation(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> 
 
 
 def traced(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
-    """The result of a Python function, whose operations are noted."""
+    """The result of a Python function; its operations are noted."""
     frame = CallFrame(called)
     twin_of(function, frame)(*given, **named)
     return frame.result()

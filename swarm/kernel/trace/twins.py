@@ -1,4 +1,4 @@
-"""Twins of functions for traces: the same statements, whose control flow and calls go through a `CallFrame`.
+"""Twins of functions for traces: the same statements, with control flow and calls that go through a `CallFrame`.
 
     if x > 0.0:          def then():
         y = x                nonlocal y

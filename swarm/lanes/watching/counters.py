@@ -216,7 +216,7 @@ class Counters(Record):
 
     @outlined
     def come_back(self, share, p, before, end, after):
-        """The sides of particle p, whose step has left the cell at `end`, and which is back in it `after`."""
+        """The sides of particle p: its step has left the cell at `end`, and it is back in the cell `after`."""
         state = share.state
         start = before._replace(r=before.r + (after.r - end))
         for c, one in enumerate(self.each):

@@ -32,7 +32,7 @@ _ROOM = 1e-9
 _MOST = 24
 # The most cells that a particle may come through in a frame: seconds.
 _MOST_CELLS = 1e7
-# Particles whose sides are found at a time.
+# Particles with sides found at a time.
 _AT_ONCE = 65_536
 
 

@@ -41,7 +41,7 @@ _ALONE = (*_EVERY_POINT, OTHER_POINTS)
 
 
 class Asked(NamedTuple):
-    """A run as it is asked for, whose arguments are of the right types; no particles where all come from sources."""
+    """A run as it is asked for, with arguments of the right types; no particles where all come from sources."""
 
     scene: Scene
     particles: Particles | TiedParticles | None
@@ -79,7 +79,7 @@ def _walls(asked: Asked) -> Iterator[tuple[int, Surface]]:
 
 
 def _of_walls(name: str, without: Any) -> Callable[[Asked], Found]:
-    """Walls whose attribute has another value than that of a wall without it."""
+    """Walls with an attribute of another value than that of a wall without it."""
 
     def found(asked: Asked) -> Found:
         for i, wall in _walls(asked):
@@ -113,7 +113,7 @@ def _of_scene(name: str) -> Callable[[Asked], Found]:
 
 
 def _argument(name: str, *without: Any) -> Callable[[Asked], Found]:
-    """A method whose argument has another value than these."""
+    """A method with an argument of another value than these."""
 
     def found(asked: Asked) -> Found:
         got = getattr(asked.method, name, without[0])
@@ -580,7 +580,7 @@ CAPABILITIES = (
     Capability("mass of a wall", _masses, {
         _EVERY_BODY: Refusal(
             "surfaces[{i}] must have no mass and no inertia with bodies, got {got}",
-            "make it a body, whose cavities= are walls that move with it",
+            "make it a body: its cavities= are walls that move with it",
         ),
         _FIXED_STEPS: _with_method("{name}", "None", "value"),
         (CHORDS,): _LOSES,

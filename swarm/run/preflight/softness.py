@@ -111,7 +111,7 @@ def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: M
     depths = depths_of(method, mass, speeds, (scene.pairs or Pairs()).restitution)
     least = np.minimum(radius, radius[fastest])
     k = int(np.nanargmax(depths / least))
-    subject = f"particle {k}, whose velocity differs from that of particle {fastest} by {speeds[k]:.3g} m/s,"
+    subject = f"particle {k}, at {speeds[k]:.3g} m/s against particle {fastest},"
     _warn(method, subject, "it", float(depths[k]), float(least[k]))
 
 

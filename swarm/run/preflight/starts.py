@@ -54,7 +54,7 @@ def error_of(scene: Scene, particles: Particles, outside: NDArray[np.intp], dist
         where += f"{_how_far(scene, wall, place)} {_named(scene, wall)}"
     else:
         radius, depth = particles.radius[first], distances[wall, 0]
-        where += f"whose radius of {radius:g} m reaches {depth:.6g} m beyond {_named(scene, wall)}"
+        where += f"and its radius of {radius:g} m reaches {depth:.6g} m beyond {_named(scene, wall)}"
     most = int(met[np.argmax(counts)])
     mend = _mend(scene, most, position, int(counts.max()))
     error = SceneError(

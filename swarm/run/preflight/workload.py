@@ -19,7 +19,7 @@ from ...surfaces.time_of_impact import flights
 _LOG = logging.getLogger("swarm")
 # At some 10 ns an impact: minutes a frame, without a sign of progress; and days of a processor.
 _MOST_A_FRAME, _MANY = 1e10, 1e13
-# Particles whose flights are computed, of which the median counts, and most parts of a fall until its hit is known.
+# Particles with flights that are computed, of which the median counts, and most parts of a fall until its hit is known.
 _PARTICLES, _PARTS = 4, 8
 # Chords of a walk through the volume, and how many of the last of them count.
 _CHORDS, _COUNTED = 60, 30

@@ -1,4 +1,4 @@
-"""The tip of a cone that balls are in: the parallel surface is a cone too, whose tip is farther along the axis."""
+"""The tip of a cone that balls are in: the parallel surface is a cone too; its tip is farther along the axis."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,6 +1,6 @@
 """Which cells of a spline the surface is in, how far it is from all others, and how much phi bends near it.
 
-In a cell a cubic is between the least and the largest of its Bernstein coefficients, and so are its derivatives, whose
+In a cell a cubic is between the least and the largest of its Bernstein coefficients, and so are its derivatives: their
 coefficients are differences of these: bounds that hold, not samples.
 """
 
@@ -18,7 +18,7 @@ Places = NDArray[np.int64]
 
 # From the B-spline coefficients of a cell to its Bernstein coefficients, along one axis.
 _BERNSTEIN = np.array([[1.0, 4.0, 1.0, 0.0], [0.0, 4.0, 2.0, 0.0], [0.0, 2.0, 4.0, 0.0], [0.0, 1.0, 4.0, 1.0]]) / 6.0
-# Cells whose coefficients are looked at together.
+# Cells with coefficients that are looked at together.
 _BATCH = 16_384
 # The clearance is known up to this many cells: a flight through empty space takes a step for each.
 _FARTHEST = 63

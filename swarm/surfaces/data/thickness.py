@@ -46,7 +46,7 @@ _BALLS = (1.0, 1.5)
 _CLOSE = 1e-6
 # Steps from a first ball to the one that touches both sides; none is needed where these are parallel.
 _STEPS = 3
-# Inverse powers of the plastic number, whose multiples fill a square evenly.
+# Inverse powers of the plastic number: their multiples fill a square evenly.
 _EVEN = np.array([0.7548776662466927, 0.5698402909980532])
 
 
@@ -90,7 +90,7 @@ def _down(value: float) -> float:
 def _thinnest(thin: _Thin, surface: "_Surface", spacing: float) -> int | None:
     """The thinnest place that samples this far apart do not resolve."""
     found = np.flatnonzero(thin.thickness < RESOLVED * spacing)
-    # Of each cell one place is enough: that whose sides are most parallel, as those of a wall are.
+    # Of each cell one place is enough: that with the most parallel sides, as those of a wall are.
     facing = (surface.normals[thin.at[found]] * surface.normals[thin.to[found]]).sum(axis=1)
     found = found[np.argsort(facing, kind="stable")]
     cells = np.column_stack([np.floor(thin.point[found] / (_ROUND * spacing)), thin.gap[found]])

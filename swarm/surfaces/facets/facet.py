@@ -115,7 +115,7 @@ class FacetNumbers(Flat):
 
 
 class SheetSide(FacetNumbers):
-    """One side of a triangle that is a wall from both sides: a facet of a sheet, whose other side is another facet.
+    """One side of a triangle that is a wall from both sides: a facet of a sheet; its other side is another facet.
 
     The sides are so far apart that the place of a particle says on which one it is, also where it touches it.
     """

@@ -43,8 +43,8 @@ def proper(soup: Soup) -> Soup:
 def seams_closed(soup: Soup, weld: float | None) -> tuple[Soup, float, float | None]:
     """The triangles with open edges closed: also how far a corner was moved, and within which distance.
 
-    Corners of open edges within a distance of each other are one, and a triangle whose open edge has another's corner
-    on it, within that distance, is two.
+    Corners of open edges within a distance of each other are one, and a triangle with another's corner on its
+    open edge, within that distance, is two.
     """
     edges, counts = edges_of(soup.triangles)
     if not (counts == 1).any():

@@ -50,10 +50,10 @@ class _Made(NamedTuple):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Mesh(Surface):
-    """A mesh whose triangles are walls, exactly: edges, corners and thin walls are what they are in the file.
+    """A mesh of triangles that are walls, exactly: edges, corners and thin walls are what they are in the file.
 
-    It is closed, or with `open=True` it is of sheets, whose triangles are walls from both sides: chutes, funnels, boxes
-    without a lid. Particles go around their edges; which way a triangle is turned does not matter.
+    It is closed, or with `open=True` it is of sheets: each triangle is a wall from both sides. So are chutes, funnels,
+    boxes without a lid. Particles go around their edges; which way a triangle is turned does not matter.
 
     In a scene file: kind = "mesh" and file = "part.stl", relative to the scene file, without a `spacing`; laws of a
     group in a table [surface.groups.NAME]. Files other than STL and OBJ in text need the extra `mesh`.
@@ -273,7 +273,7 @@ class Mesh(Surface):
         """
         if self.open:
             raise SceneError(
-                f"a mesh must be closed to enclose a volume, got {self!r}, whose sheets have no inside; leave open out"
+                f"a mesh must be closed to enclose a volume, got {self!r}: its sheets have no inside; leave open out"
             )
         a, b, c = np.moveaxis((self.vertices - self.vertices[0])[self.triangles], 1, 0)
         return float((a * np.cross(b, c)).sum() / 6.0)

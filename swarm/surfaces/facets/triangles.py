@@ -44,8 +44,8 @@ def read_mesh(path: Path, scale: float, weld: float | None) -> TriangleMesh:
         weld: the distance within which corners of open edges are one [m]; None: one that suits the mesh.
 
     Raises:
-        SceneError: the file holds no mesh, or one that is not closed, whose triangles cannot be turned the same way, or
-            whose parts intersect.
+        SceneError: the file holds no mesh, or one that is not closed, has triangles that cannot be turned the same
+            way, or has parts that intersect.
     """
     return closed(path, read_soup(path, scale), weld)
 
@@ -113,7 +113,7 @@ def _refuse_open(path: Path, vertices: Floats, edges: Indices, counts: Indices, 
     raise SceneError(
         f"the mesh {path} must be closed (watertight), with two triangles at each edge, got {len(rims)} edges of one "
         f"triangle and {len(many)} of more than two: {'; '.join(messages)}; close its holes, for example with "
-        "trimesh.repair or MeshLab, or use swarm.Mesh with open=True, whose triangles are walls from both sides"
+        "trimesh.repair or MeshLab, or use swarm.Mesh with open=True: its triangles are walls from both sides"
     )
 
 

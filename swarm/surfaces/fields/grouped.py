@@ -12,7 +12,7 @@ from ..surface import Surface
 from .many import Many
 from .members import alike, can_be_member, kind_of
 
-# So many surfaces of one kind stay walls of their own, whose numbers are not looked up: an impact in a sphere with 6
+# So many surfaces of one kind stay separate walls; their numbers are not looked up: an impact in a sphere with 6
 # balls takes 24 ns, and 31 as a field of a few. From 8 on LLVM no longer vectorises them: 112 and 38 ns.
 _FEW = 6
 

@@ -23,7 +23,7 @@ from .members import Few, GrownLike, Members, alike, nearest, table_of, touched,
 
 # So many bodies are looked at one after the other by all lanes together, where flights are straight: in a sphere an
 # impact among 10, 24 and 40 balls takes 18, 37 and 57 ns, from cell to cell 55, 73 and 91. Of other bodies, which take
-# longer, fewer; and in a cell that repeats, whose faces end flights too: among 27 balls 87 ns, from cell to cell 52.
+# longer, fewer; and in a cell that repeats, as its faces end flights too: among 27 balls 87 ns, from cell to cell 52.
 # Under gravity cells are faster from 16 on: so few are in one cell.
 _FEW, _FEW_BALLS, _IN_ONE_CELL = 24, 48, 16
 # The quaternion that turns nothing.
@@ -183,7 +183,7 @@ class Many(Surface):
 
     def holds_balls(self) -> str | None:
         if self.is_foam():
-            return "whose cavities have edges where they meet, at which balls would turn"
+            return "with cavities that have edges where they meet, at which balls would turn"
         return self.solids()[0].holds_balls()
 
     def contain(self, points: Floats) -> NDArray[np.bool_]:
@@ -236,9 +236,9 @@ class Many(Surface):
 def members_of(
     surfaces: Sequence[Surface], repeated: tuple[Floats, Floats] | None, largest: float | None = None
 ) -> Members:
-    """Solid surfaces of one kind as one field; in a scene whose cell repeats, with the corners of that.
+    """Solid surfaces of one kind as one field; in a scene with a cell that repeats, with the corners of that.
 
-    Of points, or of balls whose radii are the `largest` at most [m].
+    Of points, or of balls with radii of the `largest` at most [m].
     """
     if largest is None:
         bodies = alike([surface.walls()[0] for surface in surfaces])

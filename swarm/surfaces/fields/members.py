@@ -28,7 +28,7 @@ _KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, R
 
 
 class GrownLike(Record):
-    """The numbers of one of the bodies of a field, whose walls the centre of a ball with this radius meets."""
+    """The numbers of one of the bodies of a field, as the centre of a ball with this radius meets its walls."""
 
     body: Any
     radius: float
@@ -71,7 +71,7 @@ class Members(Record):
     few = False
 
     def in_cells(self):
-        """The field whose bodies a flight meets in the cells that it passes, and nowhere else."""
+        """The field of bodies that a flight meets in the cells that it passes, and nowhere else."""
         return self
 
     def gone(self):
@@ -313,7 +313,7 @@ def nearest(members, points, found):
 
 @outlined
 def _least_in_shell(members, r, center, shell):
-    """The least phi in the cells that are `shell` cells away from one, and whose it is."""
+    """The least phi in the cells that are `shell` cells away from one, and the number of its body."""
     grid, best, which = members.grid, math.inf, 0
     for x in _around(center.x, shell, grid.shape.x):
         for y in _around(center.y, shell, grid.shape.y):

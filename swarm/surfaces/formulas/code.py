@@ -31,7 +31,7 @@ def class_of(
     along: Function | None = None,
     base: Any = OwnNumbers,
 ) -> Any:
-    """The class of numbers whose kernels call these functions; with `along`, the coefficients of phi along a flight.
+    """The class of numbers by which kernels call these functions; with `along`, the coefficients of phi along a flight.
 
     Raises:
         SceneError: they are not functions of (parameters, x, y, z), or the parameters are no NamedTuple of numbers.

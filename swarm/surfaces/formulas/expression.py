@@ -21,7 +21,7 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
 # Long enough for any surface that one writes down, short enough that its derivatives are.
 _LONGEST, _DEEPEST, _MOST_NODES = 2000, 60, 400
 _LARGEST_EXPONENT = 64.0
-# Numbers whose squares and inverse squares are numbers.
+# Numbers with squares and inverse squares that are numbers.
 _LARGEST = 1e150
 # Exact fractions longer than this are rounded, so that powers of powers stay short.
 _BITS = 1000
@@ -48,7 +48,7 @@ class NonSmoothTerm(NamedTuple):
 
 
 def parse(text: Any, parameters: Iterable[str] = (), pieces: list[NonSmoothTerm] | None = None) -> Any:
-    """The SymPy expression of a formula in x, y, z and `parameters`, whose symbols are p0, p1, ... in their order.
+    """The SymPy expression of a formula in x, y, z and `parameters`; their symbols are p0, p1, ... in their order.
 
     SymPy simplifies as it builds, so that sqrt(x**2)**2 becomes x**2. What is smooth only in places is appended to
     `pieces` as it is read, inner ones first, whether or not anything of it is left.

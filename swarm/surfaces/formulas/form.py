@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 
 
 class FormSurface(Surface):
-    """A surface whose numbers are those of a `Form`: what `Formula` and `OwnSurface` share."""
+    """A surface with the numbers of a `Form`: what `Formula` and `OwnSurface` share."""
 
     # Fields of the subclasses; `bounds` and `size` are methods.
     box: Box | None

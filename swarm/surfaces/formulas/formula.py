@@ -42,7 +42,7 @@ class Formula(FormSurface):
     Raises:
         SceneError: the formula holds anything else, an argument is out of its range, or phi is not finite, has no
             surface in the bounds, no gradient on it, or a corner or a pole where particles may be. Any root, fractional
-            or negative power, log or quotient counts whose argument may be 0 there, even if it cancels out.
+            or negative power, log or quotient with an argument that may be 0 there counts, even if it cancels out.
 
     >>> Formula("x**2/0.25 + y**2/0.25 + z**4 - 1").phi([[1.0], [0.0], [0.0]])
     array([3.])

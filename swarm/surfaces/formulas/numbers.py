@@ -12,7 +12,7 @@ from .. import contract
 from ..time_of_impact.course import positive, rise_time
 from ..time_of_impact.march import SafeStep, Search, first_met
 
-# Points this close, relative to the size, are joined by Gauss's rule, whose error is the 7th power; its outer node.
+# Points this close, relative to the size, are joined by Gauss's rule, with an error of the 7th power; its outer node.
 _SHORT = 1e-2
 _NODE = 0.5 * math.sqrt(0.6)
 

@@ -35,7 +35,7 @@ class Moving(Record):
         return self.body.count()
 
     def during(self, remaining, after):
-        """The wall over a step, at whose start and end so much of the frame is left [s]."""
+        """The wall over a step; at its start and end so much of the frame is left [s]."""
         start = self.drive.pose(remaining)
         end = start if after is remaining else self.drive.pose(after)
         return self.posed(self.body, start, end, self.drive, remaining, after)
@@ -98,7 +98,7 @@ def carried(
 ) -> Walls:
     """The walls of a scene in the frame that ends at a moment [s]; those of fields are before all others.
 
-    Of points, or of balls whose radii are this one at most [m].
+    Of points, or of balls of this radius at most [m].
     """
     of_surfaces = [walls_of(surface, moment, largest) for surface in surfaces]
     all_walls = (*(Field(walls_of(field, moment, largest)[0]) for field in fields), *itertools.chain(*of_surfaces))

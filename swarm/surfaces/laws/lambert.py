@@ -14,9 +14,9 @@ class Lambert(WallLaw):
     Args:
         probability: in [0, 1]: so many particles leave diffusely, the others as from a mirror.
 
-    A particle leaves with the speed, relative to the wall, with which it comes, in a direction whose cosine to the
-    normal, c, has the distribution c^2, and whose azimuth is uniform: per solid angle that is c/pi. In a scene with a
-    plane the sine of the angle to the normal is uniform in (-1, 1). The speed is kept to the last digit.
+    A particle leaves with the speed, relative to the wall, with which it comes, in a direction at random: the
+    cosine to the normal, c, has the distribution c^2, and the azimuth is uniform: per solid angle that is c/pi. In a
+    scene with a plane the sine of the angle to the normal is uniform in (-1, 1). The speed is kept to the last digit.
 
     Raises:
         SceneError: by the surface: the probability is not in [0, 1].

@@ -3,7 +3,7 @@
 It is given as in DXF: a vertex is x and y, and a third number says how the side that begins there bulges: tan(angle/4)
 of the arc, 0 a line, 1 a half circle; above 0 it turns to the left, which is outwards where the vertices go round
 counter-clockwise. Edges are written with n, the unit normal out of the outline at their start a, and a curvature k:
-they are where n.d + k/2 |d|^2 = 0 with d = r - a, whose value is the distance to first order.
+they are where n.d + k/2 |d|^2 = 0 with d = r - a; its value is the distance to first order.
 """
 
 import math
@@ -117,10 +117,10 @@ class Outline:
         for arc in bent.tolist():
             points.append(self._curve(arc)[:: (_POINTS - 1) // 16])
             owner.append(np.full(len(points[-1]), arc))
-        every, whose = np.concatenate(points), np.concatenate(owner)
+        every, sides = np.concatenate(points), np.concatenate(owner)
         step = max(1, _BATCH // n)
         for first in range(0, len(every), step):
-            some, k = every[first : first + step], whose[first : first + step]
+            some, k = every[first : first + step], sides[first : first + step]
             distance = self._distances(some)[3]
             apart = np.abs(np.arange(n) - k[:, None])
             distance[(apart <= 1) | (apart == n - 1)] = math.inf

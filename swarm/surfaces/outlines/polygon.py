@@ -26,8 +26,8 @@ class Polygon(Outlined):
     Args:
         vertices: rows (x, y) or (x, y, bulge) [m], at least three, or two and an arc. As in DXF the bulge of the side
             that begins at a vertex is tan(angle/4) of its arc: 0 a line, 1 a half circle; above 0 it turns to the left,
-            and so bulges outwards where the vertices go round counter-clockwise. A ring whose last vertex is its first
-            one again, as shapely has it, is the same outline.
+            and so bulges outwards where the vertices go round counter-clockwise. A ring with its first vertex
+            once more at its end, as shapely has it, is the same outline.
         axis: across the outline; three numbers, not all 0. Seen from its tip x and y of the vertices are to the right
             and upwards: along x and y of the scene for z, along y and z for x, along z and x for y.
         center: where the origin of the vertices is, three numbers [m].

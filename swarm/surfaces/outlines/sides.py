@@ -145,7 +145,7 @@ class Side(Unturned):
 
 
 class Sides(Members, Patched):
-    """The sides of an outline: a field whose bodies are walls as far as they go."""
+    """The sides of an outline: a field with walls for bodies, as far as they go."""
 
     def is_in_another(self, number, r):
         return _is_beyond(self, number, r)
@@ -231,7 +231,7 @@ def _near(side, r, v, pull):
     """The first and the last time at which a fall may be near a side: in a square around it."""
     if square(side.end) == 0.0:
         return 0.0, math.inf  # a wall without ends
-    # Arcs are at most half circles: all is within the circle whose diameter is the chord.
+    # Arcs are at most half circles: all is within the circle that has the chord as its diameter.
     d, room = r - side.body.center - 0.5 * side.end, 0.500001 * norm(side.end) + side.slack
     t, n = side.ahead, side.body.b
     first, last = _within(dot(t, d), dot(t, v), dot(t, pull), room)

@@ -13,7 +13,7 @@ from ..time_of_impact.course import rise_time
 
 # What leaves goes so far beyond the face, in lengths of the cell; a step that ends within twice that has left well.
 _BEYOND = 5e-10
-# A flight that goes on over cells ends after so many, whose number is a float with digits to spare for the position.
+# A flight that goes on over cells ends after so many; their number is a float with digits to spare for the position.
 CELLS = 2.0**40
 # Of a length of the cell, the part by which a flight may end later for the sake of its time.
 _LATER = 1e-4

@@ -132,7 +132,7 @@ def _shifts(
             f"period[{k}] must be as long as each solid at least, got {length:g}, shorter than {name}, which is "
             f"{high - low:g} long"
         )
-    # From the image whose upper end is the lowest in the cell
+    # From the image with the lowest upper end in the cell
     near = _NEAR * length + largest
     first, last = math.ceil((-near - high) / length), math.floor((length + near - low) / length)
     return [n * length for n in range(first, last + 1)]

@@ -96,7 +96,7 @@ def _pair(name: str, value: Any) -> tuple[float, float]:
 
 
 def is_there(spans: Spans, time: float) -> bool:
-    """Whether a time [s] is in one of the spans, whose ends are not."""
+    """Whether a time [s] is inside one of the spans."""
     if spans is None:
         return True
     k = bisect.bisect_right(spans, (time, math.inf)) - 1
@@ -185,7 +185,7 @@ class Present(Unturned):
 def walls_then(surface: Any, moment: float, largest: float | None = None) -> tuple[Any, ...]:
     """The walls of a surface as kernels take them in the frame, or the piece of one, that ends at a moment [s].
 
-    Of points, or of balls whose radii are this one at most [m].
+    Of points, or of balls of this radius at most [m].
     """
     walls: tuple[Any, ...] = surface.walls() if largest is None else surface.walls_of_balls(largest)
     if surface.present is None:

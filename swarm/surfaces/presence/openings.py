@@ -248,7 +248,7 @@ def are_open(volumes: Sequence[Surface], points: NDArray[np.float64], time: floa
 def outside(volume, r):
     """Signed distance outside of a volume, to first order: above 0 there, and NaN where that has no value.
 
-    What is neither `Walls` nor a `Field` is the inside of one body of a field, whose admissible side is outside of it.
+    What is neither `Walls` nor a `Field` is the inside of one body of a field; its admissible side is the outside.
     """
     if isinstance(volume, Field):
         return -volume.members.deepest_in_cell(r)

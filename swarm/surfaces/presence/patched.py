@@ -14,8 +14,8 @@ from .absence import Absence
 class Patched(Record):
     """What a field gives of its walls where each is there on its patch only. See also `fields.members.Members`.
 
-    `list_in_cell` and its like name the walls whose patch may be near a point. What slides on another wall meets one by
-    `crossing.arrival`, which asks whether it `is_there`.
+    `list_in_cell` and its like name the walls with a patch that may be near a point. What slides on another wall
+    meets one by `crossing.arrival`, which asks whether it `is_there`.
     """
 
     def is_there(self, number, r, near):

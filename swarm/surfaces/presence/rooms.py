@@ -138,7 +138,7 @@ def inside_of(walls, number, r):
 
 
 def owner_of(walls, rooms, r):
-    """The number of the room that is asked for the walls near a point: whose walls touch it least, then the deepest."""
+    """The number of the room asked for the walls near a point: that with the fewest walls there, then the deepest."""
     owner, fewest, deepest = 0, math.inf, math.inf
     for k, room in enumerate(rooms):
         gap, touching = gap_in(room, r), 0.0

@@ -50,7 +50,7 @@ class Face(NamedTuple):
     Attributes:
         level: the surface of which it is a part, without edges.
         plane: its unit normal out of the admissible side, and its offset along that [m]; None: it is not flat.
-        longer: the surface whose face is so far [m] outside of this one; None: none is known.
+        longer: the surface with a face so far [m] outside of this one; None: none is known.
     """
 
     level: Surface
@@ -203,7 +203,7 @@ def _between(rooms: Sequence[Room], pair: tuple[int, int], box: tuple[Floats, Fl
             if together and grown is None and not all(can):
                 raise SceneError(
                     "parts must overlap, or have a flat or a round face in common, got "
-                    f"{room[i]!r:.100} and {other[k]!r:.100}, whose common face is of a kind that cannot be opened; "
+                    f"{room[i]!r:.100} and {other[k]!r:.100}; their common face is of a kind that cannot be opened; "
                     "let the parts overlap, or give a swarm.Opening between them, which keeps them apart"
                 )
             found.append(Seam(pair, (i, k), (a, b), grown, together))

@@ -15,7 +15,7 @@ _AFAR = 1024.0
 
 
 class Distance(contract.Smooth):
-    """A shape whose inner function q is a squared distance: phi = sqrt(q) - radius.
+    """A shape with a squared distance as its inner function q: phi = sqrt(q) - radius.
 
     It has the fields `radius` and `radius2`, its square, and gives `inner`, and `inner_gradient` or its own `gradient`.
     """
@@ -58,7 +58,7 @@ class Distance(contract.Smooth):
 
 
 class ExactChord(contract.Smooth):
-    """A shape that gives an exact `chord_guess`, and whose gap is a distance up to round-off."""
+    """A shape that gives an exact `chord_guess`, and its gap is a distance up to round-off."""
 
     def chord_improve(self, r, p, kappa):
         return 0.0

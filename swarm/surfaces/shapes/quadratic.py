@@ -32,7 +32,7 @@ class QuadricNumbers(contract.Smooth):
     side: float
 
     def by_right_angles(self, axes: Any) -> Any:
-        """The numbers of the quadric whose own axes are these other axes of the scene, or their opposites."""
+        """The numbers of the quadric with these as its own axes: other axes of the scene, or their opposites."""
         b = None if self.b is None else vec((axes @ np.array(self.b)).tolist())
         center, a = axes @ np.array(self.center), abs(axes) @ np.array(self.a)
         return self._replace(center=vec(center.tolist()), a=vec(a.tolist()), b=b)

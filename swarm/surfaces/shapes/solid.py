@@ -1,6 +1,6 @@
 """A solid body with edges: what its parts have in common; phi is the largest of the parts' phi, and inner function.
 
-A part is a wall whose admissible side is outside of it. The body is hit when the flight is inside of all parts.
+A part is a wall with its admissible side outside. The body is hit when the flight is inside of all parts.
 """
 
 import math
@@ -76,7 +76,7 @@ class SolidNumbers(contract.Smooth):
         return clear
 
     def farthest_push(self):
-        # phi is about the distance, whose faces are flat or wide: no pole within a push.
+        # phi is about the distance, and its faces are flat or wide: no pole within a push.
         return -math.inf
 
     def moving_step(self, seen, longest):
@@ -97,7 +97,7 @@ def body(parts: Sequence[Any], extent: float = 0.0) -> SolidNumbers:
     """The intersection of parts, each the numbers of a wall that is admissible outside of the part.
 
     Args:
-        parts: numbers of walls with side -1, or of planes, whose part is where normal.r > offset.
+        parts: numbers of walls with side -1, or of planes: their part is where normal.r > offset.
         extent: distance from the origin within which the parts' centres lie [m], where that is far.
     """
     return SolidNumbers(tuple(parts), -1.0, float(extent))

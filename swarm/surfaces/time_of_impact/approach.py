@@ -1,4 +1,4 @@
-"""Safe steps to a wall whose level is known near each place of a flight, and what follows from them.
+"""Safe steps to a wall with a level that is known near each place of a flight, and what follows from them.
 
 Where the level along a whole flight is no quartic, or one of which round-off leaves nothing, it is asked for anew at
 the end of each step: a polynomial of the time from there that is nowhere below it. A step ends where a parabola above

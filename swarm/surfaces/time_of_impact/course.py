@@ -1,6 +1,6 @@
 """The level along a flight as a polynomial of time, and when it first rises through 0.
 
-A straight flight makes the level of a quadric a parabola, whose root is a closed form. A fall makes it a quartic, whose
+A straight flight makes the level of a quadric a parabola; its root is a closed form. A fall makes it a quartic; its
 first root is found by safe steps: none is skipped, however close to a double one. Steps have two methods: `first_step`
 and `next_step`, which take a flight from the time that the steps so far have led to by a length on, 0 if it is there.
 """
@@ -31,7 +31,7 @@ _NO_HIT = float(np.finfo(np.float64).tiny)
 
 
 class Majorant(Record):
-    """A level from one time of a flight on, c + 2 b t + a2 t^2 + ..., whose rest has a bound s t^3 up to a time."""
+    """A level from one time of a flight on, c + 2 b t + a2 t^2 + ..., with a rest of at most s t^3 up to a time."""
 
     if TYPE_CHECKING:
         c: Any
@@ -157,7 +157,7 @@ def close(window):
 
 
 class Fall(Record):
-    """The steps of a flight whose level is known as a whole."""
+    """The steps of a flight with a level that is known as a whole."""
 
     level: Quartic
     nearly: float  # what `close` says of the window

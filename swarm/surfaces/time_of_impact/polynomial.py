@@ -1,7 +1,7 @@
-"""Safe steps along a straight flight whose level is a polynomial of time of degree 4 at most.
+"""Safe steps along a straight flight with a level that is a polynomial of time of degree 4 at most.
 
 The coefficients are known once for the whole flight. From the wall inwards the level has a root at 0, which is divided
-out: what is left is a cubic, whose first root above 0 is the hit. The last step leaves to Newton's method what two
+out: what is left is a cubic; its first root above 0 is the hit. The last step leaves to Newton's method what two
 steps of that make round-off: one by the same coefficients, and one by the level at the place of impact.
 """
 

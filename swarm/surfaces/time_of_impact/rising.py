@@ -1,7 +1,7 @@
 """Until when the level of a wall that moves surely stays below 0: safe steps of one wall.
 
-In the frame of a wall the flight is a curve whose velocity w, acceleration a and jerk j have bounds W, A and J for any
-time ahead. Along it the level f of a wall with the inner function q, whose H = grad grad q/2 has eigenvalues of at most
+In the frame of a wall the flight is a curve: its velocity w, acceleration a and jerk j have bounds W, A and J for any
+time ahead. Along it the level f of a wall with the inner function q, where H = grad grad q/2 has eigenvalues of at most
 the magnitude m, has
     f' = grad q.w,   f''/2 = w.H w + grad q.a/2,   |f'''| <= 6 m W A + |grad q| J,
 the last where H is constant. A step ends where the parabola above f rises through 0; near the hit each one triples the
@@ -90,11 +90,11 @@ def flight_of(r, v, pull, remaining):
     return Flight(r, v, pull, remaining, norm(v), norm(pull))
 
 
-# --- Levels whose second derivative is known: below c + 2 b t + a t^2 + k t^3, with a bound k of f'''/6 -------
+# --- Levels with a known second derivative: below c + 2 b t + a t^2 + k t^3, with a bound k of f'''/6 -------
 
 
 class Level(Majorant):
-    """A level whose third derivative has a bound: f, f'/2, f''/2, |grad q| and m."""
+    """A level with a bound of its third derivative: f, f'/2, f''/2, |grad q| and m."""
 
     c: float
     b: float
@@ -197,7 +197,7 @@ class Ahead(Record):
 
 
 class SecondDerivativeBound(Ahead):
-    """Of a level whose second derivative has a bound."""
+    """Of a level with a bound of its second derivative."""
 
     seen: InWallFrame
     level: float
@@ -220,7 +220,7 @@ class SecondDerivativeBound(Ahead):
 
 
 class ThirdDerivativeBound(Ahead):
-    """Of a level whose third derivative has one."""
+    """Of a level with one of its third derivative."""
 
     body: Any
     seen: InWallFrame
@@ -236,7 +236,7 @@ class ThirdDerivativeBound(Ahead):
 
 
 def level_step(body, seen, level, longest):
-    """The `LevelStep` of a level whose third derivative has a bound, whose time is at most the longest."""
+    """The `LevelStep` of a level with a bound of its third derivative; its time is at most the longest."""
     return LevelStep(level.c, level.b, ThirdDerivativeBound(body, seen, level).longest(min(level.own_rise(), longest)))
 
 
@@ -244,7 +244,7 @@ def patch_step(wall, is_behind, edges, seen, longest):
     """The `LevelStep` of a part of a wall, until the wall is met and until the place is between all edges of the part.
 
     From behind the wall, where a particle has come to beyond an edge, it meets the part only after it has come back.
-    The wall is then given as seen from there; the edges are planes, whose admissible side is beyond them.
+    The wall is then given as seen from there; the edges are planes; their admissible side is beyond them.
     """
     step, is_there = level_step(wall, seen, wall.level_along(seen), longest), not is_behind
     time = step.time

@@ -1,4 +1,4 @@
-"""Safe steps in lanes, to walls in any motion whose levels have a bound of their third derivative.
+"""Safe steps in lanes, to walls in any motion with levels that have a bound of their third derivative.
 
 A stride is one safe step of all walls together. Its bounds hold until the parabola of a level itself rises: near the
 hit what is not known of f''' is the only error, and a stride leaves the cube of its length. What a few strides do not
