@@ -10,6 +10,7 @@ from . import moved
 from .version import VERSION
 
 if TYPE_CHECKING:
+    from .authoring.file_run import run
     from .bodies.body import Body, Strain
     from .bodies.copies import Bodies
     from .bodies.elastic import elastic
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from .pairs import Pairs
     from .particles import Particles
     from .placing.filling import fill
+    from .run.next_impact import NextImpact, bounce
     from .run.result import Result
     from .run.simulation import simulate
     from .scene import Scene
@@ -90,6 +92,7 @@ _HOMES = {
     "particles": ("Particles",),
     "scene": ("Scene",),
     "sources.source": ("Source",),
+    "run.next_impact": ("NextImpact", "bounce"),
     "run.result": ("Result",),
     "run.simulation": ("simulate",),
     "surfaces.counter": ("Counter",),
@@ -103,25 +106,29 @@ _HOMES = {
     "surfaces.laws": ("Absorb", "CercignaniLampis", "Lambert", "Sticky"),
     "surfaces.wall_law": ("Leave", "WallLaw"),
 }  # fmt: skip
+# A public name that is a package, which may be called.
+_PACKAGES = ("run",)
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Absorb", "AugmentedLagrangian", "Bodies", "Body", "Box", "Boxes", "Capsule", "Capsules", "CercignaniLampis",
     "CompleteError", "Cone", "ContactHistory", "Counter", "Cylinder", "Cylinders", "Ellipsoid", "Ellipsoids",
     "FileError", "Formula", "Frame", "Guide", "Impact", "ImpactLog", "Intersection", "Lambert", "Leave", "Mesh",
-    "Midpoint", "Opening", "Oscillation", "OwnSurface", "Pairs", "Paraboloid", "Particles", "Path", "Penalty", "Plane",
-    "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene", "SceneError", "Slab",
-    "Source", "Sphere", "Spheres", "Stadium", "Sticky", "Strain", "SwarmError", "Torus", "Trajectory", "Translation",
-    "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "chain", "contact_history",
-    "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "pack", "place", "report", "rigid", "simulate",
-    "sweep", "tetrahedron",
+    "Midpoint", "NextImpact", "Opening", "Oscillation", "OwnSurface", "Pairs", "Paraboloid", "Particles", "Path",
+    "Penalty", "Plane", "Polygon", "Prism", "Quadric", "Result", "Rotation", "RunError", "Sampled", "Scene",
+    "SceneError", "Slab", "Source", "Sphere", "Spheres", "Stadium", "Sticky", "Strain", "SwarmError", "Torus",
+    "Trajectory", "Translation", "Trapezoidal", "Union", "Verlet", "WallLaw", "WallTimeError", "__version__", "bounce",
+    "chain", "contact_history", "dumbbell", "elastic", "fill", "from_mesh", "load", "load_impacts", "pack", "place",
+    "report", "rigid", "run", "simulate", "sweep", "tetrahedron",
 ]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
+    if name in _PACKAGES:
+        return importlib.import_module(f".{name}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module 'swarm' has no attribute {name!r}")
-    # No public name is the name of a module: importing that module would hide it.
+    # No other public name is the name of a module: importing that module would hide it.
     value = getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
     importlib.import_module(".common.signature", __name__).show_in_lines(value)
     globals()[name] = value

@@ -13,7 +13,7 @@ from .common.checks import closest, count, listed, particles_fit
 from .common.columns import read_columns, row_of
 from .errors import SceneError
 from .files import paths
-from .methods import Method
+from .methods import Impact, Method
 from .particles import Particles
 from .placing.filling import fill
 from .run.options import RunOptions
@@ -234,9 +234,8 @@ def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None 
     for key in document:
         if key not in _TABLES:
             raise SceneError(f"{key}: unknown key, expected {listed(_TABLES)}{closest(key, _TABLES)}")
-    for key in ("method", "run"):
-        if key not in document:
-            raise SceneError(f"{key}: expected a [{key}] table, got none")
+    if "run" not in document:
+        raise SceneError("run: expected a [run] table, got none")
     if "particles" in document and "body" in document:
         raise SceneError("particles: expected a [particles] or a [body] table, got both")
     if not {"particles", "body", "source"} & set(document):
@@ -246,7 +245,7 @@ def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None 
     counters = run_tables.counters_of(document["counter"]) if "counter" in document else ()
     return Job(
         scene=scene,
-        method=tables.method_of(document["method"]),
+        method=tables.method_of(document["method"]) if "method" in document else Impact(),
         run=dataclasses.replace(_run(document["run"], path), sources=sources, counters=counters),
         text=text,
         source=_start_of(document),

@@ -5,17 +5,13 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from ..common import interrupt
 from ..errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
-
-if TYPE_CHECKING:
-    from ..run.options import RunOptions
-    from ..scene_file import Job
 
 # Behind the reason why a run has stopped.
 _COMPILED = ", after a compilation that was under way"
@@ -65,6 +61,7 @@ def run(  # noqa: PLR0913  one argument an option
     # An exception in the middle of an import may be lost; nothing is open yet.
     with interrupt.at_once():
         from .. import scene_file as files
+        from ..authoring.file_run import check_outputs, named_alone
         from ..common.checks import duration
         from ..files import paths
         from ..run.simulation import carry_out
@@ -77,7 +74,7 @@ def run(  # noqa: PLR0913  one argument an option
     try:
         with interrupt.at_once():
             job = files.read(scene_file, plugins or ())
-            alone = _named_alone(job, trajectory=output, recording=recording, impacts=impacts)
+            alone = named_alone(job, trajectory=output, recording=recording, impacts=impacts)
             stored = scene_file.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
             target = paths.target_of("trajectory", output or stored)
             options = dataclasses.replace(
@@ -97,7 +94,10 @@ def run(  # noqa: PLR0913  one argument an option
                 shards=shards,
             )
             # Before particles are made and kernels compiled.
-            _check_outputs(job, options, alone)
+            allow = "overwrite it by naming it on the command line: {} --overwrite"
+            check_outputs(
+                job, options, alone, allow, {name: f"{option} {{}}" for name, option in files.OUTPUTS.items()}
+            )
             before, start = paths.identity(target), job.start()
             resumes = resume and paths.checkpoint_of(target).exists()
         try:
@@ -123,36 +123,6 @@ def run(  # noqa: PLR0913  one argument an option
     report("complete", target, wall_time=result.wall_time, compile_time=result.compile_time)
     if not (quiet or as_json):
         table(of_result(result, getattr(start, "volume", None)))
-
-
-def _named_alone(job: "Job", **given: Path | None) -> list[str]:
-    """The outputs that the scene file names and the command line does not, in the folder of the file."""
-    alone = [name for name, file in given.items() if file is None and getattr(job.run, name) is not None]
-    job.require_within(alone)
-    return alone
-
-
-def _check_outputs(job: "Job", options: "RunOptions", alone: list[str]) -> None:
-    """Raise a SceneError if an output cannot be written, or may not be replaced.
-
-    What the scene file names alone is not overwritten: --overwrite is meant for files of the command line.
-    """
-    from ..files import marks, paths
-    from ..scene_file import OUTPUTS
-
-    paths.check_distinct({**options.files(), "recording": options.recording}, job.inputs())
-    begins = not options.resume or (options.overwrite and not paths.checkpoint_of(options.trajectory).exists())
-    for name, option in OUTPUTS.items():
-        file = getattr(options, name)
-        if file is None:
-            continue
-        if not begins and name != "recording":
-            paths.check_place(file, name)  # the session reads what is there
-        elif name in alone:
-            allow = f"overwrite it by naming it on the command line: {option} {file} --overwrite"
-            marks.check_target(file, False, name, allow)
-        else:
-            marks.check_target(file, options.overwrite, name)
 
 
 def _stopped(reason: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:

@@ -1,1 +1,24 @@
-"""A run: the loop over frames, its sessions, and the threads that advance it."""
+"""The run of a scene file, `swarm.run("scene.toml")`; and a package, the loop over frames.
+
+    swarm.run(path, output=None, *, plugins=(), **options) -> swarm.Result
+
+`path` is the scene file, `output` the trajectory to write, `plugins` the modules whose code the file may name, and
+`options` are keywords of `swarm.simulate` in place of the keys of [run]: `swarm.run("scene.toml", until=2.0)`.
+"""
+
+import sys
+from types import ModuleType
+from typing import Any
+
+
+class _Called(ModuleType):
+    """This package, which may be called: a function of its name would hide its modules, or be hidden by them."""
+
+    def __call__(self, path: Any, output: Any = None, *, plugins: Any = (), **options: Any) -> Any:
+        """Carry out the run of a scene file; see the function of `authoring.file_run`."""
+        from .engines import wing  # Numba only where something runs
+
+        return wing("authoring.file_run").run(path, output, plugins=plugins, **options)
+
+
+sys.modules[__name__].__class__ = _Called

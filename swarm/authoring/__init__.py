@@ -1,0 +1,1 @@
+"""From a scene file: its run in Python, what it will do, its schema, files to begin with, and the reference."""

@@ -1,0 +1,112 @@
+"""The run of a scene file, from Python and from the command line: its outputs, checked, and the call `swarm.run`."""
+
+import dataclasses
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..common.checks import closest, listed, path_of
+from ..errors import SceneError
+from ..files import marks, paths
+from ..run.options import RunOptions
+from ..run.result import Result
+from ..run.simulation import carry_out
+from ..scene_file import OUTPUTS, Job, read
+
+# Keywords of `simulate` that a scene file has as tables of its own.
+_TABLES = ("sources", "counters")
+# How Python names an output, for sentences.
+_IN_PYTHON = {"trajectory": "output={!r}", "recording": "recording={!r}", "impacts": "impacts={!r}"}
+
+
+def run(
+    path: str | os.PathLike[str],
+    output: str | os.PathLike[str] | None = None,
+    *,
+    plugins: Sequence[str] = (),
+    **options: Any,
+) -> Result:
+    """Carry out the run of a scene file, as `swarm run` does.
+
+    Args:
+        path: the scene file, TOML.
+        output: the trajectory to write; None: that which the file names in [run], or no file at all.
+        plugins: the modules whose code the file may name, as "module:Name": laws, surfaces, methods, observables.
+        options: keywords of `simulate`, such as until, every, threads or progress, in place of the keys of [run].
+
+    Returns:
+        A `Result`.
+
+    Raises:
+        SceneError: the file cannot be read, a key or an option is unknown or out of its range; nothing has run.
+        FileError, RunError, KeyboardInterrupt, WallTimeError: as of `simulate`.
+
+    Conserves: what the method of the file does, by default `Impact`.
+
+    >>> import pathlib, swarm, tempfile
+    >>> text = '''
+    ... [particles]
+    ... count = 10
+    ... speed = 1.0
+    ... [[surface]]
+    ... kind = "sphere"
+    ... radius = 0.5
+    ... [run]
+    ... until = 1.0
+    ... every = 0.5
+    ... '''
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "scene.toml"
+    ...     _ = file.write_text(text)
+    ...     result = swarm.run(file, until=2.0)
+    >>> result.observables["time"]
+    array([0. , 0.5, 1. , 1.5, 2. ])
+    """
+    known = [one.name for one in dataclasses.fields(RunOptions) if one.name not in (*_TABLES, "trajectory")]
+    for name in options:
+        if name not in known:
+            more = "; the trajectory is the argument output" * (name == "trajectory")
+            raise SceneError(f"{name}: unknown option, expected {listed(known)}{more or closest(name, known)}")
+    job = read(path_of("path", path), plugins)
+    given: dict[str, Any] = {"scene_text": job.text, **options}
+    if output is not None:
+        given["trajectory"] = paths.target_of("trajectory", output)
+    elif job.run.trajectory is None and not given.get("resume"):
+        # Nothing is written: nothing to go on with.
+        given.setdefault("checkpoint", None)
+    chosen = dataclasses.replace(job.run, **given)
+    alone = named_alone(job, trajectory=output, recording=options.get("recording"), impacts=options.get("impacts"))
+    check_outputs(job, chosen, alone, "overwrite it by naming it in Python: {}, overwrite=True", _IN_PYTHON)
+    try:
+        return carry_out(job.scene, job.start(), job.method, chosen)
+    except SceneError as error:
+        raise job.located(error) from None
+
+
+def named_alone(job: Job, **given: Any) -> list[str]:
+    """The outputs that the scene file names and the caller does not, in the folder of the file."""
+    alone = [name for name, file in given.items() if file is None and getattr(job.run, name) is not None]
+    job.require_within(alone)
+    return alone
+
+
+def check_outputs(job: Job, options: RunOptions, alone: list[str], allow: str, named: dict[str, str]) -> None:
+    """Raise a SceneError if an output cannot be written, or may not be replaced.
+
+    What the scene file names alone is not overwritten: the option to overwrite is meant for files of the caller. The
+    sentence says how these are `allow`ed, with the name of an output as the caller gives it, of `named`.
+    """
+    paths.check_distinct({**options.files(), "recording": options.recording}, job.inputs())
+    going_on = options.trajectory is not None and paths.checkpoint_of(options.trajectory).exists()
+    begins = not options.resume or (options.overwrite and not going_on)
+    for name in OUTPUTS:
+        file: Path | None = getattr(options, name)
+        if file is None:
+            continue
+        if not begins and name != "recording":
+            paths.check_place(file, name)  # the session reads what is there
+        elif name in alone:
+            marks.check_target(file, False, name, allow.format(named[name].format(str(file))))
+        else:
+            marks.check_target(file, options.overwrite, name)
