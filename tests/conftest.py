@@ -26,7 +26,7 @@ from numba.core.config import _OptLevel
 import swarm
 from swarm.contact import reflection
 from swarm.contact.regularisation import Hertz, Linear, regularisation
-from swarm.kernel import cache
+from swarm.kernel import machine_code
 from swarm.kernel.jit import inlined
 from swarm.kernel.vector import Vec, vec
 from swarm.run import tiers
@@ -400,4 +400,4 @@ def edited(path):
 def compiled(function):
     """A function as a kernel of its own, which is kept in no cache."""
     helper = types.FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
-    return numba.njit(error_model="numpy")(cache.calling(inlined(helper)))
+    return numba.njit(error_model="numpy")(machine_code.calling(inlined(helper)))

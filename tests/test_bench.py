@@ -15,7 +15,7 @@ import pytest
 from children import python
 
 from bench import bars, collisions, compare, compiling, reference, report
-from swarm.kernel import cache
+from swarm.kernel import machine_code
 
 pytestmark = pytest.mark.physics
 
@@ -339,7 +339,7 @@ def test_compile_meets_every_kernel_of_a_longer_run(name):
     case = compiling.CASES[name]
 
     def kernels():
-        return {(kernel.__name__, kinds) for kernel in cache._kernels for kinds in kernel.overloads}
+        return {(kernel.__name__, kinds) for kernel in machine_code._kernels for kinds in kernel.overloads}
 
     compiling.call(case, time.process_time())
     met = kernels()

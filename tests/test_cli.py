@@ -278,12 +278,25 @@ main()
 """
 
 
-@pytest.mark.parametrize("name", ["typer", "numpy", "numba", "msgspec", "swarm.run.simulation"])
-def test_an_interrupt_in_an_import_is_one_word(folder, name):
-    done = subprocess.run(
-        [sys.executable, "-c", INTERRUPTED.format(name=name), "run", "scene.toml"],
+def interrupted(folder, name):
+    """A run that is interrupted where it imports a module."""
+    return subprocess.run(
+        [sys.executable, "-c", INTERRUPTED.format(name=name), "run", "scene.toml", "--compile", "always"],
         cwd=folder, capture_output=True, text=True, timeout=600,
     )  # fmt: skip
+
+
+@compiled_only
+def test_an_interrupt_in_the_import_of_the_compiler_is_one_of_the_run(folder):
+    done = interrupted(folder, "numba")
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr.startswith("interrupted: scene.h5 holds the frames that were finished; resume with")
+    assert command("run", "scene.toml", "--resume", "--quiet", cwd=folder).returncode == 0
+
+
+@pytest.mark.parametrize("name", ["typer", "numpy", "msgspec", "swarm.run.simulation"])
+def test_an_interrupt_in_an_import_is_one_word(folder, name):
+    done = interrupted(folder, name)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
     assert [path.name for path in folder.iterdir()] == ["scene.toml"]
 

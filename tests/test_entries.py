@@ -9,7 +9,7 @@ import pytest
 from children import python
 
 import swarm
-from swarm.kernel import cache, jit
+from swarm.kernel import cache, jit, machine_code
 from swarm.kernel.entries import key_of
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import Vec
@@ -125,7 +125,7 @@ def with_a_helper(x):
 @compiled_only
 def test_a_kernel_of_the_users_with_another_helper_is_compiled(tmp_path, monkeypatch):
     """Numba looks at the file of the kernel alone."""
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     found = []
     for one, value in ((shifted, 4.0), (shifted, 4.0), (doubled, 6.0)):
         monkeypatch.setitem(globals(), "helper", jit.inlined(one))
@@ -144,7 +144,7 @@ def phi_of(surface, r):
 
 @compiled_only
 def test_a_cell_that_is_run_again_compiles_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     found = []
     for old, new, value in (("", "", 1.5), ("", "", 1.5), ("FACTOR = 2.0", "FACTOR = 3.0", 2.5), ("", "", 1.5)):
         kernel, surface = jit.kernel(phi_of), cell(old, new)["Mine"](0.5)
@@ -170,7 +170,7 @@ def twice_the_radius(surface):
 @compiled_only
 def test_what_is_never_found_is_not_written(tmp_path, monkeypatch):
     """Each start would add a file."""
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     kernel, surface = jit.kernel(twice_the_radius), cell()["Mine"](0.5)
     assert kernel(surface) == 1.0
     assert cache.is_compiled(kernel, (surface,))

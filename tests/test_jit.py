@@ -19,7 +19,7 @@ from numba.core.errors import TypingError
 
 import swarm
 from swarm.compiled_scene import MOST_WALLS
-from swarm.kernel import arrays, cache
+from swarm.kernel import arrays, cache, machine_code
 from swarm.kernel import jit as _jit
 from swarm.kernel.arrays import kept
 from swarm.kernel.compilers import _DEEPEST, deep
@@ -309,7 +309,7 @@ def test_only_kernels_become_machine_code(monkeypatch, tmp_path):
     for step in ("_optimize_final_module", "_finalize_specific"):
         numbas = getattr(JITCodeLibrary, step)
         monkeypatch.setattr(JITCodeLibrary, step, lambda self, numbas=numbas: made.append(self.name) or numbas(self))
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     assert _jit.kernel(one_more_quarter)(1.0) == 1.25
     assert made == ["one_more_quarter"] * 2
 
@@ -334,7 +334,7 @@ def calls_python(x):
 @pytest.mark.filterwarnings("ignore:Code running in object mode:numba.core.errors.NumbaWarning")
 def test_a_helper_may_call_python(monkeypatch, tmp_path):
     """Numba looks for the objects of a helper beside its machine code, which it has in the kernel only."""
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     assert _jit.kernel(calls_python)(1.0) == 2.0
 
 
@@ -364,14 +364,14 @@ def limit_of_a_script():
 @compiled_only
 def test_the_deepest_fold_of_the_most_walls_compiles(limit_of_a_script, monkeypatch, tmp_path):
     """24 walls nest 1500 frames of the compiler; a script has 1000."""
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     walls = swarm.Scene(in_all_directions(MOST_WALLS)).compiled().walls()
     assert not _jit.kernel(takes_steps)(walls, Vec(0.0, 0.0, 0.0))
 
 
 @compiled_only
 def test_a_compilation_that_fails_gives_the_limit_back(limit_of_a_script, monkeypatch, tmp_path):
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     with pytest.raises(TypingError):
         _jit.kernel(cannot_be_compiled)(1.0)
 
@@ -445,7 +445,7 @@ def one_more(x):
 
 @compiled_only
 def test_compilations_are_reported_and_cached_kernels_are_not(tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     sentences = []
     with caplog.at_level("INFO", "swarm"), cache.kernels_compiled(sentences.append) as spent:
         first = _jit.kernel(one_more)
@@ -466,7 +466,7 @@ def test_no_kernel_waits_for_scipy():
     """Numba imports it before its first kernel, for products of matrices; a kernel that has them finds it still."""
     code = """
 import sys, numba, numpy as np
-from swarm import observables
+from swarm.kernel import machine_code
 assert "scipy.linalg" not in sys.modules
 numba.njit(lambda x: x + 1.0)(1.0)
 assert "scipy.linalg" not in sys.modules

@@ -13,7 +13,7 @@ from children import python
 
 import swarm
 from swarm.grains import step
-from swarm.kernel import cache, digest, entries, frozen
+from swarm.kernel import digest, entries, frozen, machine_code
 from swarm.kernel.entries import key_of
 from swarm.kernel.frozen import Frozen
 from swarm.kernel.trace import calls
@@ -177,7 +177,7 @@ sys.path.insert(0, {root!r})
 import numpy as np
 import swarm
 from swarm import observables
-from swarm.kernel import cache
+from swarm.kernel import cache, machine_code
 logging.basicConfig(level="INFO", format="%(message)s")
 with cache.kernels_compiled(lambda sentence: None):
     from swarm.run.engine import Run
@@ -262,10 +262,10 @@ def test_where_nothing_can_be_written_the_key_is_the_same(cavity, tmp_path, monk
 
 def test_the_user_sets_the_folder(monkeypatch, tmp_path):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "numba"))
-    assert cache.cache_folder().parent == tmp_path / "numba"
+    assert machine_code.cache_folder().parent == tmp_path / "numba"
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert cache.cache_folder().parent == tmp_path / "xdg" / "swarm"
+    assert machine_code.cache_folder().parent == tmp_path / "xdg" / "swarm"
 
 
 def one_more(x):
@@ -276,7 +276,7 @@ def one_more(x):
 def test_each_level_of_optimisation_has_its_own_kernels(monkeypatch, tmp_path):
     from swarm.kernel.jit import kernel
 
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     found = []
     for level in ("3", "0", "3"):
         monkeypatch.setattr(numba.config, "OPT", numba.config._OptLevel(level))

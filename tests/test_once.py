@@ -12,14 +12,14 @@ import pytest
 from numba import types
 from numba.core.errors import TypingError
 
-from swarm.kernel import cache, once
+from swarm.kernel import cache, machine_code, once
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT is set: nothing compiles")
 
 PROCESS = """
 import sys, time
 from numba.core import caching, event
-from swarm.kernel import cache
+from swarm.kernel import cache, machine_code
 
 class Slowly(event.Listener):
     def on_start(self, compiled):
@@ -37,7 +37,7 @@ caching.IndexDataCacheFile._save_index = late
 sys.path.insert(0, sys.argv[1])
 from twice import twice
 
-kernel = cache.cached(twice, {})
+kernel = machine_code.cached(twice, {})
 argument = {"int": 3, "float": 1.5}[sys.argv[2]]
 print("ready", flush=True)
 sys.stdin.readline()
@@ -98,11 +98,11 @@ def test_of_processes_that_start_together_one_compiles(tmp_path, monkeypatch):
     assert counts[0] == 1
     assert sorted(counts[1:]) == [0, 1]
     # Both entries are there, each with its file, and no lock is left.
-    monkeypatch.setattr(cache, "_folder", cache.cache_folder)
+    monkeypatch.setattr(machine_code, "_folder", machine_code.cache_folder)
     monkeypatch.syspath_prepend(tmp_path)
     import twice as module
 
-    kernel = cache.cached(module.twice, {})
+    kernel = machine_code.cached(module.twice, {})
     assert cache.is_compiled(kernel, (3,))
     assert cache.is_compiled(kernel, (1.5,))
     assert not cache.is_compiled(kernel, (1j,))
@@ -113,35 +113,35 @@ def test_of_processes_that_start_together_one_compiles(tmp_path, monkeypatch):
 @compiled_only
 def test_an_entry_without_its_file_is_not_compiled(tmp_path, monkeypatch):
     """A kill may come between the two."""
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
-    kernel = cache.cached(twice, {})
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    kernel = machine_code.cached(twice, {})
     assert kernel(3) == 6
     for path in tmp_path.rglob("*.nbc"):
         path.unlink()
-    assert not cache.is_compiled(cache.cached(twice, {}), (3,))
+    assert not cache.is_compiled(machine_code.cached(twice, {}), (3,))
 
 
 @compiled_only
 def test_a_compilation_that_fails_gives_its_lock_back(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
-    kernel = cache.cached(wrong, {})
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    kernel = machine_code.cached(wrong, {})
     for _ in range(2):
         with pytest.raises(TypingError):
             kernel(3)
-        assert not is_held(cache._lock_of(kernel, (types.int64,)))
+        assert not is_held(machine_code._lock_of(kernel, (types.int64,)))
 
 
 @compiled_only
 @pytest.mark.parametrize("failing", ["save_overload", "lock"])
 def test_a_disk_that_takes_nothing_costs_time_alone(tmp_path, monkeypatch, failing):
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
-    kernel = cache.cached(twice, {})
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    kernel = machine_code.cached(twice, {})
 
     def full(*_args):
         raise OSError(28, "No space left on device")
 
     if failing == "lock":
-        monkeypatch.setattr(cache, "_LOCK", "/no such folder/lock")
+        monkeypatch.setattr(machine_code, "_LOCK", "/no such folder/lock")
     else:
         monkeypatch.setattr(kernel._cache._cache_file, "save", full)
     assert kernel(3) == 6

@@ -146,7 +146,7 @@ def test_functions_of_a_library_are_called_in_one_tier_only(surface, method, sam
 
 FOUND = """
 import logging, swarm
-from swarm.kernel import cache
+from swarm.kernel import cache, machine_code
 from swarm.run.engine import Run
 found, real = [], cache.is_compiled
 cache.is_compiled = lambda *call: found.append(real(*call)) or found[-1]
@@ -171,6 +171,30 @@ def test_kernels_of_another_process_are_found(tmp_path):
         1: ("[False, False, True, False]", True),
         2: ("[True, True]", False),
     }
+
+
+WITHOUT_A_COMPILER = """
+import hashlib, sys, swarm
+from swarm.run import tiers
+tiers._BEFORE_COMPILER = {seconds}
+scene = swarm.Scene([swarm.Sphere(0.5)], gravity=(0.0, 0.0, -1.0))
+result = swarm.simulate(scene, swarm.fill(scene, 20, speed=1.0), swarm.Impact(), until=2.0, every=0.1)
+print(hashlib.sha256(result.particles.position.tobytes()).hexdigest())
+print(any(name in sys.modules for name in ("numba", "llvmlite")))
+"""
+
+
+@compiled_only
+def test_a_run_of_few_particles_imports_no_compiler(tmp_path):
+    """The compiler is imported after a time of plain Python, here 0 s, some of the run or more than all of it."""
+    found = [
+        python("-c", WITHOUT_A_COMPILER.format(seconds=seconds), env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
+        for seconds in (0.0, 0.02, 1e3)
+    ]
+    assert [done.stderr for done in found] == ["", "", ""]
+    digests, imports = zip(*(done.stdout.split() for done in found), strict=True)
+    assert len(set(digests)) == 1
+    assert imports == ("True", "True", "False")
 
 
 def test_another_word_is_refused():

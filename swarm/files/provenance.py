@@ -4,6 +4,7 @@ import datetime
 import os
 import platform
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +27,6 @@ class Course(NamedTuple):
 def makers() -> dict[str, str]:
     """What makes a trajectory, and when, for the attributes of h5md/creator."""
     import h5py
-    import numba
     import numpy
 
     return {
@@ -34,7 +34,7 @@ def makers() -> dict[str, str]:
         "version": VERSION,
         "python": platform.python_version(),
         "numpy": numpy.__version__,
-        "numba": numba.__version__,
+        "numba": version("numba"),
         "hdf5": h5py.version.hdf5_version,
         "machine": f"{_processor()}, {os.cpu_count()} logical cores, {platform.system()}",
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),

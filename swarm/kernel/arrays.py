@@ -1,25 +1,16 @@
 """Operations of kernels beyond Python, on arrays and their elements: arrays of their own, rows, indices, tickets.
 
-Each is an operation of the compiler with the same definition in plain Python.
+Each is an operation of the compiler, by `emission/arrays.py`, with the same definition in plain Python.
 """
 
-import functools
-import math
 import threading
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from llvmlite.ir import Constant
-from llvmlite.ir.instructions import InsertValue
-from numba import types
-from numba.core import cgutils
-from numba.core.imputils import impl_ret_borrowed
-from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
-from .trace.calls import INTRINSIC, operation
+from .deferred import defer
 
 
 def spaced(stride: int) -> Callable[[Any], Any]:
@@ -33,18 +24,7 @@ def spaced(stride: int) -> Callable[[Any], Any]:
     def known(tables: Any) -> Any:
         return tables
 
-    @operation(known, lambda tables: tables, types.BaseNamedTuple)
-    def _emit_tables(context, builder, signature, args):
-        (tables,) = args
-        columns, item = (context.get_constant(types.intp, k) for k in (stride, np.dtype(float).itemsize))
-        for k, kind in enumerate(signature.args[0]):
-            if isinstance(kind, types.Array) and kind.ndim == 2:
-                table = context.make_array(kind)(context, builder, builder.extract_value(tables, k))
-                table.shape = cgutils.pack_array(builder, [builder.extract_value(table.shape, 0), columns])
-                table.strides = cgutils.pack_array(builder, [builder.mul(columns, item), item])
-                tables = builder.insert_value(tables, table._getvalue(), k)
-        return impl_ret_borrowed(context, builder, signature.return_type, tables)
-
+    defer(lambda machine_code: machine_code.emit_spaced(known, stride))
     return known
 
 
@@ -64,47 +44,6 @@ def unwritten(shape: Any, dtype: Any) -> Any:
     return np.zeros(shape, dtype)
 
 
-def _type_of_scratch(shape, dtype):
-    return types.Array(dtype.dtype, len(shape) if isinstance(shape, types.BaseTuple) else 1, "C")
-
-
-def _part(builder: Any, made: Any, k: int) -> Any:
-    """A part of a tuple, as the constant that it was made of where it is one."""
-    while isinstance(made, InsertValue):
-        if made.indices == [k]:
-            return made.value
-        made = made.aggregate
-    return builder.extract_value(made, k)
-
-
-def _on_stack(zeros: bool, context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    kind, asked = signature.return_type, signature.args[0]
-    shape = [_part(builder, args[0], k) for k in range(len(asked))] if isinstance(asked, types.BaseTuple) else [args[0]]
-    number = context.get_data_type(kind.dtype)
-    item = context.get_constant(types.intp, context.get_abi_sizeof(number))
-    if all(isinstance(one, Constant) for one in shape):
-        # Where a function begins: what a loop asks for in each of its rounds is the same.
-        size = context.get_constant(types.intp, math.prod(one.constant for one in shape))
-        with builder.goto_entry_block():
-            data = builder.alloca(number, size)
-    else:
-        size = functools.reduce(builder.mul, shape)
-        data = builder.alloca(number, size)
-    if zeros:
-        cgutils.memset(builder, data, builder.mul(size, item), 0)
-    strides = [item]
-    for columns in reversed(shape[1:]):
-        strides.insert(0, builder.mul(columns, strides[0]))
-    table = context.make_array(kind)(context, builder)
-    populate_array(table, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
-    return table._getvalue()
-
-
-INTRINSIC.update((scratch, unwritten))
-operation(scratch, _type_of_scratch, types.Any, types.Any)(functools.partial(_on_stack, True))
-operation(unwritten, _type_of_scratch, types.Any, types.Any)(functools.partial(_on_stack, False))
-
-
 def copy_row(target: Any, i: Any, source: Any, m: Any, count: Any) -> None:
     """target[i, :count] = source[m, :count], of tables in C order.
 
@@ -112,21 +51,6 @@ def copy_row(target: Any, i: Any, source: Any, m: Any, count: Any) -> None:
     take AMD processors some 20 cycles each.
     """
     target[int(i), :count] = source[int(m), :count]
-
-
-@operation(
-    copy_row, lambda target, i, source, m, count: types.none, types.Array, types.Any, types.Array, types.Any, types.Any
-)
-def _emit_copy_row(context, builder, signature, args):
-    places = []
-    for k in (0, 2):
-        table = context.make_array(signature.args[k])(context, builder, args[k])
-        row = context.cast(builder, args[k + 1], signature.args[k + 1], types.intp)
-        columns = builder.extract_value(table.shape, 1)
-        places.append(builder.gep(table.data, [builder.mul(row, columns)]))
-    count = context.cast(builder, args[4], signature.args[4], types.intp)
-    cgutils.raw_memcpy(builder, places[0], places[1], count, 8)
-    return context.get_dummy_value()
 
 
 _TAKING = threading.Lock()
@@ -139,27 +63,8 @@ def next_of(ticket: Any) -> int:
         return int(ticket[0]) - 1
 
 
-@operation(next_of, lambda ticket: types.int64, types.Array)
-def _emit_next(context, builder, signature, args):
-    counter = context.make_array(signature.args[0])(context, builder, args[0]).data
-    return builder.atomic_rmw("add", counter, context.get_constant(types.int64, 1), "monotonic")
-
-
 def fetch(row: Any, i: Any) -> None:
     """Ask for the line of the cache that holds row[i], which is needed soon; the index may be of any place."""
-
-
-@operation(fetch, lambda row, i: types.none, types.Array, types.Any)
-def _emit_fetch(context, builder, signature, args):
-    data = context.make_array(signature.args[0])(context, builder, args[0]).data
-    place = builder.gep(data, [context.cast(builder, args[1], signature.args[1], types.intp)])
-    place = builder.bitcast(place, cgutils.voidptr_t)
-    number, pointer = ir.IntType(32), cgutils.voidptr_t
-    kind = ir.FunctionType(ir.VoidType(), [pointer, number, number, number])
-    ask = builder.module.declare_intrinsic("llvm.prefetch", [pointer], kind)
-    # To read, of use for long, data
-    builder.call(ask, [place, number(0), number(3), number(1)])
-    return context.get_dummy_value()
 
 
 def aligned_copy(values: NDArray[Any]) -> NDArray[Any]:
@@ -187,11 +92,6 @@ def index(value: Any) -> Any:
     nothing that may count from the end (in a box that is carried along 29 instead of 9.5 ns an impact).
     """
     return value
-
-
-@operation(index, lambda value: types.uintp, types.Any)
-def _emit_index(context, builder, signature, args):
-    return context.cast(builder, *args, *signature.args, signature.return_type)
 
 
 def kept(value):

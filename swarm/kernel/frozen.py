@@ -15,18 +15,17 @@ import os
 import sys
 import types
 from collections.abc import Callable, Iterator
+from importlib.metadata import version
 from typing import Any
 
-import numba
 import numpy as np
 
 Function = Callable[..., Any]
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), range)
 # Modules that are known by their version; any other is known by what the function takes from it.
 _PYTHON = ".".join(map(str, sys.version_info[:3]))
-_VERSIONS = {
-    **dict.fromkeys(sys.stdlib_module_names, _PYTHON), "numpy": np.__version__, "numba": numba.__version__,
-}  # fmt: skip
+_VERSIONS = {**dict.fromkeys(sys.stdlib_module_names, _PYTHON), "numpy": np.__version__}
+_KNOWN = {*_VERSIONS, "numba"}
 _PACKAGE, _TRACER = __name__.partition(".")[0], __name__.rpartition(".")[0]
 _CODE = operator.attrgetter(
     "co_code", "co_exceptiontable", "co_flags", "co_names", "co_varnames", "co_freevars", "co_cellvars", "co_argcount",
@@ -43,6 +42,11 @@ _NAMED_TUPLES = ("collections", "namedtuple_")
 _ONE: Any = collections.namedtuple("_ONE", "field")
 # Fields and slots of a class, which are in its `_fields`.
 _DESCRIPTORS = (types.MemberDescriptorType, types.GetSetDescriptorType, type(_ONE.field))
+
+
+def _version_of(root: str) -> str:
+    """The version of a top module, or nothing of this package."""
+    return version(root) if root == "numba" else _VERSIONS.get(root, "")
 
 
 class Frozen:
@@ -125,7 +129,7 @@ class Frozen:
         elif isinstance(value, type) and (issubclass(value, tuple) or value in _DISPATCHED):
             self._class(value)
         elif self._is_by_name(value):
-            self.add("known", _root(value), getattr(value, "__name__", repr(value)), _VERSIONS.get(_root(value), ""))
+            self.add("known", _root(value), getattr(value, "__name__", repr(value)), _version_of(_root(value)))
         elif isinstance(getattr(value, "py_func", value), types.FunctionType):
             return self.function(value)
         elif isinstance(value, types.ModuleType) and code is not None:
@@ -167,7 +171,7 @@ class Frozen:
 
         The folder of the cache is named by the code of the tracer and of what it works with.
         """
-        if _root(value) in _VERSIONS:
+        if _root(value) in _KNOWN:
             return True
         return _root(value) == _PACKAGE and (self._package is None or _module_of(value).startswith(_TRACER))
 

@@ -1,95 +1,98 @@
-"""The one place for the compiler's flags: kernels, and functions of their own in them.
+"""Kernels, and functions of their own in them, as modules declare them; `machine_code.py` makes machine code of them.
 
 A kernel is a plain function, and whatever it calls is traced into it: functions and methods of records, from the same
-definitions that plain Python runs.
+definitions that plain Python runs. Nothing here imports the compiler.
 """
 
-import importlib
-import importlib.util
+import functools
 from collections.abc import Callable
-from types import FunctionType
 from typing import Any, TypeVar
 
 import numpy as np
-from numba.np import linalg as blas
 from numpy.typing import NDArray
 
 from . import cache
-from .compilers import KernelCompiler, LongKernelCompiler, PartCompiler
-from .trace import calls
-from .trace.helpers import leaving, prepare
-from .trace.ways import select as select
+from .deferred import compiler, defer
 
 Array = NDArray[np.generic]
 F = TypeVar("F", bound=Callable[..., Any])
 
-# Strict IEEE arithmetic: `fastmath` would let the compiler reorder sums, and with them the energy balance.
-# The NumPy error model makes 1/0 an infinity; Python's would put a branch before every division, and a
-# branch in the lane loop costs its vectorisation.
-# Without reference counts: each array that a NamedTuple hands on counts as taken and given back, by an atomic
-# instruction that two threads do for the same arrays. They were 100 of the 140 ns of a particle that flies freely
-# through a frame, and a third of what there is to compile. So kernels make no arrays but `scratch`.
-_FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
-# C calls no kernel.
-_KERNEL: Any = {"no_cfunc_wrapper": True, **_FLAGS}
-# Only kernels call helpers, and Python never their compiled form: no wrappers saves a fifth of the compile time.
-_OUTLINE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler, **_FLAGS}
-_INLINE: Any = {"forceinline": True, **_OUTLINE}
-# What of a user's functions cannot be traced.
-calls.leave = leaving({**_INLINE, "_nrt": True})
 
+def select(condition: Any, first: Any, second: Any) -> Any:
+    """`first if condition else second` without a branch; both are evaluated.
 
-def _find_scipy_only() -> None:
-    """Let Numba look whether SciPy is there, as it does before the first kernel, without importing its linear algebra.
-
-    The import is 0.1 of 0.8 s of every start where SciPy is installed, for products of matrices, which no kernel here
-    has. One that has them imports it as it always did.
+    Python's conditional expression compiles to a branch. LLVM usually turns it back into a select, but with three
+    surfaces its jump threading splits the paths first, and the lane loop is no longer vectorised (measured:
+    58 ns an impact instead of 17).
     """
-    ask: Any = blas.ensure_blas
-
-    def find() -> None:
-        if importlib.util.find_spec("scipy") is None:
-            raise ImportError
-
-    blas.ensure_blas = find
-    try:
-        importlib.import_module("numba.np.arraymath")
-    finally:
-        blas.ensure_blas = ask
+    return first if condition else second
 
 
-_find_scipy_only()
+class Kernel:
+    """A function that is compiled when it is first called.
+
+    Args:
+        function: what it computes, in plain Python.
+        is_long: whether it is many short loops, see `compilers.py`.
+
+    Attributes:
+        py_func: the function.
+    """
+
+    def __init__(self, function: Any, is_long: bool) -> None:
+        self.py_func, self.is_long = function, is_long
+        functools.update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """The result of the compiled function."""
+        return self.compiled(*arguments)
+
+    @functools.cached_property
+    def compiled(self) -> Any:
+        """Numba's dispatcher of it."""
+        return compiler().kernel_of(self)
+
+    def __getattr__(self, name: str) -> Any:
+        # What Numba's dispatcher has. Python and its tools ask for names with underscores of any object.
+        if name.startswith("__"):
+            raise AttributeError(f"a kernel has no attribute {name}")
+        return getattr(self.compiled, name)
+
+    def __reduce__(self) -> str:
+        return str(self.py_func.__qualname__)
 
 
 def kernel(function: F) -> F:
     """Compile a module-level function, without the GIL, cached on disk."""
-    return _kernel(function, KernelCompiler)
+    made: Any = function if cache.is_disabled() else Kernel(function, is_long=False)
+    return made  # type: ignore[no-any-return]
 
 
 def long_kernel(function: F) -> F:
     """`kernel` for what is not flights: many short loops, see `compilers.py`."""
-    return _kernel(function, LongKernelCompiler)
-
-
-def _kernel(function: F, compiler: Any) -> F:
-    if cache.is_disabled():
-        return function
-    # Numba keeps what it knows of a function by its identity: a kernel that is made again has one of its own.
-    traced = FunctionType(
-        function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
-    )
-    prepare(traced, _INLINE, outlined=False, is_kernel=True)
-    compiled: F = cache.cached(function, {**_KERNEL, "pipeline_class": compiler}, cache.calling(traced))
-    return compiled
+    made: Any = function if cache.is_disabled() else Kernel(function, is_long=True)
+    return made  # type: ignore[no-any-return]
 
 
 def outlined(function: F) -> F:
     """Keep a helper that is rare and long a function of its own in kernels: to inline it costs compile time."""
-    prepare(function, _OUTLINE, outlined=True)
-    return function
+    return _prepared(function, is_outlined=True)
 
 
 def inlined(function: F) -> F:
     """A helper that functions may call which Numba compiles because they cannot be traced: see `trace/helpers.py`."""
-    prepare(function, _INLINE, outlined=False)
+    return _prepared(function, is_outlined=False)
+
+
+def _prepared(function: F, is_outlined: bool) -> F:
+    if not cache.is_disabled():
+        defer(lambda machine_code: machine_code.prepare_helper(function, is_outlined))
+    return function
+
+
+def allocating(function: F, body: Any) -> F:
+    """A helper of the user's, which may make arrays; kernels call `body` in its place."""
+    if not cache.is_disabled():
+        function.in_kernels = body  # type: ignore[attr-defined]  # what the digest of its code is of
+        defer(lambda machine_code: machine_code.prepare_allocating(function, body))
     return function

@@ -3,14 +3,11 @@
 They are prepared for Numba too: a function that cannot be traced may use them.
 """
 
-import operator
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
 
 from .jit import Array, inlined, select
-from .trace.calls import operation
 
 # What a velocity is scaled by to restore its square is 1 within round-off, unless next to nothing is left of it.
 _NEAR = 1e-6
@@ -60,41 +57,6 @@ def vec(values: Any) -> Vec:
     """Three numbers, or the three rows of an array, as a vector."""
     x, y, z = values
     return Vec(x, y, z)
-
-
-def _is_vector(kind: Any) -> bool:
-    return isinstance(kind, types.BaseNamedTuple) and issubclass(kind.instance_class, Vec)  # type: ignore[attr-defined]
-
-
-_KIND = types.NamedUniTuple(types.float64, 3, Vec)
-
-
-def _emitted(symbol: Any, instruction: str, first: Any, second: Any) -> None:
-    """Let kernels do this operator component by component: no function of its own for the compiler.
-
-    As overloads of the operators they cost up to a tenth of the time to compile.
-    """
-    vectors = [kind is types.BaseNamedTuple for kind in (first, second)]
-
-    def typed(a, b):
-        good = (_is_vector(k) if v else isinstance(k, types.Float) for k, v in zip((a, b), vectors, strict=True))
-        return _KIND if all(good) else None
-
-    @operation(symbol, typed, first, second)
-    def _emit(context, builder, signature, args):
-        one, two = (
-            [builder.extract_value(arg, k) for k in range(3)] if v else 3 * [arg]
-            for arg, v in zip(args, vectors, strict=True)
-        )
-        parts = [getattr(builder, instruction)(*pair) for pair in zip(one, two, strict=True)]
-        return context.make_tuple(builder, signature.return_type, parts)
-
-
-_emitted(operator.add, "fadd", types.BaseNamedTuple, types.BaseNamedTuple)
-_emitted(operator.sub, "fsub", types.BaseNamedTuple, types.BaseNamedTuple)
-_emitted(operator.mul, "fmul", types.BaseNamedTuple, types.Float)
-_emitted(operator.mul, "fmul", types.Float, types.BaseNamedTuple)
-_emitted(operator.truediv, "fdiv", types.BaseNamedTuple, types.Float)
 
 
 @inlined

@@ -13,13 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel import cache
+from ..kernel import cache, deferred
 
 CHOICES = ("auto", "always", "never")
 # Seconds of plain Python, of all runs of a process with the same missing kernels, after which these are compiled.
 _PATIENCE = 1.0
 # In that time more particles than this have a few impacts each: nearly all of such a run is compiled anyway.
 _FEW = 2000
+# Seconds of plain Python before the compiler is imported, to see which kernels are there: as long as that takes.
+_BEFORE_COMPILER = 0.4
 # Seconds of plain Python so far in this process, by kind of kernel that was missing.
 _spent: dict[str, float] = {}
 _lock = threading.Lock()
@@ -42,12 +44,16 @@ class Tier:
         self.remaining = {"always": 0.0, "never": math.inf}.get(choice, patience)
         self.is_plain = self.remaining > 0.0
         self._missing: list[str] = []
+        self._spent = 0.0
 
     def choose(self, calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> None:
         """Choose the tier for the next calls, kernels and their arguments."""
         if self.remaining == math.inf:
             return
         self._missing = []
+        if self.remaining > 0.0 and self._spent < _BEFORE_COMPILER and not deferred.is_loaded():
+            self.is_plain = True
+            return
         if self.remaining > 0.0:
             self._missing = [cache.kind(*call) for call in calls if not cache.is_compiled(*call)]
             self.remaining = min(self.remaining, _PATIENCE - spent(self._missing))
@@ -56,6 +62,7 @@ class Tier:
     def spend(self, seconds: float) -> None:
         """Count a time [s] that the kernels of this tier took."""
         self.remaining -= seconds
+        self._spent += seconds
         if self.is_plain:
             with _lock:
                 for kind in self._missing:

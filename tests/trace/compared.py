@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numba.extending import overload
 
-from swarm.kernel import cache
 from swarm.kernel import jit as _jit
+from swarm.kernel import machine_code
 from swarm.kernel.trace import helpers
 
 compiled_only = pytest.mark.skipif(
@@ -52,7 +52,7 @@ def in_kernel(function, outlined=False):
     """A function as a helper of a compiled function; it must be traced."""
     helper = copied(function)
     (_jit.outlined if outlined else _jit.inlined)(helper)
-    compiled = numba.njit(**FLAGS)(cache.calling(helper))
+    compiled = numba.njit(**FLAGS)(machine_code.calling(helper))
 
     def called(*arguments):
         helpers.left_to_numba.clear()
@@ -71,7 +71,7 @@ def by_numba(function):
 def left_to_numba(function):
     """A function that kernels call, which Numba compiles, without a trace."""
     helper = copied(function)
-    overload(helper, strict=False, jit_options=_jit._INLINE)(lambda *_: function)
+    overload(helper, strict=False, jit_options=machine_code._INLINE)(lambda *_: function)
     return helper
 
 

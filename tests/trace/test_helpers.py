@@ -11,7 +11,7 @@ from conftest import METHODS, every_surface, scene_of
 from numba.core.errors import TypingError
 
 import swarm
-from swarm.kernel import cache, jit
+from swarm.kernel import jit, machine_code
 from swarm.kernel.compilers import deep
 from swarm.kernel.trace import helpers
 from swarm.run.engine import Run
@@ -109,7 +109,7 @@ def test_what_cannot_be_traced_is_compiled_by_numba(function, decorator, left):
     def calls(a):
         return helper(a)
 
-    direct = numba.njit(**FLAGS)(cache.calling(jit.inlined(calls)))
+    direct = numba.njit(**FLAGS)(machine_code.calling(jit.inlined(calls)))
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert bits(direct(2.0)) == bits(expected(function))
@@ -140,7 +140,7 @@ def test_nothing_stays_of_a_trace_that_was_given_up(left):
         return inner(row)
 
     row = np.zeros(2)
-    assert numba.njit(**FLAGS)(cache.calling(jit.inlined(calls)))(row) == 2.0
+    assert numba.njit(**FLAGS)(machine_code.calling(jit.inlined(calls)))(row) == 2.0
     assert row.tolist() == [1.0, 1.0]
     assert f"{__name__}.writes_and_gives_up" in left
 
@@ -163,7 +163,7 @@ NEITHER = [
 def test_what_neither_can_do_is_reported_in_one_sentence(function, sentence, left):
     helper = jit.inlined(copied(function))
     with pytest.raises(TypingError):
-        numba.njit(**FLAGS)(cache.calling(helper))(1.0)
+        numba.njit(**FLAGS)(machine_code.calling(helper))(1.0)
     (reason,) = left.values()
     assert "\n" not in reason
     assert sentence in reason
@@ -171,14 +171,14 @@ def test_what_neither_can_do_is_reported_in_one_sentence(function, sentence, lef
 
 
 def test_a_kernel_that_cannot_be_traced_is_compiled(tmp_path, monkeypatch, left):
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     assert jit.kernel(loop_with_else)(1.0) == 3.0
     assert f"{__name__}.loop_with_else" in left
 
 
 def test_an_integer_that_no_kernel_holds(left):
     helper = jit.inlined(copied(of_large_numbers))
-    assert numba.njit(**FLAGS)(cache.calling(helper))(np.uint64(3)) == 3
+    assert numba.njit(**FLAGS)(machine_code.calling(helper))(np.uint64(3)) == 3
     assert "more than 64 bits" in left[f"{__name__}.of_large_numbers"]
 
 
@@ -198,7 +198,7 @@ def test_no_warning_while_a_trace_does_what_is_known(left):
 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert np.isnan(numba.njit(**FLAGS)(cache.calling(of_constants))(1.0))
+        assert np.isnan(numba.njit(**FLAGS)(machine_code.calling(of_constants))(1.0))
     assert left == {}
 
 
@@ -214,7 +214,7 @@ def test_threads_trace_at_the_same_time():
                 total = total + k
             return total
 
-        return numba.njit(**FLAGS)(cache.calling(counted))
+        return numba.njit(**FLAGS)(machine_code.calling(counted))
 
     compiled, results = [made(k) for k in range(4)], {}
     threads = [

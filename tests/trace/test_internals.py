@@ -20,7 +20,7 @@ from numba_internals import ALL
 from test_helpers import loop_with_else
 
 import swarm
-from swarm.kernel import cache, compilers, jit
+from swarm.kernel import compilers, jit, machine_code
 
 pytestmark = compiled_only
 PACKAGE = Path(swarm.__file__).parent
@@ -215,7 +215,7 @@ def a_kernel(x):
 
 def test_numba_asks_a_kernel_to_optimise_its_functions(monkeypatch, tmp_path):
     """And each of the hooks of `compilers.py` is called."""
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     asked = []
     ours = compilers._Kernel._optimize_functions
 
@@ -231,7 +231,7 @@ def test_numba_asks_a_kernel_to_optimise_its_functions(monkeypatch, tmp_path):
 
 
 def test_what_numba_compiles_of_a_helper_is_no_machine_code(monkeypatch, tmp_path):
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     made = []
     for step in ("_optimize_final_module", "_finalize_final_module", "get_pointer_to_function"):
         ours = getattr(compilers._Part, step)

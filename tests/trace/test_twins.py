@@ -199,6 +199,7 @@ def test_a_function_without_source():
     """As of `python -c` and of an interactive session."""
     code = textwrap.dedent("""
         import numba
+        from swarm.kernel import machine_code
         from swarm.kernel.jit import inlined
         from swarm.kernel.trace import helpers
         @inlined

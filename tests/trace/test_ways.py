@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from swarm.kernel import cache, jit
+from swarm.kernel import jit, machine_code
 from swarm.kernel.arrays import scratch
 from swarm.kernel.jit import inlined, outlined
 from swarm.kernel.trace import helpers
@@ -135,7 +135,7 @@ LEFT = (has_no_value_on_one_way, asks_for_a_class, has_an_else_of_a_loop)
 
 @pytest.mark.parametrize("function", [*TRACED, *LEFT], ids=lambda function: function.__name__)
 def test_kernels_do_what_python_does(function, monkeypatch, tmp_path):
-    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     monkeypatch.setattr(helpers, "left_to_numba", {})
     kernel = jit.kernel(function)
     for x in ((0.5, 1.5, 2.5), (1.5, -0.5, 1.0), (-1.0, 2.0, 0.0), (0.0, -0.0, 3.0)):

@@ -14,11 +14,12 @@ from numba.core.dispatcher import Dispatcher
 from numba.extending import lower_builtin, type_callable
 
 from ..entries import is_own
+from ..jit import Kernel, select
 from .frame import CallFrame, Range
 from .notes import taken
 from .twins import twin_of
 from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted
-from .ways import select, traced_select, unified
+from .ways import traced_select, unified
 
 # Functions that are operations of a kernel, see `noted`, by themselves where all that they are given is known.
 OPERATIONS: set[Any] = {
@@ -94,6 +95,8 @@ def operation(function: Any, typed: Callable[..., Any], *kinds: Any) -> Any:
 
 def called(function: Any, /, *given: Any, **named: Any) -> Any:
     """A call while a helper is traced."""
+    if isinstance(function, Kernel):
+        function = function.compiled
     if isinstance(function, python_types.MethodType):
         # Before it is looked up: a method of a record may be outlined.
         function, given = function.__func__, (function.__self__, *given)

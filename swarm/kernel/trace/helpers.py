@@ -37,8 +37,6 @@ class Helper:
 
     def __init__(self, function: Any, body: Any, outlined: bool) -> None:
         self._function, self._body, self._outlined = function, body, outlined
-        if body is not function:
-            function.in_kernels = body  # what the digest of its code is of
         self.signature = inspect.signature(function)
         self.name: str = function.__name__
         kinds = self.signature.parameters.values()

@@ -13,8 +13,7 @@ import numpy as np
 from ...common import checks
 from ...errors import SceneError
 from ...kernel.frozen import Frozen
-from ...kernel.jit import _INLINE, inlined
-from ...kernel.trace.helpers import prepare
+from ...kernel.jit import allocating, inlined
 from ...kernel.vector import Symmetric, Vec
 from .numbers import OwnNumbers
 
@@ -125,9 +124,7 @@ def _taking_arrays(function: Function, count: int) -> Function:
     def in_kernels(parameters, x, y, z):
         return function(parameters, x, y, z)
 
-    # What a user writes may make arrays.
-    prepare(in_python, {**_INLINE, "_nrt": True}, outlined=False, body=in_kernels)
-    return in_python
+    return allocating(in_python, in_kernels)
 
 
 def _one_by_one(function: Function, count: int, parameters: Any, *rows: Any) -> Any:

@@ -5,12 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-import numba
-from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numpy.typing import ArrayLike
 
 from ...common.checks import Vector
 from ...errors import SceneError
+from ...kernel.cache import is_disabled
 from ...kernel.jit import kernel
 from ...kernel.vector import ZERO, total
 from ..surface import Box, Surface
@@ -94,8 +93,11 @@ class OwnSurface(FormSurface):
         return replace(form, bend=form.sampled_bend() if self.curvature is None else Bend.of_magnitude(self.curvature))
 
     def require_compiled(self) -> None:
-        if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        if is_disabled():
             return
+        import numba
+        from numba.core.errors import NumbaError, UnsupportedBytecodeError
+
         kinds = (numba.typeof(self.numbers()), numba.typeof(ZERO))
         functions = (self.phi_function, _compiled_phi), (self.gradient_function, _compiled_gradient)
         for function, compiled in functions:

@@ -1,0 +1,113 @@
+"""Instructions of the operations of `kernel/arrays.py`."""
+
+import functools
+import math
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from llvmlite.ir import Constant
+from llvmlite.ir.instructions import InsertValue
+from numba import types
+from numba.core import cgutils
+from numba.core.imputils import impl_ret_borrowed
+from numba.np.arrayobj import populate_array
+
+from ..arrays import copy_row, fetch, index, next_of, scratch, unwritten
+from ..trace.calls import INTRINSIC, operation
+
+
+def emit_spaced(known: Any, stride: int) -> None:
+    """Those of a function that `spaced` returned."""
+
+    @operation(known, lambda tables: tables, types.BaseNamedTuple)
+    def _emit_tables(context, builder, signature, args):
+        (tables,) = args
+        columns, item = (context.get_constant(types.intp, k) for k in (stride, np.dtype(float).itemsize))
+        for k, kind in enumerate(signature.args[0]):
+            if isinstance(kind, types.Array) and kind.ndim == 2:
+                table = context.make_array(kind)(context, builder, builder.extract_value(tables, k))
+                table.shape = cgutils.pack_array(builder, [builder.extract_value(table.shape, 0), columns])
+                table.strides = cgutils.pack_array(builder, [builder.mul(columns, item), item])
+                tables = builder.insert_value(tables, table._getvalue(), k)
+        return impl_ret_borrowed(context, builder, signature.return_type, tables)
+
+
+def _type_of_scratch(shape, dtype):
+    return types.Array(dtype.dtype, len(shape) if isinstance(shape, types.BaseTuple) else 1, "C")
+
+
+def _part(builder: Any, made: Any, k: int) -> Any:
+    """A part of a tuple, as the constant that it was made of where it is one."""
+    while isinstance(made, InsertValue):
+        if made.indices == [k]:
+            return made.value
+        made = made.aggregate
+    return builder.extract_value(made, k)
+
+
+def _on_stack(zeros: bool, context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    kind, asked = signature.return_type, signature.args[0]
+    shape = [_part(builder, args[0], k) for k in range(len(asked))] if isinstance(asked, types.BaseTuple) else [args[0]]
+    number = context.get_data_type(kind.dtype)
+    item = context.get_constant(types.intp, context.get_abi_sizeof(number))
+    if all(isinstance(one, Constant) for one in shape):
+        # Where a function begins: what a loop asks for in each of its rounds is the same.
+        size = context.get_constant(types.intp, math.prod(one.constant for one in shape))
+        with builder.goto_entry_block():
+            data = builder.alloca(number, size)
+    else:
+        size = functools.reduce(builder.mul, shape)
+        data = builder.alloca(number, size)
+    if zeros:
+        cgutils.memset(builder, data, builder.mul(size, item), 0)
+    strides = [item]
+    for columns in reversed(shape[1:]):
+        strides.insert(0, builder.mul(columns, strides[0]))
+    table = context.make_array(kind)(context, builder)
+    populate_array(table, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
+    return table._getvalue()
+
+
+INTRINSIC.update((scratch, unwritten))
+operation(scratch, _type_of_scratch, types.Any, types.Any)(functools.partial(_on_stack, True))
+operation(unwritten, _type_of_scratch, types.Any, types.Any)(functools.partial(_on_stack, False))
+
+
+@operation(
+    copy_row, lambda target, i, source, m, count: types.none, types.Array, types.Any, types.Array, types.Any, types.Any
+)
+def _emit_copy_row(context, builder, signature, args):
+    places = []
+    for k in (0, 2):
+        table = context.make_array(signature.args[k])(context, builder, args[k])
+        row = context.cast(builder, args[k + 1], signature.args[k + 1], types.intp)
+        columns = builder.extract_value(table.shape, 1)
+        places.append(builder.gep(table.data, [builder.mul(row, columns)]))
+    count = context.cast(builder, args[4], signature.args[4], types.intp)
+    cgutils.raw_memcpy(builder, places[0], places[1], count, 8)
+    return context.get_dummy_value()
+
+
+@operation(next_of, lambda ticket: types.int64, types.Array)
+def _emit_next(context, builder, signature, args):
+    counter = context.make_array(signature.args[0])(context, builder, args[0]).data
+    return builder.atomic_rmw("add", counter, context.get_constant(types.int64, 1), "monotonic")
+
+
+@operation(fetch, lambda row, i: types.none, types.Array, types.Any)
+def _emit_fetch(context, builder, signature, args):
+    data = context.make_array(signature.args[0])(context, builder, args[0]).data
+    place = builder.gep(data, [context.cast(builder, args[1], signature.args[1], types.intp)])
+    place = builder.bitcast(place, cgutils.voidptr_t)
+    number, pointer = ir.IntType(32), cgutils.voidptr_t
+    kind = ir.FunctionType(ir.VoidType(), [pointer, number, number, number])
+    ask = builder.module.declare_intrinsic("llvm.prefetch", [pointer], kind)
+    # To read, of use for long, data
+    builder.call(ask, [place, number(0), number(3), number(1)])
+    return context.get_dummy_value()
+
+
+@operation(index, lambda value: types.uintp, types.Any)
+def _emit_index(context, builder, signature, args):
+    return context.cast(builder, *args, *signature.args, signature.return_type)
