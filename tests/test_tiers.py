@@ -176,9 +176,9 @@ def test_kernels_of_another_process_are_found(tmp_path):
 WITHOUT_A_COMPILER = """
 import hashlib, sys, swarm
 from swarm.run import tiers
-tiers._BEFORE_COMPILER = {seconds}
+tiers._BEFORE_COMPILER, tiers._PATIENCE = {seconds}, 1e4
 scene = swarm.Scene([swarm.Sphere(0.5)], gravity=(0.0, 0.0, -1.0))
-result = swarm.simulate(scene, swarm.fill(scene, 20, speed=1.0), swarm.Impact(), until=2.0, every=0.1)
+result = swarm.simulate(scene, swarm.fill(scene, 3, speed=1.0), swarm.Impact(), until=1.0, every=0.1)
 print(hashlib.sha256(result.particles.position.tobytes()).hexdigest())
 print(any(name in sys.modules for name in ("numba", "llvmlite")))
 """
@@ -189,7 +189,7 @@ def test_a_run_of_few_particles_imports_no_compiler(tmp_path):
     """The compiler is imported after a time of plain Python, here 0 s, some of the run or more than all of it."""
     found = [
         python("-c", WITHOUT_A_COMPILER.format(seconds=seconds), env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
-        for seconds in (0.0, 0.02, 1e3)
+        for seconds in (0.0, 0.002, 1e3)
     ]
     assert [done.stderr for done in found] == ["", "", ""]
     digests, imports = zip(*(done.stdout.split() for done in found), strict=True)
