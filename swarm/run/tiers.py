@@ -20,8 +20,10 @@ CHOICES = ("auto", "always", "never")
 _PATIENCE = 1.0
 # In that time more particles than this have a few impacts each: nearly all of such a run is compiled anyway.
 _FEW = 2000
-# Seconds of plain Python before the compiler is imported, to see which kernels are there: as long as that takes.
-_BEFORE_COMPILER = 0.4
+# Seconds of plain Python in a process before it imports the compiler, to see which kernels are there: as long as that
+# takes, and what it was not yet known then to be missing. Runs of more particles than these are seldom done by then.
+_BEFORE_COMPILER, _ANY = 0.4, "any kernel"
+_VERY_FEW = 200
 # Seconds of plain Python so far in this process, by kind of kernel that was missing.
 _spent: dict[str, float] = {}
 _lock = threading.Lock()
@@ -40,20 +42,26 @@ class Tier:
 
     def __init__(self, choice: str, numbers: Any, particles: int) -> None:
         patience = 0.0 if particles > _FEW or not _same_bits(numbers) else _PATIENCE
+        self._particles = particles
         # Time left for plain Python [s].
         self.remaining = {"always": 0.0, "never": math.inf}.get(choice, patience)
         self.is_plain = self.remaining > 0.0
         self._missing: list[str] = []
-        self._spent = 0.0
+        # What is left after the compiler is imported [s].
+        self._later = 0.0
 
     def choose(self, calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> None:
         """Choose the tier for the next calls, kernels and their arguments."""
         if self.remaining == math.inf:
             return
         self._missing = []
-        if self.remaining > 0.0 and self._spent < _BEFORE_COMPILER and not deferred.is_loaded():
-            self.is_plain = True
+        waits = self._particles <= _VERY_FEW and not deferred.is_loaded()
+        before = _BEFORE_COMPILER - spent([_ANY]) if waits else 0.0
+        if min(before, self.remaining) > 0.0:
+            self._later, self.remaining = self.remaining - before, before
+            self._missing, self.is_plain = [_ANY], True
             return
+        self.remaining, self._later = self.remaining + self._later, 0.0
         if self.remaining > 0.0:
             self._missing = [cache.kind(*call) for call in calls if not cache.is_compiled(*call)]
             self.remaining = min(self.remaining, _PATIENCE - spent(self._missing))
@@ -62,7 +70,6 @@ class Tier:
     def spend(self, seconds: float) -> None:
         """Count a time [s] that the kernels of this tier took."""
         self.remaining -= seconds
-        self._spent += seconds
         if self.is_plain:
             with _lock:
                 for kind in self._missing:
