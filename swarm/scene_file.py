@@ -11,6 +11,7 @@ import numpy as np
 
 from .common.checks import closest, count, listed, particles_fit
 from .common.columns import read_columns, row_of
+from .common.validated import Count, Flag, Magnitude, NotNegativeCount, Part, Positive
 from .errors import SceneError
 from .files import paths
 from .methods import Impact, Method
@@ -37,16 +38,16 @@ OUTPUTS = {"trajectory": "-o", "recording": "--record", "impacts": "--impacts"}
 
 @dataclass(frozen=True)
 class ParticlesTable:
-    """[particles]: their number, speed and mass, or the file that holds them."""
+    """[particles]: their number, speed and mass, or the file that holds them; `fill` and `pack` check the values."""
 
-    count: int | None = None
-    speed: float | None = None
-    temperature: float | None = None
-    mass: float | None = None
-    seed: int | None = None
-    exact: bool | None = None
+    count: Count | None = None
+    speed: Magnitude | None = None
+    temperature: Magnitude | None = None
+    mass: Positive | None = None
+    seed: NotNegativeCount | None = None
+    exact: Flag | None = None
     radius: float | list[float] | None = None
-    fraction: float | None = None
+    fraction: Part | None = None
     source: str | None = dataclasses.field(default=None, metadata={"key": "from"})
     frame: int | None = None
 

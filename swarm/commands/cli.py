@@ -13,6 +13,7 @@ from .info import info
 from .pictures import animate, plot, record, view
 from .report import report
 from .run import run
+from .schema import schema
 from .sweep import sweep
 
 _FAILED, _BAD_INPUT = 1, 2
@@ -55,6 +56,7 @@ app.command(epilog="Example:  swarm plot cavity.h5 -o cavity.png")(plot)
 app.command(epilog="Example:  swarm report cavity.h5 -o cavity.html, or swarm report FOLDER of a sweep")(report)
 app.command(epilog="Example:  swarm animate cavity.h5 -o cavity.mp4 --frames 100")(animate)
 app.command(epilog="Example:  swarm export cavity.h5 -o cavity.vtkhdf --frames ::10")(export)
+app.command(epilog="Example:  swarm schema -o swarm.schema.json, and #:schema ./swarm.schema.json in a file")(schema)
 
 
 def main() -> None:

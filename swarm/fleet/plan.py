@@ -26,7 +26,7 @@ _WITHOUT_EFFECT = ("threads", "checkpoint", "compile")
 # Hexadecimal digits of that digest: among a million runs two have the same once in 500 sweeps, which is found.
 _DIGITS = 12
 STEM = re.compile(rf"[0-9a-f]{{{_DIGITS}}}")
-_COMBINE, _WAYS = "combine", ("product", "zip")
+COMBINE, WAYS = "combine", ("product", "zip")
 # Keys of a document that make its scene.
 _SCENE = ("surface", "gravity", "period", "plane", "pairs")
 # Keys of a document that name files; their content is part of what is computed.
@@ -102,8 +102,8 @@ def _lists(table: Any) -> tuple[dict[str, list[Any]], str]:
     """The values of every key, and how they are combined."""
     if not isinstance(table, dict):
         raise SceneError(f"sweep: expected a [sweep] table, got {table!r:.200}")
-    way = one_of(f"sweep.{_COMBINE}", table.get(_COMBINE, _WAYS[0]), _WAYS)
-    given = dict(_flat({key: value for key, value in table.items() if key != _COMBINE}))
+    way = one_of(f"sweep.{COMBINE}", table.get(COMBINE, WAYS[0]), WAYS)
+    given = dict(_flat({key: value for key, value in table.items() if key != COMBINE}))
     if not given:
         raise SceneError('sweep: expected at least one list, such as "particles.seed" = {range = 20}, got none')
     for one, other in itertools.permutations(given, 2):
@@ -115,7 +115,7 @@ def _lists(table: Any) -> tuple[dict[str, list[Any]], str]:
 def _flat(table: Document, before: str = "") -> Iterator[tuple[str, Any]]:
     """The keys of a table and of those within it, as TOML makes them of keys with dots that have no quotes."""
     for key, value in table.items():
-        if isinstance(value, dict) and not (len(value) == 1 and set(value) <= set(_MAKERS)):
+        if isinstance(value, dict) and not (len(value) == 1 and set(value) <= set(MAKERS)):
             if not value:
                 raise SceneError(f'sweep."{before}{key}": expected a list of values, got an empty table')
             yield from _flat(value, f"{before}{key}.")
@@ -126,11 +126,11 @@ def _flat(table: Document, before: str = "") -> Iterator[tuple[str, Any]]:
 def _values(where: str, given: Any) -> list[Any]:
     """The values of a list, or of a table such as {range = 20}."""
     if not isinstance(given, (dict, list)):
-        raise SceneError(f"{where}: expected a list of values, or one of {listed(_MAKERS)} in a table, got {given!r}")
+        raise SceneError(f"{where}: expected a list of values, or one of {listed(MAKERS)} in a table, got {given!r}")
     values: Any = given
     if isinstance(given, dict):
         ((name, numbers),) = given.items()
-        values = _MAKERS[name](f"{where}.{name}", numbers)
+        values = MAKERS[name](f"{where}.{name}", numbers)
     if not values:
         raise SceneError(f"{where}: expected at least one value, got none")
     return list(values)
@@ -164,7 +164,7 @@ def _ends(where: str, given: Any) -> tuple[float, float, int]:
     return number(f"{where}[0]", given[0]), number(f"{where}[1]", given[1]), n
 
 
-_MAKERS: dict[str, Callable[[str, Any], list[Any]]] = {
+MAKERS: dict[str, Callable[[str, Any], list[Any]]] = {
     "range": _range,
     "linspace": lambda where, given: list(map(float, np.linspace(*_ends(where, given)))),
     "geomspace": _geometric,

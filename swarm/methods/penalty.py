@@ -28,6 +28,7 @@ class Penalty(fixed_step.SoftWalls):
         dt: step h > 0 [s]; frames must fall on whole steps.
         penalty: alpha > 0, the stiffness of the wall (N/m for a = 1 and a gap in m).
         exponent: a >= 1 of the regularisation: 1 a linear spring, 1.5 Hertz's law.
+        gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
 
     Raises:
         SceneError: an argument is out of its range; a frame time is not a whole number of steps.

@@ -83,7 +83,9 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
     if isinstance(described, OwnSurface):
         return _with_nested(described.table(), described, arrays)
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
-    given = {field.metadata.get("key", field.name): getattr(described, field.name) for field in _kept(type(described))}
+    given = {
+        field.metadata.get("key", field.name): getattr(described, field.name) for field in kept_fields(type(described))
+    }
     table = {key: value for key, value in given.items() if value is not None and not _is_left_out(described, key)}
     table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
     mine = type(described)
@@ -158,7 +160,7 @@ def _is_left_out(described: Surface | Method, key: str) -> bool:
     return field is not None and field.metadata.get("younger", False) and getattr(described, key) == field.default
 
 
-def _kept(cls: type[Any]) -> list[dataclasses.Field[Any]]:
+def kept_fields(cls: type[Any]) -> list[dataclasses.Field[Any]]:
     """The fields of a dataclass that a file has: not the options of a session, and nothing that is made of others."""
     return [field for field in dataclasses.fields(cls) if field.metadata.get("in_file", True)]
 
@@ -167,7 +169,7 @@ def convert(table: Any, cls: type[T], where: str) -> T:
     """A dataclass from a table: no unknown key, no missing one, every value of its type."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table, got {table!r}")
-    names = {field.metadata.get("key", field.name): field for field in _kept(cls)}
+    names = {field.metadata.get("key", field.name): field for field in kept_fields(cls)}
     for key in table:
         if key not in names:
             at_top = key in ("gravity", "period", "plane")
