@@ -10,6 +10,7 @@ from ..errors import SceneError, SwarmError
 from ..version import VERSION
 from .export import export
 from .info import info
+from .new import new
 from .pictures import animate, plot, record, view
 from .report import report
 from .run import run
@@ -47,6 +48,7 @@ def _options(
     pass
 
 
+app.command(epilog="Example:  swarm new cavity && swarm run cavity.toml")(new)
 app.command(epilog=f"Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2\n\n{_CODES}")(run)
 app.command(epilog=f"Example:  swarm sweep examples/sweeps/cooling.toml -o cooling\n\n{_CODES}")(sweep)
 app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")(info)
