@@ -36,9 +36,18 @@ def mixed(packing, side=10, collisions=60, pairs=None, seed=1):
 # --- Pressure --------------------------------------------------------------------------------------------
 
 
+def test_the_equation_of_2004():
+    """Its virial coefficients are 4, 10 and 18.36477, and its values those of the paper's."""
+    assert [kolafa(0.40), kolafa(0.49)] == pytest.approx([6.94546, 12.17036], abs=6e-6)
+    # Powers of y/(1 - y) in y: B4 of hard spheres is 18.3647684, exactly known.
+    y = 1e-3
+    third = (kolafa(y) - 1.0 - 4.0 * y - 10.0 * y**2) / y**3
+    assert third == pytest.approx(18.3647684 + 28.2245 * y, abs=1e-4)
+
+
 @pytest.mark.parametrize("packing", [0.1, rarely(0.2), 0.3, rarely(0.4), 0.49])
 def test_pressure_by_the_virial(packing):
-    """Within 0.3 % of simulations, as Kolafa's equation has them, and 0.5 % of Carnahan's and Starling's."""
+    """Within 0.3 % of simulations, as the equation of 2004 has them, and 0.5 % of Carnahan's and Starling's."""
     # In a gas the pressure of few collisions is known as well.
     found = hard_spheres.measure(packing, {0.1: 100_000, 0.3: 400_000}.get(packing, 1_000_000))
     assert found.error < 1.5e-3 * found.compressibility
