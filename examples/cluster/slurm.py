@@ -13,6 +13,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+# Of each worker, which pauses at 80 % of it and is ended at 95 %.
+GIBIBYTES = 2
+
 
 def cluster_of(arguments: argparse.Namespace) -> Any:
     """The cluster, without a job yet; a worker of one thread for each core."""
@@ -26,7 +29,7 @@ def cluster_of(arguments: argparse.Namespace) -> Any:
         account=arguments.account,
         cores=arguments.cores,
         processes=arguments.cores,
-        memory=arguments.memory,
+        memory=arguments.memory or f"{GIBIBYTES * arguments.cores}GiB",
         walltime=arguments.walltime,
         interface=arguments.interface,
         scheduler_options={"dashboard_address": ":0"},
@@ -40,7 +43,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("run.h5"), help="the trajectory, on shared storage")
     parser.add_argument("--jobs", type=int, default=2, help="jobs, of one node each")
     parser.add_argument("--cores", type=int, default=16, help="cores of a job")
-    parser.add_argument("--memory", default="16GB", help="memory of a job")
+    parser.add_argument("--memory", help=f"memory of a job, such as 64GiB; by default {GIBIBYTES} GiB for each core")
     parser.add_argument("--walltime", default="01:00:00", help="of a job")
     parser.add_argument("--partition")
     parser.add_argument("--account")

@@ -31,6 +31,15 @@ def test_the_job_of_slurm_starts_one_worker_for_each_core():
     assert "--nworkers 12 " in script
 
 
+@pytest.mark.skipif(importlib.util.find_spec("dask_jobqueue") is None, reason="dask-jobqueue is not installed")
+@pytest.mark.parametrize(("words", "job", "worker"), [([], 32, "2.00GiB"), (["--memory", "64GiB"], 64, "4.00GiB")])
+def test_the_memory_of_a_job_is_enough_for_its_workers(words, job, worker):
+    """16 cores by default, each with a worker: 2 GiB for each, and what is asked for where it is."""
+    script = printed("slurm", "scene.toml", "--script", *words)
+    assert f"#SBATCH --mem={job}G" in script.splitlines()
+    assert f"--memory-limit {worker} " in script
+
+
 @pytest.mark.physics
 def test_workers_of_this_machine_have_the_same_bits():
     assert printed("local").count("the same bits") == 3
