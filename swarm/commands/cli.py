@@ -8,6 +8,7 @@ import typer
 from ..common import interrupt
 from ..errors import SceneError, SwarmError
 from ..version import VERSION
+from .check import check
 from .export import export
 from .info import info
 from .new import new
@@ -49,6 +50,7 @@ def _options(
 
 
 app.command(epilog="Example:  swarm new cavity && swarm run cavity.toml")(new)
+app.command(epilog="Example:  swarm check examples/scenes/cavity.toml")(check)
 app.command(epilog=f"Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2\n\n{_CODES}")(run)
 app.command(epilog=f"Example:  swarm sweep examples/sweeps/cooling.toml -o cooling\n\n{_CODES}")(sweep)
 app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")(info)

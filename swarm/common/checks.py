@@ -21,7 +21,7 @@ Vector = tuple[float, float, float]
 # Magnitudes with squares and inverse squares that are finite.
 SMALLEST, LARGEST = 1e-100, 1e100
 # Bytes of a particle in a run (`python -m bench bars`); and a number of particles that fits on every machine.
-_PARTICLE, FEW = 146, 1_000_000
+PARTICLE, FEW = 146, 1_000_000
 _DOUBLE = 8
 # Characters of a value that are shown in a sentence.
 _SHOWN = 200
@@ -174,7 +174,7 @@ def particles_fit(name: str, count: int) -> None:
     """Raise a `SceneError` if this many particles do not fit in the memory of this machine."""
     count = min(count, 10**300)  # which float() can convert
     if count > FEW:
-        require_memory(name, f", got {count:.6g} particles, which take", _PARTICLE * count)
+        require_memory(name, f", got {count:.6g} particles, which take", PARTICLE * count)
 
 
 def duration(name: str, value: str) -> float:

@@ -163,6 +163,14 @@ class FrameTimes(Validated):
             before = number * self.every
         yield self.count - 1, before, self.until
 
+    def on_disk(self, surfaces: int, more: int = 0) -> int:
+        """Bytes of the observables of all frames in a file, with `more` in each."""
+        return self.count * (_NUMBERS + _SURFACE * surfaces + more)
+
+    def in_memory(self, surfaces: int, more: int = 0) -> int:
+        """Bytes of the observables of all frames in memory."""
+        return self.count * (_OBJECTS + _SURFACE * surfaces + more)
+
     def require_room(
         self, first: int, target: Path | None, numbers: int, surfaces: int, packed: bool, more: int = 0
     ) -> None:

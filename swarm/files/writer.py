@@ -53,6 +53,31 @@ _PACKED: dict[str, dict[str, Any]] = {
 _STEP, _TIME, _WALL_TIME = "parameters/frame", "parameters/time", "parameters/wall_time"
 _EDGES = "particles/all/box/edges/value"
 
+# A dataset of particles: its name, its shape for one particle, its type.
+Column = tuple[str, tuple[int, ...], Any]
+
+
+def columns_of(scene: Scene, particles: Particles, storage: Storage) -> list[Column]:
+    """The datasets of the particles of a run, which have a row for each frame."""
+    laws, births = scene.compiled().laws, particles.births
+    kept: list[Column] = [(name, (3,), storage.precision) for name in PARTS]
+    kept += [(IMAGES, (3,), np.int64)] * (scene.period is not None)
+    kept += [(COUNTS, (), np.int64), *[(ESCAPES, (), np.float64)] * bool(scene.pieces.open_volumes())]
+    kept += [(ABSORBED, (), np.float64)] * (laws is not None and laws.may_end)
+    kept += [(BORN, (), np.float64)] * (births is not None and bool(births.balls))
+    kept += [(COLLISIONS, (), np.int64)] * (particles.radius is not None)
+    return kept + [(SPINS, (3,), storage.precision)] * (particles.spin is not None)
+
+
+def size_of(scene: Scene, particles: Particles, storage: Storage, frames: int) -> int:
+    """Bytes that the particles of a run take in its trajectory, without compression: whole chunks of frames."""
+    row = sum(
+        int(np.prod(width)) * np.dtype(kind).itemsize for _name, width, kind in columns_of(scene, particles, storage)
+    )
+    n = len(range(len(particles))[storage.kept()])
+    return (-(-frames // _CHUNK[0]) * _CHUNK[0] * row + 2 * np.dtype(np.int64).itemsize) * n
+
+
 # Number, time [s], positions, velocities and impacts, observables.
 Written = tuple[int, float, State, dict[str, Any]]
 WriteFrames = Callable[[list[Written]], None]
@@ -88,6 +113,7 @@ class TrajectoryWriter(AppendedFile):
         self.course: Course | None = None
         self._wall_time: Any = None
         self._radius, self._turns, self._volume = particles.radius, particles.spin is not None, particles.volume
+        self._columns = columns_of(scene, particles, storage)
         self._edges: Any = None
         # None of a file of an older version.
         self._sums: checksums.RowSums | None = None
@@ -145,15 +171,7 @@ class TrajectoryWriter(AppendedFile):
         if self._bodies is not None:
             bonds = file.create_dataset("connectivity/bonds", data=self._bodies.bonds())
             bonds.attrs["particles_group"] = everything.ref
-        laws = self._scene.compiled().laws
-        kept: list[tuple[str, tuple[int, ...], Any]] = [(name, (3,), self._storage.precision) for name in PARTS]
-        kept += [(IMAGES, (3,), np.int64)] * (repeats is not None)
-        kept += [(COUNTS, (), np.int64), *[(ESCAPES, (), np.float64)] * bool(self._scene.pieces.open_volumes())]
-        kept += [(ABSORBED, (), np.float64)] * (laws is not None and laws.may_end)
-        kept += [(BORN, (), np.float64)] * (self._births is not None and bool(self._births.balls))
-        kept += [(COLLISIONS, (), np.int64)] * (self._radius is not None)
-        kept += [(SPINS, (3,), self._storage.precision)] * self._turns
-        for name, width, kind in kept:
+        for name, width, kind in self._columns:
             self._make_particles(name, (n, *width), kind)
 
     def _describe(self, parameters: Any) -> None:

@@ -20,7 +20,7 @@ from .statements import Statement, rows_of
 from .verdicts import judged
 
 # A table has at most this many surfaces, and a statement this many numbers.
-_MOST = 8
+MOST = 8
 # Observables with one number for each of these are stated; members of fields are too many.
 _NUMBERED = ("surface", "part", "cavity", "source")
 
@@ -34,9 +34,9 @@ def of_trajectory(trajectory: Any) -> dict[str, str]:
     """The content of a `Trajectory`, and whether the run went well: the rows of a table."""
     scene, seen = trajectory.scene, trajectory.observed() if len(trajectory) else {}
     if seen:
-        stated = of_content(content_of(trajectory), _MOST)
+        stated = of_content(content_of(trajectory), MOST)
     else:
-        stated = [Statement("frames", "0: the run ended before the first was written"), *of_surroundings(scene, _MOST)]
+        stated = [Statement("frames", "0: the run ended before the first was written"), *of_surroundings(scene, MOST)]
         stated.append(of_method(trajectory.method))
     return {**rows_of(stated), "observables": ", ".join(seen) or "none", "size": file_size(trajectory.path)}
 
@@ -50,7 +50,7 @@ def of_result(result: Any) -> dict[str, str]:
     # A page counts all of the wall time: it is all that a file keeps.
     rest = " in the rest" if result.compile_time > 0.0 else ""
     known = result.scene is not None and result.method is not None
-    stated = of_content(content_of_result(result, "a summary"), _MOST) if known else of_numbers(seen)
+    stated = of_content(content_of_result(result, "a summary"), MOST) if known else of_numbers(seen)
     return {
         **rows_of(stated),
         "wall time": f"{result.wall_time:.2f} s{compiled}, {plain(float(f'{rate:.3g}'))} impacts/s{rest}",
@@ -234,9 +234,9 @@ def of_numbers(seen: dict[str, Any]) -> list[Statement]:
                 f"{one.axes[0]} {k}: {many(value) if one.unit == '1' else amount(value, one.unit)}"
                 for k, value in enumerate(np.asarray(seen[name][-1]).tolist()) if value
             ]  # fmt: skip
-            more = [f"{len(each) - _MOST + 1} more"] if len(each) > _MOST else []
+            more = [f"{len(each) - MOST + 1} more"] if len(each) > MOST else []
             if each:
-                stated.append(Statement(name.replace("_", " "), ", ".join([*each[: _MOST - len(more)], *more])))
+                stated.append(Statement(name.replace("_", " "), ", ".join([*each[: MOST - len(more)], *more])))
     return stated
 
 

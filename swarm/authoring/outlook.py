@@ -1,0 +1,264 @@
+"""What the run of a scene file will do, without running it: what runs where, its hints, its sizes, about its time."""
+
+import contextlib
+import logging
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..ball_numbers import balls_volume
+from ..common.checks import PARTICLE, in_bytes
+from ..errors import SceneError
+from ..files import marks
+from ..files.writer import size_of
+from ..kernel import cache
+from ..run.engines import run_of
+from ..run.machine import warn_open
+from ..run.options import Task
+from ..run.preflight import hints, knows, workload
+from ..run.preflight.admission import task_of
+from ..scene_file import Job
+from ..words import facts
+from ..words.amounts import many
+from ..words.content import Content
+from ..words.statements import rows_of
+
+# Bytes of a row of a log of impacts, and of Python with NumPy, Numba and HDF5.
+_ROW, _PROGRAM = 112, 2.5e8
+# What a frame takes besides its impacts: of each particle [s], and of its bytes on the disk [bytes/s].
+_SEEN, _WRITTEN = 7e-8, 3e8
+# Times of one core [s], from `bench/results`: an impact on a wall in straight flights, in a fall, where a flight takes
+# steps, on one of many bodies or triangles; an impact of balls; a step of a ball by Penalty, of a point by springs and
+# by multipliers, and of a point or link of a body.
+_STRAIGHT, _FALL, _STEPS, _FIELD = 4e-9, 2e-8, 5e-7, 1e-7
+_BALLS, _GRAIN, _SPRING, _SWEEPS, _PART = 2e-7, 2e-6, 5e-10, 5e-7, 2e-8
+# Steps of a crossing of a particle that slides, and what each takes.
+_STEPS_A_CROSSING, _SLIDING = 150, 1e-6
+# An impact in plain Python, a kernel to compile, and what a run takes to begin and to end [s].
+_PYTHON, _COMPILING, _BEGINNING = 1e-4, 1.2, 0.5
+# Particles of which the engine is made, to see which kernels it needs.
+_MOST = 200_000
+
+
+class Load(NamedTuple):
+    """The work of a run.
+
+    Attributes:
+        events: how many there are.
+        noun: what they are.
+        cost: of one [s of a core].
+        shared: whether threads share them.
+    """
+
+    events: float
+    noun: str
+    cost: float
+    shared: bool = True
+
+
+def outlook(job: Job, target: Path) -> dict[str, str]:
+    """What the run of a job would do, with the trajectory in `target`: rows of names and values.
+
+    Raises:
+        SceneError: it would be refused.
+    """
+    start = job.start()
+    task = task_of(job.scene, start, job.method, job.run)
+    content = _content(task, start, target.name)
+    with _caught() as warnings:
+        if job.scene.is_open():
+            warn_open()
+        hints.give(task)
+    made = rows_of(facts.of_setting(content, facts.MOST))
+    made |= {"hints": "\n".join(f"· {one}" for one in warnings) or "none"}
+    return made | _sizes(task, target) | _time(task)
+
+
+def _content(task: Task, start: Any, name: str) -> Content:
+    """What words are made of, as it is at the start."""
+    times = task.options.times
+    ends = np.linspace(0.0, times.until, min(times.count, 10_000_000))
+    body = None if task.bodies is None else start.body
+    seen: dict[str, Any] = {"time": ends}
+    return Content(
+        name, task.scene, task.method, body, len(task.particles), seen, {"start": task.particles},
+        counters=task.options.counters,
+    )  # fmt: skip
+
+
+@contextlib.contextmanager
+def _caught() -> Iterator[list[str]]:
+    """The warnings of the package, in place of the screen."""
+    log, found = logging.getLogger("swarm"), list[str]()
+    handler = logging.Handler(logging.WARNING)
+    handler.emit = lambda record: found.append(record.getMessage())  # type: ignore[method-assign]
+    handlers, passes = log.handlers, log.propagate
+    log.handlers, log.propagate = [handler], False
+    try:
+        yield found
+    finally:
+        log.handlers, log.propagate = handlers, passes
+
+
+# --- Sizes -----------------------------------------------------------------------------------------------
+
+
+def _sizes(task: Task, target: Path) -> dict[str, str]:
+    options, n = task.options, len(task.particles)
+    storage, surfaces = options.storage, len(task.scene.surfaces)
+    size = options.times.on_disk(surfaces) + size_of(task.scene, task.particles, storage, options.times.count)
+    most = "at most " * (storage.compression != "none")
+    files = [(f"trajectory {target}", f"{most}{in_bytes(size)}", _there(target, "trajectory"))]
+    if options.impacts is not None:
+        rows = _impacts(task) * _logged(options.impact_particles, n)
+        there = _there(options.impacts, "impacts")
+        files.append((f"log of impacts {options.impacts}", f"about {in_bytes(_ROW * rows)}", there))
+    if options.recording is not None:
+        there = _there(options.recording, "recording")
+        files.append((f"recording {options.recording}", f"at most {options.record_megabytes:g} MB", there))
+    memory = PARTICLE * n + options.times.in_memory(surfaces)
+    return {
+        "files": "\n".join(f"{name}, {size}{there}" for name, size, there in files),
+        "memory": f"about {in_bytes(memory)}, besides the {in_bytes(_PROGRAM)} of Python, Numba and HDF5",
+    }
+
+
+def _logged(particles: Any, n: int) -> float:
+    """The part of the particles that is logged."""
+    if isinstance(particles, str):
+        return 1.0
+    return len(particles) / n if isinstance(particles, tuple) else 1.0 / particles
+
+
+def _there(path: Path, what: str) -> str:
+    """What stands against a new file, or nothing."""
+    try:
+        marks.check_target(path, False, what)
+    except SceneError as error:
+        return f" ({str(error).removeprefix(f'{what}: ')})"
+    return ""
+
+
+# --- Time ------------------------------------------------------------------------------------------------
+
+
+def _time(task: Task) -> dict[str, str]:
+    """About how long the run takes, from the flights at its start and the costs of `bench/results`."""
+    loads, options = _loads(task), task.options
+    threads = options.thread_count()
+    n, frames = len(task.particles), options.times.count
+    seconds = _BEGINNING + frames * (_SEEN * n + options.storage.bytes_of(n) / _WRITTEN)
+    python = seconds + _PYTHON * sum(one.events for one in loads)
+    seconds += sum(one.events * one.cost / (threads if one.shared else 1) for one in loads)
+    work = " and ".join(f"{many(float(f'{one.events:.2g}'))} {one.noun}" for one in loads)
+    stated = {"work": f"about {work}"} if work else {}
+    missing, kernels = _kernels(task)
+    is_plain = missing > 0 and python < _COMPILING and options.compile != "always"
+    if options.compile == "never" or is_plain:
+        return stated | {"time": f"about {_about(python)}, in plain Python"}
+    on = f" on {threads} threads" if threads > 1 and any(one.shared for one in loads) else ""
+    once = f", and once {_about(_COMPILING * missing)} to compile {missing} of {kernels} kernels" if missing else ""
+    return stated | {"time": f"about {_about(seconds)}{on}{once}; from the start, to a factor of a few"}
+
+
+def _about(seconds: float) -> str:
+    """A time in a suitable unit, with the digits that an estimate has."""
+    for size, unit in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.1g} s" if seconds < 10.0 else f"{seconds:.0f} s"
+
+
+def _loads(task: Task) -> list[Load]:
+    """The work of a run, as far as its start shows it."""
+    options, method, n = task.options, task.method, len(task.particles)
+    engine = knows.engine_of(knows.Asked(task.scene, task.bodies or task.particles, method, options))
+    dt = getattr(method, "dt", None)
+    steps = options.until / dt if dt else 0.0
+    if task.bodies is not None:
+        body = task.bodies.body
+        parts = len(body) + len(body.links) + len(body.springs)
+        return [Load(steps * len(task.bodies), "steps of bodies", _PART * parts)]
+    if engine == knows.GRAINS:
+        return [Load(steps * n, "steps of balls", _GRAIN, shared=False)]
+    impacts = _impacts(task)
+    if engine in (knows.BALLS, knows.HEAVY):
+        return [Load(impacts + _collisions(task), "impacts and collisions", _BALLS, shared=False)]
+    if engine in (knows.SOFT, knows.BASELINE):
+        return [Load(steps * n, "steps of particles", _SPRING)]
+    if engine == knows.PAPER:
+        return [Load(impacts, "contacts", _SWEEPS)]
+    flights = Load(impacts, "impacts", _cost_of_an_impact(task), engine != knows.MASSIVE)
+    return [flights, *_sliding(task)]
+
+
+def _sliding(task: Task) -> list[Load]:
+    """The steps of particles that come to slide, as under gravity they do where impacts take energy."""
+    scene, laws = task.scene, task.compiled.laws
+    if scene.gravity is None or laws is None or laws.restitution is None:
+        return []
+    crossing = math.sqrt(scene.finite_size() / math.hypot(*scene.gravity))
+    steps = len(task.particles) * task.options.until / crossing * _STEPS_A_CROSSING
+    return [Load(steps, "steps of sliding at most", _SLIDING)]
+
+
+def _impacts(task: Task) -> float:
+    """The impacts on walls, if particles go on as they fly at the start; none where none flies."""
+    if not task.scene.surfaces or not len(task.particles):
+        return 0.0
+    moves = task.scene.moves()
+    between = _crossing(task) if moves else workload.time_between(task.compiled, task.particles)
+    return len(task.particles) * task.options.until / between if 0.0 < between < math.inf else 0.0
+
+
+def _crossing(task: Task) -> float:
+    """The time of a crossing of the scene at the mean speed, after a fall where there is gravity [s]."""
+    speed = _speed(task)
+    return task.scene.finite_size() / speed if speed > 0.0 else math.inf
+
+
+def _speed(task: Task) -> float:
+    """The mean speed at the start, with that of a fall through the scene [m/s]."""
+    speed, scene = float(np.sqrt((task.particles.velocity**2).sum(axis=0)).mean()), task.scene
+    pull = 0.0 if scene.gravity is None else math.hypot(*scene.gravity)
+    return math.hypot(speed, math.sqrt(pull * scene.finite_size()))
+
+
+def _collisions(task: Task) -> float:
+    """The collisions of balls in a gas: N (N/V) pi d^2 sqrt(2) |v| t / 2, times Enskog's factor.
+
+    That is the one of Carnahan and Starling, in a plane of Henderson.
+    """
+    balls, scene = task.particles, task.scene
+    assert balls.radius is not None
+    volume = balls.volume
+    if scene.period is not None and all(length is not None for length in scene.period):
+        volume = float(np.prod([length for length in scene.period if length is not None]))
+    if volume is None or not volume > 0.0:
+        return 0.0
+    width, part = 2.0 * float(np.nanmean(balls.radius)), balls_volume(scene, balls.radius) / volume
+    if scene.plane is not None:
+        across, near = 2.0 * width, (1.0 - 7.0 / 16.0 * part) / (1.0 - part) ** 2
+    else:
+        across, near = math.pi * width**2, (1.0 - 0.5 * part) / (1.0 - part) ** 3
+    return 0.5 * len(balls) ** 2 / volume * across * near * math.sqrt(2.0) * _speed(task) * task.options.until
+
+
+def _cost_of_an_impact(task: Task) -> float:
+    walls, falls = task.compiled.walls(), task.scene.gravity is not None
+    if walls.fields():
+        return _FIELD * (2.0 if falls else 1.0)
+    each = _STEPS if walls.in_steps() else _FALL if falls else _STRAIGHT
+    return each * max(1, len(walls.each))
+
+
+def _kernels(task: Task) -> tuple[int, int]:
+    """How many kernels are not compiled yet, and how many the run is known to need; (0, 0): too many to look."""
+    if len(task.particles) > _MOST:
+        return 0, 0
+    with run_of(task) as run:
+        calls = list(run.calls())
+    return sum(not cache.is_compiled(*call) for call in calls), len(calls)

@@ -1,0 +1,123 @@
+"""What `swarm check` says: that of a run, nothing written, sizes as they are, counts as they are in closed form."""
+
+import dataclasses
+import math
+
+import h5py
+import numpy as np
+import pytest
+from conftest import row
+from test_cli import command
+from test_scene_file import GOOD
+
+import swarm
+from swarm import scene_file
+from swarm.authoring import outlook
+from swarm.authoring.starters import KINDS, text_of
+from swarm.files.writer import size_of
+from swarm.run.preflight.admission import task_of
+
+GAS = text_of("gas").replace("count = 100", "count = 1000").replace("radius = 0.05", "radius = 0.01")
+
+
+def looked(folder, text, **more):
+    """The rows of a scene file."""
+    path = folder / "scene.toml"
+    path.write_text(text)
+    job = scene_file.read(path)
+    return outlook.outlook(dataclasses.replace(job, run=dataclasses.replace(job.run, **more)), folder / "scene.h5")
+
+
+def task(folder, text):
+    (folder / "scene.toml").write_text(text)
+    job = scene_file.read(folder / "scene.toml")
+    return task_of(job.scene, job.start(), job.method, job.run)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_scenes_to_begin_with(kind, tmp_path):
+    rows = looked(tmp_path, text_of(kind))
+    assert {"frames", "what runs", "method", "hints", "files", "memory", "time"} <= set(rows)
+    assert rows["hints"] == "none"
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
+
+
+def test_the_command(tmp_path):
+    (tmp_path / "scene.toml").write_text(GOOD)
+    done = command("check", "scene.toml", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    for words in ("10 particles of 1 kg", "a sphere of radius 0.5 m", "trajectory scene.h5", "hints", "none"):
+        assert words in done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
+    (tmp_path / "scene.toml").write_text(GOOD.replace("radius = 0.5", "radius = -0.5"))
+    refused, as_run = (command(name, "scene.toml", cwd=tmp_path) for name in ("check", "run"))
+    assert (refused.returncode, refused.stderr) == (as_run.returncode, as_run.stderr)
+    assert "surface[0].radius must be above 0, got -0.5" in refused.stderr
+
+
+def test_hints_are_those_of_the_run(tmp_path, caplog):
+    text = GOOD.replace("speed = 0.5", "speed = 0.0")
+    rows = looked(tmp_path, text)
+    assert caplog.messages == []
+    swarm.run(tmp_path / "scene.toml", compile="never")
+    assert [f"· {message}" for message in caplog.messages] == rows["hints"].splitlines()
+    assert "all 10 particles are at rest" in rows["hints"]
+
+
+CELL = GOOD.replace("[particles]", "period = [2.0, 2.0, 2.0]\n[particles]").replace(
+    "radius = 0.5", 'radius = 0.5\nside = "outside"\ncenter = [1, 1, 1]'
+)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD,
+        GOOD.replace("every = 0.5", 'every = 0.5\nprecision = "float32"'),
+        GOOD.replace("every = 0.5", "every = 0.5\nframes = 4"),
+        GOOD.replace("radius = 0.5", 'radius = 0.5\nlaws = [{kind = "absorb", probability = 0.0}]'),
+        GOOD.replace("speed = 0.5", "speed = 0.5\nradius = 0.01"),
+        CELL,
+    ],
+)
+def test_the_particles_of_the_file_have_the_size(text, tmp_path):
+    """To the byte; and the sentence about the file, before there is one and then."""
+    (tmp_path / "scene.toml").write_text(text)
+    job = scene_file.read(tmp_path / "scene.toml")
+    size = size_of(job.scene, job.start(), job.run.storage, job.run.times.count)
+    assert looked(tmp_path, text)["files"].endswith("kB")
+    swarm.run(tmp_path / "scene.toml", tmp_path / "scene.h5", compile="never")
+    with h5py.File(tmp_path / "scene.h5") as file:
+        there = file["particles/all"]
+        held = [there[f"{name}/value"] for name in there if name != "box" and f"{name}/value" in there]
+        assert size == sum(one.id.get_storage_size() for one in [*held, there["mass"], there["id"]])
+    assert "scene.h5 exists; choose another name, or overwrite it" in looked(tmp_path, text)["files"]
+
+
+def test_counts_are_those_of_closed_forms(tmp_path):
+    """The mean chord of a ball is 4 R/3; the collisions of a dilute gas by kinetic theory."""
+    cavity = task(tmp_path, GOOD.replace("count = 10", "count = 400").replace("until = 1.0", "until = 50.0"))
+    (load,) = outlook._loads(cavity)
+    assert load.events == pytest.approx(400 * 50.0 / (4.0 / 3.0), rel=0.5)
+    gas = task(tmp_path, GAS)
+    (load,) = outlook._loads(gas)
+    speed = float(np.sqrt((gas.particles.velocity**2).sum(axis=0)).mean())
+    assert load.events == pytest.approx(0.5e6 * math.pi * 4e-4 * math.sqrt(2.0) * speed, rel=0.02)
+
+
+def test_what_slides_moves_or_falls(tmp_path):
+    """A load of each kind, and none that is not finite."""
+    for old, new, nouns in (
+        ("radius = 0.5", "radius = 0.5\nrestitution = 0.5", ["impacts"]),
+        ("[particles]", "gravity = [0, 0, -9.81]\n[particles]", ["impacts"]),
+        ("radius = 0.5", 'radius = 0.5\nmotion = {kind = "rotation", axis = [0, 0, 1], rate = 1.0}', ["impacts"]),
+        ('kind = "impact"', 'kind = "penalty"\ndt = 0.01\npenalty = 1e4', ["steps of particles"]),
+        ("speed = 0.5", "speed = 0.5\nradius = 0.01", ["impacts and collisions"]),
+    ):
+        with row(new):
+            loads = outlook._loads(task(tmp_path, GOOD.replace(old, new)))
+            assert [one.noun for one in loads] == nouns
+            assert all(0.0 < one.events < math.inf for one in loads)
+    falls = GOOD.replace("radius = 0.5", "radius = 0.5\nrestitution = 0.5")
+    loads = outlook._loads(task(tmp_path, f"gravity = [0, 0, -9.81]\n{falls}"))
+    assert [one.noun for one in loads] == ["impacts", "steps of sliding at most"]
