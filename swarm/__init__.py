@@ -1,6 +1,28 @@
-"""Particles bouncing in rigid cavities and off rigid solids, with energy conserved to round-off.
+"""Particles that bounce in rigid cavities and keep their energy.
 
-The public names are loaded when they are first used, so that `swarm --help` need not wait for Numba.
+The public names by topic; `help(swarm.simulate)` and so on describe each:
+
+    Scenes         Scene, Pairs, Union, Intersection, Opening, Counter,
+                   Source
+    Surfaces       Box, Capsule, Cone, Cylinder, Ellipsoid, Formula, Mesh,
+                   OwnSurface, Paraboloid, Plane, Polygon, Prism, Quadric,
+                   Sampled, Slab, Sphere, Stadium, Torus, from_mesh
+    Many solids    Boxes, Capsules, Cylinders, Ellipsoids, Spheres
+    Motions        Guide, Oscillation, Path, Rotation, Translation
+    Laws of walls  Absorb, CercignaniLampis, Lambert, Leave, Sticky, WallLaw
+    Particles      Particles, fill, pack
+    Bodies         Bodies, Body, Strain, chain, dumbbell, elastic, place,
+                   rigid, tetrahedron
+    Methods        Impact, Penalty, AugmentedLagrangian, Verlet, Midpoint,
+                   Trapezoidal
+    Runs           simulate, run, sweep, bounce, NextImpact, Frame
+    Results        Result, Trajectory, load, ImpactLog, load_impacts,
+                   report, ContactHistory, contact_history
+    Errors         SwarmError, SceneError, RunError, FileError,
+                   CompleteError, WallTimeError
+
+They are loaded when they are first used, so that `swarm --help` need not
+wait for Numba. `swarm docs -o FOLDER` writes pages of them all.
 """
 
 import importlib

@@ -2,11 +2,13 @@
 
 import inspect
 import pydoc
+import re
 
 import pytest
 
 import swarm
 from swarm.commands.run import run
+from swarm.common.signature import in_columns
 from swarm.run.options import RunOptions
 
 LINED = ["contact_history", "elastic", "fill", "pack", "place", "rigid", "simulate", "sweep"]
@@ -36,6 +38,51 @@ def test_the_signature_holds_every_name_and_default(name):
     assert shown.return_annotation == function.__annotations__["return"]
     for key in names:
         assert key in str(shown)
+
+
+def test_help_of_a_function_is_as_wide_as_a_terminal():
+    """The longest one, all of it."""
+    for function in (swarm.simulate, swarm.fill, swarm.pack, swarm.sweep):
+        lines = pydoc.plain(pydoc.render_doc(function)).splitlines()
+        assert [line for line in lines if len(line) > 80] == []
+
+
+def test_help_of_a_class_is_in_lines_of_a_terminal():
+    """Its own text and those of its methods; examples and headings of Python are as they are."""
+    lines = pydoc.plain(pydoc.render_doc(swarm.Impact)).splitlines()[1:]
+    assert [line for line in lines if len(line) > 80] == []
+    method = pydoc.plain(pydoc.render_doc(swarm.Trajectory)).partition("Data descriptors")[0].splitlines()
+    assert [line for line in method if len(line) > 80 and not re.match(r" \|\s+(>>>|\.\.\.)", line)] == []
+
+
+def test_help_of_the_package_begins_with_all_public_names_by_topic():
+    text = pydoc.plain(pydoc.render_doc(swarm))
+    assert max(map(len, text.partition("PACKAGE CONTENTS")[0].splitlines())) <= 80
+    topics = swarm.__doc__.split("\n\n")[2]
+    names = re.findall(r"\w+", re.sub(r"(?m)^    \w[\w ]{13}", "", topics))
+    assert sorted(names) == sorted(set(swarm.__all__) - {"__version__"})
+    assert len(text.partition(topics.splitlines()[0].strip())[0].splitlines()) < 10
+
+
+ENTRY = (4, "one: two"), (8, "three"), (8, "four"), (8, "five.")
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("One two three four five.", ["One two three", "four five."]),
+        (
+            "Args:\n    one: two three four five.",
+            ["Args:", "    one: two", "        three", "        four", "        five."],
+        ),
+        ("As it is:\n\n    code(which, is, longer)", ["As it is:", "", "    code(which, is, longer)"]),
+        (">>> print('an example')\nan example of more", [">>> print('an example')", "an example of more"]),
+        ("| a | table | of numbers |", ["| a | table | of numbers |"]),
+        ("Conserves: the energy.\nOrder: 2.", ["Conserves: the", "energy.", "Order: 2."]),
+    ],
+)
+def test_docstrings_in_columns(text, lines):
+    assert in_columns(text, 16).splitlines() == lines
 
 
 def test_arguments_are_bound_as_before():

@@ -1,10 +1,12 @@
-"""Signatures that `help` shows in lines of a terminal: a parameter each, with the short names of types.
+"""What `help` shows in lines of a terminal: signatures, a parameter each with the short names of types, and docstrings.
 
 Public names get them when they are first used, see `__getattr__` of the package.
 """
 
+import functools
 import inspect
 import re
+import textwrap
 from types import FunctionType
 from typing import Any
 
@@ -14,12 +16,22 @@ from .validated import bare
 
 # The columns of a terminal; the modules of a type, before its name.
 _COLUMNS, _MODULES = 80, re.compile(r"\b(?:\w+\.)+(?=[A-Za-z])")
+# What `help` puts before the lines of a docstring, and before those of a method.
+_INDENTED, _OF_METHOD = 4, 8
+# Headings of sections that have entries, the lines of these, and paragraphs that begin with a word and a colon.
+_SECTION = re.compile(r"(Args|Attributes|Returns|Raises|Yields)\b[^:]*:$")
+_ENTRY = re.compile(r" {4}[*\w., \"-]+: ")
+_NOTE = re.compile(r"(Conserves|Order|Cost|Source|Reference): ")
 # What NumPy's name of all that becomes an array stands for: a line of 300 characters.
 _ARRAY = inspect.formatannotation(ArrayLike)
+_OF_NUMPY = re.compile(r"ndarray\[tuple\[Any, \.\.\.\], dtype\[(\w+)\]\]")
 
 
 class Lined(inspect.Signature):
     """A signature: its text has a line for each parameter where one line would be too long."""
+
+    # Of a line, less the name of the function and what `help` puts before it.
+    columns = _COLUMNS
 
     def __str__(self) -> str:
         return self.format()
@@ -35,7 +47,7 @@ class Lined(inspect.Signature):
             named |= parameter.kind in (parameter.KEYWORD_ONLY, parameter.VAR_POSITIONAL)
             parts.append(_short(str(parameter)))
         line = f"({', '.join(parts)}){returned}"
-        if len(line) <= (max_width or _COLUMNS):
+        if len(line) <= (max_width or self.columns):
             return line
         return "".join(["(\n", *(f"    {part},\n" for part in parts), ")", returned])
 
@@ -46,11 +58,56 @@ def _short(text: str) -> str:
     inner = _ARRAY.removeprefix("typing.").removeprefix("Union[").removesuffix("]")
     for end, name in ((", NoneType]", "ArrayLike | None"), ("]", "ArrayLike")):
         text = text.replace(f"Union[{inner}{end}", name)
-    return _MODULES.sub("", text.replace(f"{_ARRAY} | None", "ArrayLike | None").replace(_ARRAY, "ArrayLike"))
+    return _OF_NUMPY.sub(
+        r"NDArray[\1]",
+        _MODULES.sub("", text.replace(f"{_ARRAY} | None", "ArrayLike | None").replace(_ARRAY, "ArrayLike")),
+    )
+
+
+def in_columns(text: str, width: int = _COLUMNS - _INDENTED) -> str:
+    """A docstring with its paragraphs and entries in lines of so many characters; examples and tables stay.
+
+    >>> in_columns("Conserves: the energy, and the momentum of all.", 24).splitlines()
+    ['Conserves: the energy,', 'and the momentum of all.']
+    """
+    done: list[str] = []
+    for indent, lines in _blocks(text.splitlines()):
+        if indent is None or max(map(len, lines)) <= width:
+            done += lines
+        else:
+            later = " " * (indent + 4 if indent and _ENTRY.match(lines[0]) else indent)
+            done += textwrap.wrap(
+                " ".join(line.strip() for line in lines), width, initial_indent=" " * indent,
+                subsequent_indent=later, break_long_words=False, break_on_hyphens=False,
+            )  # fmt: skip
+    return "\n".join(done)
+
+
+def _blocks(lines: list[str]) -> list[tuple[int | None, list[str]]]:
+    """Paragraphs and entries of a docstring, with the indent of each; None of what stays as it is."""
+    found: list[tuple[int | None, list[str]]] = []
+    in_section = stays = False
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        if not line.strip():
+            stays = False
+            found.append((None, [line]))
+            continue
+        if indent == 0:
+            in_section = _SECTION.match(line) is not None
+        begins = not found or not found[-1][1][0].strip()
+        stays = stays or line.lstrip().startswith((">>>", "|")) or (indent > 0 and not in_section and begins)
+        if stays or _SECTION.match(line):
+            found.append((None, [line]))
+        elif found and found[-1][0] is not None and not _ENTRY.match(line) and not _NOTE.match(line):
+            found[-1][1].append(line)
+        else:
+            found.append((4 if in_section else 0, [line]))
+    return found
 
 
 def show_in_lines(value: Any) -> None:
-    """Show the signature of a function in lines where it is long, of a class those of its methods too.
+    """Show the signature and the docstring of a function in lines, of a class those of its methods too.
 
     >>> from collections.abc import Callable
     >>> def function(first: Callable[[int], str] | None = None, *, second: str = "none", third: float = 0.5): ...
@@ -65,20 +122,31 @@ def show_in_lines(value: Any) -> None:
     """
     if isinstance(value, FunctionType):
         _line(value)
+    _line_text(value, _INDENTED)
     for kind in value.__mro__ if isinstance(value, type) else ():
         if kind.__module__.partition(".")[0] == value.__module__.partition(".")[0]:
             for one in vars(kind).values():
                 function = getattr(one, "__func__", one)
                 if isinstance(function, FunctionType):
-                    _line(function)
+                    _line(function, _INDENTED)
+                if isinstance(function, FunctionType | property | functools.cached_property):
+                    _line_text(function, _OF_METHOD)
 
 
-def _line(function: FunctionType) -> None:
+def _line_text(value: Any, indent: int) -> None:
+    """Give a docstring lines that are as wide as a terminal, less the indent that `help` adds."""
+    text = value.__doc__
+    if isinstance(text, str) and max(map(len, text.splitlines()), default=0) > _COLUMNS - indent:
+        value.__doc__ = in_columns(inspect.cleandoc(text), _COLUMNS - indent)
+
+
+def _line(function: FunctionType, indent: int = 0) -> None:
     """Give a function a `Lined` signature, if its own is long; checks of arguments are not part of it."""
     if "__signature__" not in vars(function):
         for name, kind in function.__annotations__.items() if function.__name__ == "__init__" else ():
             if not isinstance(kind, (type, str)):
                 function.__annotations__[name] = bare(kind)
-        signature = Lined.from_callable(function)
-        if len(inspect.Signature.__str__(signature)) > _COLUMNS:
+        signature, columns = Lined.from_callable(function), _COLUMNS - len(function.__name__) - indent
+        if len(inspect.Signature.__str__(signature)) > columns:
+            signature.columns = columns
             function.__signature__ = signature  # type: ignore[attr-defined]

@@ -92,9 +92,11 @@ def sweep(  # noqa: PLR0913  the keywords are the public interface
     """Carry out the runs of a sweep file, a scene file with a [sweep] table, and return the table of their results.
 
         [sweep]
-        combine = "product"                          # every value with every other; or "zip"
-        "surface.0.restitution" = [0.5, 0.7, 0.9]    # a key of the scene file: a table or list and what is in it
-        "particles.seed" = {range = 20}              # 0 to 19; {linspace = [a, b, n]}, {geomspace = [a, b, n]}
+        combine = "product"     # every value with every other; or "zip"
+        # keys of the scene file: a table or list and what is in it
+        "surface.0.restitution" = [0.5, 0.7, 0.9]
+        "particles.seed" = {range = 20}    # 0 to 19
+        "run.until" = {linspace = [1.0, 2.0, 5]}    # or geomspace
 
     Every run is an ordinary one, with its trajectory STEM.h5, its checkpoint, and STEM.json, which notes its end; the
     stem is a digest of its scene, so that lists can be made longer later. A run that fails is a row with its sentence

@@ -1,9 +1,12 @@
-"""The run of a scene file, `swarm.run("scene.toml")`; and a package, the loop over frames.
+"""The run of a scene file; and a package: frames, threads.
 
     swarm.run(path, output=None, *, plugins=(), **options) -> swarm.Result
 
-`path` is the scene file, `output` the trajectory to write, `plugins` the modules whose code the file may name, and
-`options` are keywords of `swarm.simulate` in place of the keys of [run]: `swarm.run("scene.toml", until=2.0)`.
+`path` is the scene file, `output` the trajectory to write, `plugins` the
+modules whose code the file may name, and `options` are keywords of
+`swarm.simulate` in place of the keys of [run]:
+
+    result = swarm.run("scene.toml", until=2.0)
 """
 
 import sys

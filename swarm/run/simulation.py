@@ -63,7 +63,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         check everything
         for each frame: 0, every, 2 every, ..., until
             advance all blocks to the frame   (not for the first)
-            observe; fail if a number is not finite, or a particle outside rigid walls
+            observe; fail if a number is not finite, or a particle outside
             copy the frame; a background thread writes and flushes it
             update the progress display
             save a checkpoint if one is due (within a long frame too)
@@ -133,7 +133,9 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
 
     >>> import swarm
     >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
-    >>> result = swarm.simulate(cavity, swarm.fill(cavity, 10, speed=1.0), swarm.Impact(), until=2.0, every=0.5)
+    >>> start = swarm.fill(cavity, 10, speed=1.0)
+    >>> impact = swarm.Impact()
+    >>> result = swarm.simulate(cavity, start, impact, until=2.0, every=0.5)
     >>> result.observables["time"]
     array([0. , 0.5, 1. , 1.5, 2. ])
     """
