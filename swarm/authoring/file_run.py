@@ -32,7 +32,7 @@ def run(
     Args:
         path: the scene file, TOML.
         output: the trajectory to write; None: that which the file names in [run], or no file at all.
-        plugins: the modules whose code the file may name, as "module:Name": laws, surfaces, methods, observables.
+        plugins: the modules with code that the file may name, as "module:Name": laws, surfaces, methods, observables.
         options: keywords of `simulate`, such as until, every, threads or progress, in place of the keys of [run].
 
     Returns:

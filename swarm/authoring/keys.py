@@ -87,7 +87,7 @@ _CHECKED: dict[Any, Any] = {
     checks.one_of: lambda choices: {"enum": list(choices)},
 }
 _PLAIN: dict[Any, Form] = {float: NUMBER, int: INTEGER, str: TEXT, bool: {"type": "boolean"}}
-# The forms of keys whose fields have a check of their own, or none, as what they hold is checked together.
+# The forms of keys with a check of their own in their fields, or none, as what they hold is checked together.
 _OF_KEYS: dict[str, Form] = {
     "side": {"enum": list(SIDES)},
     "rotation": either(
@@ -228,7 +228,7 @@ def _form(kind: Any) -> Form | None:
 
 
 def keys_of(cls: type[Any], meanings: Mapping[str, str] | None = None) -> tuple[Key, ...]:
-    """The keys of a class whose objects a table describes, with what `meanings` says of them, or its docstring."""
+    """The keys of a class with objects that a table describes, with what `meanings` says of them, or its docstring."""
     known, found = meanings_of(cls) if meanings is None else meanings, []
     for field in kept_fields(cls):
         name = field.metadata.get("key", field.name)

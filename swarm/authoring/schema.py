@@ -18,7 +18,7 @@ _OF_FILES = ("from", "frame")
 
 
 def schema_of(sweep: bool = False) -> Form:
-    """The schema of scene files; of sweep files, whose [sweep] may give what other tables lack.
+    """The schema of scene files; of sweep files, in which [sweep] may give what other tables lack.
 
     >>> sorted(schema_of()["required"]), sorted(schema_of(sweep=True)["required"])
     (['run'], ['sweep'])

@@ -104,7 +104,7 @@ class Listener:
             self.spent.seconds += self.spent.latest[1] - first
 
 
-# Of the contexts that are open, whom the compiler tells.
+# Of the contexts that are open: the compiler tells each of them.
 listeners: list[Listener] = []
 
 

@@ -30,7 +30,7 @@ from .cache import base, is_disabled, listeners
 from .compilers import KernelCompiler, LongKernelCompiler, PartCompiler
 from .deferred import loaded
 from .digest import key_of_kernel, was_compiled
-from .emission import arrays, fours, vectors  # noqa: F401  # each tells Numba of its operations
+from .emission import array_operations, sums, vector_operators  # noqa: F401  # each tells Numba of its operations
 from .entries import File, Key, is_own, key_of
 from .jit import Kernel
 from .once import held
@@ -60,7 +60,7 @@ _INLINE: Any = {"forceinline": True, **_OUTLINE}
 # What of a user's functions cannot be traced, and what may make arrays.
 _ALLOCATING: Any = {**_INLINE, "_nrt": True}
 calls.leave = leaving(_ALLOCATING)
-emit_spaced = arrays.emit_spaced
+emit_spaced = array_operations.emit_spaced
 
 
 def _find_scipy_only() -> None:
@@ -116,7 +116,7 @@ def _typeof_kernel(kernel: Kernel, _context: Any) -> Any:
     return numba.typeof(kernel.compiled)
 
 
-class _Told(event.Listener):  # type: ignore[misc]
+class _Announcer(event.Listener):  # type: ignore[misc]
     """Hands on to the contexts that are open when a compilation begins and ends."""
 
     def on_start(self, compiled: Any) -> None:
@@ -129,7 +129,7 @@ class _Told(event.Listener):  # type: ignore[misc]
             one.ends()
 
 
-event.register("numba:compile", _Told())
+event.register("numba:compile", _Announcer())
 
 
 # --- On disk ---------------------------------------------------------------------------------------------

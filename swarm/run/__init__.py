@@ -3,7 +3,7 @@
     swarm.run(path, output=None, *, plugins=(), **options) -> swarm.Result
 
 `path` is the scene file, `output` the trajectory to write, `plugins` the
-modules whose code the file may name, and `options` are keywords of
+modules with code that the file may name, and `options` are keywords of
 `swarm.simulate` in place of the keys of [run]:
 
     result = swarm.run("scene.toml", until=2.0)

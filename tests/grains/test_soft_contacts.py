@@ -187,7 +187,7 @@ def warnings_of(caplog, scene, start, method):
 def test_soft_contacts_are_reported_before_the_run(caplog):
     (pair,) = warnings_of(caplog, swarm.Scene([], period=(1.0, 1.0, 1.0)), two((10.0, -10.0)), SOFT)
     depth = depth_of(SOFT, 0.5 * MASS, 20.0)
-    assert f"by 20 m/s, sinks up to {depth:.2g} m into it, {depth / RADIUS:.2g} radii" in pair
+    assert f"at 20 m/s against particle 0, sinks up to {depth:.2g} m into it, {depth / RADIUS:.2g} radii" in pair
     (wall,) = warnings_of(caplog, swarm.Scene([ROOM]), thrown(5.0), SOFT)
     assert "with 5 m/s, sinks up to 0.016 m into a wall, 1.6 radii" in wall
     assert "use a penalty of 6.2e+04 or more (1000 here)" in wall
