@@ -2,11 +2,10 @@
 
 import swarm
 
-scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=None)
-particles = swarm.fill(scene, 10_000, speed=0.5, mass=1.0, seed=1)
-result = swarm.simulate(scene, particles, swarm.Impact(), until=10.0, every=0.1, trajectory="sphere.h5", threads=2)
+scene = swarm.Scene([swarm.Sphere(radius=0.5)])
+gas = swarm.fill(scene, 10_000, speed=0.5, seed=1)
+result = swarm.simulate(scene, gas, swarm.Impact(), until=10.0, every=0.1, trajectory="sphere.h5")
 
-print(result.particles.position.shape)
 print(result.observables["impacts"][-1], "impacts")
 print(result.observables["energy_error"].max(), "worst relative energy error of a particle")
 

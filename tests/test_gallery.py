@@ -1,4 +1,4 @@
-"""Every picture that a README shows is there, and examples and benchmarks take their look from one place."""
+"""Every picture that a page shows is there, and examples and benchmarks take their look from one place."""
 
 import re
 import struct
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-READMES = sorted(ROOT.glob("**/README.md"))
+PAGES = sorted({*ROOT.glob("**/README.md"), *ROOT.glob("examples/**/*.md")})
 SOURCES = sorted(path for folder in ("examples", "bench") for path in (ROOT / folder).rglob("*.py"))
 PICTURES = sorted(path for folder in ("examples", "bench") for path in (ROOT / folder).rglob("*.png"))
 # What of matplotlib makes a look of its own: its styles, pyplot, named colours, shades of grey, and colours in digits.
@@ -16,20 +16,20 @@ OWN_LOOK = re.compile(
 )
 
 
-def shown(readme):
-    """The files that a README shows as pictures."""
-    return [readme.parent / name for name in re.findall(r"!\[[^\]]*\]\(([^):]+\.png)\)", readme.read_text())]
+def shown(page):
+    """The files that a page shows as pictures."""
+    return [page.parent / name for name in re.findall(r"!\[[^\]]*\]\(([^):]+\.png)\)", page.read_text())]
 
 
 def test_what_is_shown_is_there():
-    pictures = [path for readme in READMES for path in shown(readme)]
+    pictures = [path for page in PAGES for path in shown(page)]
     assert len(pictures) > 30
     assert [str(path) for path in pictures if not path.is_file()] == []
 
 
 def test_pictures_of_examples_are_shown():
-    """One that no README shows has no caption."""
-    seen = {path.resolve() for readme in READMES for path in shown(readme)}
+    """One that no page shows has no caption."""
+    seen = {path.resolve() for page in PAGES for path in shown(page)}
     assert [path.name for path in (ROOT / "examples").glob("*.png") if path.resolve() not in seen] == []
 
 

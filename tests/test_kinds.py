@@ -1,4 +1,4 @@
-"""What makes a new kind of scene, as README says; and the order of surfaces changes nothing.
+"""What makes a new kind of scene, as examples/guide/compiling.md says; and the order of surfaces changes nothing.
 
 Kinds are compared without a compilation: each kernel of a run has one, of the types of its arguments.
 """

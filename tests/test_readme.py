@@ -1,4 +1,4 @@
-"""The READMEs: the first Python is examples/quickstart.py; all Python, scene files and commands run; files exist."""
+"""README, the gallery, the guide: the first Python is examples/quickstart.py; all Python, files and commands run."""
 
 import csv
 import itertools
@@ -10,24 +10,49 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from test_cli import command
-from test_howto import SECTION
 
 from swarm import scene_file
 from swarm.run.options import RunOptions
 
 ROOT = Path(__file__).parents[1]
-PATHS = [ROOT / "README.md", ROOT / "examples" / "README.md", ROOT / "bench" / "README.md"]
-README = PATHS[0].read_text()
-# In the order in which they are read, and run.
+GUIDE = ROOT / "examples" / "guide"
+# In the order in which commands run. test_howto.py runs the answers of GUIDE/how.
+FIRST = [ROOT / "README.md", GUIDE / "scene_files.md", ROOT / "examples" / "README.md"]
+PAGES = FIRST + sorted({*GUIDE.glob("*.md")} - {*FIRST})
+ANSWERS = sorted(GUIDE.glob("*/*.md"))
+BENCH = ROOT / "bench" / "README.md"
+PATHS = [*PAGES, *ANSWERS, BENCH]
+README = PAGES[0].read_text()
+ALL = "\n".join(path.read_text() for path in (*PAGES, BENCH))
 WHOLE = "\n".join(path.read_text() for path in PATHS)
-# What test_howto.py does not run.
-ALL = WHOLE.replace(SECTION, "")
+# Pages without Python: a gallery, a list of pages, and what is for those that change the code.
+WITHOUT_PYTHON = {ROOT / "examples" / "README.md", GUIDE / "README.md", GUIDE / "architecture.md"}
 
 
-def test_it_is_a_page():
-    assert len(README.splitlines()) <= 150
+def named(path):
+    return str(path.relative_to(ROOT))
+
+
+def test_readme_is_read_in_two_minutes():
+    assert len(README.split()) <= 700
+    assert max(map(len, README.splitlines())) <= 100
+
+
+@pytest.mark.parametrize("path", [*PAGES, *ANSWERS], ids=named)
+def test_a_page_is_short(path):
+    assert len(path.read_text().splitlines()) <= 250
+
+
+def test_every_page_is_in_the_list_of_pages():
+    links = {(GUIDE / link).resolve() for link in re.findall(r"\]\(([^)#]+)", (GUIDE / "README.md").read_text())}
+    assert {*GUIDE.rglob("*.md")} - links == {GUIDE / "README.md"}
+
+
+def test_terms_of_the_paper_wait_for_its_page():
+    assert [named(path) for path in (*PAGES, *ANSWERS) if "State I" in path.read_text()] == [named(GUIDE / "paper.md")]
 
 
 def test_first_screen_is_the_example():
@@ -43,18 +68,28 @@ def test_files_that_are_named_exist():
     assert [path for path in sorted(paths) if not (ROOT / path).exists()] == []
 
 
-@pytest.mark.parametrize("path", PATHS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_links_lead_to_files(path):
-    links = [link for link in re.findall(r"\]\(([^)#]+)\)", path.read_text()) if "://" not in link]
-    assert links
-    assert [link for link in links if not (path.parent / link).exists()] == []
+def slug(title):
+    """The name that GitHub gives a heading's anchor."""
+    return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
-BENCH = PATHS[2].read_text()
+@pytest.mark.parametrize("path", PATHS, ids=named)
+def test_links_lead_to_files_and_to_sections(path):
+    text = path.read_text()
+    links = [link for link in re.findall(r"\]\(([^)]+)\)", text) if "://" not in link]
+    for link in links:
+        file, _, anchor = link.partition("#")
+        target = path.parent / file if file else path
+        assert target.exists(), link
+        if anchor:
+            assert anchor in {slug(title) for title in re.findall(r"^#+ (.*)$", target.read_text(), re.MULTILINE)}, link
+
+
+REPORTED = BENCH.read_text()
 # The sections of bench/README.md with a report, and those rows of it that have a name and two numbers.
 REPORTS = {
     part.splitlines()[0]: re.findall(r"^ *(\S.*?) {2,}([\d.e+-]+) +[\d.e+-]+(?: |$)", "\n".join(blocks), re.MULTILINE)
-    for part in re.split(r"^## ", BENCH, flags=re.MULTILINE)[1:]
+    for part in re.split(r"^## ", REPORTED, flags=re.MULTILINE)[1:]
     if (blocks := re.findall(r"```\n(.*?)```", part, re.DOTALL))
 }
 # What waits for a quiet machine: python -m bench fields -o bench/results
@@ -63,7 +98,7 @@ WAITING = [pytest.mark.xfail(strict=True, reason="its table is not committed yet
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=WAITING * (name == "Fields")) for name in REPORTS])
 def test_a_report_that_is_quoted_is_committed_and_names_its_commit(name):
-    part = BENCH.split(f"## {name}\n")[1].split("\n## ")[0]
+    part = REPORTED.split(f"## {name}\n")[1].split("\n## ")[0]
     assert re.search(r"\b[0-9a-f]{7}, 20\d\d-\d\d-\d\d", part)
     files = [path.read_text().splitlines() for path in (ROOT / "bench" / "results").glob("*.csv")]
     tables = [
@@ -86,7 +121,8 @@ def test_ci_runs_the_readme_test_command():
     assert 'pip install -e ".[test]"' in README
     assert "python -m pytest -n auto --dist worksteal\n" in README
     assert 'pip install --quiet --disable-pip-version-check -e ".[test]"' in ci
-    assert 'python -m pytest -n auto --dist worksteal -m "not long"` runs the slow ones too, and `-m long`' in README
+    sentence = 'python -m pytest -n auto --dist worksteal -m "not long"` runs the slow ones too, and `-m long`'
+    assert sentence in " ".join(README.split())
     assert 'python -m pytest -q -n auto --dist worksteal -m "not long"\n' in ci
 
 
@@ -101,29 +137,68 @@ def copy_examples(folder, count):
             path.write_text(re.sub(r"range = \d+", "range = 2", text))
 
 
+def worst(result, name):
+    return result.observables[name].max()
+
+
+def has_frames_of(universe, result):
+    frames = universe.trajectory
+    return frames.n_frames == 101 and frames[-1].positions[7] == pytest.approx(
+        result.particles.position[:, 7], rel=1e-6
+    )
+
+
+# What the code of a page has found.
+FACTS = {
+    "README.md": lambda a: (
+        a["result"].particles.position.shape == (3, 10_000) and worst(a["result"], "energy_error") <= 1e-14
+    ),
+    "examples/guide/balls.md": lambda a: a["gas"].observables["collisions"][-1] > 0,
+    "examples/guide/billiards.md": lambda a: a["start"].volume == pytest.approx(np.pi + 4.0, rel=0.05),
+    "examples/guide/bodies.md": lambda a: worst(a["tumbled"], "energy_error") < 1e-9,
+    "examples/guide/compiling.md": lambda a: a["result"].compile_time == 0.0,
+    "examples/guide/laws.md": lambda a: a["stored"].observables["absorbed"][-1, 0] == len(a["gone"]) > 0,
+    "examples/guide/limits.md": lambda a: (
+        "surfaces[0].temperature must be None with Penalty, got 1; use Impact" in a["printed"]
+    ),
+    "examples/guide/many_runs.md": lambda a: len(a["table"]) == 8 and (a["table"]["state"] == "done").all(),
+    "examples/guide/meshes.md": lambda a: a["smooth"].mesh_error < 0.05,
+    "examples/guide/methods.md": lambda a: worst(a["exact"], "energy_error") < 1e-14,
+    "examples/guide/moving_walls.md": lambda a: worst(a["carried"], "energy_error") <= 1e-12,
+    "examples/guide/openings.md": lambda a: (
+        0 < a["drained"].observables["escaped"][-1] <= 100 and a["passed"].observables["escaped"][-1] == 0
+    ),
+    "examples/guide/other_programs.md": lambda a: has_frames_of(a["universe"], a["result"]),
+    "examples/guide/paper.md": lambda a: a["history"].converged and len(a["history"]) == 13,
+    "examples/guide/pictures.md": lambda _: Path("gas.gif").stat().st_size > 10_000 and Path("gas.html").exists(),
+    "examples/guide/results.md": lambda a: a["run"].observables["layers"].shape == (21, 6) and a["force"] > 0.0,
+    "examples/guide/running.md": lambda a: (a["first"].particles.position == a["again"].particles.position).all(),
+    "examples/guide/scene_files.md": lambda a: a["result"].particles.position.shape[0] == 3,
+    "examples/guide/scenes.md": lambda a: (
+        worst(a["settling"], "energy_error") <= 1e-14
+        and worst(a["settling"], "max_penetration") <= 1e-14
+        and a["settling"].observables["dissipated_energy"][-1] > 0.0
+    ),
+    "examples/guide/sources.md": lambda a: (
+        a["fed"].observables["born"][-1, 2] == 1000 and a["poured"].observables["born"][-1, 0] > 0
+    ),
+}
+
+
+def test_every_page_has_code():
+    assert {*FACTS} == {named(path) for path in {*PAGES} - WITHOUT_PYTHON}
+    assert [path for path in PAGES if path not in WITHOUT_PYTHON and "```python\n" not in path.read_text()] == []
+
+
 @pytest.mark.physics
-def test_the_python_runs_from_top_to_bottom(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("page", FACTS)
+def test_the_python_of_a_page_runs_from_top_to_bottom(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     copy_examples(tmp_path, 2)
-    Path("cavity.h5").touch()  # what the command above the first block has written
     names = {}
-    for block in re.findall(r"```python\n(.*?)```", ALL, re.DOTALL):
-        exec(block, names)
-    result, settling = names["result"], names["settling"]
-    assert result.particles.position.shape == (3, 10_000)
-    assert result.observables["energy_error"].max() <= 1e-14
-    seen = settling.observables
-    assert seen["energy_error"].max() <= 1e-14
-    assert seen["max_penetration"].max() <= 1e-14
-    assert seen["dissipated_energy"][-1] > 0.0
-    assert names["history"].converged
-    assert len(names["history"]) == 13
-    universe = names["universe"]
-    assert universe.trajectory.n_frames == 101
-    assert universe.trajectory[-1].positions[7] == pytest.approx(result.particles.position[:, 7], rel=1e-6)
-    output = capsys.readouterr().out
-    assert "impacts" in output
-    assert "True" in output
+    for block in re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL):
+        exec(compile(block, page, "exec"), names)
+    assert FACTS[page]({**names, "printed": capsys.readouterr().out})
 
 
 # What the words of a command stand for.
@@ -131,16 +206,16 @@ NAMES = {
     "SCENE.toml": "scene.toml", "SWEEP.toml": "sweep.toml", "RUN.h5": "scene.h5", "OUT.h5": "out.h5",
     "OUT.rrd": "out.rrd", "N": "2", "local:2": "local:1",
 }  # fmt: skip
-SCENE = re.search(r"```toml\n(.*?)```", README, re.DOTALL)[1]
+SCENE = re.search(r"```toml\n(.*?)```", (GUIDE / "scene_files.md").read_text(), re.DOTALL)[1]
 
 
 def commands():
-    """Every command of swarm in the READMEs, without its options in brackets and, where it has some, with them all.
+    """Every command of swarm in the pages, without its options in brackets and, where it has some, with them all.
 
     What only reads files is run once.
     """
     spans = re.findall(r"`(swarm [a-z]+ [^`\n]*\.[^`\n]*)`", ALL) + re.findall(
-        r"^(?:pip install \. && )?(swarm [a-z]+ \S+\.\S+.*)$", ALL, re.MULTILINE
+        r"^(?:pip install \S+ && )?(swarm [a-z]+ \S+\.\S+.*)$", ALL, re.MULTILINE
     )
     seen = set()
     for span in spans:
@@ -152,7 +227,7 @@ def commands():
 
 
 def settings():
-    """Every `key = value` of [run] in the READMEs."""
+    """Every `key = value` of [run] in the pages."""
     return [line for line in re.findall(r"`([a-z_]+ = [^`]*)`", ALL) if line.split()[0] in RunOptions.__annotations__]
 
 

@@ -33,7 +33,11 @@ class Result:
 
     Attributes:
         particles: the particles at `until`.
-        observables: name -> array with one entry a frame; "momentum" and "angular_momentum" (frames, 3), "impulse" and
+        observables: name -> array with one entry a frame: "time" [s]; "kinetic_energy", "potential_energy",
+            "contact_energy" and their sum, "total_energy" [J]; "dissipated_energy", what contacts have lost so far [J];
+            counts since 0 s, "impacts", "escaped", "unconverged" and "sweeps"; how many are "sliding", and how long
+            all have been, "sliding_time" [s]; the worst particle's "energy_error", relative to its energy at the start,
+            and "max_penetration" into a wall [m]; "momentum" and "angular_momentum" (frames, 3), "impulse" and
             "wall_heat" (frames, surfaces). Where a surface is a union or an intersection also "part_impulse" and
             "part_heat" (frames, parts), of each of `scene.parts`. Where walls move also "wall_work" (frames, surfaces)
             [J] and "wall_position" (frames, surfaces, 3) [m] and "wall_orientation" (frames, surfaces, 4), quaternions
