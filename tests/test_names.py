@@ -24,7 +24,14 @@ STRINGS = (tokenize.STRING, getattr(tokenize, "FSTRING_MIDDLE", tokenize.STRING)
 PLAIN = re.compile(TURNS.pattern + r"|\b[Ww]hose\b")
 PAGES = [
     path
-    for pattern in ("README.md", "bench/README.md", "examples/**/*.md", "examples/**/*.ipynb", "examples/**/*.toml")
+    for pattern in (
+        "README.md",
+        "bench/*.md",
+        "examples/**/*.md",
+        "examples/**/*.ipynb",
+        "examples/**/*.toml",
+        "swarm/**/*.toml",
+    )
     for path in ROOT.parent.glob(pattern)
     if ".ipynb_checkpoints" not in path.parts
 ]

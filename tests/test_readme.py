@@ -249,6 +249,8 @@ def test_the_commands_run_in_their_order(tmp_path, monkeypatch):
         "info",
         "report",
         "sweep",
+        "new",
+        "schema",
     }
     assert len(found) >= 12
     for words in found:
