@@ -12,9 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 from test_cli import command
 
+import swarm
 from swarm import scene_file
+from swarm.commands.cli import app
 from swarm.run.options import RunOptions
 
 ROOT = Path(__file__).parents[1]
@@ -109,6 +112,18 @@ def test_a_report_that_is_quoted_is_committed_and_names_its_commit(name):
     first = [(what, pytest.approx(float(least), rel=1e-2)) for what, least in REPORTS[name][:5]]
     assert first
     assert any(all(row in table for row in first) for table in tables), first
+
+
+@pytest.mark.parametrize("path", PATHS, ids=named)
+def test_names_and_options_in_a_page_exist(path):
+    """`swarm.NAME` is a public name, and the options in a line with a command are options of it."""
+    text = path.read_text().replace("swarm.schema.json", "")
+    assert [name for name in re.findall(r"\bswarm\.([A-Za-z_]\w*)", text) if not hasattr(swarm, name)] == []
+    known = typer.main.get_command(app).commands
+    for name, rest in re.findall(r"\bswarm ([a-z]+) ([^`\n]*\.[^`\n]*)", text):
+        parameters = known[name].params if name in known else []
+        options = {option for one in parameters for option in (*one.opts, *one.secondary_opts)}
+        assert set(re.findall(r"(?<!\S)\[?(--?[a-z][a-z-]*)", rest)) <= options | {"--help"}, rest
 
 
 def test_every_shipped_scene_is_named():
