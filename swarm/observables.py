@@ -108,6 +108,9 @@ def observe(law, walls, gravity, state, drawn, size, partial):
                     i = left + j
                     m, r, v = mass[i], column(position, 0, i), column(velocity, 0, i)
                     e = _energies(law, walls.at(0.0), gravity, m, r, v)
+                    if law is not None:
+                        # What a particle that has escaped had stored is lost.
+                        e = e._replace(stored=select(is_gone(state, i), 0.0, e.stored))
                     p = m * v
                     error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
                     now = walls.at(0.0)
@@ -135,6 +138,15 @@ def observe(law, walls, gravity, state, drawn, size, partial):
                 half //= 2
             for row in range(ROWS):
                 partial[begin // CHUNK, row] = sums[row, 0]
+
+
+@kernel
+def store(law, walls, remaining, state, into):
+    """What the contacts of each particle store when so much of the frame is left [s], per mass, into an array (N,)."""
+    now = walls.at(remaining)
+    for i in range(state.mass.size):
+        r = column(state.position, 0, i)
+        into[i] = select(is_gone(state, i), 0.0, contact_energy(law, now, 1.0 / state.mass[i], r))
 
 
 @kernel

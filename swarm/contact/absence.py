@@ -53,7 +53,7 @@ def stands(openings, walls, wall, r, near):
 
 
 @outlined
-def _lets_out(openings, rules, walls, wall, r, near):
+def lets_out(openings, rules, walls, wall, r, near):
     """Whether a wall that a particle is on lets it out: it is open there, and no closed wall lies on it."""
     if not lets_through(openings, walls, wall, r, near):
         return False
@@ -101,7 +101,7 @@ def open_wall_at(openings, rules, walls, gravity, motion, near):
     number, touch, ways = walls.numbers_near(r), TOUCH * rules.size, ends_of(walls)
     for i in range(number.size):
         here = walls.distance(number[i], r) >= -touch and not is_absent(ways, walls, number[i], r, near, BEYOND)
-        if not here or not _lets_out(openings, rules, walls, number[i], r, near):
+        if not here or not lets_out(openings, rules, walls, number[i], r, near):
             continue
         if _is_pressed(walls, gravity, number[i], r, v) or not leads_on(walls, number[i], r):
             return number[i]
@@ -133,9 +133,9 @@ def through(walls, gravity, wall, motion):
 @outlined
 def open_wall_of(openings, rules, walls, active, r, near):
     """The wall of those that hold a particle that lets it out at its place, or -1."""
-    if _lets_out(openings, rules, walls, active.first, r, near):
+    if lets_out(openings, rules, walls, active.first, r, near):
         return active.first
-    return active.second if _lets_out(openings, rules, walls, active.second, r, near) else -1.0
+    return active.second if lets_out(openings, rules, walls, active.second, r, near) else -1.0
 
 
 @outlined
@@ -215,7 +215,7 @@ def _part_until_open(openings, rules, walls, wall, path, near):
 
 
 def _lets_out_at(openings, rules, walls, wall, path, near, part):
-    return _lets_out(openings, rules, walls, wall, at_part(path, part), near)
+    return lets_out(openings, rules, walls, wall, at_part(path, part), near)
 
 
 # --- Into volumes ----------------------------------------------------------------------------------------

@@ -282,6 +282,13 @@ class GrainsRun(BaseRun):
         kernel(self._matter, walls, remaining, world.grains, world.near, found)
         return found
 
+    def _length(self, duration: float) -> float:
+        # Each piece has steps of its own.
+        return duration
+
+    def _clock_time(self, moment: float) -> float:
+        return super()._clock_time(moment) if self._instants is None else moment
+
     # --- A frame -------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:

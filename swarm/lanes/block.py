@@ -16,7 +16,7 @@ from ..kernel.vector import put
 from ..methods import contract as methods
 from ..surfaces.in_motion.moving import Carried
 from .accounts import add_to_rows, add_work
-from .escape import let_out_lanes
+from .escape import meet_openings, step_out, step_out_lanes
 from .flight import go
 from .hit_member import of_lane, pick, picks
 from .periodic import return_lanes
@@ -142,9 +142,11 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
     for i in range(live):
         if lanes.wall[i] <= methods.HARD:
             lane, wall = lanes.given(method, i), methods.HARD - lanes.wall[i]
-            contact, status = method.hard_pass(walls, gravity, lane, wall, lanes, i)
+            contact, status = method.hard_pass(lanes.faced(walls, i), gravity, lane, wall, lanes, i)
             _put_contact(method, lanes, i, contact)
             _count_contacts(method, share, lanes, i, i + 1)
+            if lanes.stand is not None and status == Status.DONE.value:
+                step_out(method, walls, share, lanes, i)
             if share.counts is not None:
                 share.counts.add(wall, contact.hits)
             if lanes.lane(i).hits > hard.most_hits:
@@ -169,7 +171,7 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
     if lanes.period is not None:
         return_lanes(lanes.period, state, lanes, live)
     if state.openings is not None:
-        let_out_lanes(state.openings, method, walls, gravity, share, lanes, live)
+        meet_openings(state.openings, method, walls, gravity, share, lanes, live)
     if method.solves is not None:
         solve(method, walls, gravity, state.multipliers, lanes, live)
     for watch in watches:
@@ -182,6 +184,7 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
         counters.keep_before(method, gravity, lanes, live)
     some_arrived, some_hard = _make_contacts(method, walls, gravity, watches, lanes, picked, live)
     _count_contacts(method, share, lanes, 0, live)
+    some_arrived = step_out_lanes(method, walls, share, lanes, live) | some_arrived
     for watch in watches:
         watch.add_rows(method, walls, state, lanes, live)
     return some_arrived, some_hard, some_wrong
@@ -199,7 +202,7 @@ def _make_contacts(method, walls, gravity, watches, lanes, picked, live):
     some_arrived, some_hard = False, False
     for i in range(index(live)):
         lane, found = lanes.given(method, i), solution(method, lanes, i)
-        here = method.walls_of(of_lane(walls, picked, i), lane.remaining)
+        here = method.walls_of(lanes.faced(of_lane(walls, picked, i), i), lane.remaining)
         contact = method.contact(here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _put_contact(method, lanes, i, contact), (contact.wall <= methods.HARD) & (not method.holds)
         _add_impulse(walls, lanes.impulse, i, contact.wall, contact.impulse)

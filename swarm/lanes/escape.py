@@ -5,11 +5,13 @@ import math
 import numpy as np
 
 from ..contact import crossing
-from ..contact.absence import closeness, hit_wall, lets_through, open_wall_of, through
+from ..contact.absence import closeness, hit_wall, lets_out, lets_through, open_wall_of, through
+from ..contact.energy import contact_energy
 from ..contact.events import ARRIVED, FLYING
 from ..kernel.arrays import index
-from ..kernel.jit import outlined
+from ..kernel.jit import outlined, select
 from ..kernel.vector import norm, put
+from ..methods.contract import HARD, wall_of
 from ..surfaces.presence.openings import is_open
 from ..surfaces.presence.rooms import leads_on
 from .table import marked_lanes
@@ -42,6 +44,14 @@ def detain(share, p, wall, remaining, wait):
     return False
 
 
+def meet_openings(openings, method, walls, gravity, share, lanes, live):
+    """The lanes at openings, at the end of their flights."""
+    if method.steps_into_walls:
+        face_lanes(openings, method, walls, gravity, share, lanes, live)
+    else:
+        let_out_lanes(openings, method, walls, gravity, share, lanes, live)
+
+
 def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
     """The lanes with a flight that has ended on a wall where it is open, if no closed one is at the same place.
 
@@ -49,15 +59,15 @@ def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
     """
     near = closeness(walls)
     for i in range(index(live)):
-        lanes.marked[i] = is_open(openings, lanes.wall[i], lanes.lane(i).r, near)
+        lanes.marked[i] = is_open(openings, wall_of(lanes.wall[i]), lanes.lane(i).r, near)
     for k in range(marked_lanes(lanes, live)):
         i = index(lanes.order[k])
         flier = lanes.lane(i)
         r, v = flier.r, flier.v
         now = walls.at(flier.remaining)
-        wall = hit_wall(openings, method, now, (r, v), lanes.wall[i], near)
+        wall = hit_wall(openings, method, now, (r, v), wall_of(lanes.wall[i]), near)
         if not lets_through(openings, now, wall, r, near):
-            lanes.wall[i] = wall
+            lanes.wall[i] = select(lanes.wall[i] <= HARD, HARD - wall, wall)
             continue
         if leads_on(now, wall, r):
             (flier.r, flier.v), lanes.wall[i] = through(now, gravity, wall, (r, v)), -1.0
@@ -65,10 +75,83 @@ def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
         p, counters = index(lanes.particle[i]), share.counters
         if counters is not None:
             counters.retire(share.state, lanes, p, i)
-        escape(share, p, lanes.wall[i], r, v, flier.remaining)
+        escape(share, p, wall, r, v, flier.remaining)
         if counters is not None:
             counters.load(share.state, lanes, p, i)
         flier.remaining, lanes.wall[i] = 0.0, -1.0
+
+
+# --- Of steps into walls ---------------------------------------------------------------------------------
+
+
+def face_lanes(openings, method, walls, gravity, share, lanes, live):
+    """Find to which lanes which walls are open in their steps, by the foot of each on the wall at the start of it."""
+    for i in range(index(live)):
+        for k, _wall in enumerate(walls.each):
+            lanes.stand[k, i] = 1.0
+        if lanes.wall[i] != -1.0:
+            _face(openings, method, walls, gravity, share, lanes, i)
+
+
+@outlined
+def _face(openings, method, walls, gravity, share, lanes, i):
+    lane, near, lost, some_open = lanes.given(method, i), closeness(walls), 0.0, False
+    now = method.at_start(walls, lane.remaining)
+    for k, wall in enumerate(now.each):
+        if lets_out(openings, method, now, float(k), wall.project(lane.r), near):
+            lanes.stand[k, i], some_open = 0.0, True
+            # What it has stored is lost with the wall.
+            lost += method.law.stored_energy(wall.gap_of(wall.inner(lane.r)))
+    if some_open:
+        _lose(method, share, lanes, i, lost)
+        lanes.wall[i] = method.touched(lanes.faced(walls, i), gravity, lane)
+
+
+def _lose(method, share, lanes, i, lost):
+    """Take energy from a lane [J], for ever."""
+    state, p = share.state, index(lanes.particle[i])
+    state.dissipated[p] += lost
+    lane = lanes.lane(i)
+    lane.twice -= 2.0 * lost / state.mass[p]
+    if not method.dissipates:
+        # Else it is booked with the work of the walls, where the lane retires.
+        state.energy[p] -= lost / state.mass[p]
+
+
+def step_out_lanes(method, walls, share, lanes, live):
+    """The lanes that have stepped through an open wall: whether any has."""
+    found = False
+    if lanes.stand is None:
+        return found
+    for i in range(index(live)):
+        # A hard lane has not taken its step yet.
+        if lanes.wall[i] > HARD:
+            found = step_out(method, walls, share, lanes, i) | found
+    return found
+
+
+@outlined
+def step_out(method, walls, share, lanes, i):
+    """A lane after its step: whether it is through an open wall; then what it has stored in others is lost."""
+    flier, out = lanes.lane(i), -1.0
+    for k, wall in enumerate(method.at_start(walls, flier.remaining).each):
+        if lanes.stand[k, i] == 0.0 and wall.level_of(wall.inner(flier.r)) > 0.0:
+            out = float(k)
+    if out < 0.0:
+        return False
+    p, counters = index(lanes.particle[i]), share.counters
+    rest = method.at_start(lanes.faced(walls, i), flier.remaining)
+    _lose(method, share, lanes, i, contact_energy(method.law, rest, 1.0, flier.r))
+    if counters is not None:
+        counters.retire(share.state, lanes, p, i)
+    escape(share, p, out, flier.r, flier.v, method.seconds(flier.remaining))
+    if counters is not None:
+        counters.load(share.state, lanes, p, i)
+    flier.remaining, lanes.wall[i], lanes.marked[i] = 0.0, -1.0, True
+    return True
+
+
+# --- Of what slides --------------------------------------------------------------------------------------
 
 
 @outlined

@@ -12,6 +12,7 @@ from ..kernel.record import Record
 from ..kernel.vector import Vec, column, put
 from ..methods import contract as methods
 from ..surfaces.in_motion.moving import Carried
+from ..surfaces.presence.ajar import Faced
 from ..surfaces.time_of_impact import flights
 from .table import EIGHT, STRIDE, Advanced, Number, Rows, copy_lane, table
 
@@ -59,6 +60,7 @@ class Lanes(NamedTuple):
     period: Any = None  # the cell where it repeats
     before: Any = None  # what a lane is before its contact, where impacts are logged or counted by wall
     began: Any = None  # the same before its flight, where there are counters
+    stand: Any = None  # (walls, stride) 1 of a wall that stands in its step, 0 of one that is open to it
 
     def lane(self, i):
         """The rows of a lane."""
@@ -69,6 +71,12 @@ class Lanes(NamedTuple):
         lane = self.lane(i)
         flown = self.flown[i] if method.asks_flown else None
         return methods.Lane(lane.r, lane.v, lane.remaining, lane.hits, method.own(*lane.own), flown)
+
+    def faced(self, walls, i):
+        """The walls as the step of a lane meets them."""
+        if self.stand is None:
+            return walls
+        return Faced(walls, tuple(self.stand[k, i] for k, _wall in enumerate(walls.each)))
 
     def load(self, method, walls, share, i, k):
         """Particle i into lane k, as it starts the frame, or as a halt left it."""

@@ -18,7 +18,8 @@ def solve(method, walls, gravity, multipliers, lanes, live):
     """The contact's unknown of every lane, its multiplier where the method has one, and the velocity where it turns."""
     if method.most_sweeps(walls) > 0:
         for i in range(live):
-            lanes.kappa[i], lanes.unsolved[i] = method.guess(walls, gravity, lanes.given(method, i), lanes.wall[i])
+            here = lanes.faced(walls, i)
+            lanes.kappa[i], lanes.unsolved[i] = method.guess(here, gravity, lanes.given(method, i), lanes.wall[i])
     if multipliers is not None:
         _begin_multipliers(method, walls, gravity, lanes, live)
     _newton(method, walls, gravity, multipliers, lanes, live)
@@ -27,7 +28,7 @@ def solve(method, walls, gravity, multipliers, lanes, live):
     # The velocity after the contact, where one loop with the rest of the contact would be too long.
     if method.turns:
         for i in range(live):
-            turned = method.turn(walls, gravity, lanes.given(method, i), lanes.wall[i], lanes.kappa[i])
+            turned = method.turn(lanes.faced(walls, i), gravity, lanes.given(method, i), lanes.wall[i], lanes.kappa[i])
             put(lanes.turned, 0, i, turned.v)
             lanes.turned[3, i] = turned.impulse
 
@@ -49,7 +50,8 @@ def _newton(method, walls, gravity, multipliers, lanes, live):
         remaining = 0
         for i in range(live):
             going = unsolved[i]
-            kappa[i], unsolved[i], found = method.improve(walls, gravity, lanes.given(method, i), lanes.wall[i],
+            kappa[i], unsolved[i], found = method.improve(
+                lanes.faced(walls, i), gravity, lanes.given(method, i), lanes.wall[i],
                 methods.Solution(kept(kappa[i]), going, methods.NOT_TURNED), record[MULTIPLIER, i],
             )  # fmt: skip
             if multipliers is not None:
@@ -69,7 +71,7 @@ def _begin_multipliers(method, walls, gravity, lanes, live):
     kappa, record = lanes.kappa, lanes.record
     for i in range(live):
         record[MULTIPLIER, i], kappa[i], record[ACCELERATION, i] = method.first_multiplier(
-            walls, gravity, lanes.given(method, i), lanes.wall[i], kappa[i]
+            lanes.faced(walls, i), gravity, lanes.given(method, i), lanes.wall[i], kappa[i]
         )
         lanes.sweeping[i] = lanes.unsolved[i]
         record[BEFORE, i], record[MISS, i] = np.nan, np.nan

@@ -122,6 +122,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         if self.adaptive:
             base.check_crossing("dt", self.dt, scene, particles)
         else:
+            fixed_step.check_instants(scene, self.dt)
             fixed_step.check_solids(scene, particles, self.dt)
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:

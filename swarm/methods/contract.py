@@ -20,7 +20,7 @@ from ..common.status import Status
 from ..contact.impulse import LoopRecord
 from ..contact.laws import NONE
 from ..contact.reflection import ReflectedVelocity
-from ..kernel.jit import outlined
+from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec
 
@@ -89,6 +89,11 @@ class Contact(NamedTuple):
     work: Any = 0.0
 
 
+def wall_of(asked):
+    """The wall of the end of a flight, also where its contact is left to `hard_pass`."""
+    return select(asked <= HARD, HARD - asked, asked)
+
+
 def refused(lane, status):
     """A contact that is not taken, for this reason: a result of `hard_pass`."""
     return Contact(lane.r, lane.v, lane.remaining, 0.0, 0.0, 0.0, 0.0, False), status
@@ -151,6 +156,19 @@ class MethodNumbers(Record):
 
         A method of steps takes all there are, to ask them over its step.
         """
+        return walls.at(remaining)
+
+    @property
+    def steps_into_walls(self):
+        """Whether it finds its contacts by steps into walls: then it is decided before each which walls are open."""
+        return False
+
+    def touched(self, walls, gravity, lane):
+        """The wall that the next step of such a method touches, as the `FlightEnd` has it."""
+        return -1.0
+
+    def at_start(self, walls, remaining):
+        """The walls at the start of that step, with so much of the frame left in the method's unit."""
         return walls.at(remaining)
 
     # --- Flight ---

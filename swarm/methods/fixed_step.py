@@ -45,6 +45,7 @@ class SoftWalls(base.Method):
     def check(self, scene: Scene, particles: Particles) -> None:
         if particles.radius is None:
             base.check_bends(scene)
+            check_instants(scene, self.dt)
         check_solids(scene, particles, self.dt)
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
@@ -54,7 +55,7 @@ class SoftWalls(base.Method):
     def record(self, kind: type["SoftNumbers"], scene: Scene, factor: float, form: Any = None) -> "SoftNumbers":
         """The numbers of this description, of a kind that divides such a factor by the mass."""
         longest = longest_step(scene, self.dt)
-        return kind(self.dt, self.law(), longest, factor, form, moves(scene), _half_widths(scene))
+        return kind(self.dt, self.law(), longest, factor, form, moves(scene), _half_widths(scene), scene.finite_size())
 
     def span(self, name: str, duration: float) -> float:
         return whole_steps(name, duration, self.dt)
@@ -92,6 +93,16 @@ def check_gradient(method: Any) -> None:
 def moves(scene: Scene) -> Moves | None:
     """`Moves` as kernels take it, where a wall moves."""
     return Moves(0.0) if scene.moves() else None
+
+
+def check_instants(scene: Scene, dt: float) -> None:
+    """Raise a `SceneError` where walls come or go, or openings open or shut, within a step."""
+    for time in scene.instants:
+        if abs(time / dt - round(time / dt)) > _WHOLE:
+            raise SceneError(
+                f"walls must come and go, and openings open and shut, at whole steps, got {time:g} s with dt = {dt:g} "
+                f"s, which is {time / dt:.6g} steps; give times that are multiples of dt, another dt, or Impact"
+            )
 
 
 def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
@@ -203,12 +214,15 @@ class Steps(contract.MethodNumbers):
     def dissipates(self):
         return self.moving is not None
 
+    @property
+    def steps_into_walls(self):
+        return not self.lands
+
     def walls_of(self, walls, remaining):
         # Of all walls: each part of a step asks for those that it needs.
         return walls
 
-    def before(self: Any, walls, remaining):
-        """The walls at the start of a step, with so many of the frame left."""
+    def at_start(self: Any, walls, remaining):
         return walls.at(remaining * self.dt)
 
     def over(self: Any, walls, remaining):
@@ -221,7 +235,7 @@ class Steps(contract.MethodNumbers):
 
     def times(self, walls, remaining):
         """The walls at the start of that step, over it and at its end."""
-        return self.before(walls, remaining), self.over(walls, remaining), self.after(walls, remaining)
+        return self.at_start(walls, remaining), self.over(walls, remaining), self.after(walls, remaining)
 
     def reach(self: Any, before, gravity, lane):
         """From r0 to the point of the force that it takes, as if there were no wall."""
@@ -246,13 +260,17 @@ class Steps(contract.MethodNumbers):
             lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.remaining - steps,
             lane.hits, lane.own,
         )  # fmt: skip
-        to_point = walls.during(start.remaining * dt, (start.remaining - self.point) * dt)
-        touched = to_point.touched(start.r, self.reach(self.before(walls, start.remaining), gravity, start))
+        wall = self.touched(walls, gravity, start)
+        return contract.FlightEnd(start.r, start.v, start.remaining, select(start.remaining > 0.0, wall, -1.0))
+
+    def touched(self: Any, walls, gravity, lane):
+        dt = self.dt
+        to_point = walls.during(lane.remaining * dt, (lane.remaining - self.point) * dt)
+        touched = to_point.touched(lane.r, self.reach(self.at_start(walls, lane.remaining), gravity, lane))
         # Several walls at once, or nested solves: the careful way.
         alone = (touched.number <= 1.0) & (not isinstance(self.form, MeanValue))
         wall = select(alone, touched.wall, contract.HARD - touched.wall)
-        wall = select(self.is_too_fast(displacement(gravity, start.v, dt)), contract.HARD, wall)
-        return contract.FlightEnd(start.r, start.v, start.remaining, select(start.remaining > 0.0, wall, -1.0))
+        return select(self.is_too_fast(displacement(gravity, lane.v, dt)), contract.HARD, wall)
 
 
 class SoftNumbers(Steps):
@@ -265,6 +283,7 @@ class SoftNumbers(Steps):
     form: Any  # of the discrete gradient, or None
     moving: Any  # None, or `Moves` where a wall moves
     half_widths: Any  # of the solid of each wall [m], infinite for a cavity; None if no wall has another side
+    size: float  # of the scene [m]
 
     def passes(self, walls, lane, wall, r, v):
         """Whether a step that ends so leads a lane through the middle of this wall."""
@@ -297,7 +316,7 @@ class SoftNumbers(Steps):
         if self.is_too_fast(displacement(gravity, lane.v, self.dt)):
             return contract.refused(lane, Status.TOO_FAST.value)
         step = self.careful_step(walls, gravity, lane, lanes.impulse, i)
-        new = select(self.before(walls, lane.remaining).outside(-1.0, lane.r), 0.0, 1.0)
+        new = select(self.at_start(walls, lane.remaining).outside(-1.0, lane.r), 0.0, 1.0)
         status = Status.DONE.value if step.solved else Status.UNSOLVED.value
         if self._passes_any(walls, lane, step.r, step.v):
             return contract.refused(lane, Status.TOO_DEEP.value)

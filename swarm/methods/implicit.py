@@ -122,7 +122,7 @@ class RuleNumbers(fixed_step.SoftNumbers):
 
     def free(self, walls, gravity, lane):
         """The point, as if it felt no force."""
-        return lane.r + self.reach(self.before(walls, lane.remaining), gravity, lane)
+        return lane.r + self.reach(self.at_start(walls, lane.remaining), gravity, lane)
 
     def there(self, walls, lane):
         """The walls when the particle is at the point."""
@@ -161,7 +161,7 @@ class RuleNumbers(fixed_step.SoftNumbers):
         return fixed_step.contact(lane, wall, taken)
 
     def careful_step(self, walls, gravity, lane, impulse, i):
-        before = self.before(walls, lane.remaining)
+        before = self.at_start(walls, lane.remaining)
         free = Step(lane.r, self.reach(before, gravity, lane), lane.own.over_mass)
         reactions = scratch((walls.length(), 4), np.float64)
         point, solved = corner.hold(_AtEnd(), self.law, None, self.there(walls, lane), free, reactions)
@@ -206,7 +206,7 @@ class TrapezoidalNumbers(RuleNumbers):
 
     def add_impulses(self, walls, lane, reactions, impulse, i):
         h, law, moving = self.dt, self.law, self.moving
-        before, over = self.before(walls, lane.remaining), self.over(walls, lane.remaining)
+        before, over = self.at_start(walls, lane.remaining), self.over(walls, lane.remaining)
         corner.add_reaction_impulses(reactions, h, impulse, i)
         # h/(2m) |F0|
         factor = 2.0 * lane.own.over_mass / h

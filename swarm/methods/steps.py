@@ -50,6 +50,11 @@ class StepNumbers(penalty.GradientSteps):
     longest: Any  # step that jumps over no solid [m]; None without solids
     moving: Any  # None, or `Moves` where a wall moves, in fixed steps
 
+    @property
+    def size(self):
+        """That of the scene [m]."""
+        return self.shortest_length / base.SHORTEST
+
     def is_new(self, walls, r):
         """Whether a contact step starts with an impact."""
         raise NotImplementedError
@@ -200,7 +205,7 @@ class FixedSteps(StepNumbers):
             # Refused before the run.
             return contract.refused(lane, Status.UNCONVERGED.value)
         energy, r, v = _first_energy(lane), lane.r, lane.v
-        remaining, hits = cut.h, 0.0
+        walls, remaining, hits = self.at_start(walls, lane.remaining), cut.h, 0.0
         for _i in range(_MOST_BOUNCES):
             hit = flights.first_hit(walls, None, r, v)
             t = min(hit.time, remaining)

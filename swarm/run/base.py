@@ -160,6 +160,14 @@ class BaseRun:
         """What the error of the energy is relative to [J]; None: each particle has an error of its own."""
         return None
 
+    def _length(self, duration: float) -> float:
+        """The length of a piece of a frame [s] in the unit in which this engine counts it down."""
+        return self._method.span("the time between two doors", duration)
+
+    def _clock_time(self, moment: float) -> float:
+        """The time of this engine at the end of a frame, or of a piece of one [s]."""
+        return self._method.instant(moment)
+
     def _switch(self, instant: float) -> None:
         """Change what changes at the instant at which a piece of a frame begins [s]."""
 
@@ -189,7 +197,7 @@ class BaseRun:
                 self._switch(before)
             if self._impacts is not None:
                 self._impacts.begin = before
-            if not self._advance_piece(after - before, after, writing, latest):
+            if not self._advance_piece(self._length(after - before), after, writing, latest):
                 return False
             self._done[0] = k + 1
         self._begun[0], self._done[0] = moment, 0
@@ -202,7 +210,7 @@ class BaseRun:
 
     def _advance_piece(self, span: float, moment: float, writing: float, latest: float) -> bool:
         """Advance by a piece of a frame, as `advance` does by all of it."""
-        self._moment = self._method.instant(moment) if self._instants is None else moment
+        self._moment = self._clock_time(moment)
         self._prepare(span, moment)
         again = True
         while again:
@@ -227,7 +235,7 @@ class BaseRun:
             return self._share_done(span)
         k, times = int(self._done[0]), self._times(self._end)
         before, after = times[k : k + 2]
-        done = before - times[0] + self._share_done(after - before) * (after - before)
+        done = before - times[0] + self._share_done(self._length(after - before)) * (after - before)
         return float(done / (times[-1] - times[0]))
 
     def arrays(self) -> Arrays:

@@ -2,15 +2,18 @@
 
 import bisect
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import observables
 from ..contact.events import ARRIVED, CAREFUL, EDGE, FLYING, HELD
 from ..errors import RunError
 from ..scene import Scene
 from ..state import Contacts, State
+from .base import OUTSIDE
 from .engine import Run
 from .failures import sentence_of_coming
 
@@ -18,15 +21,42 @@ from .failures import sentence_of_coming
 class DoorRun(Run):
     """The run of particles, piece by piece of each frame: from one instant to the next nothing comes or goes."""
 
+    # What contacts stored before the instant that has come, per mass [J/kg].
+    _stored_before: NDArray[np.float64] | None = None
+
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
         self._instants = self._scene.instants
+
+    def _prepare(self, span: float, moment: float) -> None:
+        super()._prepare(span, moment)
+        if self._stored_before is not None:
+            self._lose(self._stored_before - self._stored(self._numbers.seconds(span)))
+            self._stored_before = None
 
     def _reach(self, moment: float) -> None:
         super()._reach(moment)
         if not self._scene.moves():
             self._walls, self._faces = self._compiled.walls(moment), self._scene.open_faces(moment)
         self.state = self.state._replace(openings=self._compiled.openings(moment))
+
+    # --- What soft contacts store ------------------------------------------------------------------------
+
+    def _stored(self, remaining: float) -> NDArray[np.float64]:
+        """What the contacts of each particle store with so much left of a piece [s], per mass [J/kg]."""
+        found = np.zeros(self.state.mass.size)
+        self._tier.kernel(observables.store)(self._law, self._walls, remaining, self.state, found)
+        return found
+
+    def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+        yield from super().calls()
+        if self._law is not None:
+            yield observables.store, (self._law, self._walls, 0.0, self.state, np.zeros(self.state.mass.size))
+
+    def _lose(self, lost: NDArray[np.float64]) -> None:
+        """Take energies from the particles, per mass [J/kg], which were stored with walls that went."""
+        self.state.energy[:] -= lost
+        self.state.dissipated[:] += lost * self.state.mass
 
     # --- At an instant -----------------------------------------------------------------------------------
 
@@ -38,8 +68,10 @@ class DoorRun(Run):
         if (came := comers(self._scene, instant)).any():
             # Particles from sources are born later, where no wall is at that time.
             self._present.reach(instant)
-            state = self.state
-            require_free(self._scene, state, came, self._deepest, instant, self._first, self._present.count)
+            state, deepest = self.state, OUTSIDE * self._scene.finite_size()
+            require_free(self._scene, state, came, deepest, instant, self._first, self._present.count)
+        if self._law is not None:
+            self._stored_before = self._stored(0.0)
         contacts = self.state.contacts
         if contacts is None or not self._kinds:
             return

@@ -224,6 +224,8 @@ class Run(BaseRun):
     def _empty_lanes(self) -> lanes.Lanes:
         rows = Sending.ROWS if self._numbers.laws.send_off else lanes.Flying.ALL
         made = lanes.empty(len(self._owners), self._booked, self.state.period, rows)
+        if self.state.openings is not None and self._numbers.steps_into_walls:
+            made = made._replace(stand=table.table(self._walls.length()))
         watched = self._impacts is not None or self._tally is not None
         made = made._replace(before=table.table(impact_log.ROWS)) if watched else made
         counters = self._counters

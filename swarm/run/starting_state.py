@@ -34,6 +34,8 @@ def state_of(compiled: CompiledScene, particles: Particles, method: Method, book
     """The state with the arrays of the particles and so many rows of what walls give; energies are still to be set."""
     n, laws, rows = len(particles), compiled.laws, len(compiled.numbering.surfaces_of_rows)
     period, openings, ends = compiled.cell(), compiled.openings(), laws is not None and laws.may_end
+    # What soft contacts have stored is lost with a wall that goes, or opens.
+    loses = laws is not None or (method.law() is not None and (openings is not None or compiled.scene.has_doors()))
     return State(
         particles.position,
         particles.velocity,
@@ -42,7 +44,7 @@ def state_of(compiled: CompiledScene, particles: Particles, method: Method, book
         np.empty(n),
         np.zeros(n, np.int64),
         np.zeros((booked, n)),
-        np.zeros(0 if laws is None else n),
+        np.zeros(n if loses else 0),
         _no_sweeps(n) if method.has_multipliers() else None,
         _no_contacts(rows, n) if method.may_slide() else None,
         None if laws is None or not laws.give_heat else np.zeros((rows, n)),

@@ -591,7 +591,7 @@ CAPABILITIES = (
     }),
     Capability("opening", _of_walls("openings", ()), {
         (SOFT_BODIES, PAPER_BODIES): _with_method("openings", "left out", "count"),
-        _FIXED_STEPS: _with_method("openings", "left out", "count"),
+        (BASELINE,): _with_method("openings", "left out", "count"),
         (MASSIVE, HEAVY): Refusal(
             "surfaces[{i}].openings must be left out where a wall has a mass, got {count}",
             "give the wall a motion instead of a mass",
@@ -602,7 +602,7 @@ CAPABILITIES = (
     }, within="opening"),
     Capability("present", _of_walls("present", None), {
         (SOFT_BODIES, PAPER_BODIES): _with_method("present", "None"),
-        _FIXED_STEPS: _with_method("present", "None"),
+        (BASELINE,): _with_method("present", "None"),
         (CHORDS,): _CHANGES,
         (MASSIVE, HEAVY): Refusal(
             "surfaces[{i}].present must be None where a wall has a mass, got {got}",
