@@ -10,6 +10,7 @@ from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
+from ..contact.laws import Laws
 from ..contact.wall_impact import RandomSource
 from ..kernel.arrays import aligned_copy
 from ..methods.base import Method
@@ -51,7 +52,8 @@ class CollidingRun(BaseRun):
         self._windows = windows_of(compiled, self._clock)
         laws, openings = box.laws, compiled.openings()
         rough = box.turning is not None and box.turning.friction is not None
-        loses = laws.may_dissipate or laws.loses or box.loss is not None or rough
+        every = self._every_laws(compiled, box)
+        loses = any(one.may_dissipate or one.loses for one in every) or box.loss is not None or rough
         balls = Balls(particles.radius, np.zeros(n, np.int64), np.zeros(1), particles.spin)
         # The energy of each ball is not kept. An array of zeros that is never written takes one page of memory.
         unused = np.zeros(n)
@@ -59,7 +61,7 @@ class CollidingRun(BaseRun):
         self.state = State(
             particles.position, particles.velocity, particles.mass, *2 * (unused,),
             np.zeros(n, np.int64), np.zeros((2 * rows if scene.moves() else rows, 1)), np.zeros(n if loses else 0),
-            None, None, np.zeros((rows, 1)) if laws.give_heat else None,
+            None, None, np.zeros((rows, 1)) if any(one.give_heat for one in every) else None,
             image=particles.image, period=compiled.cell(), balls=balls,
             escape_time=None if openings is None else np.full(n, math.nan), openings=openings,
             absorbed_time=np.full(n, math.nan) if laws.may_end else None,
@@ -71,8 +73,10 @@ class CollidingRun(BaseRun):
             gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
         self._box = self._with_heavy(compiled, box)._replace(
             window=None if self._windows is None else self._windows.numbers,
-            gates=gates, source=RandomSource(seeding.signed(), seeding.first) if laws.send_off else None,
+            gates=gates,
         )  # fmt: skip
+        if any(one.send_off for one in every):
+            self._box = self._box._replace(source=RandomSource(seeding.signed(), seeding.first))
         super().__init__(compiled, method, n, threads, Tier(compile, self._box, n), seeding, watched)
         if feed is not None:
             self._feed, self.state = feed, self.state._replace(born_time=feed.born_time)
@@ -91,6 +95,10 @@ class CollidingRun(BaseRun):
         self._frame_before = 0.0  # [s]
         self._walls = self._walls_seen(0.0)
         self._choose_tier()
+
+    def _every_laws(self, compiled: CompiledScene, box: Any) -> list[Laws]:
+        """The laws of all walls."""
+        return [box.laws]
 
     def _with_heavy(self, compiled: CompiledScene, box: Any) -> Any:
         """What the balls are in, with walls that have a mass."""

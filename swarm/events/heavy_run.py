@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..compiled_scene import CompiledScene
+from ..contact.laws import Laws
 from ..kernel.vector import ZERO
 from ..run.base import Arrays, named
 from ..run.observed import Observed
@@ -19,6 +20,9 @@ class HeavyRun(CollidingRun):
 
     _freedoms: Freedoms
     _observed: Observed
+
+    def _every_laws(self, compiled: CompiledScene, box: Any) -> list[Laws]:
+        return scenery_of(compiled, 0.0).each_laws()
 
     def _with_heavy(self, compiled: CompiledScene, box: Any) -> Any:
         state = self.state

@@ -47,7 +47,7 @@ class ReactingRun(BaseRun):
         energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(gravity, vec(particles.position))
         self._source = RandomSource(seeding.signed(), seeding.first)
         self._scenery = self._scenery_of(compiled, 0.0)
-        heat = np.zeros((walls, n)) if self._scenery.laws.give_heat else None
+        heat = np.zeros((walls, n)) if any(laws.give_heat for laws in self._scenery.each_laws()) else None
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.asarray(energy) + np.zeros(n), np.zeros(n),
             np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None, heat,
@@ -71,7 +71,7 @@ class ReactingRun(BaseRun):
     def _scenery_of(self, compiled: CompiledScene, moment: float) -> SceneWalls:
         """The walls in the frame that ends at a moment [s], with random numbers where they send particles off."""
         found = scenery_of(compiled, moment)
-        return found._replace(source=self._source) if found.laws.send_off else found
+        return found._replace(source=self._source) if any(laws.send_off for laws in found.each_laws()) else found
 
     def _prepare(self, span: float, moment: float) -> None:
         self._scenery = self._scenery_of(self._compiled, moment)

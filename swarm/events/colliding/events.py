@@ -92,8 +92,7 @@ def _at_wall(box, flock, books, clock, i, now):
     """What comes when a ball may meet a wall: it is reflected, or gone, or looks farther; a status if it goes wrong."""
     if box.heavy is not None:
         if flock.event[index(FLOATS * i + WALL)] >= first_number(box):
-            strike_heavy(box, flock, books, clock, i, now)
-            return FLIES
+            return strike_heavy(box, flock, books, clock, i, now)
         if len(box.walls.each) == 0:
             _look_for_wall(box, flock, i, now)
             return FLIES

@@ -1,12 +1,15 @@
 """The impact of a ball on a wall with a mass, after which the balls near such walls look for their next wall."""
 
+import math
+
+from ...common.status import Status
 from ...kernel.arrays import index
 from ...kernel.gravity import potential
 from ...kernel.jit import outlined, select
 from ...kernel.vector import ZERO, square
 from ...lanes.watching.log import Struck
 from ..reacting.freedoms import TOO_LONG, TOO_SHORT, ParticleFlight
-from ..reacting.strikes import all_stay, strike, with_energy
+from ..reacting.strikes import Turner, all_stay, strike, with_energy
 from .again import aim_again, queue_both
 from .aim import find_wall
 from .clock import EVENTS, moment_of
@@ -19,7 +22,7 @@ from .window import END
 
 @outlined
 def strike_heavy(box, flock, books, clock, i, now):
-    """The impact of a ball on the wall with a mass that it meets now."""
+    """The impact of a ball on the wall with a mass that it meets now: a status."""
     heavy, m = box.heavy, box.kinds.mass_of(i)
     wall = flock.event[index(FLOATS * i + WALL)] - first_number(box)
     follow(box, flock, books, clock, i, now)
@@ -29,9 +32,21 @@ def strike_heavy(box, flock, books, clock, i, now):
         spares = box.loss.spares(flock, i, now)
         walls = tuple(one._replace(restitution=select(spares, 1.0, one.restitution)) for one in walls)
     twice = flock.kept.at(i, flock.stamp(i), square(v) + 2.0 * potential(box.pull, r))
-    blow = strike(walls, wall, heavy.freedoms, ParticleFlight(r, v, ZERO, now, 0.0), m)
+    random, turner = None, None
+    if box.source is not None:
+        random = box.source.of_impact(i, books.impacts[index(i)], box.laws)
+    if box.turning is not None:
+        turner = Turner(i, box.kinds.radius_of(i), box.turning)
+    blow = strike(walls, wall, heavy.freedoms, ParticleFlight(r, v, ZERO, now, 0.0), m, random, turner)
     left, fall = twice - 2.0 * (blow.given + blow.lost) / m, 2.0 * potential(box.pull, blow.r)
+    if books.heat is not None:
+        left += 2.0 * blow.heat / m
+        books.heat[index(blow.owner), 0] += blow.heat
+        if box.watchers.counts is not None:
+            box.watchers.counts.give(float(blow.owner), blow.heat, 0.0)
     v1, kept = with_energy(blow.v, left, fall)
+    if random is not None and math.isnan(v1.x):
+        return Status.SENT_WRONG.value
     flock.put(i, now, blow.r, v1)
     flock.kept.keep(i, flock.stamp(i), kept)
     books.impulse[index(blow.owner), 0] += blow.impulse
@@ -50,6 +65,7 @@ def strike_heavy(box, flock, books, clock, i, now):
         _look_again(box, flock, now)
     else:
         renew_leases(box, flock, clock, now)
+    return Status.DONE.value
 
 
 @outlined

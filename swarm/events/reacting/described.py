@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled_scene import CompiledScene
-from ...contact.laws import NONE
+from ...contact.laws import NONE, Laws
 from ...kernel.vector import Vec, vec
 from ...motion import Guide, Rotation, Translation, pose, unit_axis
 from ...run.observed import Observed
@@ -44,15 +44,24 @@ def _reacting(compiled: CompiledScene) -> tuple[Reacting, ...]:
     """The walls that react, in the order of the scene's walls; rows of freedoms are in that of its surfaces."""
     scene = compiled.scene
     rows = [i for i, surface in enumerate(scene.surfaces) if surface.reacts()]
-    made, number = [], 0
+    made, number = list[Reacting](), 0
     for i in dict.fromkeys(compiled.numbering.surfaces_of_rows):
         surface = scene.surfaces[i]
         walls = walls_then(surface, 0.0, compiled.largest)
         if surface.reacts():
             freedom = _freedom(surface, rows.index(i), scene.gravity or (0.0, 0.0, 0.0))
-            made += [Reacting(wall, freedom, number + k, surface.restitution) for k, wall in enumerate(walls)]
+            laws = _laws_of(surface, scene)
+            made += [
+                Reacting(wall, freedom, number + k, surface.restitution, laws, float(k)) for k, wall in enumerate(walls)
+            ]
         number += len(walls)
     return tuple(made)
+
+
+def _laws_of(surface: Surface, scene: Scene) -> Laws | None:
+    """The laws of a surface that reacts; None where they are a restitution at most."""
+    laws = Scene([surface], plane=scene.plane).compiled(None, "walls that react").laws or NONE
+    return laws._replace(moving=None) if laws.send_off or laws.friction is not None else None
 
 
 def _freedom(surface: Surface, row: int, gravity: tuple[float, float, float]) -> Any:

@@ -83,6 +83,29 @@ class Falling(Posed):
 _AT_REST = Drive(ZERO, ZERO, (), None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
 
 
+class Spread(Record):
+    """Velocities of a particle relative to a wall, as those of the same particle at a wall that nothing moves.
+
+    With A = 1/m + (what a unit impulse gives the wall) and A = S S/m the energy of the velocity w = S y relative to the
+    wall, w.A^-1 w/2, is m y.y/2. In y an elastic impact is the reflection about S n, and a law of a wall at rest does
+    to a wall with a mass what it does to a fixed one: what it keeps of the energy is kept with the wall's, and a gas in
+    equilibrium with a wall of its temperature stays so.
+    """
+
+    way: Any  # along which S differs from 1, or None
+    factor: float  # of S where there is no way
+    more: float  # of w along the way, times it, in S
+    less: float  # and in 1/S
+
+    def out(self, y):
+        """S y."""
+        return self.factor * y if self.way is None else y + (self.more * dot(y, self.way)) * self.way
+
+    def back(self, w):
+        """S^-1 w."""
+        return (1.0 / self.factor) * w if self.way is None else w + (self.less * dot(w, self.way)) * self.way
+
+
 class Freedom(Record):
     """A way to move of a wall, by its `row` among the `walls` and its `lightness`, 1/M or 1/I; times are of a frame."""
 
@@ -107,6 +130,23 @@ class Freedom(Record):
     def mobility(self, n, arm):
         """The velocity along n that a unit impulse along n gives the wall at the end of the arm [1/kg]."""
         raise NotImplementedError
+
+    def along(self, arm):
+        """The only way in which the end of the arm moves, as fast as the wall by its length; None: any way."""
+        raise NotImplementedError
+
+    def response(self, impulse, arm):
+        """The velocity that an impulse at the end of the arm gives that [m/s]."""
+        b, lightness = self.along(arm), self.lightness
+        return lightness * impulse if b is None else (lightness * dot(impulse, b)) * b
+
+    def spread(self, mass, arm):
+        """The `Spread` of velocities of a particle of this mass relative to the end of the arm."""
+        b, part = self.along(arm), mass * self.lightness
+        if b is None:
+            return Spread(None, math.sqrt(1.0 + part), 0.0, 0.0)
+        s = math.sqrt(1.0 + part * square(b))
+        return Spread(b, 1.0, part / (s + 1.0), -part / (s * (s + 1.0)))
 
     def push(self, walls, t, impulse, arm):
         """Give the wall an impulse at a time, at the end of an arm from its centre."""
@@ -202,6 +242,9 @@ class Shifted(Freedom):
             return super().posed(body, walls, t)
         here = self.pose(walls, t)
         return Falling(body, here, here, _AT_REST, 0.0, 0.0)
+
+    def along(self, arm):
+        return self.axis
 
     def mobility(self, n, arm):
         if self.axis is None:

@@ -29,6 +29,9 @@ class Turning(Freedom):
         """By how much an impulse along n at the end of the arm turns it."""
         return dot(cross(arm, n), self.axis)
 
+    def along(self: Any, arm):
+        return cross(self.axis, arm)
+
     def mobility(self: Any, n, arm):
         lever = self.lever(n, arm)
         return self.lightness * lever * lever

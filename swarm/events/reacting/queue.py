@@ -47,6 +47,10 @@ class SceneWalls(NamedTuple):
     pull: Any  # gravity, or None
     source: Any = None  # `RandomSource` where walls send particles off by a law
 
+    def each_laws(self) -> list[Laws]:
+        """The laws of the walls without a mass, and of each that reacts and has some."""
+        return [self.laws, *(wall.laws for wall in self.reacting if wall.laws is not None)]
+
 
 class Queue(NamedTuple):
     """The particles between two impacts, and what is next for each: arrays of one column a particle."""
@@ -153,8 +157,14 @@ def _bounce(scenery, queue, i, wall, rule, now):
 def _strike(scenery, walls, queue, i, rule, now):
     """The impact of particle i on a wall that reacts."""
     r, v, m = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i]
-    blow = strike(scenery.reacting, queue.struck[i], walls, ParticleFlight(r, v, ZERO, now, 0.0), m)
+    random = None
+    if scenery.source is not None:
+        random = scenery.source.of_impact(i, queue.impacts[i], scenery.laws)
+    blow = strike(scenery.reacting, queue.struck[i], walls, ParticleFlight(r, v, ZERO, now, 0.0), m, random)
     left = 2.0 * queue.energy[i] - 2.0 * (blow.given + blow.lost) / m
+    if queue.heat is not None:
+        left += 2.0 * blow.heat / m
+        queue.heat[index(blow.owner), i] += blow.heat
     v1, kept = with_energy(blow.v, left, 2.0 * potential(scenery.pull, blow.r))
     put(queue.position, 0, i, blow.r)
     put(queue.velocity, 0, i, v1)
@@ -251,7 +261,7 @@ def _carry_out(scenery, freedoms, queue, i, now, rule):
         _strike(scenery, freedoms, queue, i, rule, now)
     elif queue.wall[i] >= 0.0:
         _bounce(scenery, queue, i, queue.wall[i], rule, now)
-    if scenery.laws.own is not None and math.isnan(queue.velocity[0, i]):
+    if scenery.source is not None and math.isnan(queue.velocity[0, i]):
         return Status.SENT_WRONG.value
     _aim(scenery, queue, i, rule.end)
     return select(queue.hits[i] <= MOST_HITS, Status.DONE.value, Status.STALLED.value)

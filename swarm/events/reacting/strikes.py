@@ -3,9 +3,11 @@
 import math
 from typing import Any, NamedTuple
 
+from ...ball_numbers import INERTIA
+from ...contact.wall_impact import Arriving, by_law
 from ...kernel.jit import select
 from ...kernel.record import Record
-from ...kernel.vector import ZERO, Vec, dot, square, with_square
+from ...kernel.vector import ZERO, Vec, cross, dot, either, norm, square, with_square
 from ...surfaces.time_of_impact.flights import NEVER, sooner
 
 # The energy is that which is left where the square of the speed is off by no more than this part.
@@ -18,10 +20,45 @@ class WallImpact(NamedTuple):
     r: Vec  # on the wall
     v: Vec
     impulse: float
-    given: float  # energy that the wall gains [J]
+    given: float  # energy that the wall gains, and the spin of a ball [J]
     lost: float  # energy that is dissipated [J]
     owner: int
     slip: Vec  # velocity relative to the wall along it, before [m/s]
+    heat: float = 0.0  # energy that the wall's law gives besides [J]
+
+
+class Turner(NamedTuple):
+    """A ball that turns: its number, its radius, and the `BallSpins` of all."""
+
+    i: Any
+    radius: float
+    turning: Any
+
+
+class Facing(Record):
+    """A wall as its laws see it, in the velocities of a `Spread`: its normal."""
+
+    n: Vec
+
+    def unit_normal(self, _wall, _r):
+        """The normal."""
+        return self.n
+
+
+class Rubbed(Record):
+    """What friction does in a strike."""
+
+    impulse: Vec  # besides the normal one, on the wall
+    lost: float  # energy [J]
+    turned: float  # energy of the spin that the ball gains [J]
+
+
+class LawImpulse(Record):
+    """The impulse of a strike on the wall by a law of that, and what this takes and gives of the energy [J]."""
+
+    impulse: Vec
+    lost: float
+    heat: float
 
 
 class Reacting(Record):
@@ -31,8 +68,15 @@ class Reacting(Record):
     freedom: Any  # how it may move
     owner: int  # its number among all walls of the scene
     restitution: float
+    laws: Any = None  # None, or the `Laws` of the surface, where they are more than a restitution
+    number: float = 0.0  # among the walls of the surface
 
-    def strike(self, walls, flight, mass):
+    @property
+    def sends_off(self):
+        """Whether it sends particles off by a law: a constant for the compiler."""
+        return self.laws is not None and self.laws.send_off
+
+    def strike(self, walls, flight, mass, random=None, turner=None):
         """The impact of a particle on it: its `WallImpact`."""
         freedom = self.freedom
         surface = freedom.posed(self.body, walls, flight.time)
@@ -48,11 +92,59 @@ class Reacting(Record):
         give = freedom.mobility(n, arm)
         both = square(n) / mass + give
         impulse = (1.0 + self.restitution) * approach / both
-        freedom.push(walls, flight.time, impulse * n, arm)
         lost = 0.5 * (1.0 - self.restitution) * (1.0 + self.restitution) * approach * approach / both
-        given = impulse * (speed + 0.5 * impulse * give)
         slip = flight.v - u - ((dot(n, flight.v) - speed) / square(n)) * n
-        return WallImpact(r, flight.v - (impulse / mass) * n, impulse, given, lost, self.owner, slip)
+        if self.laws is None:
+            freedom.push(walls, flight.time, impulse * n, arm)
+            given = impulse * (speed + 0.5 * impulse * give)
+            return WallImpact(r, flight.v - (impulse / mass) * n, impulse, given, lost, self.owner, slip)
+        whole, heat, turned, happens, law = impulse * n, 0.0, 0.0, False, None
+        if self.laws.send_off:
+            happens, law = self._by_law(r, n, flight.v - u, (mass, arm), random)
+        if self.laws.friction is not None:
+            point = r if turner is None else r + turner.radius * n
+            at, there = freedom.arm(point), surface.velocity(point)
+            passing = flight.v - (impulse / mass) * n - there - freedom.response(whole, at)
+            more = self._rubbed(n, passing, (mass, at), select(happens, 0.0, impulse), turner)
+            whole, lost, turned = whole + more.impulse, lost + more.lost, more.turned
+            arm, u = either(happens, arm, at), either(happens, u, there)
+        if law is not None:
+            whole, heat = either(happens, law.impulse, whole), select(happens, law.heat, 0.0)
+            lost, impulse = select(happens, law.lost, lost), select(happens, dot(n, law.impulse), impulse)
+        freedom.push(walls, flight.time, whole, arm)
+        given = dot(u, whole) + 0.5 * freedom.mobility(whole, arm) + turned
+        v1 = flight.v - (1.0 / mass) * whole
+        return WallImpact(r, v1, impulse, given, lost, self.owner, slip, heat)
+
+    def _by_law(self, r, n, w, at, random):
+        """Whether a law acts on a particle of the relative velocity w, and the `LawImpulse` then."""
+        mass, arm = at
+        spread = self.freedom.spread(mass, arm)
+        facing, before = spread.out(n), spread.back(w)
+        arriving = Arriving(r, before, square(before), mass)
+        wall = Facing(facing * (1.0 / norm(facing)))
+        random = random._replace(across=self.laws.across)
+        happens, bounce = by_law(self.laws, wall, None, self.number, arriving, random)
+        after = either(bounce.keeps, with_square(bounce.v, arriving.twice), bounce.v)
+        half = 0.5 * mass
+        return happens, LawImpulse(mass * spread.back(before - after), half * bounce.lost, half * bounce.heat)
+
+    def _rubbed(self, n, passing, at, impulse, turner):
+        """What friction takes, of a velocity relative to the wall after a normal impulse: `Rubbed`."""
+        mass, arm = at
+        slip, give = passing - dot(passing, n) * n, 1.0 / mass
+        if turner is not None:
+            slip, give = slip + turner.radius * cross(turner.turning.at(turner.i), n), give + 1.0 / (INERTIA * mass)
+        speed = norm(slip)
+        way = slip * (1.0 / select(speed > 0.0, speed, 1.0))
+        give += self.freedom.mobility(way, arm)
+        most, stops = self.laws.friction_of(self.number) * impulse, speed / give
+        along = select(most < stops, most, stops)
+        turned = 0.0
+        if turner is not None:
+            twist = (-along / (INERTIA * mass * turner.radius)) * cross(n, way)
+            turned = -0.5 * mass * turner.radius * turner.radius * turner.turning.add(turner.i, twist)
+        return Rubbed(along * way, along * (speed - 0.5 * along * give), turned)
 
 
 def reach_of_all(reacting, walls, flight):
@@ -73,11 +165,11 @@ def first_hit(reacting, gravity, walls, flight):
     return hit
 
 
-def strike(reacting, wall, walls, flight, mass):
+def strike(reacting, wall, walls, flight, mass, random=None, turner=None):
     """The impact of a particle on the wall with this number: its `WallImpact`."""
     for k, one in enumerate(reacting):
         if wall == k:
-            return one.strike(walls, flight, mass)
+            return one.strike(walls, flight, mass, random, turner)
     return WallImpact(flight.r, flight.v, 0.0, 0.0, 0.0, -1, ZERO)
 
 

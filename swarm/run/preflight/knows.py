@@ -90,12 +90,6 @@ def _of_walls(name: str, without: Any) -> Callable[[Asked], Found]:
     return found
 
 
-def _of_moved(name: str, without: Any) -> Callable[[Asked], Found]:
-    """The same of walls that have a mass."""
-    alike = _of_walls(name, without)
-    return lambda asked: (one for one in alike(asked) if asked.scene.surfaces[one["i"]].reacts())
-
-
 def _option(name: str) -> Callable[[Asked], Found]:
     def found(asked: Asked) -> Found:
         if got := getattr(asked.options, name):
@@ -149,6 +143,10 @@ def _ends(asked: Asked) -> Found:
         yield from ({"i": i, "k": k, "got": law} for k, law in enumerate(wall.laws) if may_end(law))
 
 
+def _ends_that_move(asked: Asked) -> Found:
+    yield from (one for one in _ends(asked) if asked.scene.surfaces[one["i"]].reacts())
+
+
 def _waits_beside_motions(asked: Asked) -> Found:
     yield from _waits(asked) if asked.scene.moves() else ()
 
@@ -161,10 +159,6 @@ def _sticky(asked: Asked) -> Found:
 def _doors(asked: Asked) -> Found:
     if asked.scene.has_doors():
         yield {}
-
-
-def _rubs_that_move(asked: Asked) -> Found:
-    yield from ({"i": i, "got": f"{one.friction:g}"} for i, one in _walls(asked) if one.friction > 0.0 and one.reacts())
 
 
 def _losses_that_fall(asked: Asked) -> Found:
@@ -514,12 +508,6 @@ CAPABILITIES = (
         (SOFT_BODIES, PAPER_BODIES): _with_method("friction", "0"),
         (CHORDS,): _LOSES,
     }),
-    Capability("friction of a wall with a mass", _rubs_that_move, {
-        (MASSIVE, HEAVY): Refusal(
-            "surfaces[{i}].friction must be 0 where that wall has a mass, got {got}: impacts push it along its normal "
-            "alone", f"leave it out, or {_TO_MOTION}",
-        ),
-    }, within="friction"),
     Capability("temperature", _of_walls("temperature", None), {
         _EVERY_BODY: _with_bodies("temperature", "None"),
         _FIXED_STEPS: _with_method("temperature", "None"),
@@ -528,12 +516,6 @@ CAPABILITIES = (
             f"surfaces[{{i}}].temperature must be None with {_WITH_PENALTY}, got {{got}}", "use Impact"
         ),
     }),
-    Capability("temperature of a wall with a mass", _of_moved("temperature", None), {
-        (MASSIVE, HEAVY): Refusal(
-            "surfaces[{i}].temperature must be None where that wall has a mass, got {got}",
-            f"leave it out, or {_TO_MOTION}",
-        ),
-    }, within="temperature"),
     Capability("law of a wall", _of_walls("laws", ()), {
         _EVERY_BODY: _with_bodies("laws", "left out"),
         _FIXED_STEPS: _with_method("laws", "left out"),
@@ -543,10 +525,10 @@ CAPABILITIES = (
             "use restitution and friction, or Impact",
         ),
     }),
-    Capability("law of a wall with a mass", _of_moved("laws", ()), {
-        (MASSIVE, HEAVY): Refusal(
-            "surfaces[{i}].laws must be left out where that wall has a mass, got {got}",
-            f"leave it out, or {_TO_MOTION}",
+    Capability("absorption by a wall with a mass", _ends_that_move, {
+        (HEAVY,): Refusal(
+            "surfaces[{i}].laws[{k}] must not absorb particles where that wall has a mass, got {got}",
+            f"leave that law out, or {_TO_MOTION}",
         ),
     }, within="law of a wall"),
     Capability("absorption", _ends, {
