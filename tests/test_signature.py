@@ -75,6 +75,10 @@ ENTRY = (4, "one: two"), (8, "three"), (8, "four"), (8, "five.")
             "Args:\n    one: two three four five.",
             ["Args:", "    one: two", "        three", "        four", "        five."],
         ),
+        (
+            "Args:\n    one: or\n        more: two three.",
+            ["Args:", "    one: or", "        more:", "        two", "        three."],
+        ),
         ("As it is:\n\n    code(which, is, longer)", ["As it is:", "", "    code(which, is, longer)"]),
         (">>> print('an example')\nan example of more", [">>> print('an example')", "an example of more"]),
         ("| a | table | of numbers |", ["| a | table | of numbers |"]),

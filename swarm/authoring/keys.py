@@ -101,7 +101,6 @@ _OF_KEYS: dict[str, Form] = {
     "part": listed(named("surface"), 1),
     "present": SPANS,
     "times": SPANS,
-    "open": listed({"enum": [sign + axis for axis in "xyz" for sign in "+-"]}),
     "centers": ROWS,
     "radii": NUMBERS,
     "lengths": NUMBERS,
@@ -131,6 +130,7 @@ _OF_KEYS: dict[str, Form] = {
 }  # fmt: skip
 # Where a key of this name means something else.
 _OF_CLASS: dict[tuple[str, str], Form] = {
+    ("Box", "open"): listed({"enum": [sign + axis for axis in "xyz" for sign in "+-"]}),
     ("Mesh", "open"): {"type": "boolean"},
     ("Mesh", "vertices"): listed(VECTOR, 4),
     ("Polygon", "vertices"): listed(listed(NUMBER, 2, 3), 1),

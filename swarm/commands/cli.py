@@ -9,6 +9,7 @@ from ..common import interrupt
 from ..errors import SceneError, SwarmError
 from ..version import VERSION
 from .check import check
+from .docs import docs
 from .export import export
 from .info import info
 from .new import new
@@ -50,17 +51,44 @@ def _options(
 
 
 app.command(epilog="Example:  swarm new cavity && swarm run cavity.toml")(new)
-app.command(epilog="Example:  swarm check examples/scenes/cavity.toml")(check)
+app.command(
+    short_help="Say what a scene file will do, without running it.",
+    epilog="Example:  swarm check examples/scenes/cavity.toml",
+)(check)
 app.command(epilog=f"Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2\n\n{_CODES}")(run)
-app.command(epilog=f"Example:  swarm sweep examples/sweeps/cooling.toml -o cooling\n\n{_CODES}")(sweep)
+app.command(
+    short_help="Carry out the runs of a sweep file, with a table of results.",
+    epilog=f"Example:  swarm sweep examples/sweeps/cooling.toml -o cooling\n\n{_CODES}",
+)(sweep)
 app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")(info)
 app.command(epilog="Example:  swarm record cavity.h5 -o cavity.rrd")(record)
-app.command(epilog="Example:  swarm view cavity.rrd -o cavity.png --times 0,5,10")(view)
-app.command(epilog="Example:  swarm plot cavity.h5 -o cavity.png")(plot)
-app.command(epilog="Example:  swarm report cavity.h5 -o cavity.html, or swarm report FOLDER of a sweep")(report)
-app.command(epilog="Example:  swarm animate cavity.h5 -o cavity.mp4 --frames 100")(animate)
-app.command(epilog="Example:  swarm export cavity.h5 -o cavity.vtkhdf --frames ::10")(export)
-app.command(epilog="Example:  swarm schema -o swarm.schema.json, and #:schema ./swarm.schema.json in a file")(schema)
+app.command(
+    short_help="Draw a contact sheet of a recording, without a screen.",
+    epilog="Example:  swarm view cavity.rrd -o cavity.png --times 0,5,10",
+)(view)
+app.command(
+    short_help="Draw energies, impacts, speeds and particles of a trajectory.",
+    epilog="Example:  swarm plot cavity.h5 -o cavity.png",
+)(plot)
+app.command(
+    short_help="Make a page of a run or a sweep for any browser.",
+    epilog="Example:  swarm report cavity.h5 -o cavity.html, or swarm report FOLDER of a sweep",
+)(report)
+app.command(
+    short_help="Make a film of a trajectory.", epilog="Example:  swarm animate cavity.h5 -o cavity.mp4 --frames 100"
+)(animate)
+app.command(
+    short_help="Write a trajectory for ParaView, OVITO, Blender and others.",
+    epilog="Example:  swarm export cavity.h5 -o cavity.vtkhdf --frames ::10",
+)(export)
+app.command(
+    short_help="Write the JSON Schema of scene files, for editors.",
+    epilog="Example:  swarm schema -o swarm.schema.json, and #:schema ./swarm.schema.json in a file",
+)(schema)
+app.command(
+    short_help="Write the reference as pages for a browser.",
+    epilog="Example:  swarm docs -o reference, then open reference/index.html",
+)(docs)
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ _COLUMNS, _MODULES = 80, re.compile(r"\b(?:\w+\.)+(?=[A-Za-z])")
 _INDENTED, _OF_METHOD = 4, 8
 # Headings of sections that have entries, the lines of these, and paragraphs that begin with a word and a colon.
 _SECTION = re.compile(r"(Args|Attributes|Returns|Raises|Yields)\b[^:]*:$")
-_ENTRY = re.compile(r" {4}[*\w., \"-]+: ")
+_ENTRY = re.compile(r" {4}(?! )[*\w., \"-]+: ")
 _NOTE = re.compile(r"(Conserves|Order|Cost|Source|Reference): ")
 # What NumPy's name of all that becomes an array stands for: a line of 300 characters.
 _ARRAY = inspect.formatannotation(ArrayLike)

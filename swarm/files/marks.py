@@ -145,6 +145,7 @@ _KINDS: dict[str, tuple[str, Callable[[Path], bool]]] = {
     "report": ("a report of swarm", _holds(rb'<meta name="generator" content="swarm ')),
     "table": ("the table of a sweep", is_table),
     "schema": ("a schema of swarm", _holds(rb'"title": "swarm \w+ file"')),
+    "page of the reference": ("a page of swarm", _holds(rb'<meta name="generator" content="swarm |^// swarm ')),
     "scene file": ("one that is overwritten", _never),
 }
 _FORMATS: dict[str, tuple[str, Callable[[Path], bool]]] = {
