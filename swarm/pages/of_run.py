@@ -2,6 +2,7 @@
 
 import datetime
 import functools
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,8 +12,12 @@ from ..words import facts, verdicts
 from ..words import titles as words
 from ..words.amounts import amount, many
 from ..words.content import Content, content_of
+from ..words.statements import Statement
 from . import html, pictures, reproduce
 from .html import Page, filled
+
+# Of the first screen: the most numbers, and the most surfaces.
+_NUMBERS, _SURFACES = 4, 3
 
 
 class Note(NamedTuple):
@@ -20,6 +25,13 @@ class Note(NamedTuple):
 
     text: str
     command: str = ""
+
+
+class Answer(NamedTuple):
+    """Whether a run went well, in words."""
+
+    text: str
+    holds: bool
 
 
 def report(trajectory: Any, path: Any, overwrite: bool) -> Page:
@@ -48,7 +60,7 @@ def of_trajectory(trajectory: Any) -> Page:
         title=words.title(content),
         about=" · ".join(about),
         notes=_notes(trajectory),
-        verdicts=verdicts.judged(content),
+        **_first_screen(content, spent),
         places=pictures.of_places(content),
         series=pictures.of_series(content),
         scene=facts.of_setting(content),
@@ -69,7 +81,7 @@ def of_content(content: Content, wall_time: float) -> Page:
         title=words.title(content),
         about="a run without a trajectory",
         notes=[],
-        verdicts=verdicts.judged(content),
+        **_first_screen(content, wall_time),
         places=pictures.of_places(content),
         series=pictures.of_series(content),
         scene=facts.of_setting(content),
@@ -78,6 +90,28 @@ def of_content(content: Content, wall_time: float) -> Page:
         again=reproduce.Again([why]),
     )
     return Page(words.title(content), page)
+
+
+def _first_screen(content: Content, spent: float | None) -> dict[str, Any]:
+    """What a page has without scrolling: whether the run went well, what happened, and what it was, in short."""
+    judged = verdicts.judged(content)
+    happened = [(one.label, one.text) for one in facts.of_numbers(content.seen)[:_NUMBERS]]
+    what = [(one.label, one.text) for one in facts.of_setting(content, _SURFACES)]
+    return {
+        "verdicts": judged,
+        "answer": _answer(judged),
+        "happened": happened + _speed(content, spent, None)[:1],
+        "what": [row for row in what if not row[0].startswith("counter")],
+    }
+
+
+def _answer(judged: Sequence[Statement]) -> Answer:
+    """One of the judgements, in short."""
+    checked = [one.verdict for one in judged if one.verdict is not None]
+    failed = checked.count(False)
+    if failed:
+        return Answer(f"✗ no: {failed} of {len(checked)} checks fail{'s' * (failed == 1)}", False)
+    return Answer("✓ yes: it holds" if len(checked) == 1 else f"✓ yes: all {len(checked)} checks hold", True)
 
 
 def _when(makers: dict[str, str], path: Path) -> list[str]:

@@ -19,7 +19,7 @@ from ..words.amounts import amount, many
 from ..words.content import Content
 
 # Of a graph, and of a picture of particles [inches]; pixels an inch of the latter, and most particles in it.
-_GRAPH, _PLACES, _DPI, _SHOWN = (5.0, 2.8), (5.0, 4.6), 170, 5000
+_GRAPH, _PLACES, _DPI, _SHOWN = (5.0, 2.8), (4.4, 3.15), 240, 5000
 # Larger graphs, of very many frames, are pixels: a page is to be small.
 _LARGEST = 120_000
 # Colours of the light style, and what they are on the page.

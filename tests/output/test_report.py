@@ -14,9 +14,10 @@ from pages import Read
 import swarm
 from swarm.commands import summary
 from swarm.files import paths
-from swarm.pages import html, pictures
+from swarm.pages import html, of_run, pictures
 from swarm.pictures import drawing, style
 from swarm.triangles.shapes import shapes_of
+from swarm.words.statements import Statement
 
 SCENE = """
 gravity = [0.0, 0.0, -9.81]
@@ -33,7 +34,7 @@ kind = "impact"
 until = 1.0
 every = 0.25
 """
-SECTIONS = ["verdicts", "scene", "series", "numbers", "speed", "reproduce"]
+SECTIONS = ["verdicts", "happened", "places", "scene", "series", "numbers", "speed", "reproduce"]
 
 
 @pytest.fixture(scope="module")
@@ -87,11 +88,27 @@ def test_it_says_what_ran_how_well_and_how_fast(page):
     assert page.title == "20 particles in a sphere, under gravity: Impact, 1 s"
     assert "✓ holds" in read.texts["verdicts"]
     assert "energy" in read.texts["verdicts"]
+    assert "✓ yes: all 4 checks hold" in read.texts["verdicts"]
+    for word in ("impacts", "wall time", "20 particles of 1 kg", "a sphere of radius 0.5 m", "Impact"):
+        assert word in read.texts["happened"]
     for word in ("wall time", "threads", "swarm", "Python", "NumPy", "Numba", "HDF5", "machine", np.__version__):
         assert word in read.texts["speed"]
     assert "9.81" in read.texts["scene"]
     assert SCENE.strip() in read.texts["reproduce"]
     assert "swarm run '<b>run.toml' -o again.h5" in read.texts["reproduce"]
+
+
+@pytest.mark.parametrize(
+    ("judged", "answer"),
+    [
+        ([True, True, None], ("✓ yes: all 2 checks hold", True)),
+        ([True], ("✓ yes: it holds", True)),
+        ([True, False], ("✗ no: 1 of 2 checks fails", False)),
+        ([False, False, True], ("✗ no: 2 of 3 checks fail", False)),
+    ],
+)
+def test_the_answer_in_short(judged, answer):
+    assert of_run._answer([Statement("one", "of some", verdict) for verdict in judged]) == answer
 
 
 def test_names_are_escaped(page):
@@ -114,13 +131,13 @@ def test_it_is_written_where_it_may_be(folder, page, tmp_path, monkeypatch):
             graphs_alone.setattr(pictures, "of_places", lambda content: [])
             assert trajectory.report(target).title == page.title
         before = target.read_text()
-        assert Read(before).ids == Read(page.html).ids
+        assert Read(before).ids == [name for name in Read(page.html).ids if name != "places"]
         with pytest.raises(swarm.SceneError, match=r"report: .*page.html exists"):
             trajectory.report(target)
         monkeypatch.setattr(pictures, "of_series", lambda content: [])
         monkeypatch.setattr(pictures, "of_places", lambda content: [])
         trajectory.report(target, overwrite=True)
-    assert Read(target.read_text()).ids == SECTIONS != Read(before).ids
+    assert Read(target.read_text()).ids == [name for name in SECTIONS if name != "places"] != Read(before).ids
     with pytest.raises(swarm.SceneError, match=r"ends in \.html, got .*page\.pdf"):
         page.save(tmp_path / "page.pdf")
     with pytest.raises(swarm.SceneError, match="does not exist; create it first"):

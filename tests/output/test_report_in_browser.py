@@ -54,6 +54,20 @@ def test_a_page_is_light_or_dark_as_the_reader_asks(run, scheme, is_dark):
     assert np.ptp(seen) > 0.7
 
 
+def test_the_first_screen_has_the_answer_the_numbers_and_the_particles(run):
+    """Without scrolling at 1200 x 800: where each section ends [pixels]."""
+    names = "verdicts", "happened", "places"
+    ends = ", ".join(f"document.getElementById('{name}').getBoundingClientRect().bottom" for name in names)
+    page = run / "first.html"
+    script = f"<script>document.body.dataset.ends = JSON.stringify([{ends}, innerHeight]);</script></body>"
+    page.write_text((run / "run.html").read_text().replace("</body>", script))
+    document = browser(run, "--window-size=1200,800", "--dump-dom", page.as_uri())
+    *ends, height = map(float, re.search(r'data-ends="\[([^\]]+)\]"', document)[1].split(","))
+    assert max(ends) <= 800.0
+    assert min(ends) > 100.0
+    assert height > 600.0
+
+
 def test_a_page_needs_no_network_and_logs_nothing(run):
     page = browser(run, "--dump-dom", (run / "run.html").as_uri())
     assert "How to reproduce it" in page
