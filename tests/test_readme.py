@@ -186,6 +186,7 @@ FACTS = {
     "examples/guide/other_programs.md": lambda a: has_frames_of(a["universe"], a["result"]),
     "examples/guide/paper.md": lambda a: a["history"].converged and len(a["history"]) == 13,
     "examples/guide/pictures.md": lambda _: Path("gas.gif").stat().st_size > 10_000 and Path("gas.html").exists(),
+    "examples/guide/readers.md": lambda a: "True" in a["printed"],
     "examples/guide/results.md": lambda a: a["run"].observables["layers"].shape == (21, 6) and a["force"] > 0.0,
     # Of 1000 particles and 11 frames, in chunks of ten
     "examples/guide/running.md": lambda a: (
@@ -270,6 +271,7 @@ def test_the_commands_run_in_their_order(tmp_path, monkeypatch):
         "sweep",
         "new",
         "schema",
+        "check",
     }
     assert len(found) >= 12
     for words in found:
