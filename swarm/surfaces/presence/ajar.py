@@ -35,7 +35,7 @@ class Faced(Record):
         return self._of(self.walls.at(remaining))
 
     def during(self, remaining, after):
-        """The walls over a step, at whose start and end so much of the frame is left [s]."""
+        """The walls over a step; at its start and end so much of the frame is left [s]."""
         return self._of(self.walls.during(remaining, after))
 
     def _of(self, now):
