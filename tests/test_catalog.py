@@ -9,7 +9,7 @@ GUIDE = Path(__file__).parents[1] / "examples" / "guide" / "results.md"
 
 
 def test_the_guide_shows_the_catalog():
-    assert "\n".join(catalog.markdown()) in GUIDE.read_text()
+    assert "\n".join(catalog.markdown()) in GUIDE.read_text(), "run: python tests/reference/tables.py"
 
 
 def test_the_help_of_a_result_names_every_observable():

@@ -116,7 +116,7 @@ def test_the_first_sentence_is_raised_and_what_is_supported_is_not():
 
 def test_the_guide_shows_the_table():
     guide = Path(__file__).parents[1] / "examples" / "guide" / "limits.md"
-    assert "\n".join(knows.markdown()) in guide.read_text()
+    assert "\n".join(knows.markdown()) in guide.read_text(), "run: python tests/reference/tables.py"
 
 
 def test_what_is_a_kind_of_another_capability_is_refused_with_it():
