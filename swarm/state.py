@@ -142,6 +142,9 @@ class State(NamedTuple):
     # Where particles come during the run, and no contact lasts from pass to pass:
     late: Floats | None = None  # (N,) what is left of the frame, in the method's unit, of those that start within it
 
+    # Where contacts take time, and laws of walls act at their ends:
+    pressed: Floats | None = None  # (walls, N) the impulse of each contact so far, per mass [m/s]
+
     @property
     def absorbed(self) -> Any:
         """`Absorbed`, or None where no wall absorbs any."""

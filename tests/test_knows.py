@@ -105,9 +105,9 @@ def test_the_first_sentence_is_raised_and_what_is_supported_is_not():
     warm = swarm.Scene([swarm.Sphere(0.5, temperature=300.0)])
     knows.require_known(asked(warm, POINT, IMPACT))
     with pytest.raises(
-        swarm.SceneError, match=r"^surfaces\[0\].temperature must be None with Penalty, got 300; use Impact$"
+        swarm.SceneError, match=r"^surfaces\[0\].temperature must be None with Verlet, got 300; use Impact$"
     ):
-        knows.require_known(asked(warm, POINT, PENALTY))
+        knows.require_known(asked(warm, POINT, swarm.Verlet(1e-3, 1e3)))
     with pytest.raises(
         swarm.SceneError, match=r"^surfaces\[0\].temperature .* with particles that have a radius and Penalty"
     ):

@@ -16,6 +16,7 @@ from ..kernel.vector import put
 from ..methods import contract as methods
 from ..surfaces.in_motion.moving import Carried
 from .accounts import add_to_rows, add_work
+from .contact_ends import end_contacts, end_hard_contacts, impulses_before
 from .escape import meet_openings, step_out, step_out_lanes
 from .flight import go
 from .hit_member import of_lane, pick, picks
@@ -142,11 +143,14 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
     for i in range(live):
         if lanes.wall[i] <= methods.HARD:
             lane, wall = lanes.given(method, i), methods.HARD - lanes.wall[i]
+            kept = impulses_before(method, walls, lanes, i)
             contact, status = method.hard_pass(lanes.faced(walls, i), gravity, lane, wall, lanes, i)
             _put_contact(method, lanes, i, contact)
             _count_contacts(method, share, lanes, i, i + 1)
-            if lanes.stand is not None and status == Status.DONE.value:
-                step_out(method, walls, share, lanes, i)
+            if status == Status.DONE.value:
+                end_hard_contacts(method, walls, gravity, share, lanes, i, lane.v, kept)
+                if lanes.stand is not None:
+                    step_out(method, walls, share, lanes, i)
             if share.counts is not None:
                 share.counts.add(wall, contact.hits)
             if lanes.lane(i).hits > hard.most_hits:
@@ -182,7 +186,7 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
         some_wrong = send_off(method, walls, gravity, share, lanes, picked, live)
     if counters is not None and method.contacts_take_time:
         counters.keep_before(method, gravity, lanes, live)
-    some_arrived, some_hard = _make_contacts(method, walls, gravity, watches, lanes, picked, live)
+    some_arrived, some_hard = _make_contacts(method, walls, gravity, share, lanes, picked, live)
     _count_contacts(method, share, lanes, 0, live)
     some_arrived = step_out_lanes(method, walls, share, lanes, live) | some_arrived
     for watch in watches:
@@ -197,9 +201,9 @@ def _count_contacts(method, share, lanes, first, after):
             share.counters.count_contact(method, share, lanes, i)
 
 
-def _make_contacts(method, walls, gravity, watches, lanes, picked, live):
+def _make_contacts(method, walls, gravity, share, lanes, picked, live):
     """The contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
-    some_arrived, some_hard = False, False
+    some_arrived, some_hard, watches = False, False, share.watchers.of_impacts()
     for i in range(index(live)):
         lane, found = lanes.given(method, i), solution(method, lanes, i)
         here = method.walls_of(lanes.faced(of_lane(walls, picked, i), i), lane.remaining)
@@ -210,7 +214,8 @@ def _make_contacts(method, walls, gravity, watches, lanes, picked, live):
         lanes.wall[i] = contact.wall
         for watch in watches:
             watch.note(lanes, i, contact.impulse)
-        some_arrived, some_hard = some_arrived | arrived, some_hard | hard
+        end_contacts(method, walls, gravity, share, lanes, i, lane.v, (contact.wall, contact.impulse))
+        some_arrived, some_hard = some_arrived | arrived | lanes.marked[i], some_hard | hard
     return some_arrived, some_hard
 
 

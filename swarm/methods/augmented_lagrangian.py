@@ -81,6 +81,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     tolerance at round-off, such as 1e-28. A gap below the round-off of the coordinates counts as 0. Order: 1 in dt, at
     impacts; flights are exact (`python -m bench order`). Cost: sweeps times a scalar solve; the sweeps are in the
     observable "sweeps".
+    Laws of walls, openings and doors are those of `Penalty`: laws act where a contact ends.
     Walls may move without turning in fixed steps, which are those of the frame of each wall; steps that are cut at
     impacts, and exact impacts in their place, know walls at rest only.
     Source: García Orden & Ortega 2007, eqs. (6)-(9), and the composite form of contact/discrete_gradient.py.
@@ -145,6 +146,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
             _POLICIES[self.on_unconverged],
             None if self.adaptive else fixed_step.longest_step(scene, self.dt),
             fixed_step.moves(scene),
+            fixed_step.laws_at_ends(scene),
         )
 
     def time_of_impact(self) -> float | None:

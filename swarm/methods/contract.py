@@ -147,6 +147,11 @@ class MethodNumbers(Record):
         return NONE
 
     @property
+    def laws_at_ends(self):
+        """The `Laws` of its walls that act where a contact ends, of a method whose contacts take time; or None."""
+        return
+
+    @property
     def sliding_tolerance(self):
         """The relative error of a crossing, of a particle that slides."""
         return 0.0

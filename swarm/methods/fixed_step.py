@@ -13,7 +13,7 @@ from ..common.status import Status
 from ..common.validated import Positive, choice
 from ..contact import medial
 from ..contact.discrete_gradient import MeanValue
-from ..contact.laws import Moves
+from ..contact.laws import Laws, Moves
 from ..contact.regularisation import regularisation
 from ..errors import SceneError
 from ..kernel.arrays import kept
@@ -55,7 +55,17 @@ class SoftWalls(base.Method):
     def record(self, kind: type["SoftNumbers"], scene: Scene, factor: float, form: Any = None) -> "SoftNumbers":
         """The numbers of this description, of a kind that divides such a factor by the mass."""
         longest = longest_step(scene, self.dt)
-        return kind(self.dt, self.law(), longest, factor, form, moves(scene), _half_widths(scene), scene.finite_size())
+        return kind(
+            self.dt,
+            self.law(),
+            longest,
+            factor,
+            form,
+            moves(scene),
+            _half_widths(scene),
+            scene.finite_size(),
+            laws_at_ends(scene),
+        )
 
     def span(self, name: str, duration: float) -> float:
         return whole_steps(name, duration, self.dt)
@@ -93,6 +103,12 @@ def check_gradient(method: Any) -> None:
 def moves(scene: Scene) -> Moves | None:
     """`Moves` as kernels take it, where a wall moves."""
     return Moves(0.0) if scene.moves() else None
+
+
+def laws_at_ends(scene: Scene) -> Laws | None:
+    """The laws of walls as kernels take them, where a wall has any besides its motion."""
+    laws = scene.compiled(apart="fixed steps").laws
+    return laws if laws is not None and (laws.loses or laws.send_off) else None
 
 
 def check_instants(scene: Scene, dt: float) -> None:
@@ -215,6 +231,10 @@ class Steps(contract.MethodNumbers):
         return self.moving is not None
 
     @property
+    def laws_at_ends(self: Any):
+        return self.ends
+
+    @property
     def steps_into_walls(self):
         return not self.lands
 
@@ -284,6 +304,7 @@ class SoftNumbers(Steps):
     moving: Any  # None, or `Moves` where a wall moves
     half_widths: Any  # of the solid of each wall [m], infinite for a cavity; None if no wall has another side
     size: float  # of the scene [m]
+    ends: Any  # None, or the `Laws` of its walls, which act where a contact ends
 
     def passes(self, walls, lane, wall, r, v):
         """Whether a step that ends so leads a lane through the middle of this wall."""

@@ -43,6 +43,11 @@ class Penalty(fixed_step.SoftWalls):
     error that names a penalty which holds it.
     Walls may move without turning: the step is that of the frame of each wall, and with the energy less the work of the
     walls it conserves the same. Where walls move in any way but uniformly, free steps are jumped over in several parts.
+    Laws of walls, such as `restitution`, `friction`, `temperature` and `laws`, act on points where a contact ends: they
+    make of it what they make of an impact on a rigid wall, and what they take or give is booked. Friction is that of
+    the whole impulse of a contact. A contact that a weight makes last is rubbed each time that it swings back.
+    Openings are asked for at the foot of a point on its wall at the start of a step, and doors are at whole steps; what
+    a contact stores with a wall that opens, or goes, is in "dissipated_energy".
     Particles with a radius press on one another and on walls by the same law, with the gap R_i + R_j - |r_i - r_j|:
     all impulses of a step are solved together, so that energy, momentum and angular momentum of the whole are conserved
     at any dt. There `restitution` (0.01 or more) and `friction` of `Pairs` and of surfaces count, walls may move in any

@@ -49,6 +49,7 @@ class StepNumbers(penalty.GradientSteps):
     policy: int
     longest: Any  # step that jumps over no solid [m]; None without solids
     moving: Any  # None, or `Moves` where a wall moves, in fixed steps
+    ends: Any  # None, or the `Laws` of its walls, which act where a contact ends
 
     @property
     def size(self):

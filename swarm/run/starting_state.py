@@ -35,6 +35,7 @@ def state_of(compiled: CompiledScene, particles: Particles, method: Method, book
     n, laws, rows = len(particles), compiled.laws, len(compiled.numbering.surfaces_of_rows)
     period, openings, ends = compiled.cell(), compiled.openings(), laws is not None and laws.may_end
     # What soft contacts have stored is lost with a wall that goes, or opens.
+    presses = laws is not None and (laws.loses or laws.send_off) and method.law() is not None
     loses = laws is not None or (method.law() is not None and (openings is not None or compiled.scene.has_doors()))
     return State(
         particles.position,
@@ -56,7 +57,8 @@ def state_of(compiled: CompiledScene, particles: Particles, method: Method, book
         _starts(particles, ends),
         np.full(n, math.nan) if ends else None,
         np.full(n, -1, np.int32) if ends else None,
-        late=np.zeros(n) if particles.births is not None and not method.may_slide() else None,
+        late=np.zeros(n) if (particles.births is not None or ends) and not method.may_slide() else None,
+        pressed=np.zeros((rows, n)) if presses else None,
     )
 
 

@@ -492,7 +492,7 @@ CAPABILITIES = (
         ),
     }),
     Capability("restitution", _of_walls("restitution", 1.0), {
-        _FIXED_STEPS: _with_method("restitution", "1"),
+        (BASELINE,): _with_method("restitution", "1"),
         (SOFT_BODIES, PAPER_BODIES): _with_method("restitution", "1"),
         (CHORDS,): _LOSES,
     }),
@@ -504,13 +504,13 @@ CAPABILITIES = (
         ),
     }, within="restitution"),
     Capability("friction", _of_walls("friction", 0.0), {
-        _FIXED_STEPS: _with_method("friction", "0"),
+        (BASELINE,): _with_method("friction", "0"),
         (SOFT_BODIES, PAPER_BODIES): _with_method("friction", "0"),
         (CHORDS,): _LOSES,
     }),
     Capability("temperature", _of_walls("temperature", None), {
         _EVERY_BODY: _with_bodies("temperature", "None"),
-        _FIXED_STEPS: _with_method("temperature", "None"),
+        (BASELINE,): _with_method("temperature", "None"),
         (CHORDS,): _LOSES,
         (GRAINS,): Refusal(
             f"surfaces[{{i}}].temperature must be None with {_WITH_PENALTY}, got {{got}}", "use Impact"
@@ -518,7 +518,7 @@ CAPABILITIES = (
     }),
     Capability("law of a wall", _of_walls("laws", ()), {
         _EVERY_BODY: _with_bodies("laws", "left out"),
-        _FIXED_STEPS: _with_method("laws", "left out"),
+        (BASELINE,): _with_method("laws", "left out"),
         (CHORDS,): _LOSES,
         (GRAINS,): Refusal(
             f"surfaces[{{i}}].laws must be left out with {_WITH_PENALTY}, got {{got}}",
@@ -544,7 +544,7 @@ CAPABILITIES = (
         ),
     }, within="law of a wall"),
     Capability("wait beside walls that move", _waits_beside_motions, {
-        (*_RIGID_POINTS, *_RIGID_BALLS): Refusal(
+        (*_RIGID_POINTS, SOFT, PAPER, *_RIGID_BALLS): Refusal(
             "surfaces[{i}].laws[{k}] must not let particles wait where a wall moves, got {got}: a particle that waits "
             "would have to move with its wall", "leave that law out, or the motions",
         ),

@@ -1,0 +1,151 @@
+"""The laws of walls with methods whose contacts take time: they act where a contact ends.
+
+There a wall without laws has turned round the normal velocity of a particle, over some steps. Its laws make of that
+what they make of an impact on a rigid wall at which the particle arrives as it would be before: so restitution,
+temperatures and all other laws are those of `Impact`, whatever the penalty, and so is what they take. Friction is
+Coulomb's, of the whole impulse of the contact, also of what carries a weight.
+"""
+
+import math
+
+import numpy as np
+
+from ..contact.reflection import given, relative, rub, wall_velocity
+from ..contact.wall_impact import Arriving, RandomSource, book_energy, impact_on_wall
+from ..kernel.arrays import index, scratch
+from ..kernel.gravity import potential
+from ..kernel.jit import outlined
+from ..kernel.vector import dot, square
+from .accounts import add_work
+from .escape import detain
+
+# Newton steps onto a wall, from where a step has ended.
+_SWEEPS = 5
+
+
+def end_contacts(method, walls, gravity, share, lanes, i, before, pushed):
+    """Add what a wall (number, impulse per mass) has given a lane in a step, and let its laws act at the contact's end.
+
+    The velocity `before` is that at the start of the step.
+    """
+    if method.laws_at_ends is None:
+        return
+    _wall, impulse = pushed
+    if impulse > 0.0:
+        _end(method, walls, gravity, share, lanes, i, (before, *pushed))
+
+
+def impulses_before(method, walls, lanes, i):
+    """What the walls had given a lane before its hard pass."""
+    if method.laws_at_ends is None:
+        return None
+    kept = scratch(walls.length(), np.float64)
+    for s in range(walls.length()):
+        kept[s] = lanes.impulse[s, i]
+    return kept
+
+
+def end_hard_contacts(method, walls, gravity, share, lanes, i, before, kept):
+    """The same of all walls after a hard pass."""
+    if method.laws_at_ends is None:
+        return
+    for s in range(walls.length()):
+        end_contacts(method, walls, gravity, share, lanes, i, before, (float(s), lanes.impulse[s, i] - kept[s]))
+
+
+@outlined
+def _end(method, walls, gravity, share, lanes, i, step):
+    before, wall, impulse = step
+    flier, p, row = lanes.lane(i), index(lanes.particle[i]), index(int(wall))
+    state = share.state
+    state.pressed[row, p] += impulse
+    now, v = method.at_start(lanes.faced(walls, i), flier.remaining), flier.v
+    # Normals of some walls are right on them alone.
+    r = flier.r
+    for _sweep in range(_SWEEPS):
+        r = now.project(wall, r)
+    n, u = now.unit_normal(wall, r), wall_velocity(method.moving, now, wall, r)
+    away, pressed = -dot(relative(u, v), n), state.pressed[row, p]
+    b = max(away, 0.0)
+    if now.distance(wall, flier.r) > 0.0 and not (method.multiplies and away > 0.0):
+        if away <= 0.0 and dot(relative(u, before), n) < 0.0:
+            # What a weight presses on is rubbed each time that it turns back before the wall lets it go.
+            state.pressed[row, p] = 0.0
+            _drag(method, walls, share, lanes, i, (wall, n, u, pressed))
+        return
+    state.pressed[row, p] = 0.0
+    # What has not turned the particle round is the rest of a contact that has ended.
+    if pressed >= b:
+        _act(method, walls, now, gravity, share, lanes, i, (wall, r, n, u, b, pressed))
+
+
+def _drag(method, walls, share, lanes, i, at):
+    """Friction of a contact that lasts."""
+    wall, n, u, pressed = at
+    laws, state, flier, p = method.laws_at_ends, share.state, lanes.lane(i), index(lanes.particle[i])
+    if laws.friction is None:
+        return
+    w = relative(u, flier.v)
+    turned, lost = rub(laws, wall, n, w, pressed)
+    work = given(u, turned - w)
+    flier.v = flier.v + (turned - w)
+    flier.twice += work - lost
+    if not method.dissipates:
+        state.energy[p] += 0.5 * (work - lost)
+    add_work(walls, lanes.impulse, i, wall, 0.5 * work)
+    state.dissipated[p] += 0.5 * lost * state.mass[p]
+
+
+def _act(method, walls, now, gravity, share, lanes, i, at):
+    """The laws of a wall where a contact ends: its place, normal, velocity, the speed away from it, and the impulse."""
+    wall, r, n, u, b, pressed = at
+    state, flier, p, laws = share.state, lanes.lane(i), index(lanes.particle[i]), method.laws_at_ends
+    v, mass = flier.v, state.mass[p]
+    fall = 2.0 * potential(gravity, r)
+    # As it would arrive at a rigid wall
+    before = v + 2.0 * b * n
+    turned = given(u, v - before)
+    # Of the impacts before this one, which has been counted.
+    number = state.impacts[p] + np.int64(flier.hits) - 1
+    random = RandomSource(share.seed, share.first).of_impact(p, number, laws)
+    arriving = Arriving(r, before, square(before) + fall, mass)
+    bounce = impact_on_wall(laws._replace(friction=None), now, gravity, wall, arriving, random)
+    bounce = _rubbed(laws, wall, n, u, bounce, bounce.impulse + max(pressed - 2.0 * b, 0.0))
+    # Of the velocities themselves: what a step is to keep is known to round-off.
+    change = square(bounce.v) - square(v)
+    flier.v = bounce.v
+    flier.twice += change
+    if not method.dissipates:
+        state.energy[p] += 0.5 * change
+    lanes.impulse[index(int(wall)), i] += bounce.impulse - 2.0 * b
+    add_work(walls, lanes.impulse, i, wall, 0.5 * (bounce.work - turned))
+    heat = book_energy(state, (index(int(wall)), p, p), mass, bounce)
+    if share.counts is not None:
+        share.counts.give(wall, heat, bounce.wait)
+    if state.absorbed is not None and bounce.wait > 0.0:
+        _keep(method, share, lanes, i, wall, bounce.wait)
+
+
+def _rubbed(laws, wall, n, u, bounce, impulse):
+    """A `Bounce` less what friction takes of the slip, but of what a law has sent off."""
+    if laws.friction is None or bounce.is_sent:
+        return bounce
+    w = relative(u, bounce.v)
+    v, lost = rub(laws, wall, n, w, impulse)
+    work = given(u, v - w)
+    return bounce._replace(
+        v=bounce.v + (v - w), twice_energy=bounce.twice_energy - lost + work,
+        work=bounce.work + work, lost=bounce.lost + lost,
+    )  # fmt: skip
+
+
+def _keep(method, share, lanes, i, wall, wait):
+    """A lane waits on a wall for whole steps, or is absorbed by it."""
+    flier, p = lanes.lane(i), index(lanes.particle[i])
+    if method.steps_into_walls and wait < math.inf:
+        wait = math.ceil(wait / method.dt) * method.dt
+    if detain(share, p, wall, method.seconds(flier.remaining), wait):
+        flier.remaining = flier.remaining - (wait / method.dt if method.steps_into_walls else wait)
+    else:
+        flier.remaining = 0.0
+    lanes.marked[i] = not (flier.remaining > 0.0)

@@ -1,0 +1,113 @@
+"""Laws of walls with `Penalty` and `AugmentedLagrangian`: at the end of a contact they are those of `Impact`."""
+
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+
+ALPHA = 4e3
+LOOP = {"dt": 5e-3, "penalty": ALPHA, "tolerance": 1e-20, "on_unconverged": "impact"}
+PENALTY = swarm.Penalty(5e-3, ALPHA)
+METHODS = {
+    "Penalty": PENALTY,
+    "Hertz": swarm.Penalty(2e-3, 1e5, exponent=1.5),
+    "mean-value": swarm.Penalty(2e-3, 1e5, exponent=1.5, gradient="mean-value"),
+    "cut": swarm.AugmentedLagrangian(**LOOP, adaptive=True, acceleration="reflection"),
+    "centred": swarm.AugmentedLagrangian(**LOOP, adaptive=True, contact_start="centred"),
+    "fixed": swarm.AugmentedLagrangian(**LOOP),
+}
+LAWS = {
+    "restitution": {"restitution": 0.7},
+    "friction": {"friction": 0.3},
+    "both": {"restitution": 0.7, "friction": 0.3},
+    "hot": {"temperature": 0.5, "accommodation": 0.6},
+    "Lambert": {"laws": [swarm.Lambert(0.7)]},
+    "CercignaniLampis": {"laws": [swarm.CercignaniLampis(0.5, 0.4, 0.6)]},
+}
+
+
+def ran(scene, particles, method, until=1.0, every=0.25, **options):
+    return swarm.simulate(scene, particles, method, until=until, every=every, compile="never", seed=4, **options)
+
+
+def balanced(seen):
+    total = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum(axis=1)
+    if "wall_work" in seen:
+        total = total - seen["wall_work"].sum(axis=1)
+    return np.abs(total - total[0]).max() / (seen["kinetic_energy"].max() + np.ptp(seen["potential_energy"]))
+
+
+def one(velocity=(0.6, 0.0, -1.0)):
+    return swarm.Particles((0.0, 0.0, 0.1), velocity)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("name", METHODS)
+def test_an_impact_on_a_plane_is_that_of_a_rigid_one(name, law):
+    scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, **LAWS[law])], gravity=None)
+    rigid, soft = (ran(scene, one(), method, 0.5) for method in (swarm.Impact(), METHODS[name]))
+    assert soft.particles.velocity == pytest.approx(rigid.particles.velocity, abs=1e-9)
+    for seen in ("dissipated_energy", "wall_heat", "impacts"):
+        assert soft.observables[seen][-1] == pytest.approx(rigid.observables[seen][-1], abs=1e-9)
+    assert soft.observables["impulse"][-1, 0] == pytest.approx(rigid.observables["impulse"][-1, 0], rel=1e-8)
+    assert balanced(soft.observables) < 1e-13
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("name", ["Penalty", "cut", "fixed"])
+def test_what_is_lost_or_given_is_booked(name, law):
+    vessel = swarm.Intersection([swarm.Ellipsoid((0.5, 0.4, 0.6), **LAWS[law]), swarm.Plane((0.0, 0.0, 1.0), 0.2)])
+    scene = swarm.Scene([vessel], gravity=None)
+    seen = ran(scene, swarm.fill(scene, 4, speed=1.0, mass=2.0, seed=3), METHODS[name], 1.5).observables
+    assert seen["impacts"][-1] > 3
+    assert balanced(seen) < 1e-12
+    assert seen["energy_error"].max() < 1e-12
+
+
+def test_walls_that_move_and_gravity():
+    motion = swarm.Oscillation((0.05, 0.03, 0.04), 1.0)
+    for law in ("both", "hot"):
+        scene = swarm.Scene([swarm.Box((0.5, 0.5, 0.5), motion=motion, **LAWS[law])], gravity=(0.3, -0.2, -1.0))
+        seen = ran(scene, swarm.fill(scene, 4, speed=1.0, mass=2.0, seed=3), PENALTY, 1.5).observables
+        assert seen["impacts"][-1] > 8
+        assert balanced(seen) < 1e-12
+
+
+@pytest.mark.parametrize("name", ["Penalty", "cut", "fixed"])
+def test_points_are_absorbed_or_wait(name):
+    scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, laws=[swarm.Absorb(1.0)])], gravity=None)
+    absorbed = ran(scene, one(), METHODS[name], 0.5)
+    assert absorbed.observables["absorbed"][-1].tolist() == [1]
+    assert absorbed.absorbed_time[0] == pytest.approx(0.1, abs=0.06)
+    scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, laws=[swarm.Sticky(0.3)])], gravity=None)
+    held, free = (ran(one_scene, one(), METHODS[name], 1.0) for one_scene in (scene, swarm.Scene([swarm.Plane(
+        (0.0, 0.0, -1.0), 0.0)], gravity=None)))  # fmt: skip
+    assert held.particles.velocity[:, 0].tolist() == pytest.approx(free.particles.velocity[:, 0].tolist(), abs=1e-9)
+    waited = (free.particles.position - held.particles.position)[2, 0] / free.particles.velocity[2, 0]
+    assert waited > 0.0
+    assert waited / 5e-3 == pytest.approx(round(waited / 5e-3), abs=1e-6) or name == "cut"
+
+
+def test_what_slides_under_its_weight_is_rubbed():
+    # v = v0 - mu g t, to rest at v0/(mu g), by contacts that last 2 pi/sqrt(alpha/m) each.
+    floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, friction=0.2)
+    scene = swarm.Scene([floor], gravity=(0.0, 0.0, -10.0))
+    result = ran(scene, swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), swarm.Penalty(1e-3, 1e5), 0.75, 0.125)
+    seen = result.observables
+    assert seen["dissipated_energy"][-1] == pytest.approx(0.5, rel=1e-3)
+    assert seen["dissipated_energy"][1] == pytest.approx(0.5 * (1.0 - 0.75**2), rel=0.08)
+    assert abs(result.particles.velocity[0, 0]) < 1e-9
+    assert balanced(seen) < 1e-12
+
+
+def test_a_particle_that_has_bounced_to_rest_presses_by_its_weight():
+    scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, restitution=0.5)], gravity=(0.0, 0.0, -10.0))
+    result = ran(scene, one((0.0, 0.0, 0.0)), swarm.Penalty(1e-3, 1e5), 1.5, 0.25)
+    seen = result.observables
+    assert balanced(seen) < 1e-12
+    assert (seen["impulse"][-1, 0] - seen["impulse"][-2, 0]) == pytest.approx(10.0 * 0.25, rel=0.05)
+    # It swings between the wall and twice the depth m g/alpha.
+    assert -2.2e-4 < result.particles.position[2, 0] < 1e-6
+    assert math.isclose(seen["dissipated_energy"][-1], 1.0, rel_tol=1e-3)
