@@ -61,6 +61,7 @@ class Matter(Record):
     period: Any  # `Lengths`, or None
     limits: Any  # `Limits` of overlaps.py
     openings: Any  # of all walls, or None
+    counters: Any = None  # `counters.Counters`, or None
 
     @property
     def rubs(self):

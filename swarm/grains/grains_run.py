@@ -12,6 +12,7 @@ from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..errors import RunError
+from ..lanes.watching.watchers import Followed
 from ..methods import Penalty
 from ..methods.base import Method
 from ..methods.fixed_step import steps_within
@@ -19,6 +20,7 @@ from ..particles import Particles
 from ..run.base import OUTSIDE, Arrays, BaseRun, named
 from ..run.doors import comers, require_free
 from ..run.feeding import Feed, There
+from ..run.preflight.counting import counters_of, crossed_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -32,6 +34,7 @@ from .faces import Fields
 from .grain_arrays import BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X
 from .matter import matter_of
 from .overlaps import COLUMNS
+from .passing import Passing
 from .step import MarchRule, World, march
 
 # The first skin of the lists, of the radius of the smallest ball. In a skin a ball may move by half of it.
@@ -54,7 +57,8 @@ class GrainsRun(BaseRun):
         scene, n, walls = compiled.scene, len(particles), len(compiled.numbering.surfaces_of_rows)
         radius = particles.radius
         assert radius is not None
-        self._matter = matter_of(compiled, method, radius)
+        counters = counters_of(scene, watched.counters, logs=True)
+        self._matter = matter_of(compiled, method, radius)._replace(counters=counters)
         rubs, spin = self._matter.rubs, particles.spin
         if spin is None and rubs:
             spin = np.zeros((3, n))
@@ -79,7 +83,8 @@ class GrainsRun(BaseRun):
         # What contacts with walls stored before the instant that has come, and the length of a step [s].
         self._stored_before: NDArray[np.float64] | None = None
         self._step, self._span = self._matter.h, 0.0
-        state = self.state
+        self._counted = watched.counters
+        self.state = state = with_counters(self.state, counters, watched.counters, scene)
         books = ContactTotals(
             balls.collisions,
             state.impacts,
@@ -100,6 +105,9 @@ class GrainsRun(BaseRun):
             self._rows_of(there),
             *self._room(len(there), _PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
         )  # fmt: skip
+        if counters is not None:
+            passing = Passing(state.mass, state.crossed, state.period)
+            self._world = self._world._replace(followed=Followed(passing, None))
         self._clock = np.zeros(arrays.CLOCK)
         self._clock[SKIN] = _SKIN * radius.min()
         self._scale, self._stored = 0.0, math.nan
@@ -152,6 +160,9 @@ class GrainsRun(BaseRun):
         kept = kept_drags(self._world)
         state = self.state
         state.position[:, born.number], state.velocity[:, born.number] = born.position, born.velocity
+        if state.crossed is not None:
+            sides = crossed_of(self._matter.counters, self._counted, self._scene, born.position).side
+            state.crossed.side[:, born.number] = sides
         self._world = self._world._replace(grains=arrays.beside(grains, self._rows_of(born.number)))
         near = self._world.near
         self._make_room(near.mate.size, near.slot.size)
@@ -397,6 +408,7 @@ class GrainsRun(BaseRun):
             # Where those are that have escaped, and how fast.
             kept |= {"position": self.state.position, "velocity": self.state.velocity}
             kept |= {} if self.state.spin is None else {"spin": self.state.spin}
+        kept |= {} if self.state.crossed is None else named("crossed", self.state.crossed)
         return kept
 
     def may_grow(self, name: str) -> bool:

@@ -20,6 +20,7 @@ from .exits import let_out, open_wall
 from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
 from .grain_arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
 from .overlaps import look_at_pairs, look_at_wall
+from .passing import count_moves
 from .vessel import SweptWall, moves, sweep_of
 
 # A sweep that changes no impulse by more than this part is the last one; also one that gains no more than half of the
@@ -50,6 +51,7 @@ class World(NamedTuple):
     near: Any
     touches: Any
     books: Any
+    followed: Any = None  # `Followed` of `Passing`, where there are counters
 
 
 # --- Of one step -----------------------------------------------------------------------------------------
@@ -80,7 +82,7 @@ def _fly(matter, grains):
 
 def _gather(matter, walls, world):
     """Add the contacts; return how many are new."""
-    grains, near, touches, _books = world
+    grains, near, touches = world.grains, world.near, world.touches
     new = gather_pairs(matter, grains, near, touches)
     for k, wall in enumerate(walls.each):
         found = gather_at_wall(matter, matter.walls[k], wall, grains, near, touches, (k, near.wall_first[k]))
@@ -213,7 +215,7 @@ def _arrive(matter, grains):
 
 def _book(matter, walls, world):
     """Book what the contacts of the step did; the largest overlap [m]."""
-    grains, near, touches, books = world
+    grains, near, touches, books = world.grains, world.near, world.touches, world.books
     deepest = book_pairs(matter, grains, touches, books)
     if matter.pairs.friction is not None:
         book_rubbing_pairs(matter, grains, near, touches, books)
@@ -227,7 +229,7 @@ def _book(matter, walls, world):
 
 def _look(matter, walls, world):
     """The `Status` of a step by its overlaps; `failed` says of which one."""
-    grains, near, _touches, books = world
+    grains, near, books = world.grains, world.near, world.books
     status = look_at_pairs(matter, grains, near, books.failed)
     for k, wall in enumerate(walls.each):
         if status == Status.DONE.value:
@@ -310,6 +312,8 @@ def march(matter, walls, world, clock, rule):
         if status != Status.DONE.value:
             return status
         escaped = 0 if matter.openings is None else _let_out(matter, now, world, rule.moment - (left - matter.h))
+        if matter.counters is not None:
+            count_moves(matter, world.grains, world.followed)
         _arrive(matter, world.grains)
         clock[DONE] += 1.0
         clock[TAKEN] += 1.0

@@ -391,7 +391,7 @@ CAPABILITIES = (
     }),
     Capability("counter", _option("counters"), {
         _EVERY_BODY: Refusal("counters must be left out with bodies, got {count}", "use particles"),
-        (GRAINS, OTHER_POINTS): Refusal(
+        (OTHER_POINTS,): Refusal(
             "counters must be left out with {method}, got {count}: a counter follows flights, not steps", "use Impact()"
         ),
         (CHORDS,): Refusal("counters must be left out with a contact_step of {step:g}, got {count}", _NO_STEP),

@@ -1,0 +1,35 @@
+"""Counters of soft balls: they get the move of each centre in a step, and change no bit of it."""
+
+from typing import Any, NamedTuple
+
+from ..kernel.arrays import index
+from ..kernel.jit import Array, outlined
+from ..lanes.watching.crossings import ParticleMoment
+from ..surfaces.periodic.period import has_left, into
+from .grain_arrays import AFTER, BEFORE, X, vector_at
+from .overlaps import move_of
+
+
+class Passing(NamedTuple):
+    """What counters of soft balls write to, and know, by the numbers of particles."""
+
+    mass: Array  # (N,) [kg]
+    crossed: Any  # `Crossed`
+    period: Any  # `Period` of the cell, or None
+
+
+@outlined
+def count_moves(matter, grains, followed):
+    """Count what all centres cross in the step; `followed` is a `Followed` of `Passing`."""
+    period = followed.state.period
+    for k in range(grains.place.shape[0]):
+        i = index(k)
+        p, move = index(grains.number[i]), move_of(matter, grains, i)
+        # Between two lists a centre may be a little outside the cell.
+        r = into(period, vector_at(grains.place, i, X)).r
+        before = ParticleMoment(r, vector_at(grains.speed, i, BEFORE), matter.h)
+        after = ParticleMoment(r + move, vector_at(grains.speed, i, AFTER), 0.0)
+        matter.counters.count_step(followed, p, before, after)
+        if has_left(period, after.r):
+            back = after._replace(r=into(period, after.r).r)
+            matter.counters.come_back(followed, p, before, after.r, back)
