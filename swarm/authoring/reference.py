@@ -1,7 +1,7 @@
 """Pages of every public name, observable, key of scene files and option of commands, from their declarations.
 
 The pages are plain HTML with one script, which searches in `search.js`: they work without a network and a server.
-(Rejected: pdoc and mkdocstrings, whose search has the names of Python alone, and not keys, options and observables.)
+(Rejected: pdoc and mkdocstrings: their search has the names of Python alone, and not keys, options and observables.)
 """
 
 import html
@@ -274,7 +274,7 @@ def form_in_words(form: Form) -> str:
         return f"{name} above {above:g}"
     if least is not None and most is not None and abs(most) < 1e99:
         return f"{name} from {least:g} to {most:g}"
-    # A length is above the smallest number whose square is not 0.
+    # A length is above the smallest number with a square that is not 0.
     return (
         name if least is None or least < 0 else f"{name} above 0" if 0 < least < 1e-9 else f"{name}, {least:g} or more"
     )

@@ -1,4 +1,4 @@
-"""The laws of walls with methods whose contacts take time: they act where a contact ends.
+"""The laws of walls with methods of contacts that take time: they act where a contact ends.
 
 There a wall without laws has turned round the normal velocity of a particle, over some steps. Its laws make of that
 what they make of an impact on a rigid wall at which the particle arrives as it would be before: so restitution,

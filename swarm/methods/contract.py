@@ -148,7 +148,7 @@ class MethodNumbers(Record):
 
     @property
     def laws_at_ends(self):
-        """The `Laws` of its walls that act where a contact ends, of a method whose contacts take time; or None."""
+        """The `Laws` of its walls that act where a contact ends, of a method of contacts that take time; or None."""
         return
 
     @property
