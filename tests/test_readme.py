@@ -115,6 +115,14 @@ def test_a_report_that_is_quoted_is_committed_and_names_its_commit(name):
 
 
 @pytest.mark.parametrize("path", PATHS, ids=named)
+def test_rows_of_a_table_have_as_many_cells_as_its_head(path):
+    text = re.sub(r"```.*?```", "", path.read_text(), flags=re.DOTALL)
+    for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
+        cells = [len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()]
+        assert len({*cells}) == 1, table.splitlines()[0]
+
+
+@pytest.mark.parametrize("path", PATHS, ids=named)
 def test_names_and_options_in_a_page_exist(path):
     """`swarm.NAME` is a public name, and the options in a line with a command are options of it."""
     text = path.read_text().replace("swarm.schema.json", "")

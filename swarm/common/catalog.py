@@ -139,5 +139,12 @@ def markdown() -> list[str]:
     rows: list[Any] = [("observable", "unit", "shape", "meaning"), ("---",) * 4]
     for name, one in OBSERVABLES.items():
         axes = (str(LENGTHS.get(axis, f"{axis[:-1]}ies" if axis.endswith("y") else f"{axis}s")) for axis in one.axes)
-        rows.append((f"`{name}`", "" if one.unit == "1" else one.unit, ", ".join(["frames", *axes]), one.meaning))
+        rows.append(
+            (
+                f"`{name}`",
+                "" if one.unit == "1" else one.unit,
+                ", ".join(["frames", *axes]),
+                one.meaning.replace("|", r"\|"),
+            )
+        )
     return [f"| {' | '.join(row)} |" for row in rows]
