@@ -182,7 +182,7 @@ FACTS = {
     "examples/guide/compiling.md": lambda a: a["result"].compile_time == 0.0,
     "examples/guide/laws.md": lambda a: a["stored"].observables["absorbed"][-1, 0] == len(a["gone"]) > 0,
     "examples/guide/limits.md": lambda a: (
-        "surfaces[0].mass must be None with Penalty, got 2; use Impact" in a["printed"]
+        "surfaces[0].temperature must be None with Verlet, got 1; use Impact" in a["printed"]
     ),
     "examples/guide/many_runs.md": lambda a: len(a["table"]) == 8 and (a["table"]["state"] == "done").all(),
     "examples/guide/meshes.md": lambda a: a["smooth"].mesh_error < 0.05,

@@ -274,7 +274,7 @@ def form_in_words(form: Form) -> str:
         return f"{name} above {above:g}"
     if least is not None and most is not None and abs(most) < 1e99:
         return f"{name} from {least:g} to {most:g}"
-    # A length is above the smallest number with a square that is not 0.
+    # A length is above the smallest number with a square above 0.
     return (
         name if least is None or least < 0 else f"{name} above 0" if 0 < least < 1e-9 else f"{name}, {least:g} or more"
     )
