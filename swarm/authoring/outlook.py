@@ -157,11 +157,13 @@ def _time(task: Task) -> dict[str, str]:
     stated = {"work": f"about {work}"} if work else {}
     missing, kernels = _kernels(task)
     is_plain = missing > 0 and python < _COMPILING and options.compile != "always"
+    # Balls that settle meet one another and walls far more often, how often the start does not show.
+    more = ", and more where balls settle" if task.particles.radius is not None and _settles(task) else ""
     if options.compile == "never" or is_plain:
-        return stated | {"time": f"about {_about(python)}, in plain Python"}
+        return stated | {"time": f"about {_about(python)}, in plain Python{more}"}
     on = f" on {threads} threads" if threads > 1 and any(one.shared for one in loads) else ""
     once = f", and once {_about(_COMPILING * missing)} to compile {missing} of {kernels} kernels" if missing else ""
-    return stated | {"time": f"about {_about(seconds)}{on}{once}; from the start, to a factor of a few"}
+    return stated | {"time": f"about {_about(seconds)}{on}{once}{more}; from the start, to a factor of a few"}
 
 
 def _about(seconds: float) -> str:
@@ -186,7 +188,8 @@ def _loads(task: Task) -> list[Load]:
         return [Load(steps * n, "steps of balls", _GRAIN, shared=False)]
     impacts = _impacts(task)
     if engine in (knows.BALLS, knows.HEAVY):
-        return [Load(impacts + _collisions(task), "impacts and collisions", _BALLS, shared=False)]
+        noun = "impacts and collisions before balls settle" if _settles(task) else "impacts and collisions"
+        return [Load(impacts + _collisions(task), noun, _BALLS, shared=False)]
     if engine in (knows.SOFT, knows.BASELINE):
         return [Load(steps * n, "steps of particles", _SPRING)]
     if engine == knows.PAPER:
@@ -195,10 +198,16 @@ def _loads(task: Task) -> list[Load]:
     return [flights, *_sliding(task)]
 
 
+def _settles(task: Task) -> bool:
+    """Whether particles settle: under gravity, at walls that take energy at impacts."""
+    laws = task.compiled.laws
+    return task.scene.gravity is not None and laws is not None and laws.restitution is not None
+
+
 def _sliding(task: Task) -> list[Load]:
-    """The steps of particles that come to slide, as under gravity they do where impacts take energy."""
-    scene, laws = task.scene, task.compiled.laws
-    if scene.gravity is None or laws is None or laws.restitution is None:
+    """The steps of particles that come to slide."""
+    scene = task.scene
+    if scene.gravity is None or not _settles(task):
         return []
     crossing = math.sqrt(scene.finite_size() / math.hypot(*scene.gravity))
     steps = len(task.particles) * task.options.until / crossing * _STEPS_A_CROSSING
