@@ -18,7 +18,6 @@ from ..bodies.copies import Bodies
 from ..bodies.elastic import block, elastic
 from ..bodies.placing import place
 from ..common import checks
-from ..errors import SceneError
 from ..methods import ALL_METHODS
 from ..motion.wall import KINDS as ALL_MOTIONS
 from ..pairs import Pairs
@@ -186,18 +185,12 @@ class Table(NamedTuple):
 
 
 def form_of(kind: Any, owner: str, name: str) -> Form:
-    """The form of a field of a class, from its annotation.
-
-    Raises:
-        SceneError: neither its type nor its check has a form; name one in this module.
-    """
+    """The form of a field of a class, from its annotation; that of any value where nothing here has another."""
     if (owner, name) in _OF_CLASS:
         return _OF_CLASS[owner, name]
     found = _form(kind)
-    if found is None and name in _OF_KEYS:
-        return _OF_KEYS[name]
     if found is None:
-        raise SceneError(f"{owner}.{name}: expected a type or a check with a form, got {kind}")
+        return _OF_KEYS.get(name, {})
     return _OF_KEYS[name] if found == TEXT and name == "side" else found
 
 

@@ -1,7 +1,7 @@
 """Pages of every public name, observable, key of scene files and option of commands, from their declarations.
 
 The pages are plain HTML with one script, which searches in `search.js`: they work without a network and a server.
-(Rejected: pdoc and mkdocstrings: their search has the names of Python alone, and not keys, options and observables.)
+(Rejected: pdoc and mkdocstrings. Their search has the names of Python alone, not keys, options and observables.)
 """
 
 import html
@@ -20,7 +20,7 @@ from ..errors import FileError, SceneError
 from ..files.paths import target_of
 from ..version import VERSION
 from . import file_run
-from .docstrings import entries_of, first_line, sections_of
+from .docstrings import entries_of, first_line, meanings_of, sections_of
 from .keys import Form, Table, tables
 from .texts import write_text
 
@@ -130,10 +130,21 @@ def _of_name(name: str) -> Entry:
     if isinstance(value, ModuleType):
         value = getattr(file_run, name)
         show_in_lines(value)
-    body = f"{_signature(name, value)}{_described(value)}"
+    body = f"{_signature(name, value)}{_described(value, name)}"
     if isinstance(value, type):
+        body += _of_bases(value)
         body += "".join(_of_member(name, member, one) for member, one in _members(value))
     return Entry(f"swarm.{name}", f"swarm.{name}", first_line(value), body)
+
+
+def _of_bases(cls: type[Any]) -> str:
+    """The names of the arguments that a class takes besides its own, and where they are described."""
+    own = entries_of(sections_of(cls).get("Args", ""))
+    taken = [name for name in inspect.signature(cls).parameters if name not in own] if own else []
+    common = [name for name in meanings_of(cls) if name in taken]
+    names = ", ".join(f"<code>{name}</code>" for name in common)
+    link = "<a href='scene-files.html#table.surface'>described once for all surfaces</a>"
+    return f"<p>And {names}, {link}.</p>" if common else ""
 
 
 def _signature(name: str, value: Any) -> str:
@@ -162,8 +173,8 @@ def _of_member(owner: str, name: str, value: Any) -> str:
     return f"<section class='member' id='swarm.{owner}.{name}'>{shown}{_described(value)}</section>"
 
 
-def _described(value: Any) -> str:
-    """The docstring of a value."""
+def _described(value: Any, owner: str = "") -> str:
+    """The docstring of a value; the arguments of a public name, the `owner`, are found by the search."""
     found = sections_of(value)
     body = _prose(found.get("", ""))
     for title in ("Args", "Attributes", *_SECTIONS):
@@ -171,12 +182,17 @@ def _described(value: Any) -> str:
             continue
         shown = {"Args": "Arguments", "Raises": "Errors"}.get(title, title)
         entries = entries_of(found[title]) if title in _WITH_ENTRIES else {}
-        body += f"<h4>{shown}</h4>" + (_entries(entries) if entries else _prose(inspect.cleandoc(found[title])))
+        body += f"<h4>{shown}</h4>" + (
+            _entries(entries, owner * (title == "Args")) if entries else _prose(inspect.cleandoc(found[title]))
+        )
     return body + (f"<h4>Example</h4><pre>{_text(found['Example'])}</pre>" if "Example" in found else "")
 
 
-def _entries(entries: dict[str, str]) -> str:
-    rows = "".join(f"<dt>{_text(name)}</dt><dd>{_line(about)}</dd>" for name, about in entries.items())
+def _entries(entries: dict[str, str], owner: str = "") -> str:
+    rows = ""
+    for name, about in entries.items():
+        anchor = f" id='argument.swarm.{owner}.{name}'" if owner else ""
+        rows += f"<dt{anchor}>{_text(name)}</dt><dd>{_line(about)}</dd>"
     return f"<dl>{rows}</dl>"
 
 
@@ -274,7 +290,7 @@ def form_in_words(form: Form) -> str:
         return f"{name} above {above:g}"
     if least is not None and most is not None and abs(most) < 1e99:
         return f"{name} from {least:g} to {most:g}"
-    # A length is above the smallest number with a square above 0.
+    # A length is above the smallest number that has a square above 0.
     return (
         name if least is None or least < 0 else f"{name} above 0" if 0 < least < 1e-9 else f"{name}, {least:g} or more"
     )
@@ -328,7 +344,7 @@ def _found(made: tuple[Section, ...]) -> list[list[str]]:
     for section in made:
         for one in section.entries:
             rows.append([one.title, f"{section.file}.html#{one.anchor}", one.about])
-            inner = re.findall(r"<(?:tr|section)[^>]* id='([^']+)'", one.body)
+            inner = re.findall(r"<(?:tr|section|dt)[^>]* id='([^']+)'", one.body)
             rows += [[f"{name.rpartition('.')[2]} ({one.title})", f"{section.file}.html#{name}", ""] for name in inner]
     return rows
 

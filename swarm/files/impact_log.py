@@ -321,6 +321,12 @@ def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_]:
 def load_impacts(path: str | Path) -> ImpactLog:
     """Open a log of impacts for reading; see `ImpactLog`.
 
+    Args:
+        path: the file, HDF5.
+
+    Returns:
+        The `ImpactLog`, which a `with` statement closes.
+
     Raises:
         SceneError: the file does not exist, or it is not a log of impacts.
 

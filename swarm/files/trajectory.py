@@ -646,5 +646,25 @@ class Trajectory(Stored):
 
 
 def load(path: str | Path) -> Trajectory:
-    """Open a trajectory for reading; see `Trajectory`."""
+    """Open a trajectory for reading; see `Trajectory`.
+
+    Args:
+        path: the file, HDF5, also while a run writes it.
+
+    Returns:
+        The `Trajectory`, which a `with` statement closes.
+
+    Raises:
+        SceneError: the file does not exist, or it is not a trajectory.
+
+    >>> import swarm, tempfile
+    >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
+    >>> start = swarm.fill(cavity, 10, speed=1.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = folder + "/run.h5"
+    ...     _ = swarm.simulate(cavity, start, swarm.Impact(), until=1.0, trajectory=file)
+    ...     with swarm.load(file) as trajectory:
+    ...         trajectory.times
+    array([0., 1.])
+    """
     return Trajectory(path)

@@ -1,6 +1,7 @@
 """The reference: every public name, observable, key of scene files and option of commands is on one page."""
 
 import html
+import inspect
 import re
 from collections import Counter
 
@@ -10,11 +11,15 @@ from test_cli import command
 from typer.main import get_command
 
 import swarm
+from swarm.authoring.docstrings import entries_of, meanings_of, sections_of
 from swarm.authoring.keys import tables
 from swarm.authoring.reference import topics, write
 from swarm.commands.cli import app
 from swarm.commands.docs import commands
 from swarm.common.catalog import OBSERVABLES
+
+# Arguments that a file or another call gives.
+MADE = {"mesh_weld", "args", "kwargs", "common"}
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +48,21 @@ def test_every_public_name_is_on_one_page(places):
     names = set(swarm.__all__) - {"__version__"}
     assert {name for some in topics().values() for name in some} == names
     assert once(places, [f"swarm.{name}" for name in names]) == {}
+
+
+def test_every_argument_of_a_public_name_is_described(pages, places):
+    """On its page, or with those of all surfaces; but for what `load` opens and what a class makes by itself."""
+    opened = {"Trajectory", "ImpactLog", "Frame", "run"}
+    for name in sorted(set(swarm.__all__) - {"__version__"} - opened):
+        value = getattr(swarm, name)
+        if isinstance(value, type) and issubclass(value, Exception):
+            continue
+        known = meanings_of(value) | entries_of(sections_of(value).get("Attributes", ""))
+        with row(name):
+            taken = [one for one in inspect.signature(value).parameters if one not in MADE and not one.startswith("_")]
+            assert [one for one in taken if one not in known] == []
+    assert places["argument.swarm.simulate.until"] == places["argument.swarm.Box.half_widths"] == 1
+    assert "described once for all surfaces" in pages["surfaces.html"]
 
 
 def test_every_observable_is_on_one_page(places):

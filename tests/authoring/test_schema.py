@@ -127,6 +127,7 @@ def test_every_key_has_a_meaning():
         with row(f"{table.place} {table.kind}"):
             assert table.meaning
             assert [key.name for key in table.keys if not key.meaning] == []
+            assert [key.name for key in table.keys if not key.form] == [], "name a form in authoring/keys.py"
             assert len({key.name for key in table.keys}) == len(table.keys)
 
 
