@@ -5,7 +5,7 @@ import math
 from ..errors import SceneError
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces.surface import Surface
+from ..surfaces.surface import Surface, shown
 
 
 def _nearest_lid(scene: Scene, surface: Surface) -> float:
@@ -23,9 +23,9 @@ def require_shapes(scene: Scene, radius: Floats) -> None:
         if why is not None:
             raise SceneError(
                 f"surfaces[{i}] must be one that particles with a radius may meet, got {type(surface).__name__}, "
-                f"{why}; they may meet Sphere, Plane, Slab, Box, Cylinder, Capsule, Torus, Cone, Ellipsoid, Polygon, "
-                "Stadium, Prism and Mesh, fields and intersections of these; make it of such surfaces, or leave the "
-                "radius out"
+                f"{why}; they may meet Sphere, Plane, Slab, Box, Cylinder, Capsule, Torus, Cone, Ellipsoid, Quadric, "
+                "Paraboloid, Formula, OwnSurface, Polygon, Stadium, Prism and Mesh, fields and intersections of these; "
+                "make it of such surfaces, or leave the radius out"
             )
         largest = int(radius.argmax())
         lid = _nearest_lid(scene, surface)
@@ -36,8 +36,10 @@ def require_shapes(scene: Scene, radius: Floats) -> None:
                 f"or longer along {scene.plane}"
             )
         if not radius[largest] < surface.largest_ball():
+            where = surface.most_bent_at()
+            sure = "" if where is None else f" that is certain, that at {shown(where)},"
             raise SceneError(
-                f"radius must be below {surface.largest_ball():.6g} m, the smallest radius of curvature of "
+                f"radius must be below {surface.largest_ball():.6g} m, the smallest radius of curvature{sure} of "
                 f"surfaces[{i}] ({type(surface).__name__}), so that no ball touches it at several points at once, got "
                 f"{radius[largest]:g} m of particle {largest}; use smaller balls, or a rounder surface"
             )

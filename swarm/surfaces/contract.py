@@ -10,10 +10,12 @@ q is then a discrete gradient of anything built on phi (the composite gradient),
 `required.py` says in one sentence, before anything is compiled, what a surface lacks for a method.
 """
 
+from typing import Any, NamedTuple
+
 from ..kernel.gravity import Gravity, as_vector
 from ..kernel.jit import outlined, select
 from ..kernel.limits import IDENTITY
-from ..kernel.vector import ZERO, absolute, dot, norm, square, times, total
+from ..kernel.vector import ZERO, Vec, absolute, dot, norm, square, times, total
 from . import curvature, newton
 from .in_motion.at_rest import AtRest
 from .time_of_impact import march
@@ -22,6 +24,17 @@ from .time_of_impact.course import Fall, close, first_rise, rise_near, rise_time
 
 # Newton steps of the chord.
 _CHORD_SWEEPS = 50
+
+
+class Bent(NamedTuple):
+    """A level at a place, for safe steps: grad q, the level, its `hessian_bounds`, and the `clearance`."""
+
+    n: Vec
+    level: Any
+    most: Any
+    magnitude: Any
+    reach: Any
+    clear: Any
 
 
 class Smooth(AtRest):
@@ -191,6 +204,12 @@ class Smooth(AtRest):
     def look(self, r, v, pull, t, is_first):
         """The `Look` of march.py at a flight at a time."""
         return march.look(self, r, v, pull, t, is_first)
+
+    def bent(self, r):
+        """What safe steps ask of a place all at once: a `Bent`."""
+        n, level = self.inner_gradient(r), self.level_of(self.inner(r))
+        most, magnitude, reach = self.hessian_bounds(r)
+        return Bent(n, level, most, magnitude, reach, self.clearance(r))
 
     # The most looks at a fall.
     falling_looks = march.FALLING_LOOKS

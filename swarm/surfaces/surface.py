@@ -161,6 +161,10 @@ class Surface(Validated):
         """The radius below which balls touch the surface at one point only [m]: its smallest radius of curvature."""
         return math.inf
 
+    def most_bent_at(self) -> Vector | None:
+        """Where on the surface that radius is, None where it is not looked for."""
+        return None
+
     def open_volumes(self, between: bool = False) -> tuple["Surface", ...]:
         """The volumes of its openings, each present while that is open: those of walls between rooms, or others."""
         return tuple(volume_of(one) for one in self.openings if (isinstance(one, Opening) and one.between) == between)

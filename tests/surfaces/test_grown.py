@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -43,6 +44,23 @@ FACES = [
     (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4),
     (1, 5, 7), (1, 7, 3),
 ]  # fmt: skip
+
+
+class Numbers(NamedTuple):
+    """Of a user-defined surface."""
+
+    size: float
+
+
+def wavy(p, x, y, z):
+    """A ball with waves."""
+    return x * x + y * y + z * z + 0.05 * math.sin(3.0 * x) - p.size * p.size
+
+
+def wavy_slope(p, x, y, z):
+    return 2.0 * x + 0.15 * math.cos(3.0 * x), 2.0 * y, 2.0 * z
+
+
 SHAPES |= {
     "egg": (swarm.Ellipsoid((0.9, 0.7, 0.8), (0.1, 0.0, 0.0), rotation=TURN), 0.9),
     "orbit": (swarm.Ellipsoid((0.7, 0.7, 0.8)), 0.8),
@@ -56,6 +74,22 @@ SHAPES |= {
     "prism": (swarm.Prism(L_SHAPE, 1.0, axis=(0.0, 1.0, 0.3)), 0.8),
     "mesh": (swarm.Mesh(2.0 * CUBE, FACES, rotation=TURN), 1.0),
     "lump": (swarm.Mesh(CUBE, FACES, side="outside", rotation=TURN), 1.0),
+}
+SHAPES |= {
+    "quadric": (swarm.Quadric(((1.5, 0.2, 0.0), (0.2, 2.0, 0.3), (0.0, 0.3, 3.0)), constant=-1.0, rotation=TURN), 0.9),
+    "waist": (swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.5, 0.0), (0.0, 0.0, -0.5)), constant=-0.3), 1.0),
+    "around a waist": (
+        swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.5, 0.0), (0.0, 0.0, -0.5)), (0.0, 0.1, 0.0), -0.2, side="outside"),
+        1.2,
+    ),
+    "bowl": (swarm.Paraboloid(0.4, (1.0, 0.0, 2.0), (0.0, 0.0, -0.5)), 0.8),
+    "dome": (swarm.Paraboloid(0.2, (1.0, 0.0, 2.0), side="outside"), 1.0),
+    "formula": (swarm.Formula("x**4 + y**4/0.5 + z**2/0.6 + 0.3*x*y - 0.6", rotation=TURN), 0.9),
+    "pear": (
+        swarm.Formula("(x**2 + y**2)*(1 + 0.4*z) + z**2 - 0.16", bounds=((-0.6,) * 3, (0.6,) * 3), side="outside"),
+        1.0,
+    ),
+    "own": (swarm.OwnSurface(Numbers(0.7), wavy, wavy_slope, size=0.7, bounds=((-1.0,) * 3, (1.0,) * 3)), 0.8),
 }
 every_shape = pytest.mark.parametrize("name", SHAPES)
 
@@ -343,9 +377,9 @@ def test_balls_that_are_too_large_for_a_shape(surfaces, plane, words):
             [swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.5, (0.6, 0.0, 0.0))])],
             r"must not be a Union of several rooms with particles that have a radius, got Union.*use particles without",
         ),
-        ([swarm.Formula("x**2 + y**2 + z**4 - 1")], "Formula"),
+        ([swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)))], "Quadric, which has a tip at"),
     ],
-    ids=["union", "formula"],
+    ids=["union", "tip"],
 )
 def test_what_no_ball_may_meet_is_refused_in_a_sentence(surfaces, words):
     scene = swarm.Scene(surfaces)

@@ -13,7 +13,10 @@ from ...common.checks import Vector
 from ...errors import SceneError
 from ...kernel.limits import EPSILON
 from ...kernel.vector import Vec, vec
-from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, shown, side_sign
+from .. import rotation as rotations
+from ..balls.by_foot import ByFoot
+from ..balls.parallel import Parallel, foot_of, tightest_of
+from ..surface import UNBOUNDED, Box, farthest, rotated_box, shown, side_sign
 from .numbers import Bend
 
 # Central differences lose least at the cube root of round-off, relative to the length.
@@ -35,7 +38,7 @@ _STRAIGHT = Bend.of_magnitude(0.0)
 Floats = NDArray[np.float64]
 
 
-class FormSurface(Surface):
+class FormSurface(Parallel):
     """A surface with the numbers of a `Form`: what `Formula` and `OwnSurface` share."""
 
     # Fields of the subclasses; `bounds` and `size` are methods.
@@ -79,6 +82,22 @@ class FormSurface(Surface):
 
     def numbers(self) -> Any:
         return self._form.numbers(self.own_center())
+
+    def tightest(self) -> tuple[float, Vector | None]:
+        radius, where = self._form.tightest
+        if where is None:
+            return radius, None
+        x, y, z = (a + b for a, b in zip(self.center, rotations.turned(self.rotation, where), strict=True))
+        return radius, (x, y, z)
+
+    def by_foot(self, largest: float) -> ByFoot:
+        form, center = self._form, np.array(self.own_center())
+        low, high = (center + corner for corner in np.array(form.wall_box(largest)))
+        box = tuple(low.tolist()), tuple(high.tolist())
+        return foot_of(self.numbers(), form.bend.most, form.tightest[0], box)  # type: ignore[arg-type]
+
+    def framed_alike(self, wall: Any) -> Any:
+        return rotations.rotated(self.rotation, wall)
 
     def size(self) -> float:
         return self._form.size
@@ -172,6 +191,23 @@ class Form:
         low, high = np.where(self.endless, [[-math.inf], [math.inf]], self.box) + np.array(center)
         return rotated_box(rotation, (tuple(low.tolist()), tuple(high.tolist())), center)
 
+    @functools.cached_property
+    def tightest(self) -> tuple[float, Vector | None]:
+        """The smallest radius of curvature that the bound of the bend makes certain, and where: None for infinite."""
+        if self.bend.most <= 0.0:
+            return math.inf, None
+        points = self.points(_SAMPLES)
+        near = self._onto(points[:, np.argsort(np.abs(self.value(points)))[: 4 * _ONTO]])
+        return tightest_of(near, self.value, self.slope, self.bend.most)
+
+    def wall_box(self, largest: float) -> Box:
+        """Around the surface as balls up to a radius meet it: where it goes on beyond its box, by so much more."""
+        if self.box is None:
+            return UNBOUNDED
+        room = 0.0 if self.side == "outside" or self.encloses else largest
+        low, high = np.where(self.endless, [[-math.inf], [math.inf]], np.array(self.box))
+        return tuple((low - room).tolist()), tuple((high + room).tolist())
+
     def value(self, points: Floats) -> Floats:
         """phi at points (3, N) relative to the center."""
         with np.errstate(all="ignore"):
@@ -230,7 +266,7 @@ class Form:
 
     def _onto(self, points: Floats) -> Floats:
         """Points moved onto the surface along the gradient; those that stay in the box."""
-        low, high = np.array(self.box)[:, :, None]
+        low, high = (np.array(UNBOUNDED) if self.box is None else np.array(self.box))[:, :, None]
         start = np.abs(self.value(points)).max()
         for _ in range(_MOVES):
             slope = self.slope(points)

@@ -1,11 +1,15 @@
 """Paraboloid: phi = rho^2/(4 f) - z, a quadric with a linear term."""
 
 import itertools
+import math
 from dataclasses import dataclass
+from typing import Any
 
 from ...common.checks import Vector
 from ...common.validated import Length
-from ..rotation import Direction
+from ..balls.by_foot import ByFoot
+from ..balls.parallel import Parallel, foot_of
+from ..rotation import Direction, rotated
 from ..surface import UNBOUNDED, Box, HalfSpace, farthest
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
@@ -15,7 +19,7 @@ _SLOPES = (0.5, 2.0)
 
 
 @dataclass(frozen=True, repr=False)
-class Paraboloid(Revolved):
+class Paraboloid(Revolved, Parallel):
     """A bowl of revolution: the space in the bowl, which is open above, or the space below it.
 
     Args:
@@ -42,6 +46,16 @@ class Paraboloid(Revolved):
     def numbers(self) -> QuadricNumbers:
         a = 0.25 / self.focal_length
         return quadric_numbers(self.own_center(), (a, a, 0.0), (0.0, 0.0, -1.0), 0.0, self.side)
+
+    def tightest(self) -> tuple[float, Vector | None]:
+        return (math.inf, None) if self.is_solid() else (2.0 * self.focal_length, self.center)
+
+    def by_foot(self, largest: float) -> ByFoot:
+        numbers = self.numbers()
+        return foot_of(numbers, numbers.hessian_bounds(None)[0], self.tightest()[0])
+
+    def framed_alike(self, wall: Any) -> Any:
+        return rotated(self.turn(), wall)
 
     def size(self) -> float:
         return 2.0 * self.focal_length

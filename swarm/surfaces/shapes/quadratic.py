@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.checks import Vector
 from ...kernel.jit import select
-from ...kernel.vector import Vec, absolute, cross, dot, largest, norm, square, times, total, vec
+from ...kernel.vector import Symmetric, Vec, absolute, cross, dot, largest, norm, square, times, total, vec
 from .. import contract
 from ..surface import side_sign
 from ..time_of_impact.course import Quartic, level_and_window, rise_time_by, rise_time_inside
@@ -102,6 +102,10 @@ class QuadricNumbers(contract.Smooth):
 
     def gradient(self, r):
         return self.tilted(times(2.0 * self.a, r - self.center), 1.0)
+
+    def hessian(self, r):
+        a = self.a
+        return Symmetric(a.x, a.y, a.z, 0.0, 0.0, 0.0)
 
     def inner(self, r):
         d = r - self.center

@@ -12,7 +12,9 @@ from ...common.checks import Vector, entries, vector
 from ...common.validated import Number, Point
 from ...errors import SceneError
 from .. import rotation as rotations
-from ..surface import UNBOUNDED, Box, Surface, box_around, extents, farthest, side_sign
+from ..balls.by_foot import ByFoot
+from ..balls.parallel import Parallel, foot_of
+from ..surface import UNBOUNDED, Box, box_around, extents, farthest, side_sign
 from .quadratic import QuadricNumbers, quadric_numbers
 
 # An asymmetry of this part of the largest entry is round-off.
@@ -56,6 +58,26 @@ class PrincipalFrame(NamedTuple):
             return math.inf
         size = math.sqrt(abs(self.height) / steepest) if self.slope == 0.0 else self.slope / (2.0 * steepest)
         return float(size) or math.inf
+
+    def tightest(self, sign: float) -> tuple[float, NDArray[np.float64] | None]:
+        """The smallest radius of curvature of a side, and where relative to the center, None where it is infinite."""
+        most = float((sign * self.curvatures).max())
+        if most <= 0.0:
+            return math.inf, None
+        curved = self.curvatures != 0.0
+        along = np.where(curved, 0.0, self.linear)
+        if self.slope > 0.0:
+            # Where the squares are 0: |grad phi| is the slope there.
+            vertex = along * (self.height / self.slope**2)
+            return self.slope / (2.0 * most), rotations.product(self.axes, np.where(curved, self.middle, vertex))
+        # The least sum of A^2 x^2 with the sum of A x^2 given is on the axis of the least A of that sign.
+        reach = np.where(self.curvatures * self.height > 0.0, abs(self.curvatures), math.inf)
+        k = int(np.argmin(reach))
+        if self.height == 0.0:
+            return 0.0, rotations.product(self.axes, self.middle)
+        vertex = math.sqrt(abs(self.height) / float(reach[k])) * np.eye(3)[k]
+        radius = math.sqrt(abs(self.height) * float(reach[k])) / most
+        return radius, rotations.product(self.axes, self.middle + vertex)
 
     def semi_axes(self) -> list[float]:
         """sqrt(|height/A|)"""
@@ -103,7 +125,7 @@ def _symmetric(name: str, value: Any) -> Matrix:
 
 
 @dataclass(frozen=True, repr=False)
-class Quadric(Surface):
+class Quadric(Parallel):
     """The surface d.A d + b.d + c = 0 with d = r - center: phi is the left side, and below 0 is inside.
 
     Args:
@@ -156,6 +178,20 @@ class Quadric(Surface):
     def numbers(self) -> QuadricNumbers:
         frame = self._frame
         return quadric_numbers(self.own_center(), frame.curvatures, frame.linear, frame.level, self.side)
+
+    def tightest(self) -> tuple[float, Vector | None]:
+        radius, where = self._frame.tightest(side_sign(self.side))
+        if where is None:
+            return radius, None
+        x, y, z = (np.array(self.center) + rotations.product(rotations.matrix(self.rotation), where)).tolist()
+        return radius, (x, y, z)
+
+    def by_foot(self, largest: float) -> ByFoot:
+        numbers = self.numbers()
+        return foot_of(numbers, numbers.hessian_bounds(None)[0], self.tightest()[0])
+
+    def framed_alike(self, wall: Any) -> Any:
+        return rotations.framed(self._axes(), wall)
 
     def size(self) -> float:
         return self._frame.size()

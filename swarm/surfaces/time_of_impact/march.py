@@ -144,11 +144,10 @@ def _safe_step(surface, r, v, pull, slack):
 
     With a slack the level counts as so much below 0.
     """
-    n = surface.inner_gradient(r)
-    side, level = surface.side, surface.level_of(surface.inner(r))
+    n, level, most, magnitude, reach, clear = surface.bent(r)
+    side = surface.side
     level = select(slack > 0.0, min(level, -slack), level)
     half = 0.5 * side * dot(n, v)
-    most, magnitude, reach = surface.hessian_bounds(r)
     speed2 = square(v)
     speed, g = math.sqrt(speed2), norm(pull)
     # level'' = 2 side (w.H w) + side grad q.G <= 2 M, where |w|^2 <= |v|^2 + 2 |G| s and grad q turns by 2 H s at most
@@ -165,7 +164,6 @@ def _safe_step(surface, r, v, pull, slack):
         shorter = min(reach, max(2.0 * _travelled(speed, g, step), -0.5 * m0 / m1))
         within = _step_within(level, half, m0 + select(m1 > 0.0, m1 * shorter, 0.0), _time_to_travel(speed, g, shorter))
         step = max(step, within)
-    clear = surface.clearance(r)
     if clear > 0.0:
         step = max(step, _time_to_travel(speed, g, clear))
     return level, half, step, _travelled(speed, g, step), norm(n)

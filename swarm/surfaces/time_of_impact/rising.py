@@ -259,10 +259,9 @@ def patch_step(wall, is_behind, edges, seen, longest):
 
 def bent_step(body, seen, longest):
     """The `LevelStep` of a wall that bounds its bend."""
-    n, level = body.inner_gradient(seen.r), body.level_of(body.inner(seen.r))
+    n, level, most, magnitude, reach, clear = body.bent(seen.r)
     half = 0.5 * body.side * dot(n, seen.v)
-    most, magnitude, reach = body.hessian_bounds(seen.r)
-    bent = SecondDerivativeBound(seen, level, half, norm(n), most, magnitude, reach, body.clearance(seen.r))
+    bent = SecondDerivativeBound(seen, level, half, norm(n), most, magnitude, reach, clear)
     return LevelStep(level, half, bent.longest(longest))
 
 

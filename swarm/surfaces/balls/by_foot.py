@@ -1,0 +1,222 @@
+"""Walls of a smooth phi that balls meet: phi is how far a ball reaches beyond its wall, by the foot of the normal.
+
+With f = side phi, below 0 where particles may be, let f'' be 2 m at most in any direction. What a place p says is then
+f(p + s) <= f(p) + grad f.s + m |s|^2, so that a ball around any centre y has no wall in it up to the root of
+    f + grad f.(y - p) + m |y - p|^2 + |grad f + 2 m (y - p)| d + m d^2.
+The foot z of y, where y = z - k grad f(z) and f(z) = 0, says that the wall is as far as |y - z|, and so that nothing of
+it is nearer, where 2 m k <= 1: up to |grad f|/(2 m), which is no more than the radius of curvature there, and for a
+quadric is the smallest one. Deeper, or before a foot is found, places on the way to it say a lower bound, with k up to
+1/(2 m) so large a one as the least such radius. So no foot needs to be searched for: the one that is found is nearest,
+or the wall is farther than any ball is large.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...kernel.jit import outlined, select
+from ...kernel.limits import EPSILON
+from ...kernel.vector import Symmetric, Vec, dot, norm, square, total
+from .. import contract
+from ..time_of_impact.course import rise_time
+
+# Newton's steps to a foot; near it each one doubles the digits. The last one is shorter than this part of the distance.
+_SWEEPS, _LAST = 24, 1e-8
+# A step this short, in parts of a place, is round-off.
+_STILL = 8.0 * EPSILON
+# Of the largest k whose foot is known to be nearest: where the matrix of a step has an inverse.
+_MOST = 1.0 - 1e-6
+# From so many radii on a place by itself says how far the wall is at least.
+_FAR = 2.0
+# Of the room that is left to the smallest radius of curvature, where H has a bound: up to this part of it.
+_PART = 0.5
+_TINY = float(np.finfo(np.float64).tiny)
+
+
+class Foot(NamedTuple):
+    """The foot of a place: how far it is, a lower bound where it is not `sure`, and the unit normal there, outwards."""
+
+    away: Any
+    normal: Vec
+    place: Vec
+    share: Any  # k
+    sure: Any
+
+
+class ByFoot(contract.Smooth):
+    """What is so far within the admissible side of a wall `body`."""
+
+    body: Any
+    radius: float  # of the ball
+    most: float  # m
+    bend: float  # the smallest radius of curvature that is certain
+    low: Vec  # corners of a box around the wall
+    high: Vec
+
+    side = 1.0
+
+    def grown(self, radius):
+        return self._replace(radius=radius)
+
+    def foot(self, r):
+        """The `Foot` of a place."""
+        return _foot(self, r)
+
+    def phi(self, r):
+        return self.radius - self.foot(r).away
+
+    def gradient(self, r):
+        return self.foot(r).normal
+
+    def distance(self, r):
+        return self.phi(r)
+
+    def unit_normal(self, r):
+        return self.gradient(r)
+
+    def project(self, r):
+        found = self.foot(r)
+        return r - (self.radius - found.away) * found.normal
+
+    def gap_scale(self, r):
+        return total(Vec(abs(r.x), abs(r.y), abs(r.z)))
+
+    def clearance(self, r):
+        near, _n = self.at_least(r)
+        return select(near > _FAR * self.radius, near, self.foot(r).away) - self.radius
+
+    def farthest_push(self):
+        # Where it is as round as the ball at the most
+        return 2.0 * self.radius
+
+    def hessian(self, r):
+        # With M = I - k grad grad f a foot moves by T = M^-1 - M^-1 n n^T M^-1/(n.M^-1 n) of what its place moves by.
+        found = self.foot(r)
+        n = found.normal
+        c = _inverse(_matrix(self, found.place, found.share))
+        w = _applied(c, n)
+        f, half = 1.0 / dot(n, w), 0.5 / select(found.away > 0.0, found.away, 1.0)
+        return Symmetric(
+            half * (c.xx - f * w.x * w.x + n.x * n.x - 1.0),
+            half * (c.yy - f * w.y * w.y + n.y * n.y - 1.0),
+            half * (c.zz - f * w.z * w.z + n.z * n.z - 1.0),
+            half * (c.xy - f * w.x * w.y + n.x * n.y),
+            half * (c.yz - f * w.y * w.z + n.y * n.z),
+            half * (c.zx - f * w.z * w.x + n.z * n.x),
+        )
+
+    def hessian_bounds(self, r):
+        return self._bounds(self.foot(r).away)
+
+    def bent(self, r):
+        near, n = self.at_least(r)
+        if near > _FAR * self.radius:
+            return contract.Bent(n, self.radius - near, 0.0, 0.0, 0.0, near - self.radius)
+        found = self.foot(r)
+        most, magnitude, reach = self._bounds(found.away)
+        reach = select(found.sure, reach, 0.0)
+        clear = found.away - self.radius
+        return contract.Bent(found.normal, -clear, most, magnitude, reach, select(clear > 0.0, clear, 0.0))
+
+    def _bounds(self, away):
+        # 1/(2 (R - d)) at most, where R is the radius of curvature; where the wall bends away, -1/(2 d) at least
+        room = self.bend - away
+        reach = _PART * min(select(room > 0.0, room, 0.0), select(away > 0.0, away, 0.0))
+        left = room - reach
+        most = select(self.most > 0.0, 0.5 / select(left > 0.0, left, 1.0), 0.0)
+        short = away - reach
+        return most, max(most, 0.5 / select(short > 0.0, short, 1.0)), reach
+
+    def at_least(self, r):
+        """What a place by itself says: how far the wall is at least, and the unit vector to where it may be."""
+        p = self.within(r)
+        side = self.side_of_body()
+        n = side * self.body.gradient(p)
+        size = norm(n)
+        return _free(self, r, p, side * self.body.phi(p), n), n * (1.0 / select(size > _TINY, size, 1.0))
+
+    def passed(self, r, v):
+        low, high, far = self.low, self.high, self.radius
+        x = ((r.x > high.x + far) & (v.x >= 0.0)) | ((r.x < low.x - far) & (v.x <= 0.0))
+        y = ((r.y > high.y + far) & (v.y >= 0.0)) | ((r.y < low.y - far) & (v.y <= 0.0))
+        return x | y | ((r.z > high.z + far) & (v.z >= 0.0)) | ((r.z < low.z - far) & (v.z <= 0.0))
+
+    def within(self, r):
+        """The nearest place of the box."""
+        low, high = self.low, self.high
+        return Vec(_clipped(r.x, low.x, high.x), _clipped(r.y, low.y, high.y), _clipped(r.z, low.z, high.z))
+
+    def side_of_body(self):
+        """+1 of a cavity, -1 of a solid."""
+        return self.body.side
+
+
+def _clipped(x, low, high):
+    return select(x < low, low, select(x > high, high, x))
+
+
+def _free(wall, y, p, f, n):
+    """How far the wall is from y at least, by what f and its gradient are at p."""
+    e, m = y - p, wall.most
+    level = f + dot(n, e) + m * square(e)
+    return select(level < 0.0, rise_time(level, 0.5 * norm(n + (2.0 * m) * e), m), 0.0)
+
+
+def _matrix(wall, z, share):
+    """I - k grad grad f"""
+    h, k = wall.body.hessian(z), -2.0 * share * wall.side_of_body()
+    return Symmetric(1.0 + k * h.xx, 1.0 + k * h.yy, 1.0 + k * h.zz, k * h.xy, k * h.yz, k * h.zx)
+
+
+def _inverse(a):
+    x, y, z = a.yy * a.zz - a.yz * a.yz, a.xx * a.zz - a.zx * a.zx, a.xx * a.yy - a.xy * a.xy
+    xy, yz, zx = a.zx * a.yz - a.xy * a.zz, a.xy * a.zx - a.yz * a.xx, a.xy * a.yz - a.zx * a.yy
+    whole = a.xx * x + a.xy * xy + a.zx * zx
+    f = 1.0 / select(abs(whole) > _TINY, whole, 1.0)
+    return Symmetric(f * x, f * y, f * z, f * xy, f * yz, f * zx)
+
+
+def _applied(a, v):
+    return Vec(
+        a.xx * v.x + a.xy * v.y + a.zx * v.z, a.xy * v.x + a.yy * v.y + a.yz * v.z, a.zx * v.x + a.yz * v.y + a.zz * v.z
+    )
+
+
+@outlined
+def _foot(wall, y):
+    """The `Foot`, by Newton's method for y = z - k grad f(z) and f(z) = 0; k is never above 1/(2 m)."""
+    body, side = wall.body, wall.side_of_body()
+    p = wall.within(y)
+    f, n = side * body.phi(p), side * body.gradient(p)
+    away, size = _free(wall, y, p, f, n), norm(n)
+    # From there so far along the normal
+    ahead = rise_time(f, 0.5 * size, wall.most)
+    ahead = select((ahead < math.inf) & (f < 0.0), ahead, -f / select(size > _TINY, size, 1.0))
+    z = wall.within(p + (ahead / select(size > _TINY, size, 1.0)) * n)
+    largest = select(wall.most > 0.0, 0.5 * _MOST / select(wall.most > 0.0, wall.most, 1.0), math.inf)
+    share, sure = 0.0, False
+    for sweep in range(_SWEEPS):
+        f, n = side * body.phi(z), side * body.gradient(z)
+        d, n2 = z - y, square(n)
+        away = max(away, _free(wall, y, z, f, n))
+        if sweep == 0:
+            share = min(dot(d, n) / select(n2 > _TINY, n2, 1.0), largest)
+        inverse = _inverse(_matrix(wall, z, share))
+        u, w = _applied(inverse, d - share * n), _applied(inverse, n)
+        bottom = dot(n, w)
+        after = min(share + (dot(n, u) - f) / select(abs(bottom) > _TINY, bottom, 1.0), largest)
+        step = (after - share) * w - u
+        share = after
+        to = z + step
+        z = wall.within(to)
+        left = abs(z.x - to.x) + abs(z.y - to.y) + abs(z.z - to.z)
+        short = _LAST * norm(d) + _STILL * total(Vec(abs(z.x) + abs(y.x), abs(z.y) + abs(y.y), abs(z.z) + abs(y.z)))
+        if norm(step) <= short:
+            sure = (left == 0.0) & (share < largest)
+            break
+    f, n = side * body.phi(z), side * body.gradient(z)
+    size = norm(n)
+    size = select(size > _TINY, size, 1.0)
+    here = (dot(z - y, n) - f) / size
+    return Foot(select(sure, here, away), n * (1.0 / size), z, share, sure)

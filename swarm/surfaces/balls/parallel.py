@@ -1,0 +1,84 @@
+"""Surfaces that balls meet by the foot of the normal: their parallel surfaces, and how large balls may be."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...common.checks import Vector
+from ...kernel.vector import Vec
+from ..surface import UNBOUNDED, Box, Surface, shown
+from .by_foot import ByFoot
+from .egg import distances_from
+
+Floats = NDArray[np.float64]
+
+# Points that are moved to where the surface is steepest least, their first step and the last one, in parts of its size.
+_STARTS, _FIRST, _SHORTEST, _SHORTER, _MOVES = 16, 0.05, 1e-6, 0.7, 3
+
+
+class Parallel(Surface):
+    """A surface with a smooth phi whose second derivatives have a bound."""
+
+    def tightest(self) -> tuple[float, Vector | None]:
+        """The smallest radius of curvature that is certain [m], and where on the surface, None where it is infinite."""
+        raise NotImplementedError
+
+    def by_foot(self, largest: float) -> ByFoot:
+        """What balls up to a radius meet, in the frame of `numbers`."""
+        raise NotImplementedError
+
+    def framed_alike(self, wall: Any) -> Any:
+        """A wall in the frame of `numbers` as the scene has it."""
+        raise NotImplementedError
+
+    def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
+        return (self.framed_alike(self.by_foot(largest)),)
+
+    def holds_balls(self) -> str | None:
+        radius, where = self.tightest()
+        if radius > 0.0 or where is None:
+            return None
+        return f"which has a tip at {shown(where)}, where its normal turns at once"
+
+    def largest_ball(self) -> float:
+        return self.tightest()[0]
+
+    def most_bent_at(self) -> Vector | None:
+        return self.tightest()[1]
+
+    def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
+        rows = self._own_rows(points, time)
+        found = np.empty(points.shape[1])
+        distances_from(self.walls_of_balls(0.0)[0], np.ascontiguousarray(rows), found)
+        return found + radius
+
+
+def foot_of(numbers: Any, most: float, bend: float, box: Box = UNBOUNDED) -> ByFoot:
+    """The wall of balls of these numbers, whose side H is at most so much, and whose surface is in a box."""
+    low, high = (Vec(*map(float, corner)) for corner in box)
+    return ByFoot(numbers, 0.0, float(most), float(bend), low, high)
+
+
+def tightest_of(points: Floats, value: Any, slope: Any, most: float) -> tuple[float, Vector]:
+    """The least |grad phi|/(2 most) of a surface, and where, from points (3, N) on it: by shorter and shorter steps."""
+    steep = np.sqrt((slope(points) ** 2).sum(axis=0))
+    best = points[:, np.argsort(steep)[:_STARTS]]
+    steep = np.sort(steep)[:_STARTS]
+    step = _FIRST * float(np.ptp(points, axis=1).max())
+    random = np.random.default_rng(0)
+    while step > _SHORTEST * float(np.abs(points).max()):
+        trial = best + step * random.normal(size=best.shape)
+        for _move in range(_MOVES):
+            normal = slope(trial)
+            with np.errstate(all="ignore"):
+                trial = trial - value(trial) / (normal**2).sum(axis=0) * normal
+        there = np.sqrt((slope(trial) ** 2).sum(axis=0))
+        less = there < steep
+        best, steep = np.where(less, trial, best), np.where(less, there, steep)
+        if not less.any():
+            step *= _SHORTER
+    k = int(np.argmin(steep))
+    x, y, z = best[:, k].tolist()
+    return (float(steep[k]) / (2.0 * most) if most > 0.0 else math.inf), (x, y, z)

@@ -1,0 +1,167 @@
+"""Balls at walls that are known by a smooth phi: the foot of the normal, and runs."""
+
+import math
+from typing import NamedTuple
+
+import mpmath
+import numpy as np
+import pytest
+from conftest import call
+
+import swarm
+
+WAVES = "x**4 + 2*y**4 + exp(z*z/2) - 1.4 + 0.2*x*y*z"
+
+
+def foot_in_high_precision(y):
+    """The distance of a place from the cavity of that formula: the least of Newton's methods from many starts."""
+    with mpmath.workdps(40):
+        place = [mpmath.mpf(float(x)) for x in y]
+
+        def phi(x, y, z):
+            return x**4 + 2 * y**4 + mpmath.exp(z * z / 2) - mpmath.mpf(1.4) + mpmath.mpf(0.2) * x * y * z
+
+        def equations(x, y, z, k):
+            slope = (
+                4 * x**3 + mpmath.mpf(0.2) * y * z,
+                8 * y**3 + mpmath.mpf(0.2) * x * z,
+                z * mpmath.exp(z * z / 2) + mpmath.mpf(0.2) * x * y,
+            )
+            return [a - b - k * s for a, b, s in zip((x, y, z), place, slope, strict=True)] + [phi(x, y, z)]
+
+        rng, found = np.random.default_rng(2), []
+        for _start in range(6):
+            u = rng.normal(size=3)
+            first = [float(a) + 0.4 * b / math.hypot(*u) for a, b in zip(y, u, strict=True)]
+            try:
+                x = mpmath.findroot(equations, (*first, 0.1), tol=1e-30, maxsteps=40)
+            except (ValueError, ZeroDivisionError, OverflowError):
+                continue
+            found.append(mpmath.sqrt(sum((a - b) ** 2 for a, b in zip(x, place, strict=False))))
+        return min(found)
+
+
+def test_the_foot_is_that_of_a_solver_in_high_precision():
+    surface, rng = swarm.Formula(WAVES), np.random.default_rng(4)
+    wall, largest, checked = surface.by_foot(0.0), surface.largest_ball(), 0
+    while checked < 5:
+        y = rng.uniform(-0.9, 0.9, 3)
+        found = call(wall.foot, y) if surface.phi(y[:, None])[0] < 0.0 else None
+        if found is None or not 0.01 < found.away < largest:
+            continue
+        assert found.sure
+        assert abs(found.away - foot_in_high_precision(y)) <= 4e-16
+        checked += 1
+
+
+def test_a_foot_that_is_far_has_a_lower_bound_above_every_radius():
+    """Where a ball of the largest radius has room the bound says so: no flight ends short of the wall."""
+    surface, rng = swarm.Formula(WAVES), np.random.default_rng(6)
+    wall, largest = surface.by_foot(0.0), surface.largest_ball()
+    for _place in range(100):
+        y = rng.uniform(-0.9, 0.9, 3)
+        if surface.phi(y[:, None])[0] >= 0.0:
+            continue
+        found = call(wall.foot, y)
+        directions = rng.normal(size=(3, 400))
+        directions *= (1.0 - 1e-9) * found.away / np.sqrt((directions**2).sum(axis=0))
+        assert surface.phi(y[:, None] + directions).max() <= 1e-12
+        assert found.sure or found.away >= (1.0 - 1e-3) * largest
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_an_ellipsoid_by_its_formula_is_an_ellipsoid(side):
+    """Distances and normals, as the kernels of an ellipsoid say."""
+    axes, center = (0.9, 0.7, 0.8), (0.1, 0.0, 0.0)
+    egg = swarm.Ellipsoid(axes, center, side).walls_of_balls(0.1)[0]
+    matrix = np.diag([1.0 / one**2 for one in axes]).tolist()
+    formula = swarm.Formula("(x/0.9)**2 + (y/0.7)**2 + (z/0.8)**2 - 1", center=center, side=side)
+    rng, sign = np.random.default_rng(8), 1.0 if side == "inside" else -1.0
+    for surface in (formula, swarm.Quadric(matrix, constant=-1.0, center=center, side=side)):
+        (wall,) = surface.walls_of_balls(0.1)
+        for _place in range(60):
+            u = rng.normal(size=3)
+            r = np.array(center) + np.array(axes) * u / math.hypot(*u) * rng.uniform(
+                *((0.5, 1.0), (1.0, 1.6))[side > "j"]
+            )
+            expected = call(egg.foot, r)
+            found = call(wall.foot, r)
+            assert abs(found.away + sign * expected[0]) <= 4e-16
+            assert np.array(found.normal) == pytest.approx(sign * np.array(expected[1]), abs=4e-15)
+
+
+class Size(NamedTuple):
+    """Of a user-defined surface."""
+
+    radius: float
+
+
+def ball_phi(p, x, y, z):
+    return x * x + y * y + z * z - p.radius * p.radius
+
+
+def ball_gradient(p, x, y, z):
+    return 2.0 * x, 2.0 * y, 2.0 * z
+
+
+WALLS = {
+    "formula": swarm.Formula("x**4 + y**4/0.5 + z**2/0.6 + 0.3*x*y - 0.6"),
+    "quadric": swarm.Quadric(((1.5, 0.2, 0.0), (0.2, 2.0, 0.3), (0.0, 0.3, 3.0)), constant=-1.0),
+    "own": swarm.OwnSurface(Size(0.7), ball_phi, ball_gradient, size=0.7, bounds=((-0.8,) * 3, (0.8,) * 3)),
+}
+
+
+@pytest.mark.parametrize("gravity", [None, (0.2, 0.1, -1.0)], ids=["straight", "falling"])
+@pytest.mark.parametrize("name", WALLS)
+def test_balls_in_it_keep_their_energy_and_overlap_by_round_off(name, gravity):
+    surface, depths = WALLS[name], []
+    scene = swarm.Scene([surface], gravity=gravity)
+    start = swarm.fill(scene, 6, speed=1.0, radius=0.06, seed=2)
+
+    def depth(frame):
+        reach = surface.reaching_outside(frame.position, start.radius)
+        depths.append(reach.max())
+        return reach.max()
+
+    result = swarm.simulate(
+        scene, start, swarm.Impact(), until=1.2, every=0.2, seed=1, progress=False, observables={"depth": depth}
+    )
+    energy = result.observables["total_energy"]
+    assert result.observables["impacts"][-1] > 4
+    assert abs(energy / energy[0] - 1.0).max() <= 1e-12
+    assert max(depths) <= 4.0 * np.finfo(float).eps
+
+
+def test_balls_of_a_formula_fly_as_those_of_the_ellipsoid_that_it_is():
+    """Each meets the walls at the same times."""
+    axes = (0.9, 0.7, 0.8)
+    ends = []
+    for surface in (swarm.Ellipsoid(axes), swarm.Formula("(x/0.9)**2 + (y/0.7)**2 + (z/0.8)**2 - 1")):
+        ball = swarm.Particles((0.1, -0.2, 0.3), (1.0, 0.7, -0.4), radius=0.2)
+        seen = []
+        swarm.simulate(
+            swarm.Scene([surface]), ball, swarm.Impact(), until=4.0, every=1.0, seed=1, progress=False,
+            observables={"place": lambda frame, seen=seen: seen.append(np.array(frame.position)) or 0.0},
+        )  # fmt: skip
+        ends.append(np.array(seen))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("surface", "words"),
+    [
+        (
+            swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 4.0, 0.0), (0.0, 0.0, 1.0)), constant=-1.0),
+            r"radius must be below 0.25 m, the smallest radius of curvature that is certain, that at \(1, 0, 0\), of "
+            r"surfaces\[0\] \(Quadric\)",
+        ),
+        (swarm.Paraboloid(0.1, center=(0.0, 0.0, -0.5)), r"radius must be below 0.2 m, .*at \(0, 0, -0.5\)"),
+        (swarm.Formula("x**4 + y**4 + z**4 - 1"), r"radius must be below 0.25\d* m, .*use smaller balls"),
+        (swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))), r"a tip at \(0, 0, 0\)"),
+    ],
+    ids=["quadric", "paraboloid", "formula", "tip"],
+)
+def test_a_ball_that_is_too_large_is_refused_in_a_sentence(surface, words):
+    ball = swarm.Particles((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), radius=0.26)
+    with pytest.raises(swarm.SceneError, match=words):
+        swarm.simulate(swarm.Scene([surface]), ball, swarm.Impact(), until=1.0)
