@@ -25,7 +25,7 @@ from ..time_of_impact.course import rise_time
 _SWEEPS, _LAST = 24, 1e-8
 # A step this short, in parts of a place, is round-off.
 _STILL = 8.0 * EPSILON
-# Of the largest k whose foot is known to be nearest: where the matrix of a step has an inverse.
+# Of the largest k that has a foot known to be nearest: where the matrix of a step has an inverse.
 _MOST = 1.0 - 1e-6
 # From so many radii on a place by itself says how far the wall is at least.
 _FAR = 2.0

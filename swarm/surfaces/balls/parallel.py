@@ -19,7 +19,7 @@ _STARTS, _FIRST, _SHORTEST, _SHORTER, _MOVES = 16, 0.05, 1e-6, 0.7, 3
 
 
 class Parallel(Surface):
-    """A surface with a smooth phi whose second derivatives have a bound."""
+    """A surface with a smooth phi; its second derivatives have a bound."""
 
     def tightest(self) -> tuple[float, Vector | None]:
         """The smallest radius of curvature that is certain [m], and where on the surface, None where it is infinite."""
@@ -56,7 +56,7 @@ class Parallel(Surface):
 
 
 def foot_of(numbers: Any, most: float, bend: float, box: Box = UNBOUNDED) -> ByFoot:
-    """The wall of balls of these numbers, whose side H is at most so much, and whose surface is in a box."""
+    """The wall of balls of these numbers: the side H is at most so much, and the surface is in a box."""
     low, high = (Vec(*map(float, corner)) for corner in box)
     return ByFoot(numbers, 0.0, float(most), float(bend), low, high)
 
