@@ -18,7 +18,9 @@ from test_cli import command
 import swarm
 from swarm import scene_file
 from swarm.commands.cli import app
+from swarm.methods import ALL_METHODS
 from swarm.run.options import RunOptions
+from swarm.surfaces import ALL_SURFACES
 
 ROOT = Path(__file__).parents[1]
 GUIDE = ROOT / "examples" / "guide"
@@ -132,6 +134,13 @@ def test_names_and_options_in_a_page_exist(path):
         parameters = known[name].params if name in known else []
         options = {option for one in parameters for option in (*one.opts, *one.secondary_opts)}
         assert set(re.findall(r"(?<!\S)\[?(--?[a-z][a-z-]*)", rest)) <= options | {"--help"}, rest
+
+
+def test_every_kind_of_surface_and_of_method_is_named():
+    assert f"{len(ALL_SURFACES)} kinds of surfaces" in README
+    scenes, methods = ((GUIDE / name).read_text() for name in ("scenes.md", "methods.md"))
+    assert [kind.__name__ for kind in ALL_SURFACES.values() if f"`{kind.__name__}" not in scenes] == []
+    assert [kind.__name__ for kind in ALL_METHODS.values() if f"`{kind.__name__}" not in methods] == []
 
 
 def test_every_shipped_scene_is_named():
