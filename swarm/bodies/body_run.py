@@ -13,6 +13,7 @@ from ..compiled_scene import CompiledScene
 from ..errors import RunError
 from ..kernel.limits import SOLVED_PLACE
 from ..methods.base import Method
+from ..motion import pose
 from ..observables import CHUNK
 from ..particles import Particles
 from ..run.base import Arrays, BaseRun
@@ -62,7 +63,7 @@ class BodyRun(BaseRun):
             len(self._ties.ends) + len(bodies.body.guides),
             len(compiled.numbering.surfaces_of_rows) + len(own),
         )
-        self._bodies = _state_of(bodies, particles, rows, walls, self._walls[2] is not None)
+        self._bodies = _state_of(bodies, particles, rows, walls, self._walls[2] is not None, scene.moves())
         none = np.zeros(0)
         # What files take of a run.
         self.state = State(
@@ -86,7 +87,8 @@ class BodyRun(BaseRun):
         self._size = drawn
         size, gravity = scene.finite_size(), np.array(scene.gravity or (0.0, 0.0, 0.0))
         room = SOLVED_PLACE * max(size, scene.extent())
-        noise = room / math.sqrt(min([*(self._link_lengths() ** 2), size * size]))
+        self._least, self._room = math.sqrt(min([*(self._link_lengths() ** 2), size * size])), room
+        noise = room / self._least
         strict = getattr(method, "on_unconverged", "") == "raise"
         dt, stages = method.dt, np.array(STAGES[getattr(method, "order", 2)])  # type: ignore[attr-defined]
         # More gain in a compiled kernel alone.
@@ -118,6 +120,11 @@ class BodyRun(BaseRun):
     def _prepare(self, span: float, moment: float) -> None:
         if self._changes:
             self._reach(moment)
+        if self._scene.moves():
+            # Places at a wall have the round-off of how far it has come.
+            far = max(math.hypot(*pose(surface.motion, moment).shift) for surface in self._scene.surfaces)
+            room = max(self._room, SOLVED_PLACE * far)
+            self._rule = self._rule._replace(room=room, noise=room / self._least)
         if not self._cut_short:
             self._bodies.remaining.fill(span * self._unit)
             if self._bodies.escape_time is not None:
@@ -215,7 +222,7 @@ class BodyRun(BaseRun):
         sums, errors, depths = zip(*(self._sums_of(*block, moment) for block in self._blocks()), strict=True)
         self._sums = np.ascontiguousarray(np.array(sums).T)
         self._seen = {
-            **summed(self._sums, self._owners, surfaces, len(self._body.cavities)),
+            **summed(self._sums, self._owners, surfaces, len(self._own), len(self._body.cavities)),
             "energy_error": max(errors),
             "max_penetration": float(max([*depths, *(out.max() for out in self._out_of_own())])),
             "impacts": int(bodies.impacts.sum()),
@@ -234,9 +241,17 @@ class BodyRun(BaseRun):
         total, lost = kinetic + fall + elastic, bodies.dissipated[some]
         work = bodies.work[some] + energies.led(r, v) - self._led_start[some]
         error, scale = np.abs(total + lost - work - self._energy_start[some]), self._scale[some]
+        if self._scene.moves():
+            # What walls have given is a scale too: a body may start at rest.
+            scale = np.maximum(scale, kinetic)
         scaled = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0.0)
-        numbers = (kinetic, fall, elastic, total, lost, bodies.sliding[some], work)
         pushed = np.ascontiguousarray(bodies.impulse[:, some]).sum(axis=1)
+        if bodies.wall_work is not None:
+            worked = np.ascontiguousarray(bodies.wall_work[: len(self._owners), some])
+            pushed = np.concatenate([pushed, worked.sum(axis=1)])
+            # The rest is that of anchors.
+            work = work - worked.sum(axis=0) if len(bodies.path) else np.zeros_like(work)
+        numbers = (kinetic, fall, elastic, total, lost, bodies.sliding[some], work)
         depth = self._depths(some, r, moment).max(initial=0.0) if len(self._body.contacts) else 0.0
         return (
             [*(one.sum() for one in numbers), *np.concatenate([*energies.momenta(r, v), pushed])],
@@ -283,8 +298,8 @@ def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
     return pool
 
 
-def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, opens: bool) -> BodyState:
-    """All copies at the start, with so many rows of multipliers and of walls, and whether walls have openings."""
+def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, opens: bool, moves: bool) -> BodyState:
+    """All copies at the start, with so many rows of multipliers and of walls, and whether walls open, and move."""
     n, body = len(bodies), bodies.body
     anchors = [(q, body.anchors[q]) for q in led_points(body)]
     paths = [[motion.harmonic(start) for start in bodies.position[:, q].T] for q, motion in anchors]  # type: ignore[union-attr]
@@ -312,4 +327,5 @@ def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, opens
         energy=np.zeros(n),
         free=np.zeros((len(body.contacts), n), np.int8) if opens else None,
         escape_time=np.full(n, math.nan) if opens else None,
+        wall_work=np.zeros((walls, n)) if moves else None,
     )

@@ -85,13 +85,14 @@ class BodyEnergies:
         return np.tensordot(self._body.contacts, r, axes=(1, 1)).transpose(1, 0, 2)
 
 
-def summed(sums: Floats, owners: list[int], surfaces: int, cavities: int) -> dict[str, Any]:
+def summed(sums: Floats, owners: list[int], surfaces: int, own: int, cavities: int) -> dict[str, Any]:
     """The observables that are sums over bodies, from those of all chunks (quantities, chunks).
 
-    `owners` says which surface each wall belongs to; the last `cavities` rows are the impulse of those of the bodies.
+    `owners` says which surface each wall belongs to. Rows of impulse are of these, then of the `own` surfaces of the
+    body, of which the last `cavities` are cavities; behind them the work of the walls, where some move.
     """
     kinetic, fall, elastic, total, lost, sliding, work, *vectors = (totals := sums.sum(axis=1))[:13].tolist()
-    pushed = totals[13:]
+    pushed, worked = np.split(totals[13:], [len(owners) + own])
     return {
         "kinetic_energy": kinetic,
         "potential_energy": fall,
@@ -104,5 +105,6 @@ def summed(sums: Floats, owners: list[int], surfaces: int, cavities: int) -> dic
         "sliding_time": sliding,
         "wall_heat": np.zeros(surfaces),
         "work": work,
+        **({"wall_work": np.bincount(owners, weights=worked, minlength=surfaces)} if len(worked) else {}),
         **({"cavity_impulse": pushed[len(pushed) - cavities :]} if cavities else {}),
     }

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .. import observables
 from ..bodies import energies
+from ..bodies.numbers import own_surfaces
 from ..common.catalog import CHUNK_SUMS, OBSERVABLES
 from ..common.snapshot import Snapshot
 from ..files.layout import UNIT, UNITS
@@ -95,7 +96,9 @@ def _added(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
         rows, of_parts = booked(task.compiled.walls()), task.compiled.numbering.parts_of_rows
         added = observables.summed(sums, owners, rows, has_heat, of_parts, len(task.options.counters))
     else:
-        added = energies.summed(sums, owners, len(task.scene.surfaces), len(task.bodies.body.cavities))
+        added = energies.summed(
+            sums, owners, len(task.scene.surfaces), len(own_surfaces(task.bodies.body)), len(task.bodies.body.cavities)
+        )
     added |= brought
     seen: dict[str, Any] = {}
     # In the order of a run on one machine.

@@ -496,10 +496,10 @@ WRONG = {
     "contact step": (lambda: started(SWING, swarm.Impact(contact_step=1e-3)), "contact_step must be 0 where .* motion"),
     "bodies": (
         lambda: started(
-            SWING, swarm.Impact(dt=1e-3),
+            SWING, swarm.Penalty(dt=1e-3, penalty=1e4),
             swarm.place(swarm.Scene([swarm.Sphere(0.5)]), swarm.dumbbell(0.1, 1.0), 2, speed=0.1, spin=0.0, seed=1),
         ),
-        r"surfaces\[0\].motion must be None with bodies",
+        r"surfaces\[0\].motion must be None with bodies and soft walls",
     ),
     "one step": (
         lambda: swarm.contact_history(

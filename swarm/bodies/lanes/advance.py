@@ -191,6 +191,8 @@ def _try(contacts, state):
                 known = (stages == 1) & (more == more)
                 guess = lanes.recent[a, i] + select(known, share * more, 0.0)
                 lanes.multiplier[a, i] = select(pace.waits[i] > 0, lanes.multiplier[a, i], guess)
+        for i in range(count):
+            pace.begun[i] = 0.0 if pace.whole[i] else elapsed * pace.step[i]
         elapsed += part
         for i in range(count):
             pace.h[i] = pace.step[i] if pace.whole[i] else part * pace.step[i]
@@ -262,7 +264,7 @@ def _look(contacts, scene, c):
     for k in range(touching.points + touching.guides, touching.plain.size):
         wall = float(touching.walls + k - touching.points)
         for i in range(count):
-            pace.out[i] = pace.out[i] | (contacts.walls.distance(wall, touching.place(r1, k, i)) > 0.0)
+            pace.out[i] = pace.out[i] | (contacts.walls_then(i).distance(wall, touching.place(r1, k, i)) > 0.0)
 
 
 def _commit(contacts):

@@ -117,7 +117,7 @@ class BodyState(NamedTuple):
     impacts: Any  # (n,)
     impulse: Any  # (walls, n) [N s]
     dissipated: Any  # (n,) [J]
-    work: Any  # (n,) of led points on what is tied to them [J]
+    work: Any  # (n,) of led points on what is tied to them, and of walls that move [J]
     sliding: Any  # (n,) [s]
     steps: Any  # (n,)
     sweeps: Any  # (n,) of Uzawa's loop
@@ -125,6 +125,7 @@ class BodyState(NamedTuple):
     energy: Any  # (n,) at the start of the run [J]
     free: Any = None  # (K, n) int8, whether a contact point has passed an opening; None without openings
     escape_time: Any = None  # (n,) when the last one of a body has [s], NaN of bodies that are inside
+    wall_work: Any = None  # (walls, n) of each wall [J], a part of `work`; None where none moves
     counts: Any = None  # (walls,) int64, impacts on each that one thread has computed, where they are counted
 
     def count_impact(self, number, wall):
@@ -170,6 +171,7 @@ class LaneNumbers(NamedTuple):
     remaining: Floats  # of the frame [s]
     step: Floats  # the step that is tried [s]
     h: Floats  # of the stage [s]
+    begun: Floats  # of the step, before the stage [s]
     error: Floats
     lag: Floats  # by how much D changed when it followed last: the sum of squares [m^2]
     previous: Floats  # error
@@ -194,7 +196,7 @@ class LaneNumbers(NamedTuple):
     active: Counts  # contacts that do
     fresh: Flags  # the step begins
     whole: Flags  # the step is one stage
-    work: Floats  # of led points in the step [J]
+    work: Floats  # of led points and of walls that move in the step [J]
     waits: Counts  # how often the solution of this step was put off to the next pass
     turns: Counts  # sweeps of Uzawa's loop in this step
     ease: Floats  # by how much its penalty is softer than that of this step: a short one needs a stiffer one
@@ -217,6 +219,7 @@ class HeldContacts(NamedTuple):
     press: Floats  # (B, 3 C) force along each [N]
     before: Floats  # (B, 3 C) and in the step before, NaN if that step had other contacts
     impulse: Floats  # (B, C) of the step [N s]
+    work: Floats  # (B, C) of its wall in the step [J]
     stages: Counts  # (B, C) in how many stages of the step it pushes
     lost: Floats  # (B,) to friction in the step [J]
     multiplier: Floats  # (B, C) lambda of walls that are springs
@@ -227,5 +230,5 @@ def arrays_of_held(lanes, most):
     whole, real, some = np.int64, np.float64, (lanes, most)
     return (
         ((lanes, most, 2), whole), ((lanes, most, 3, 3), real), ((lanes, 3 * most), real), ((lanes, 3 * most), real),
-        (some, real), (some, whole), (lanes, real), (some, real),
+        (some, real), (some, real), (some, whole), (lanes, real), (some, real),
     )  # fmt: skip

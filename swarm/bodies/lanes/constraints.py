@@ -18,6 +18,7 @@ from typing import Any
 from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import column, dot, put, square
+from ...surfaces.in_motion.moving import Carried
 from .body_arrays import BodyLanes, HeldContacts, LaneNumbers, StepRule, Ties, Touching
 
 # Where the relative error of |y|^2 would be below this after a correction, it is the last.
@@ -53,6 +54,21 @@ class Constrained(Record):
     def walls_then(self, i):
         """The walls at the end of a trial of a lane."""
         return self.walls.at(self.pace.remaining[i] - self.pace.step[i])
+
+    def walls_between(self, i):
+        """The walls over the stage of a lane, and at its start."""
+        if not self.walls_move():
+            return self.walls
+        remaining = self.pace.remaining[i] - self.pace.begun[i]
+        return self.walls.during(remaining, remaining - self.pace.h[i])
+
+    def walls_after(self, i):
+        """The walls at the end of the stage of a lane."""
+        return self.walls.at(self.pace.remaining[i] - self.pace.begun[i] - self.pace.h[i])
+
+    def walls_move(self):
+        """Whether a wall moves: a constant for the compiler."""
+        return isinstance(self.walls, Carried)
 
     def launch(self):
         """The end p of the stage without ties, and D for that."""
@@ -267,7 +283,7 @@ class Constrained(Record):
         for g in range(touching.guides):
             k, row = touching.points + g, self.ties.ends.shape[0] + g
             y0, y1 = touching.place(self.lanes.ra, k, i), touching.place(r1, k, i)
-            put(self.lanes.d, 3 * row, i, self.walls.step_normal(float(touching.walls + g), y0, y1))
+            put(self.lanes.d, 3 * row, i, self.walls_now(i).step_normal(float(touching.walls + g), y0, y1))
 
     @outlined
     def guide(self, i):
@@ -277,9 +293,9 @@ class Constrained(Record):
         for g in range(touching.guides):
             k, row, wall = touching.points + g, ties.ends.shape[0] + g, float(touching.walls + g)
             y0, y1 = touching.place(lanes.ra, k, i), touching.place(lanes.r1, k, i)
-            n, d = self.walls.unit_normal(wall, y1), column(lanes.d, 3 * row, i)
+            n, d = self.walls_now(i).unit_normal(wall, y1), column(lanes.d, 3 * row, i)
             put(lanes.y1, 3 * row, i, n)
-            lanes.f[row, i] = dot(d, y1 - y0) + self.walls.distance(wall, y0)
+            lanes.f[row, i] = dot(d, y1 - y0) + self.walls_now(i).distance(wall, y0)
             for other in range(ties.start[row], row + 1):
                 c = half * ties.couplings[row + touching.points, self.coupling(other)]
                 lanes.a[row, other, i] = c * dot(n, column(lanes.d, 3 * other, i))

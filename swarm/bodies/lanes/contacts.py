@@ -33,8 +33,8 @@ class BodyContacts(Constrained):
         """Correct the forces of contacts, and for it f, the corrections of ties and guides; whether it is the last."""
         raise NotImplementedError
 
-    def gap_gradient(self, wall, y):
-        """The gradient of the gap that the contacts solve for."""
+    def gap_gradient(self, wall, y, i):
+        """The gradient of the gap that the contacts solve for, at the end of the stage."""
         raise NotImplementedError
 
     def begin_loop(self):
@@ -86,7 +86,7 @@ class BodyContacts(Constrained):
             k, wall, d = name[a // wide, 0], name[a // wide, 1], direction(frame, a // wide, a % wide)
             e = d
             if a % wide == 0:
-                e = self.gap_gradient(float(wall), self.touching.place(lanes.r1, k, i))
+                e = self.gap_gradient(float(wall), self.touching.place(lanes.r1, k, i), i)
             for row in range(m):
                 c = half * ties.couplings[count + k, self.coupling(row)]
                 along[a, row] = c * dot(e, column(lanes.d, 3 * row, i))
@@ -108,13 +108,37 @@ class BodyContacts(Constrained):
             k, press, frame = active.name[i, a, 0], active.press[i, 3 * a], active.frame[i]
             active.stages[i, a] += 1 if press > 0.0 else 0
             active.impulse[i, a] += self.pace.h[i] * press * norm(direction(frame, a, 0))
-            away = touching.place(lanes.r1, k, i) - touching.place(lanes.ra, k, i)
+            y0, y1 = touching.place(lanes.ra, k, i), touching.place(lanes.r1, k, i)
+            away = y1 - y0
+            if self.walls_move():
+                carried, moved = self.carried(active.name[i, a, 1], y0, y1, i)
+                work = -press * dot(direction(frame, a, 0), moved)
+                for d in range(1, 3):
+                    work -= active.press[i, 3 * a + d] * dot(direction(frame, a, d), carried)
+                active.work[i, a] += work
+                self.pace.work[i] += work
+                along, away = away - carried, away - moved
+            else:
+                along = away
             for d in range(1, 3):
-                active.lost[i] += active.press[i, 3 * a + d] * dot(direction(frame, a, d), away)
+                active.lost[i] += active.press[i, 3 * a + d] * dot(direction(frame, a, d), along)
             # What a force does over the round-off of a gap; over more it is an error to be seen.
             closer = dot(direction(frame, a, 0), away)
             if touching.dissipates(active.name[i, a, 1]) and abs(closer) <= 2.0 * ROOM * self.rule.room:
                 active.lost[i] += press * closer
+
+    def carried(self, wall, y0, y1, i):
+        """By how much a wall moves a contact in the stage: what is on it, and its surface where it changes."""
+        over, h = self.walls_between(i), self.pace.h[i]
+        return over.carry(float(wall), y0) - y0, h * over.mean_velocity(float(wall), y0, y1, h)
+
+    def slip(self, walls, wall, c, u):
+        """The velocity of a contact at a place relative to its wall."""
+        return u - walls.velocity(float(wall), c) if self.walls_move() else u
+
+    def fastest(self, u, slip):
+        """A speed that the round-off of a velocity relative to a wall is relative to."""
+        return norm(u) + norm(slip) if self.walls_move() else norm(u)
 
     def is_mixed(self, i):
         """Whether a contact pushed in some stages of a composed step only: then energy went with it."""
@@ -128,7 +152,7 @@ class BodyContacts(Constrained):
         active = self.active
         active.lost[i] = 0.0
         for a in range(active.name.shape[1]):
-            active.impulse[i, a], active.stages[i, a] = 0.0, 0
+            active.impulse[i, a], active.work[i, a], active.stages[i, a] = 0.0, 0.0, 0
 
     # --- At openings
 
@@ -177,9 +201,9 @@ class BodyContacts(Constrained):
                 w = wall_at(walls, met, j, c)
                 at_wall = found < MOST_CONTACTS and walls.distance(float(w), c) >= -NEAR * self.rule.room
                 if at_wall and not self._passes(walls, (k, w), c, i):
-                    n = walls.unit_normal(float(w), c)
+                    n, slip = walls.unit_normal(float(w), c), self.slip(walls, w, c, u)
                     # A velocity towards the wall at the level of round-off does not count as an approach.
-                    if not approaching or dot(n, u) > 4.0 * EPSILON * norm(u):
+                    if not approaching or dot(n, slip) > 4.0 * EPSILON * self.fastest(u, slip):
                         name[found, 0], name[found, 1] = k, w
                         flat = Vec(1.0, 0.0, 0.0) if abs(n.x) < 0.6 else Vec(0.0, 1.0, 0.0)
                         t = cross(n, flat)

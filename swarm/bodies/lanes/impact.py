@@ -40,7 +40,7 @@ def restore(bodies, state, i):
             mass += ties.mass[p, q]
         for x in range(3):
             fall -= mass * bodies.rule.gravity[x] * r[3 * p + x, i]
-    lost = state.energy[number] - state.dissipated[number] - (kinetic + fall + elastic)
+    lost = state.energy[number] + state.work[number] - state.dissipated[number] - (kinetic + fall + elastic)
     if abs(lost) <= ENERGY_OF_IMPACT * (kinetic + abs(fall) + elastic) and kinetic > 0.0:
         # To first order: a body that has come to rest has no velocity by which more could be restored.
         factor = 0.5 * lost / kinetic
@@ -102,7 +102,7 @@ def _blow(bodies, state, name, frame, found, i):
     blow.hold(i)
     blow.respond()
     for a in range(rows):
-        rate[a] = dot(blow.direction(a), touching.place(v, name[a // wide, 0], i))
+        rate[a] = blow.rate(a, i)
         # Without what links take of it: the velocity has a part across them, of the order of the scheme.
         for row in range(m):
             rate[a] -= blow.answer[a, row] * dot(column(blow.across, 0, row), blow.between(v, row, i))
@@ -118,6 +118,7 @@ def _blow(bodies, state, name, frame, found, i):
     if not elastic:
         # Links of lengths that change give their energy away in the next short step, which takes a change back.
         lost += blow.strain(scratch(m, np.float64), against, i)
+    work = blow.work(state, p, i)
     blow.give(p, against, i)
     for a in range(found):
         w = name[a, 1]
@@ -130,7 +131,8 @@ def _blow(bodies, state, name, frame, found, i):
             lost += 0.5 * p[a] * (rate[a] + missing(blow.schur, a, rate[a], p))
     state.dissipated[number] += lost
     if is_led:
-        state.work[number] += (kinetic_of(ties, v, i) - before) + lost
+        work = (kinetic_of(ties, v, i) - before) + lost
+    state.work[number] += work
     return True
 
 
@@ -149,6 +151,27 @@ class BodyImpact(Record):
     def direction(self, a):
         """Direction of row a."""
         return direction(self.frame, a // self.wide, a % self.wide)
+
+    def rate(self, a, i):
+        """The velocity of the contact of row a along its direction, relative to the wall."""
+        k, wall, bodies = self.name[a // self.wide, 0], self.name[a // self.wide, 1], self.bodies
+        u = bodies.touching.place(bodies.lanes.v, k, i)
+        if bodies.walls_move():
+            u = bodies.slip(bodies.walls_now(i), wall, bodies.touching.place(bodies.lanes.r, k, i), u)
+        return dot(self.direction(a), u)
+
+    def work(self, state, p, i):
+        """Book the work of each wall that moves with these impulses, which push the body against the directions."""
+        total, bodies = 0.0, self.bodies
+        if state.wall_work is not None:
+            walls, number = bodies.walls_now(i), bodies.pace.body[i]
+            for a in range(p.size):
+                k, wall = self.name[a // self.wide, 0], float(self.name[a // self.wide, 1])
+                u = walls.velocity(wall, bodies.touching.place(bodies.lanes.r, k, i))
+                work = -p[a] * dot(self.direction(a), u)
+                state.wall_work[bodies.walls.row(wall), number] += work
+                total += work
+        return total
 
     def coupling(self, row):
         """The row of a link or guide among all couplings."""
@@ -173,7 +196,7 @@ class BodyImpact(Record):
         for a in range(system.shape[0]):
             y = self.between(bodies.lanes.r, a, i)
             if a >= ties.links:
-                y = bodies.walls.unit_normal(float(touching.walls + a - ties.links), y)
+                y = bodies.walls_now(i).unit_normal(float(touching.walls + a - ties.links), y)
             put(self.across, 0, a, y)
             for b in range(a + 1):
                 s = ties.couplings[self.coupling(a), self.coupling(b)] * dot(y, column(self.across, 0, b))

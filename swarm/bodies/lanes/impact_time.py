@@ -30,7 +30,7 @@ def halve(bodies, i):
 @outlined
 def look(bodies, i, larger):
     """The time at which a step that ends outside is cut; contacts that last may end outside by `larger`."""
-    touching, walls, rule, lanes, pace = bodies.touching, bodies.walls, bodies.rule, bodies.lanes, bodies.pace
+    touching, walls, rule, lanes, pace = bodies.touching, bodies.walls_then(i), bodies.rule, bodies.lanes, bodies.pace
     tau = pace.step[i]
     pace.stuck[i] += 1
     if not pace.solved[i]:
@@ -48,7 +48,7 @@ def look(bodies, i, larger):
             if not gap <= room or not _rests(bodies, k, w, i):
                 worst = max(worst, gap)
             if not gap <= room and not _stays(bodies, k, w, gap, i):
-                rate = dot(walls.unit_normal(float(w), c), touching.place(lanes.v1, k, i))
+                rate = dot(walls.unit_normal(float(w), c), bodies.slip(walls, w, c, touching.place(lanes.v1, k, i)))
                 time = tau - gap / rate if rate > 0.0 else 0.0
                 if wall < 0 or time < first:
                     first, point, wall = time, k, w
@@ -61,7 +61,7 @@ def look(bodies, i, larger):
         return STRIKE_NOW if low == 0.0 else AGAIN
     if low == 0.0 and tau <= _SHORTEST * rule.dt:
         # It is at the wall, and does not leave it.
-        start = walls.distance(float(wall), touching.place(lanes.r, point, i))
+        start = bodies.walls_now(i).distance(float(wall), touching.place(lanes.r, point, i))
         if start >= -NEAR * rule.room:
             return STRIKE_NOW
     closer = pace.high[i] < math.inf and worst < _CLOSER * pace.outside[i]
@@ -94,7 +94,7 @@ def _stays(bodies, k, wall, gap, i):
     """Whether a contact of a lasting step is as far outside as it was, since short steps do not bring it back."""
     if bodies.pace.active[i] == 0 or not bodies.touching.dissipates(wall):
         return False
-    start = bodies.walls.distance(float(wall), bodies.touching.place(bodies.lanes.r, k, i))
+    start = bodies.walls_now(i).distance(float(wall), bodies.touching.place(bodies.lanes.r, k, i))
     return gap - start <= bodies.rule.room
 
 

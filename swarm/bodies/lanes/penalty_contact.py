@@ -162,7 +162,7 @@ class SoftContacts(BodyContacts):
         # Where V is stiff its round-off is more than that of a place.
         pace.last[i] = settled or (number >= _PATIENT and error <= _LARGER and error >= 0.5 * before)
 
-    def gap_gradient(self: Any, wall, y):
+    def gap_gradient(self: Any, wall, y, i):
         return _normal(self.walls, wall, y, y)
 
     # --- Uzawa's loop

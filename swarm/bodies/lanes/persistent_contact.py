@@ -64,7 +64,7 @@ class HardContacts(BodyContacts):
         for a in range(self.pace.active[i]):
             k, wall = active.name[i, a, 0], active.name[i, a, 1]
             y0, y1 = touching.place(self.lanes.ra, k, i), touching.place(r1, k, i)
-            n = self.walls.step_normal(float(wall), y0, y1)
+            n = self.walls_between(i).step_normal(float(wall), y0, y1)
             if touching.friction[wall] > 0.0:
                 t = direction(frame, a, 1)
                 t = t - dot(t, n) * n
@@ -84,12 +84,16 @@ class HardContacts(BodyContacts):
         for a in range(found):
             k, wall = active.name[i, a, 0], active.name[i, a, 1]
             y0, y1 = touching.place(lanes.ra, k, i), touching.place(lanes.r1, k, i)
+            way = away = y1 - y0
+            if self.walls_move():
+                carried, moved = self.carried(wall, y0, y1, i)
+                way, away = way - carried, away - moved
             for d in range(wide):
-                gap[wide * a + d] = dot(direction(active.frame[i], a, d), y1 - y0)
+                gap[wide * a + d] = dot(direction(active.frame[i], a, d), away if d == 0 else way)
             # Gaps of round-off stay what they are; in a composed stage a contact can also be away from its wall.
-            away = self.walls.distance(float(wall), y0)
-            outside = away > 0.0 and not eased
-            gap[wide * a] += away if outside or away < -NEAR * rule.room else 0.0
+            start = self.walls_between(i).distance(float(wall), y0)
+            outside = start > 0.0 and not eased
+            gap[wide * a] += start if outside or start < -NEAR * rule.room else 0.0
             off = abs(gap[wide * a]) if active.press[i, 3 * a] > 0.0 else max(gap[wide * a], 0.0)
             error = max(error, off / rule.room)
         before = pace.unsettled[i] if number > 0 else 1.0
@@ -111,8 +115,8 @@ class HardContacts(BodyContacts):
                 lanes.f[row, i] -= across[a, row] * change[a]
         pace.last[i] = last and (late or creep <= max(_CREEP * abs(pace.h[i]), rule.room))
 
-    def gap_gradient(self: Any, wall, y):
-        return self.walls.unit_normal(wall, y)
+    def gap_gradient(self: Any, wall, y, i):
+        return self.walls_after(i).unit_normal(wall, y)
 
     @outlined
     def judge(self: Any, i):
@@ -125,7 +129,10 @@ class HardContacts(BodyContacts):
         number, pushes = pace.body[i], pace.brief[i]
         for a in range(pace.active[i]):
             pushes = pushes or active.press[i, 3 * a] > 0.0
-            state.impulse[self.walls.row(float(active.name[i, a, 1])), number] += active.impulse[i, a]
+            row = self.walls.row(float(active.name[i, a, 1]))
+            state.impulse[row, number] += active.impulse[i, a]
+            if state.wall_work is not None:
+                state.wall_work[row, number] += active.work[i, a]
         state.dissipated[number] += active.lost[i]
         sticking.stop(self, state, i)
         state.sliding[number] += pace.step[i]

@@ -39,8 +39,8 @@ def leave_out(bodies, i):
     active = bodies.active
     for a in range(pace.active[i]):
         k, wall = active.name[i, a, 0], float(active.name[i, a, 1])
-        before = bodies.walls.distance(wall, touching.place(lanes.ra, k, i))
-        if not bodies.walls.distance(wall, touching.place(lanes.p, k, i)) - before <= rule.room:
+        before = bodies.walls_between(i).distance(wall, touching.place(lanes.ra, k, i))
+        if not bodies.walls_after(i).distance(wall, touching.place(lanes.p, k, i)) - before <= rule.room:
             return False
     for a in range(ties.links):
         lanes.multiplier[a, i] = 0.0
@@ -71,7 +71,7 @@ def stop(bodies, state, i):
     for a in range(found):
         k, wall, press = active.name[i, a, 0], active.name[i, a, 1], active.press[i, 3 * a]
         name[a, 0], name[a, 1] = k, wall
-        n = bodies.walls.unit_normal(float(wall), touching.place(lanes.r, k, i))
+        n = bodies.walls_now(i).unit_normal(float(wall), touching.place(lanes.r, k, i))
         put_direction(frame, a, 0, n)
         if wide > 1:
             t = direction(active.frame[i], a, 1)
@@ -84,7 +84,7 @@ def stop(bodies, state, i):
     blow.respond()
     lost = blow.strain(strain, against, i)
     for a in range(rows):
-        rate[a] = dot(blow.direction(a), touching.place(lanes.v, name[a // wide, 0], i))
+        rate[a] = blow.rate(a, i)
         for row in range(m):
             rate[a] -= blow.answer[a, row] * strain[row]
     sweep(touching, (name, p, wide, wide), blow.schur, rate, change, SWEEPS)
@@ -93,10 +93,12 @@ def stop(bodies, state, i):
         lost += 0.5 * change[a] * (rate[a] + missing(blow.schur, a, rate[a], change))
     is_led = max(ties.led) >= 0
     before = kinetic_of(ties, lanes.v, i) if is_led else 0.0
+    work = blow.work(state, change, i)
     blow.give(change, against, i)
     state.dissipated[number] += lost
     if is_led:
-        state.work[number] += (kinetic_of(ties, lanes.v, i) - before) + lost
+        work = (kinetic_of(ties, lanes.v, i) - before) + lost
+    state.work[number] += work
 
 
 def _sticks(bodies, i):

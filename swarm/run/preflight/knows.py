@@ -592,7 +592,10 @@ CAPABILITIES = (
         ),
     }),
     Capability("motion", _of_walls("motion", None), {
-        _EVERY_BODY: _with_bodies("motion", "None", "move a point of the body by an anchor, in the frame of the wall"),
+        (SOFT_BODIES, PAPER_BODIES): Refusal(
+            "surfaces[{i}].motion must be None with bodies and soft walls, got {got}",
+            "use Impact(dt=...), or move a point of the body by an anchor, in the frame of the wall",
+        ),
         (CHORDS,): _LOSES,
     }),
     Capability("motion at cut steps", _motions_at_impacts, {
