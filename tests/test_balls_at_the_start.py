@@ -58,7 +58,6 @@ def test_balls_that_are_apart_are_admitted(method):
         (VESSEL, balls(), swarm.AugmentedLagrangian(1e-3, 1e4), {}, "with AugmentedLagrangian, got radii; use Impact"),
         (VESSEL, balls(), None, {"cluster": "local:2", "shards": 2, "trajectory": "run.h5"},
          "shards must be 1 or left out where particles have a radius, got 2"),
-        (VESSEL, balls(), SOFT, {"member_impacts": True}, "member_impacts must be False with particles that"),
     ],
     ids=lambda value: None if not isinstance(value, str) else value[:30].replace(" ", "_"),
 )  # fmt: skip

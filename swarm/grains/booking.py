@@ -8,7 +8,7 @@ from ..kernel.vector import dot, norm
 from .at_walls import rising
 from .contacts import closing
 from .grain_arrays import AFTER, COAST, GAP, IMPULSE, PUSH, RADIUS, SIZE, START, vector_at
-from .vessel import met, moves
+from .vessel import met, met_member, moves
 
 
 class ContactTotals(NamedTuple):
@@ -24,6 +24,13 @@ class ContactTotals(NamedTuple):
     overlap: Array  # (1,) the largest overlap since the frame before [m]
     failed: Array  # (4,) what a step was refused for, see overlaps.py
     escape_time: Any = None  # (N,) [s], of a scene with openings
+
+
+class MemberCounts(NamedTuple):
+    """Where contacts with walls are counted as they begin, by members."""
+
+    counts: Any  # `Counts`
+    places: Any  # of each wall, of each member its wall in these counts, (members,) int64
 
 
 def _lost(matter, work, gap, change):
@@ -82,3 +89,21 @@ def book_wall(matter, law, wall, grains, touches, books, number):
         if law.damping is not None:
             books.dissipated[one] += _lost(matter, work, gap, way.change)
     return deepest
+
+
+@outlined
+def count_members(matter, wall, grains, touches, members, number):
+    """Count the contacts with a wall that begin in the step, by its members."""
+    rows, half, begin = touches.wall_rows, 0.5 * matter.h, touches.wall_spans[0, number]
+    places = members.places[number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        r0, gap = vector_at(rows, c, START), rows[c, GAP]
+        move = vector_at(rows, c, COAST) + half * vector_at(grains.speed, i, AFTER)
+        own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
+        if gap <= 0.0 and gap + rising(own, r0, rows[c, SIZE], move).change > 0.0:
+            place = places[
+                index(met_member(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS], r0 + move))
+            ]
+            members.counts.add(place, 1)

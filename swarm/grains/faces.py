@@ -15,6 +15,8 @@ class Fields:
 
     def __init__(self, compiled: CompiledScene, radius: NDArray[np.float64]) -> None:
         self._compiled, self._largest = compiled, float(radius.max())
+        self._whole = compiled
+        self._places: tuple[NDArray[np.int64], ...] | None = None
         self._known = -1.0
         self._each: tuple[Field, ...] = ()
         # Of each field, of each member the number of its face, or of the body that it is.
@@ -34,7 +36,26 @@ class Fields:
             members, face = surface.faces_of_balls(self._largest + 2.0 * skin)
             made.append(upright(Field(members if surface.present is None else members.in_cells()), scene.across()))
             faces.append(face.astype(np.int32))
+        self._places = None
         self._known, self._each, self.faces = skin, tuple(made), tuple(faces)
+
+    def places(self) -> tuple[NDArray[np.int64], ...]:
+        """Of each wall, of each member its number among the walls of the scene."""
+        if self._places is None:
+            self._places = self._found_places()
+        return self._places
+
+    def _found_places(self) -> tuple[NDArray[np.int64], ...]:
+        whole, found, first = self._whole, [], 0
+        members, rows = whole.numbering.members[1], len(whole.numbering.surfaces_of_rows)
+        for i, face in zip(whole.order.fields, self.faces, strict=True):
+            count, numbers = whole.pieces.each[i].wall_count(True), self._compiled.pieces.each[i].numbers()
+            # Images of a member count for it.
+            known, own = members[first : first + count], np.repeat(numbers, len(face) // len(numbers))
+            order = np.argsort(known, kind="stable")
+            found.append(np.asarray(first + order[np.searchsorted(known[order], own)], np.int64))
+            first += count
+        return (*found, *(np.array([first + k], np.int64) for k in range(rows - len(found))))
 
     def any_moves(self) -> bool:
         """Whether any of the fields moves."""

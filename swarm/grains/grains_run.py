@@ -27,7 +27,7 @@ from ..run.tiers import Tier
 from ..state import Balls, State
 from . import energy, lists, refused
 from . import grain_arrays as arrays
-from .booking import ContactTotals
+from .booking import ContactTotals, MemberCounts
 from .drags import Drags, kept_drags, set_drags
 from .exits import stored_with_others
 from .faces import Fields
@@ -332,13 +332,20 @@ class GrainsRun(BaseRun):
         while status == Status.LEASE_ENDED or (status == Status.DONE and stop < steps):
             self._feed_in(span, moment)
             rule = MarchRule(steps, stop := self._stop(span, moment), self._watch.passes, moment)
-            status = self._call(march, self._matter, self._walls, self._world, self._clock, rule, latest=latest)
+            world = self._watched_world()
+            status = self._call(march, self._matter, self._walls, world, self._clock, rule, latest=latest)
             if status == Status.LEASE_ENDED:
                 self._list_again()
         if status == Status.DONE:
             # Those at the end of the frame.
             self._feed_in(span, moment)
         return status, 0
+
+    def _watched_world(self) -> World:
+        """The world with the counts of members, of which another is of a run that goes on."""
+        if self._tally is None:
+            return self._world
+        return self._world._replace(members=MemberCounts(self._tally.counts(), self._fields.places()))
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         # Of the step.
@@ -353,7 +360,10 @@ class GrainsRun(BaseRun):
         cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
         yield lists.list_pairs, (matter.period, world.grains, world.near, cells, 0.0)
         yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0, 0.0)
-        yield march, (matter, self._walls, world, self._clock, MarchRule(0.0, 0.0, self._watch.passes, 0.0))
+        yield (
+            march,
+            (matter, self._walls, self._watched_world(), self._clock, MarchRule(0.0, 0.0, self._watch.passes, 0.0)),
+        )
         yield energy.stored, (matter, self._walls, world.grains, world.near)
         if self._instants is not None or matter.openings is not None:
             into = self.state.dissipated

@@ -14,7 +14,7 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
 from .at_walls import gather_at_wall, push_walls, sweep_wall
-from .booking import book_pairs, book_wall
+from .booking import book_pairs, book_wall, count_members
 from .contacts import gather_pairs, push_pairs, sweep_pairs, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
@@ -52,6 +52,7 @@ class World(NamedTuple):
     touches: Any
     books: Any
     followed: Any = None  # `Followed` of `Passing`, where there are counters
+    members: Any = None  # `MemberCounts`, or None
 
 
 # --- Of one step -----------------------------------------------------------------------------------------
@@ -221,6 +222,8 @@ def _book(matter, walls, world):
         book_rubbing_pairs(matter, grains, near, touches, books)
     for k, wall in enumerate(walls.each):
         deepest = max(book_wall(matter, matter.walls[k], wall, grains, touches, books, k), deepest)
+        if world.members is not None:
+            count_members(matter, wall, grains, touches, world.members, k)
         if matter.walls[k].friction is not None:
             book_rubbing(matter, wall, grains, near, touches, books, k)
     books.overlap[0] = max(deepest, books.overlap[0])

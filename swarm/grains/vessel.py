@@ -55,12 +55,17 @@ def _deepest(some, r):
 
 @outlined
 def _outward(some, r):
+    return member(some.members, index(_nearest(some, r))).unit_normal(r)
+
+
+def _nearest(some, r):
+    """The number of the nearest member."""
     most, which = -math.inf, some.first
     for k in range(some.first, some.stop):
         depth = member(some.members, index(some.listed[index(k)])).distance(r)
         if depth > most:
             most, which = depth, k
-    return member(some.members, index(some.listed[index(which)])).unit_normal(r)
+    return some.listed[index(which)]
 
 
 def is_of_faces(like):
@@ -81,6 +86,18 @@ def met(wall, listed, spans, k, radius):
     else:
         own = member(members, index(listed[index(spans[k, BEGIN])]))
     return grown.members._replace(body=own) if moves(wall) else own
+
+
+def met_member(wall, listed, spans, k, radius, r):
+    """The number of the member of a wall that a ball meets at r, at the end of a step; 0 of one that is no field."""
+    if not isinstance(wall, Field):
+        return 0
+    grown = wall.grown(radius)
+    members = members_of(grown.members)
+    if not is_of_faces(members.like):
+        return listed[index(spans[k, BEGIN])]
+    own = NearestMembers(members, listed, spans[k, BEGIN], spans[k, END])
+    return _nearest(own, grown.members.own_end(r) if moves(wall) else r)
 
 
 def moves(wall):

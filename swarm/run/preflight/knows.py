@@ -628,11 +628,7 @@ CAPABILITIES = (
             "cavities[{k}] must be elastic with {method}, got {got}", "use Impact(dt=...)"
         ),
     }),
-    Capability("impacts on members", _option("member_impacts"), {
-        (GRAINS,): Refusal(
-            f"member_impacts must be False with {_WITH_PENALTY}, got True", "leave it out, or use Impact"
-        ),
-    }),
+    Capability("impacts on members", _option("member_impacts"), {}),
     Capability("impacts on members beside cavities", _members_beside_cavities, {
         _EVERY_BODY: Refusal(
             "member_impacts must be False with bodies that have cavities, got True: a cavity is no surface of the "
