@@ -372,7 +372,7 @@ def test_kill_9_loses_nothing_that_was_reported(tmp_path):
         ({"impact_particles": [1, -2]}, "numbers of particles from 0 on"),
         ({"impact_particles": []}, "numbers of particles from 0 on"),
         ({"impact_particles": [25]}, "impact_particles must be numbers of particles, from 0 to 24, got 25"),
-        ({"method": swarm.Penalty(dt=1e-2, penalty=1e4)}, r"impacts must be None with Penalty, .*; use Impact"),
+        ({"method": swarm.Verlet(dt=1e-2, penalty=1e2)}, r"impacts must be None with Verlet, .*; use Impact"),
         ({"trajectory": "i.h5"}, "is also the trajectory"),
     ],
 )

@@ -18,6 +18,7 @@ from ..kernel.jit import outlined
 from ..kernel.vector import dot, square
 from .accounts import add_work
 from .escape import detain
+from .watching.log import Struck
 
 # Newton steps onto a wall, from where a step has ended.
 _SWEEPS = 5
@@ -98,17 +99,30 @@ def _drag(method, walls, share, lanes, i, at):
 
 def _act(method, walls, now, gravity, share, lanes, i, at):
     """The laws of a wall where a contact ends: its place, normal, velocity, the speed away from it, and the impulse."""
+    wall, r, n, _u, b, pressed = at
+    flier, p, laws = lanes.lane(i), index(lanes.particle[i]), method.laws_at_ends
+    mass, impulse = share.state.mass[p], pressed
+    # As it would arrive at a rigid wall
+    before = flier.v + 2.0 * b * n
+    if laws.loses or laws.send_off:
+        impulse = pressed + _send(method, walls, now, gravity, share, lanes, i, at) - 2.0 * b
+    if share.log is not None:
+        time = share.moment - method.seconds(flier.remaining)
+        struck = Struck(lanes.particle[i], wall, time, r, before, flier.v, impulse * mass)
+        share.log.hit(share.state.image, share.log.with_slip(laws, now, struck))
+
+
+def _send(method, walls, now, gravity, share, lanes, i, at):
+    """Let the laws act: the impulse per mass of a rigid wall."""
     wall, r, n, u, b, pressed = at
     state, flier, p, laws = share.state, lanes.lane(i), index(lanes.particle[i]), method.laws_at_ends
     v, mass = flier.v, state.mass[p]
-    fall = 2.0 * potential(gravity, r)
-    # As it would arrive at a rigid wall
     before = v + 2.0 * b * n
     turned = given(u, v - before)
     # Of the impacts before this one, which has been counted.
     number = state.impacts[p] + np.int64(flier.hits) - 1
     random = RandomSource(share.seed, share.first).of_impact(p, number, laws)
-    arriving = Arriving(r, before, square(before) + fall, mass)
+    arriving = Arriving(r, before, square(before) + 2.0 * potential(gravity, r), mass)
     bounce = impact_on_wall(laws._replace(friction=None), now, gravity, wall, arriving, random)
     bounce = _rubbed(laws, wall, n, u, bounce, bounce.impulse + max(pressed - 2.0 * b, 0.0))
     # Of the velocities themselves: what a step is to keep is known to round-off.
@@ -124,6 +138,7 @@ def _act(method, walls, now, gravity, share, lanes, i, at):
         share.counts.give(wall, heat, bounce.wait)
     if state.absorbed is not None and bounce.wait > 0.0:
         _keep(method, share, lanes, i, wall, bounce.wait)
+    return bounce.impulse
 
 
 def _rubbed(laws, wall, n, u, bounce, impulse):

@@ -14,6 +14,7 @@ from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, HELD, PHASES
 from ..contact.hold import One, Two
+from ..contact.laws import NONE
 from ..lanes import block as blocks
 from ..lanes import careful, contact_events, slide, sliding, table
 from ..lanes import lane_arrays as lanes
@@ -59,13 +60,16 @@ class Run(BaseRun):
     ) -> None:  # fmt: skip
         n, scene = len(particles), compiled.scene
         self._numbers, self._law = method.numbers(scene), method.law()
+        if watched.log is not None and self._numbers.laws_at_ends is None and self._law is not None:
+            # Impacts are logged where contacts end, also where walls have no laws.
+            self._numbers = self._numbers._replace(ends=NONE)
         self._walls = compiled.walls()
         takes_time = self._numbers.contacts_take_time
         tier, counters = Tier(compile, (self._numbers, self._law, self._walls), n), watched.counters
         super().__init__(compiled, method, n, threads, tier, seeding, watched)
         self._counters = counters_of(scene, counters, self._impacts is not None or takes_time)
         self._booked = lanes.booked(self._walls)
-        self.state = state_of(compiled, particles, method, self._booked)
+        self.state = state_of(compiled, particles, method, self._booked, self._numbers.laws_at_ends is not None)
         self.state = with_counters(self.state, self._counters, counters, scene)
         observables.start_energies(compiled, self._law, self.state)
         self._faces = scene.open_faces()

@@ -40,6 +40,7 @@ class Impacts:
         threads: how many fill logs.
         counts: whether crossings of counters have rows too.
         meet: whether particles meet one another.
+        lasts: whether contacts take time.
 
     Attributes:
         kept: the particles and the precision, as TOML text.
@@ -53,7 +54,7 @@ class Impacts:
 
     def __init__(
         self, compiled: CompiledScene, n: int, particles: Any, precision: str, threads: int, counts: bool = False,
-        meet: bool = False,
+        meet: bool = False, lasts: bool = False,
     ) -> None:  # fmt: skip
         laws, real = compiled.laws, np.dtype(precision)
         self.kept = tomli_w.dumps({"particles": particles, "precision": precision})
@@ -62,7 +63,9 @@ class Impacts:
         self._real, self._meet = real, meet
         # A flight may cross many counters.
         in_order_of_time = meet or compiled.scene.reacts()
-        self._room = _ROWS // 2 if counts else 1 if in_order_of_time else LANES
+        # Contacts with several walls may end in one step.
+        most = min(LANES * len(compiled.numbering.surfaces_of_rows), _ROWS // 2) if lasts else LANES
+        self._room = _ROWS // 2 if counts else 1 if in_order_of_time else most
         self._spare: queue.SimpleQueue[Log] = queue.SimpleQueue()
         for _ in range(2 * threads + _MORE):
             self._spare.put(self._made(_ROWS))
@@ -147,6 +150,7 @@ def log_of(task: Task) -> Impacts | None:
     return Impacts(
         task.compiled, len(task.particles), options.impact_particles, options.precision, threads,
         bool(options.counters), task.particles.radius is not None,
+        task.method.law() is not None,
     )  # fmt: skip
 
 

@@ -30,12 +30,16 @@ class Seeding(NamedTuple):
 UNSEEDED = Seeding()
 
 
-def state_of(compiled: CompiledScene, particles: Particles, method: Method, booked: int) -> State:
-    """The state with the arrays of the particles and so many rows of what walls give; energies are still to be set."""
+def state_of(
+    compiled: CompiledScene, particles: Particles, method: Method, booked: int, presses: bool = False
+) -> State:  # fmt: skip
+    """The state with the arrays of the particles and so many rows of what walls give; energies are still to be set.
+
+    It `presses` where what a wall gives is kept until a contact ends.
+    """
     n, laws, rows = len(particles), compiled.laws, len(compiled.numbering.surfaces_of_rows)
     period, openings, ends = compiled.cell(), compiled.openings(), laws is not None and laws.may_end
     # What soft contacts have stored is lost with a wall that goes, or opens.
-    presses = laws is not None and (laws.loses or laws.send_off) and method.law() is not None
     loses = laws is not None or (method.law() is not None and (openings is not None or compiled.scene.has_doors()))
     return State(
         particles.position,

@@ -111,3 +111,27 @@ def test_a_particle_that_has_bounced_to_rest_presses_by_its_weight():
     # It swings between the wall and twice the depth m g/alpha.
     assert -2.2e-4 < result.particles.position[2, 0] < 1e-6
     assert math.isclose(seen["dissipated_energy"][-1], 1.0, rel_tol=1e-3)
+
+
+@pytest.mark.parametrize("law", ["plain", "both", "hot"])
+@pytest.mark.parametrize("name", ["Penalty", "cut", "fixed"])
+def test_the_log_has_a_row_where_a_contact_ends(tmp_path, name, law):
+    scene = swarm.Scene([swarm.Box((0.5, 0.4, 0.6), **({"plain": {}} | LAWS)[law])], gravity=None)
+    start = swarm.fill(scene, 3, speed=1.0, mass=2.0, seed=3)
+    soft = ran(scene, start, METHODS[name], impacts=tmp_path / "soft.h5")
+    ran(scene, start, swarm.Impact(), impacts=tmp_path / "rigid.h5")
+    assert soft.observables["energy_error"].max() < 1e-12
+    tables = []
+    for kind in ("soft", "rigid"):
+        with swarm.load_impacts(tmp_path / f"{kind}.h5") as log:
+            tables.append(log.table())
+    for particle in range(3):
+        mine, theirs = (rows[rows["particle"] == particle] for rows in tables)
+        assert 1 <= len(mine) <= len(theirs)
+        assert mine["surface"][0] == theirs["surface"][0]
+        # A contact lasts for pi/sqrt(alpha/m) = 0.07 s.
+        assert 0.0 < mine["time"][0] - theirs["time"][0] < 0.08
+        for key in ("velocity_before", "velocity_after", "impulse"):
+            assert mine[key][0] == pytest.approx(theirs[key][0], abs=1e-8)
+    unlogged = ran(scene, start, METHODS[name])
+    assert np.array_equal(unlogged.particles.velocity, soft.particles.velocity)
