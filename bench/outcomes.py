@@ -213,6 +213,9 @@ def _outside(cell: Cell, done: Ran) -> str:
     result, scene = done.result, done.given.scene
     seen, until = result.observables, done.given.options["until"]
     inside = ~np.isfinite(result.escape_time)
+    if scene.reacts():
+        # What is absorbed stays where it was, whatever impacts have made of the wall since.
+        inside &= ~np.isfinite(result.absorbed_time)
     position, radius = result.particles.position[:, inside], result.particles.radius
     if cell.engine == "bodies, Impact":
         there = inside.reshape(len(result.bodies.body), -1)[0]

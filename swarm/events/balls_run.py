@@ -24,7 +24,7 @@ from ..run.preflight.counting import counters_of, crossed_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
-from ..state import Balls, State
+from ..state import Balls, Floats, State
 from .colliding import events
 from .colliding.bounce import Gates
 from .colliding.box import CollisionRule, CollisionTotals
@@ -50,10 +50,11 @@ class CollidingRun(BaseRun):
         self._clock = np.zeros(CLOCK)
         self._clock[[LENGTH, REACH]] = epoch_of(scene, particles, box.grid), reach_of(box.grid)
         self._windows = windows_of(compiled, self._clock)
-        laws, openings = box.laws, compiled.openings()
+        openings = compiled.openings()
         rough = box.turning is not None and box.turning.friction is not None
         every = self._every_laws(compiled, box)
         loses = any(one.may_dissipate or one.loses for one in every) or box.loss is not None or rough
+        ends = any(one.may_end for one in every)
         balls = Balls(particles.radius, np.zeros(n, np.int64), np.zeros(1), particles.spin)
         # The energy of each ball is not kept. An array of zeros that is never written takes one page of memory.
         unused = np.zeros(n)
@@ -64,12 +65,12 @@ class CollidingRun(BaseRun):
             None, None, np.zeros((rows, 1)) if any(one.give_heat for one in every) else None,
             image=particles.image, period=compiled.cell(), balls=balls,
             escape_time=None if openings is None else np.full(n, math.nan), openings=openings,
-            absorbed_time=np.full(n, math.nan) if laws.may_end else None,
-            absorbed_wall=np.full(n, -1, np.int32) if laws.may_end else None,
+            absorbed_time=np.full(n, math.nan) if ends else None,
+            absorbed_wall=np.full(n, -1, np.int32) if ends else None,
         )  # fmt: skip
         state, self._balls, gates = self.state, balls, None
-        feed = None if particles.births is None else Feed(scene, particles, seeding.seed)
-        if openings is not None or laws.may_end or feed is not None:
+        feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
+        if openings is not None or ends or feed is not None:
             gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
         self._box = self._with_heavy(compiled, box)._replace(
             window=None if self._windows is None else self._windows.numbers,
@@ -95,6 +96,10 @@ class CollidingRun(BaseRun):
         self._frame_before = 0.0  # [s]
         self._walls = self._walls_seen(0.0)
         self._choose_tier()
+
+    def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
+        """Whether a ball at a place (3,) is clear of the walls that have a mass."""
+        return True
 
     def _every_laws(self, compiled: CompiledScene, box: Any) -> list[Laws]:
         """The laws of all walls."""

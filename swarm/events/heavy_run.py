@@ -6,9 +6,10 @@ import numpy as np
 
 from ..compiled_scene import CompiledScene
 from ..contact.laws import Laws
-from ..kernel.vector import ZERO
+from ..kernel.vector import ZERO, vec
 from ..run.base import Arrays, named
 from ..run.observed import Observed
+from ..state import Floats
 from .balls_run import CollidingRun
 from .colliding.heavy import COUNTS, Heavy
 from .reacting.described import freedoms_of, observed, scenery_of, walls_now
@@ -20,6 +21,12 @@ class HeavyRun(CollidingRun):
 
     _freedoms: Freedoms
     _observed: Observed
+
+    def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
+        r, now = vec(place), self._since(moment)
+        bodies = [(wall, wall.body.grown(radius)) for wall in self._heavy.walls]
+        posed = [(body, wall.freedom.posed(body, self._freedoms, now)) for wall, body in bodies]
+        return all(body.distance(one.own_place(r)) <= 0.0 for body, one in posed)
 
     def _every_laws(self, compiled: CompiledScene, box: Any) -> list[Laws]:
         return scenery_of(compiled, 0.0).each_laws()

@@ -1,6 +1,7 @@
 """The births of balls while a run lasts: which are due, which find a free place, and which wait for one."""
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,15 +46,19 @@ class Feed:
         scene: the vessel.
         particles: those of the start, and behind them those that may come.
         seed: of the run.
+        is_clear: whether a place (3,) is clear of the walls that impacts move, for a radius [m] at a time [s].
 
     Attributes:
         born_time: (N,) when each was born [s], NaN of those that are not.
     """
 
-    def __init__(self, scene: Scene, particles: Particles, seed: int) -> None:
+    def __init__(
+        self, scene: Scene, particles: Particles, seed: int,
+        is_clear: Callable[[Floats, float, float], bool] = lambda _place, _radius, _now: True,
+    ) -> None:  # fmt: skip
         births = particles.births
         assert births is not None
-        self._scene, self._particles, self._births = scene, particles, births
+        self._scene, self._particles, self._births, self._is_clear = scene, particles, births, is_clear
         self._places = ball_places(scene, particles, seed)
         n, sources = len(particles), births.sources
         self.born_time = np.where(births.source < 0, 0.0, np.nan)
@@ -63,7 +68,7 @@ class Feed:
         self._over, self._tried, self._blocked = np.zeros((3, sources), np.int64)
         self._earliest, self._counted = np.zeros(sources), np.full(sources, -1)
         self._energy = np.zeros(n)
-        self._changing = [i for i, one in enumerate(scene.surfaces) if changes(one)]
+        self._changing = [i for i, one in enumerate(scene.surfaces) if changes(one) and not one.reacts()]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """What a run that goes on needs, for `BaseRun.arrays`."""
@@ -145,6 +150,8 @@ class Feed:
 
     def _is_within(self, position: Floats, radius: float, now: float) -> bool:
         """Whether a ball is within the walls that move, or come and go."""
+        if not self._is_clear(position, radius, now):
+            return False
         if not self._changing:
             return True
         depths = self._scene.distances_outside(position[:, None], now, np.array([radius]))

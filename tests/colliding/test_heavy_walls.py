@@ -256,3 +256,61 @@ def test_a_ball_that_reaches_into_a_wall_is_an_error(place):
         run._observe(0.0)
         with pytest.raises(swarm.RunError, match=r"3: it is .* m outside"):
             run.require_admissible(run.seen(), 0.0)
+
+
+INLET = swarm.Source(
+    swarm.Sphere(0.3, (0.0, 0.0, 0.2)), volume=True, times=np.linspace(0.1, 1.5, 12), speed=1.0, mass=1.0, radius=0.05,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("wall", [free(motion=swarm.Translation((0.0, 0.0, 0.2))), plate(), hanging()])
+def test_balls_are_born_beside_a_wall_with_a_mass(wall):
+    """None is born where impacts have moved the wall."""
+    scene = swarm.Scene([BOX, wall], DOWN if wall.inertia else None)
+    result = swarm.simulate(
+        scene, None, swarm.Impact(), sources=[INLET], until=2.0, every=0.05, compile="never", seed=3
+    )
+    seen = result.observables
+    assert seen["born"][-1, 0] == 12
+    assert seen["energy_error"].max() <= 1e-12
+    assert seen["max_penetration"].max() <= 1e-12
+    assert seen["wall_energy"][-1, 1] != seen["wall_energy"][0, 1]
+
+
+def test_no_ball_is_born_within_a_wall_that_was_pushed():
+    """The plate is where the inlet is, and the birth waits until it has passed."""
+    inlet = swarm.Source(swarm.Sphere(0.05), volume=True, times=[0.5], speed=1.0, mass=1.0, radius=0.05)
+    plate = swarm.Slab(ACROSS, 0.1, (-0.5, 0.0, 0.0), "outside", mass=5.0, motion=swarm.Guide(ACROSS, speed=1.0))
+    options = {"until": 1.0, "every": 0.01, "compile": "never", "sources": [inlet]}
+    seen = swarm.simulate(swarm.Scene([BOX, plate]), None, swarm.Impact(), **options).observables
+    assert seen["blocked"][-1, 0] == 1
+    # Its rear face is 0.05 m away from the nearest centre at 0.6 s at the earliest.
+    born = seen["time"][np.argmax(seen["born"][:, 0] > 0)]
+    assert 0.6 <= born <= 0.8
+    assert seen["max_penetration"].max() == 0.0
+
+
+@pytest.mark.parametrize("of_heavy", [False, True])
+def test_absorbed_balls_stay_where_they_are(of_heavy):
+    """Leases end for all balls, also for those that are gone."""
+    laws = {"laws": [swarm.Absorb(0.3)]}
+    box = swarm.Box((0.5, 0.5, 0.5), **({} if of_heavy else laws))
+    wall = swarm.Sphere(0.15, side="outside", mass=2.0, **(laws if of_heavy else {}))
+    start = swarm.fill(scene := swarm.Scene([box, wall]), 20, speed=1.0, seed=3, radius=0.05)
+    options = {"until": 3.0, "every": 0.25, "compile": "never", "seed": 3}
+    result = swarm.simulate(
+        scene, start, swarm.Impact(), observables={"places": lambda frame: frame.position}, **options
+    )
+    gone, seen = np.flatnonzero(~np.isnan(result.absorbed_time)), result.observables
+    assert seen["absorbed"][-1, int(of_heavy)] == len(gone) > 2
+    assert seen["energy_error"].max() <= 1e-12
+    for i in gone:
+        later = np.array([place[:, i] for time, place in zip(seen["time"], seen["places"], strict=True)
+                          if time > result.absorbed_time[i]])  # fmt: skip
+        assert (later == result.particles.position[:, i]).all()
+    if of_heavy:
+        # Where they were absorbed, they gave the wall their normal momentum.
+        assert seen["wall_heat"][-1, 1] != 0.0
+    else:
+        depth = np.abs(result.particles.position[:, gone]).max(axis=0)
+        np.testing.assert_allclose(depth, 0.45, rtol=0, atol=1e-12)

@@ -1,8 +1,14 @@
 """All that is next for a ball, and its place in the queue."""
 
+import math
+
+from ...kernel.arrays import index
+from ...kernel.jit import outlined
 from .aim import find_partner, find_wall, forget_wall, tell_partner
-from .cells import until_exit
+from .cells import take_out, until_exit
 from .queue import requeue
+from .rows import DUE, FLOATS, LEAVES, MEETS, NO_PARTNER, PARTNER, WALL, WHOLES
+from .window import OUT
 
 
 def aim_again(box, flock, i, now):
@@ -19,3 +25,14 @@ def queue_both(flock, i):
     partner = tell_partner(flock, i)
     if partner >= 0:
         requeue(flock, partner)
+
+
+@outlined
+def vanish(box, flock, i):
+    """Take out a ball that has left the scene: it stays where it is, and meets no other ball."""
+    take_out(box.grid, flock, i, box.grid.number(i, flock))
+    for k in (MEETS, LEAVES, DUE):
+        flock.event[index(FLOATS * i + k)] = math.inf
+    flock.event[index(FLOATS * i + WALL)] = OUT
+    flock.tag[index(WHOLES * i + PARTNER)] = NO_PARTNER
+    requeue(flock, i)

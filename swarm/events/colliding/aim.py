@@ -17,7 +17,7 @@ from ...kernel.vector import Vec, dot, square
 from ...surfaces.time_of_impact.flights import Hit
 from .heavy import meet_heavy
 from .rows import DUE, FACE, FLOATS, MEETS, NO_PARTNER, PARTNER, RADIUS, SEEN, STAMP, WALL, WHOLES
-from .window import UNKNOWN, next_hit
+from .window import OUT, UNKNOWN, next_hit
 
 # So many balls of a cell are copied without a branch, and so many are looked at at once.
 _FEW, _MOST = 4, 128
@@ -281,6 +281,9 @@ def find_wall(box, flock, i, now):
     """Find when a ball meets a wall, if its cell is near one and that is not known."""
     row = FLOATS * i
     if box.heavy is not None:
+        # A lease ends for all balls, also for those that are not there.
+        if flock.event[index(row + WALL)] == OUT:
+            return
         meet_heavy(box, flock, i, now, _given_hit(box, flock, i, now))
     elif box.grid.near[index(box.grid.number(i, flock))] and flock.event[index(row + WALL)] == UNKNOWN:
         hit = next_hit(box, flock, i, now)

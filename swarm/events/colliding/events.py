@@ -14,11 +14,11 @@ from ...kernel.arrays import index
 from ...kernel.jit import long_kernel, outlined, select
 from ...kernel.vector import norm, put, square
 from ...lanes.watching.log import Struck, is_full
-from .again import aim_again, queue_both
+from .again import aim_again, queue_both, vanish
 from .ahead import fetch_next
 from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .bounce import FLIES, GONE, bounce
-from .cells import cross, mark_near, take_out, until_exit
+from .cells import cross, mark_near, until_exit
 from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, REACH, SAME, fit, moment_of
 from .followed import come_over, follow
 from .heavy import first_number
@@ -77,17 +77,6 @@ def _book(flock, books, clock, pair, blow, now):
             flock.last[index(k)] = now
 
 
-@outlined
-def _vanish(box, flock, i):
-    """Take out a ball that has left the scene: it stays where it is, and meets no other ball."""
-    take_out(box.grid, flock, i, box.grid.number(i, flock))
-    for k in (MEETS, LEAVES, DUE):
-        flock.event[index(FLOATS * i + k)] = math.inf
-    flock.event[index(FLOATS * i + WALL)] = OUT
-    flock.tag[index(WHOLES * i + PARTNER)] = NO_PARTNER
-    requeue(flock, i)
-
-
 def _at_wall(box, flock, books, clock, i, now):
     """What comes when a ball may meet a wall: it is reflected, or gone, or looks farther; a status if it goes wrong."""
     if box.heavy is not None:
@@ -113,7 +102,7 @@ def _at_given_wall(box, flock, books, clock, i, now):
     if flock.event[index(FLOATS * i + WALL)] >= 0.0:
         ended = bounce(box, flock, books, clock, i, now)
         if ended == GONE:
-            _vanish(box, flock, i)
+            vanish(box, flock, i)
             ended = FLIES
         elif ended == FLIES:
             aim_again(box, flock, i, now)

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from ...common.status import Status
 from ...kernel.arrays import index
 from ...kernel.gravity import potential
@@ -10,8 +12,9 @@ from ...kernel.vector import ZERO, square
 from ...lanes.watching.log import Struck
 from ..reacting.freedoms import TOO_LONG, TOO_SHORT, ParticleFlight
 from ..reacting.strikes import Turner, all_stay, strike, with_energy
-from .again import aim_again, queue_both
+from .again import aim_again, queue_both, vanish
 from .aim import find_wall
+from .bounce import FLIES
 from .clock import EVENTS, moment_of
 from .followed import follow
 from .heavy import LISTED, SINCE, STRIKES, first_number
@@ -27,45 +30,64 @@ def strike_heavy(box, flock, books, clock, i, now):
     wall = flock.event[index(FLOATS * i + WALL)] - first_number(box)
     follow(box, flock, books, clock, i, now)
     r, v = flock.at(box.pull, i, now)
-    walls = heavy.grown(box.kinds.radius_of(i))
-    if box.loss is not None:
-        spares = box.loss.spares(flock, i, now)
-        walls = tuple(one._replace(restitution=select(spares, 1.0, one.restitution)) for one in walls)
     twice = flock.kept.at(i, flock.stamp(i), square(v) + 2.0 * potential(box.pull, r))
-    random, turner = None, None
-    if box.source is not None:
-        random = box.source.of_impact(i, books.impacts[index(i)], box.laws)
-    if box.turning is not None:
-        turner = Turner(i, box.kinds.radius_of(i), box.turning)
-    blow = strike(walls, wall, heavy.freedoms, ParticleFlight(r, v, ZERO, now, 0.0), m, random, turner)
+    blow = _blow(box, flock, wall, ParticleFlight(r, v, ZERO, now, 0.0), (i, books.impacts[index(i)]))
     left, fall = twice - 2.0 * (blow.given + blow.lost) / m, 2.0 * potential(box.pull, blow.r)
     if books.heat is not None:
         left += 2.0 * blow.heat / m
-        books.heat[index(blow.owner), 0] += blow.heat
-        if box.watchers.counts is not None:
-            box.watchers.counts.give(float(blow.owner), blow.heat, 0.0)
     v1, kept = with_energy(blow.v, left, fall)
-    if random is not None and math.isnan(v1.x):
+    if box.gates is not None and box.gates.absorbed_time is not None and not blow.stays:
+        v1, kept = v, left
+        box.gates.absorbed_time[index(i)] = moment_of(clock, now)
+        box.gates.absorbed_wall[index(i)] = np.int32(blow.owner)
+    if box.source is not None and math.isnan(v1.x):
         return Status.SENT_WRONG.value
     flock.put(i, now, blow.r, v1)
     flock.kept.keep(i, flock.stamp(i), kept)
-    books.impulse[index(blow.owner), 0] += blow.impulse
-    if books.dissipated.size > 0:
-        books.dissipated[index(i)] += blow.lost
-    books.impacts[index(i)] += blow.impulse > 0.0
+    _book(box, books, i, blow)
     struck = Struck(i, float(blow.owner), moment_of(clock, now), blow.r, v, v1, blow.impulse, blow.slip)
     box.watchers.hit(books.image, struck)
     if box.repose is not None:
         box.repose.count(clock, (blow.impulse / m) * (blow.impulse / m), now)
     heavy.counts[STRIKES] += 1.0
     stays = all_stay(heavy.walls, wall, heavy.freedoms)
-    aim_again(box, flock, i, now)
-    queue_both(flock, i)
+    if blow.stays:
+        aim_again(box, flock, i, now)
+        queue_both(flock, i)
+    else:
+        vanish(box, flock, i)
     if stays:
         _look_again(box, flock, now)
     else:
         renew_leases(box, flock, clock, now)
-    return Status.DONE.value
+    return FLIES
+
+
+def _blow(box, flock, wall, flight, ball):
+    """The `WallImpact` of a ball, given as its number and how many impacts it has had."""
+    (i, impacts), heavy = ball, box.heavy
+    radius, random, turner = box.kinds.radius_of(i), None, None
+    walls = heavy.grown(radius)
+    if box.loss is not None:
+        spares = box.loss.spares(flock, i, flight.time)
+        walls = tuple(one._replace(restitution=select(spares, 1.0, one.restitution)) for one in walls)
+    if box.source is not None:
+        random = box.source.of_impact(i, impacts, box.laws)
+    if box.turning is not None:
+        turner = Turner(i, radius, box.turning)
+    return strike(walls, wall, heavy.freedoms, flight, box.kinds.mass_of(i), random, turner)
+
+
+def _book(box, books, i, blow):
+    owner = index(blow.owner)
+    books.impulse[owner, 0] += blow.impulse
+    if books.dissipated.size > 0:
+        books.dissipated[index(i)] += blow.lost
+    if books.heat is not None:
+        books.heat[owner, 0] += blow.heat
+        if box.watchers.counts is not None:
+            box.watchers.counts.give(float(blow.owner), blow.heat, 0.0)
+    books.impacts[index(i)] += blow.impulse > 0.0
 
 
 @outlined

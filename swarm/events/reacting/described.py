@@ -51,8 +51,10 @@ def _reacting(compiled: CompiledScene) -> tuple[Reacting, ...]:
         if surface.reacts():
             freedom = _freedom(surface, rows.index(i), scene.gravity or (0.0, 0.0, 0.0))
             laws = _laws_of(surface, scene)
+            absorbs = 1.0 if laws is not None and laws.may_end else None
             made += [
-                Reacting(wall, freedom, number + k, surface.restitution, laws, float(k)) for k, wall in enumerate(walls)
+                Reacting(wall, freedom, number + k, surface.restitution, laws, float(k), absorbs)
+                for k, wall in enumerate(walls)
             ]
         number += len(walls)
     return tuple(made)

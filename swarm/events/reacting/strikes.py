@@ -25,6 +25,7 @@ class WallImpact(NamedTuple):
     owner: int
     slip: Vec  # velocity relative to the wall along it, before [m/s]
     heat: float = 0.0  # energy that the wall's law gives besides [J]
+    stays: Any = True  # False where the law absorbs the particle, which keeps its velocity
 
 
 class Turner(NamedTuple):
@@ -59,6 +60,7 @@ class LawImpulse(Record):
     impulse: Vec
     lost: float
     heat: float
+    stays: Any
 
 
 class Reacting(Record):
@@ -70,6 +72,7 @@ class Reacting(Record):
     restitution: float
     laws: Any = None  # None, or the `Laws` of the surface, where they are more than a restitution
     number: float = 0.0  # among the walls of the surface
+    absorbs: Any = None  # 1 where a law may absorb particles
 
     @property
     def sends_off(self):
@@ -98,7 +101,8 @@ class Reacting(Record):
             freedom.push(walls, flight.time, impulse * n, arm)
             given = impulse * (speed + 0.5 * impulse * give)
             return WallImpact(r, flight.v - (impulse / mass) * n, impulse, given, lost, self.owner, slip)
-        whole, heat, turned, happens, law = impulse * n, 0.0, 0.0, False, None
+        whole, heat, turned, happens = impulse * n, 0.0, 0.0, False
+        law: Any = None
         if self.laws.send_off:
             happens, law = self._by_law(r, n, flight.v - u, (mass, arm), random)
         if self.laws.friction is not None:
@@ -113,8 +117,13 @@ class Reacting(Record):
             lost, impulse = select(happens, law.lost, lost), select(happens, dot(n, law.impulse), impulse)
         freedom.push(walls, flight.time, whole, arm)
         given = dot(u, whole) + 0.5 * freedom.mobility(whole, arm) + turned
-        v1 = flight.v - (1.0 / mass) * whole
-        return WallImpact(r, v1, impulse, given, lost, self.owner, slip, heat)
+        v1, stays = flight.v - (1.0 / mass) * whole, True
+        if self.absorbs is not None:
+            # What is absorbed gives its normal momentum to the wall, and keeps its velocity and its energy.
+            stays = law.stays | (not happens)
+            more, less = (given, 0.0) if self.laws.give_heat else (0.0, -given)
+            v1, heat, lost = either(stays, v1, flight.v), select(stays, heat, more), select(stays, lost, less)
+        return WallImpact(r, v1, impulse, given, lost, self.owner, slip, heat, stays)
 
     def _by_law(self, r, n, w, at, random):
         """Whether a law acts on a particle of the relative velocity w, and the `LawImpulse` then."""
@@ -126,8 +135,11 @@ class Reacting(Record):
         random = random._replace(across=self.laws.across)
         happens, bounce = by_law(self.laws, wall, None, self.number, arriving, random)
         after = either(bounce.keeps, with_square(bounce.v, arriving.twice), bounce.v)
+        change, stays = before - after, bounce.wait < math.inf
+        if self.absorbs is not None:
+            change = either(stays, change, (bounce.impulse / norm(facing)) * facing)
         half = 0.5 * mass
-        return happens, LawImpulse(mass * spread.back(before - after), half * bounce.lost, half * bounce.heat)
+        return happens, LawImpulse(mass * spread.back(change), half * bounce.lost, half * bounce.heat, stays)
 
     def _rubbed(self, n, passing, at, impulse, turner):
         """What friction takes, of a velocity relative to the wall after a normal impulse: `Rubbed`."""

@@ -143,10 +143,6 @@ def _ends(asked: Asked) -> Found:
         yield from ({"i": i, "k": k, "got": law} for k, law in enumerate(wall.laws) if may_end(law))
 
 
-def _ends_that_move(asked: Asked) -> Found:
-    yield from (one for one in _ends(asked) if asked.scene.surfaces[one["i"]].reacts())
-
-
 def _waits_beside_motions(asked: Asked) -> Found:
     yield from _waits(asked) if asked.scene.moves() else ()
 
@@ -379,7 +375,7 @@ CAPABILITIES = (
             "sources must be left out with {whole!r:.200}, got {count}: particles are born at any time, not at the end "
             "of a step", _TO_EXACT,
         ),
-        (MASSIVE, HEAVY): Refusal("sources must be left out where a wall has a mass, got {count}", _TO_MOTION),
+        (MASSIVE,): Refusal("sources must be left out where a wall has a mass, got {count}", _TO_MOTION),
     }),
     Capability("log of impacts", _option("impacts"), {
         _EVERY_BODY: Refusal(
@@ -525,12 +521,6 @@ CAPABILITIES = (
             "use restitution and friction, or Impact",
         ),
     }),
-    Capability("absorption by a wall with a mass", _ends_that_move, {
-        (HEAVY,): Refusal(
-            "surfaces[{i}].laws[{k}] must not absorb particles where that wall has a mass, got {got}",
-            f"leave that law out, or {_TO_MOTION}",
-        ),
-    }, within="law of a wall"),
     Capability("absorption", _ends, {
         (MASSIVE,): Refusal(
             "surfaces[{i}].laws[{k}] must not absorb particles where a wall has a mass, got {got}",
