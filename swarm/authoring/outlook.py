@@ -3,17 +3,21 @@
 import contextlib
 import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import scene_file
 from ..ball_numbers import balls_volume
 from ..common.checks import PARTICLE, in_bytes
 from ..errors import SceneError
 from ..files import marks
 from ..files.writer import size_of
+from ..fleet.plan import in_one_line
+from ..fleet.plan import read as plan_of
 from ..kernel import cache
 from ..run.engines import run_of
 from ..run.machine import warn_open
@@ -21,8 +25,9 @@ from ..run.options import Task
 from ..run.preflight import hints, knows, workload
 from ..run.preflight.admission import task_of
 from ..scene_file import Job
+from ..serialization.plugins import allowed
 from ..words import facts
-from ..words.amounts import many
+from ..words.amounts import listed, many
 from ..words.content import Content
 from ..words.statements import rows_of
 
@@ -59,14 +64,17 @@ class Load(NamedTuple):
     shared: bool = True
 
 
-def outlook(job: Job, target: Path) -> dict[str, str]:
-    """What the run of a job would do, with the trajectory in `target`: rows of names and values.
+def outlook(job: Job, target: Path, makes_folder: bool = False) -> dict[str, str]:
+    """What the run of a job would do, with the trajectory in `target`, in a folder that may be made: rows of a table.
 
     Raises:
         SceneError: it would be refused.
     """
     start = job.start()
-    task = task_of(job.scene, start, job.method, job.run)
+    try:
+        task = task_of(job.scene, start, job.method, job.run)
+    except SceneError as error:
+        raise job.located(error) from None
     content = _content(task, start, target.name)
     with _caught() as warnings:
         if job.scene.is_open():
@@ -74,7 +82,35 @@ def outlook(job: Job, target: Path) -> dict[str, str]:
         hints.give(task)
     made = rows_of(facts.of_setting(content, facts.MOST))
     made |= {"hints": "\n".join(f"· {one}" for one in warnings) or "none"}
-    return made | _sizes(task, target) | _time(task)
+    there = "" if makes_folder and not target.parent.exists() else _there(target, "trajectory")
+    return made | _sizes(task, target, there) | _time(task)
+
+
+def outlook_of_file(
+    path: Path, output: Path | None = None, threads: int | None = None, plugins: Iterable[str] = ()
+) -> dict[str, str]:
+    """What `swarm run` would do with a scene file, or `swarm sweep` with a sweep file: its first run stands for all.
+
+    Raises:
+        SceneError: it would be refused.
+    """
+    document = scene_file.document_of(scene_file.text_of(path), path)
+    if scene_file.SWEEP in document:
+        plan = plan_of(path, plugins)
+        first, folder = plan.variants[0], Path(path.stem) if output is None else output
+        with allowed(plugins):
+            text = plan.text(first)
+            job, target = scene_file.job_of(scene_file.document_of(text, path), text, path), folder / f"{first.stem}.h5"
+        kinds = len({variant.kind for variant in plan.variants})
+        over = f"{many(len(plan.variants))} over {listed(list(first.parameters))}"
+        runs = f"{over}, {many(kinds)} kind{'s' * (kinds != 1)} of scene, each compiled once"
+        about = {"runs": runs, "first run": f"{in_one_line(first.parameters)}; the other rows are of this one"}
+    else:
+        job, about = scene_file.read(path, plugins), {}
+        stored = path.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
+        target = Path(output or stored)
+    options = replace(job.run, trajectory=target, threads=job.run.threads if threads is None else threads)
+    return about | outlook(replace(job, run=options), target, makes_folder=bool(about))
 
 
 def _content(task: Task, start: Any, name: str) -> Content:
@@ -106,12 +142,12 @@ def _caught() -> Iterator[list[str]]:
 # --- Sizes -----------------------------------------------------------------------------------------------
 
 
-def _sizes(task: Task, target: Path) -> dict[str, str]:
+def _sizes(task: Task, target: Path, there: str) -> dict[str, str]:
     options, n = task.options, len(task.particles)
     storage, surfaces = options.storage, len(task.scene.surfaces)
     size = options.times.on_disk(surfaces) + size_of(task.scene, task.particles, storage, options.times.count)
     most = "at most " * (storage.compression != "none")
-    files = [(f"trajectory {target}", f"{most}{in_bytes(size)}", _there(target, "trajectory"))]
+    files = [(f"trajectory {target}", f"{most}{in_bytes(size)}", there)]
     if options.impacts is not None:
         rows = _impacts(task) * _logged(options.impact_particles, n)
         there = _there(options.impacts, "impacts")

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 
 import h5py
 import numpy as np
@@ -53,6 +54,20 @@ def test_the_command(tmp_path):
     refused, as_run = (command(name, "scene.toml", cwd=tmp_path) for name in ("check", "run"))
     assert (refused.returncode, refused.stderr) == (as_run.returncode, as_run.stderr)
     assert "surface[0].radius must be above 0, got -0.5" in refused.stderr
+
+
+def test_a_sweep_is_seen_by_its_first_run(tmp_path):
+    """Nothing is written, and it is refused as a sweep is."""
+    lists = '[sweep]\n"surface.0.radius" = [0.5, 0.7]\n"particles.seed" = {range = 3}\n'
+    (tmp_path / "sweep.toml").write_text(GOOD + lists)
+    rows = outlook.outlook_of_file(tmp_path / "sweep.toml", tmp_path / "folder")
+    assert rows["runs"].startswith("6 over surface.0.radius and particles.seed, 1 kind of scene")
+    assert '"surface.0.radius" = 0.5, "particles.seed" = 0' in rows["first run"]
+    assert re.fullmatch(r"trajectory .*/folder/[0-9a-f]{12}\.h5, [\d.]+ kB", rows["files"])
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep.toml"]
+    (tmp_path / "sweep.toml").write_text(GOOD + lists.replace("0.7", "-0.7"))
+    refused = command("check", "sweep.toml", cwd=tmp_path)
+    assert (refused.returncode, '"surface.0.radius" = -0.7' in refused.stderr) == (2, True)
 
 
 def test_hints_are_those_of_the_run(tmp_path, caplog):
