@@ -303,6 +303,7 @@ _TO_POINTS = "use particles without a radius"
 _TO_EXACT = "use Impact() with contact_step = 0"
 _NO_STEP = "leave contact_step out"
 _WITH_PENALTY = "particles that have a radius and Penalty"
+_LASTS = "its contacts last for a time, and have no instant at which a wall could send a particle off"
 _NO_METHOD = Refusal(
     "bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {whole}",
     "use Impact(dt=...), with dt in seconds",
@@ -509,7 +510,7 @@ CAPABILITIES = (
         (BASELINE,): _with_method("temperature", "None"),
         (CHORDS,): _LOSES,
         (GRAINS,): Refusal(
-            f"surfaces[{{i}}].temperature must be None with {_WITH_PENALTY}, got {{got}}", "use Impact"
+            f"surfaces[{{i}}].temperature must be None with {_WITH_PENALTY}, got {{got}}: {_LASTS}", "use Impact"
         ),
     }),
     Capability("law of a wall", _of_walls("laws", ()), {
@@ -517,7 +518,7 @@ CAPABILITIES = (
         (BASELINE,): _with_method("laws", "left out"),
         (CHORDS,): _LOSES,
         (GRAINS,): Refusal(
-            f"surfaces[{{i}}].laws must be left out with {_WITH_PENALTY}, got {{got}}",
+            f"surfaces[{{i}}].laws must be left out with {_WITH_PENALTY}, got {{got}}: {_LASTS}",
             "use restitution and friction, or Impact",
         ),
     }),
