@@ -103,10 +103,12 @@ def test_a_silo_that_a_source_fills_runs_out_as_beverloo_says():
         ),
     }
     options = {"until": 1.6, "every": 0.02, "sources": job.run.sources, "seed": 1, "observables": numbers}
+    options["counters"] = job.run.counters
     result = swarm.simulate(job.scene, None, job.method, **options)
     seen, there = result.observables, result.particles.born().position
     above, below = (there[2] > -0.05).sum(), (there[2] <= -0.05).sum()
     assert above + below == seen["born"][-1, 0] == len(there[0])
+    np.testing.assert_array_equal(seen["crossings"][:, 0] @ (1, -1), seen["below"])
     assert seen["energy_error"].max() < 1e-12
     ball, size = 4.0 / 3.0 * np.pi * 0.005**3, 0.04 - 1.4 * 0.01
     flows, shut = seen["time"] >= 1.0, (seen["time"] > 0.8) & (seen["time"] < 0.9)
