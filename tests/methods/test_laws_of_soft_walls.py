@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from cut_short import in_sessions
 
 import swarm
+from swarm.run.doors import DoorRun
 
 ALPHA = 4e3
 LOOP = {"dt": 5e-3, "penalty": ALPHA, "tolerance": 1e-20, "on_unconverged": "impact"}
@@ -135,3 +137,22 @@ def test_the_log_has_a_row_where_a_contact_ends(tmp_path, name, law):
             assert mine[key][0] == pytest.approx(theirs[key][0], abs=1e-8)
     unlogged = ran(scene, start, METHODS[name])
     assert np.array_equal(unlogged.particles.velocity, soft.particles.velocity)
+
+
+def test_a_run_in_many_sessions_has_the_same_bits(tmp_path, monkeypatch):
+    hole = swarm.Opening(swarm.Sphere(0.3, (0.5, 0.0, 0.0)), times=[(0.1, 0.6)])
+    walls = swarm.Box((0.5, 0.4, 0.6), openings=[hole], restitution=0.8, friction=0.3, laws=[swarm.Absorb(0.1)])
+    scene = swarm.Scene([walls, swarm.Sphere(0.1, side="outside", present=[(0.0, 0.5)])], gravity=None)
+    start = swarm.fill(scene, 4, speed=1.0, mass=2.0, seed=3)
+    whole = ran(scene, start, PENALTY, 0.8, 0.2)
+    path = tmp_path / "run.h5"
+
+    def go():
+        return ran(scene, start, PENALTY, 0.8, 0.2, trajectory=path, resume=True, checkpoint=1e3)
+
+    parts, ended = in_sessions(monkeypatch, DoorRun, 8, go)
+    assert ended > 4
+    assert np.array_equal(parts.particles.position, whole.particles.position)
+    assert np.array_equal(parts.escape_time, whole.escape_time, equal_nan=True)
+    for key, values in whole.observables.items():
+        assert np.array_equal(parts.observables[key], values), key
