@@ -438,6 +438,9 @@ def _beside(draft: Draft) -> None:
     draft.beside = swarm.Oscillation((0.02, -0.01, 0.03), 1.0)
     # From among solids particles come later to the vessel.
     draft.until = 1.0 if draft.start != "around" else 2.0
+    if draft.cell.engine.startswith("bodies"):
+        # They are slow: with the same steps they come to that wall later.
+        draft.until = 4.0
     _in_fixed_steps(draft)
 
 
