@@ -1,5 +1,6 @@
 """The run of particles and walls that react: all depend on all others."""
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -31,7 +32,7 @@ from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule, SceneWalls
 # Of a clock, how many events were taken where no lease is made yet: so much less for each particle that is predicted.
 _ALL_AHEAD = -1.0
 # Of a queue, what a checkpoint has under other names, or finds again.
-_NOT_KEPT = "heap", "mass", "heat", "crossed", "watchers", "image"
+_NOT_KEPT = "heap", "mass", "heat", "crossed", "watchers", "image", "absorbed"
 
 
 class ReactingRun(BaseRun):
@@ -52,6 +53,9 @@ class ReactingRun(BaseRun):
             particles.position, particles.velocity, particles.mass, np.asarray(energy) + np.zeros(n), np.zeros(n),
             np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None, heat,
         )  # fmt: skip
+        if any(laws.may_end for laws in self._scenery.each_laws()):
+            absorbed_time, absorbed_wall = np.full(n, math.nan), np.full(n, -1, np.int32)
+            self.state = self.state._replace(absorbed_time=absorbed_time, absorbed_wall=absorbed_wall)
         tier = Tier(compile, (self._scenery, gravity), n)
         super().__init__(compiled, method, n, threads, tier, seeding, watched)
         counters = counters_of(self._scene, watched.counters, logs=True)
@@ -62,6 +66,7 @@ class ReactingRun(BaseRun):
             np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool),
             np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
             Heap(np.zeros(n), number.copy(), number.copy()), state.heat, state.crossed, self._watchers(counters),
+            absorbed=state.absorbed,
         )  # fmt: skip
         self._freedoms = freedoms_of(compiled, particles.velocity)
         self._clock = np.zeros(CLOCK)
@@ -180,6 +185,8 @@ class ReactingRun(BaseRun):
         queue = {name: array for name, array in self._queue._asdict().items() if name not in _NOT_KEPT}
         queue |= {} if self.state.crossed is None else named("crossed", self.state.crossed)
         queue |= {} if self.state.heat is None else {"heat": self.state.heat}
+        absorbed = self.state.absorbed
+        queue |= {} if absorbed is None else {"absorbed_time": absorbed.time, "absorbed_wall": absorbed.wall}
         return {**queue, **named("walls", self._freedoms), "key": self._queue.heap.key, "clock": self._clock}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:

@@ -119,6 +119,45 @@ def test_a_wall_of_an_endless_mass_is_one_at_rest(law):
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("of_heavy", [False, True])
+def test_absorbed_points_stay_where_they_are(of_heavy):
+    laws = {"laws": [swarm.Absorb(0.3)]}
+    box = swarm.Box((0.5, 0.5, 0.5), **({} if of_heavy else laws))
+    wall = swarm.Sphere(0.2, side="outside", mass=2.0, **(laws if of_heavy else {}))
+    start = swarm.fill(scene := swarm.Scene([box, wall]), 20, speed=1.0, seed=3)
+    options = {"until": 2.0, "every": 0.25, "compile": "never", "seed": 3}
+    result = swarm.simulate(
+        scene, start, swarm.Impact(), observables={"places": lambda frame: frame.position}, **options
+    )
+    gone, seen = np.flatnonzero(~np.isnan(result.absorbed_time)), result.observables
+    assert seen["absorbed"][-1, int(of_heavy)] == len(gone) > 2
+    assert seen["energy_error"].max() <= 1e-12
+    for i in gone:
+        later = seen["places"][seen["time"] > result.absorbed_time[i], :, i]
+        assert (later == result.particles.position[:, i]).all()
+    if not of_heavy:
+        depth = np.abs(result.particles.position[:, gone]).max(axis=0)
+        np.testing.assert_allclose(depth, 0.5, rtol=0, atol=1e-12)
+        return
+    # Of what is absorbed the wall has the normal momentum: with the first one, it moves along the normal there.
+    first = gone[np.argmin(result.absorbed_time[gone])]
+    assert np.isfinite(result.absorbed_time[first])
+    assert seen["wall_heat"][-1, 1] != 0.0
+
+
+def test_what_a_wall_absorbs_gives_it_its_normal_momentum():
+    scene = swarm.Scene([swarm.Plane(UP, 1.0, mass=3.0, laws=[swarm.Absorb(1.0)])])
+    start = swarm.Particles([0.0, 0.0, 0.0], [0.5, 0.0, 2.0], 1.5)
+    result = swarm.simulate(scene, start, swarm.Impact(), until=1.0, compile="never")
+    # At rest along the normal relative to each other: 3 = (1.5 + 3) u.
+    np.testing.assert_allclose(result.observables["wall_velocity"][-1, 0], (0.0, 0.0, 2.0 / 3.0), rtol=0, atol=1e-15)
+    assert result.absorbed_time[0] == 0.5
+    assert result.particles.position[:, 0].tolist() == [0.25, 0.0, 1.0]
+    assert result.particles.velocity[:, 0].tolist() == [0.5, 0.0, 2.0]
+    assert result.observables["wall_heat"][-1, 0] == pytest.approx(0.5 * 3.0 * 4.0 / 9.0, rel=1e-15)
+    assert result.observables["energy_error"].max() <= 1e-15
+
+
 @pytest.mark.parametrize("wall", WALLS)
 def test_a_law_that_is_a_mirror_is_an_elastic_impact(wall):
     ends = []

@@ -9,6 +9,8 @@ heap, not a prediction for every particle.
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ...common.status import Status
 from ...contact.laws import Laws
 from ...contact.wall_impact import Arriving, book, impact_on_wall
@@ -76,6 +78,7 @@ class Queue(NamedTuple):
     crossed: Any = None  # `Crossed`, where there are counters
     watchers: Watchers = Watchers()
     image: Any = None
+    absorbed: Any = None  # `Absorbed`, where a wall may absorb particles
 
 
 class ReactionRule(NamedTuple):
@@ -99,6 +102,15 @@ def _aim(scenery, queue, i, end):
     queue.wait[i], queue.due[i], queue.wall[i] = hit.time, t + hit.time, hit.wall
 
 
+def _is_absorbed(queue, i):
+    """Whether a wall has absorbed particle i: it stays where it is, and nothing is next for it."""
+    return False if queue.absorbed is None else not math.isnan(queue.absorbed.time[i])
+
+
+def _absorb(queue, i, owner, time):
+    queue.absorbed.time[i], queue.absorbed.wall[i] = time, np.int32(owner)
+
+
 def _seen(scenery, queue, i, now, end):
     """The `ParticleFlight` of particle i at a time."""
     t, r, v = now - queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
@@ -109,6 +121,9 @@ def _seen(scenery, queue, i, now, end):
 
 def _next(scenery, walls, queue, i, now, end, soon):
     """The time at which something may happen to particle i: by its reach if that is far, else as it is now."""
+    if _is_absorbed(queue, i):
+        queue.near[i], queue.struck[i] = False, NONE
+        return math.inf
     flight = _seen(scenery, queue, i, now, end)
     target = now + flight.longest
     free = reach_of_all(scenery.reacting, walls, flight)
@@ -144,11 +159,14 @@ def _bounce(scenery, queue, i, wall, rule, now):
         random = scenery.source.of_impact(i, queue.impacts[i], laws)
     walls = scenery.given.at(rule.end - now)
     bounce = impact_on_wall(laws, walls, scenery.pull, wall, arriving, random)
-    put(queue.velocity, 0, i, bounce.v)
-    owner = index(scenery.owners[int(wall)])
+    owner, v1, time = index(scenery.owners[int(wall)]), bounce.v, rule.moment - (rule.end - now)
+    if queue.absorbed is not None and bounce.wait == math.inf:
+        _absorb(queue, i, owner, time)
+        v1 = v
+    put(queue.velocity, 0, i, v1)
     book(laws, queue, (owner, i, i), m, bounce)
     queue.energy[i] = 0.5 * bounce.twice_energy
-    struck = Struck(i, wall, rule.moment - (rule.end - now), r, v, bounce.v, m * bounce.impulse)
+    struck = Struck(i, wall, time, r, v, v1, m * bounce.impulse)
     struck = queue.watchers.with_slip(laws, walls, struck)
     queue.watchers.hit(None, struck._replace(wall=float(owner)))
 
@@ -166,13 +184,16 @@ def _strike(scenery, walls, queue, i, rule, now):
         left += 2.0 * blow.heat / m
         queue.heat[index(blow.owner), i] += blow.heat
     v1, kept = with_energy(blow.v, left, 2.0 * potential(scenery.pull, blow.r))
+    time = rule.moment - (rule.end - now)
+    if queue.absorbed is not None and not blow.stays:
+        _absorb(queue, i, blow.owner, time)
+        v1, kept = v, left
     put(queue.position, 0, i, blow.r)
     put(queue.velocity, 0, i, v1)
     queue.energy[i] = 0.5 * kept
     queue.impulse[index(blow.owner), i] += blow.impulse
     queue.dissipated[i] += blow.lost
     queue.impacts[i] += blow.impulse > 0.0
-    time = rule.moment - (rule.end - now)
     queue.watchers.hit(None, Struck(i, float(blow.owner), time, blow.r, v, v1, blow.impulse, blow.slip))
 
 
@@ -198,7 +219,8 @@ def predict(scenery, freedoms, queue, clock, rule, first, last):
         i = index(k)
         if now == 0.0:
             queue.time[i], queue.hits[i] = 0.0, 0
-            _aim(scenery, queue, i, rule.end)
+            if not _is_absorbed(queue, i):
+                _aim(scenery, queue, i, rule.end)
         queue.heap.key[i] = _next(scenery, freedoms, queue, i, now, rule.end, _soon(clock))
 
 
@@ -208,7 +230,8 @@ def arrive(scenery, queue, rule, first, last):
     for k in range(first, last):
         if is_full(queue.watchers.log):
             return k
-        _fly(scenery, queue, index(k), rule.end, rule.end - queue.time[index(k)], rule.end)
+        if not _is_absorbed(queue, index(k)):
+            _fly(scenery, queue, index(k), rule.end, rule.end - queue.time[index(k)], rule.end)
     return last
 
 
@@ -263,7 +286,8 @@ def _carry_out(scenery, freedoms, queue, i, now, rule):
         _bounce(scenery, queue, i, queue.wall[i], rule, now)
     if scenery.source is not None and math.isnan(queue.velocity[0, i]):
         return Status.SENT_WRONG.value
-    _aim(scenery, queue, i, rule.end)
+    if not _is_absorbed(queue, i):
+        _aim(scenery, queue, i, rule.end)
     return select(queue.hits[i] <= MOST_HITS, Status.DONE.value, Status.STALLED.value)
 
 

@@ -19,7 +19,7 @@ from ...surfaces.in_motion.drive import drive_of
 from ...surfaces.laws.sticky import Sticky
 from ...surfaces.periodic.images import MASS_AND_PERIOD, WITHOUT_PERIOD
 from ...surfaces.surface import Surface
-from ...surfaces.wall_law import lets_wait, may_end
+from ...surfaces.wall_law import lets_wait
 from ..options import RunOptions
 
 # --- Engines ---------------------------------------------------------------------------------------------
@@ -136,11 +136,6 @@ def _waits(asked: Asked) -> Found:
         for k, law in enumerate(wall.laws):
             if not isinstance(law, str) and lets_wait(law):
                 yield {"i": i, "k": k, "got": law}
-
-
-def _ends(asked: Asked) -> Found:
-    for i, wall in _walls(asked):
-        yield from ({"i": i, "k": k, "got": law} for k, law in enumerate(wall.laws) if may_end(law))
 
 
 def _waits_beside_motions(asked: Asked) -> Found:
@@ -522,12 +517,6 @@ CAPABILITIES = (
             "use restitution and friction, or Impact",
         ),
     }),
-    Capability("absorption", _ends, {
-        (MASSIVE,): Refusal(
-            "surfaces[{i}].laws[{k}] must not absorb particles where a wall has a mass, got {got}",
-            f"leave that law out, or {_TO_MOTION}",
-        ),
-    }, within="law of a wall"),
     Capability("laws of groups of a mesh", _groups, {
         (GRAINS,): Refusal(
             f"surfaces[{{i}}].groups must be None with {_WITH_PENALTY}, got laws of {{got}}",
