@@ -186,8 +186,6 @@ SUPPORTED = {
     "pair restitution": "law of pairs", "pair friction": "law of pairs", "contact duration": "contact duration",
 }  # fmt: skip
 OF_WALLS = {"union": "union", "field": "field", "mesh": "mesh or outline", "prism": "mesh or outline"}
-# A wall with a mass has no motion that turns it; the walls beside it do.
-NOT_OF_HEAVY_WALLS = ("turning",)
 
 
 @pytest.mark.parametrize("engine", cells.ENGINES)
@@ -195,8 +193,6 @@ def test_the_table_says_yes_where_a_cell_works(engine):
     known = {tuple(name.split(" / ")[1:]): word for name, word in pairs.KNOWN.items() if name.startswith(f"{engine} /")}
     asked = {one: name for one, name in SUPPORTED.items() if one in {capability for _wall, capability in known}}
     for one, name in asked.items():
-        if "heavy" in engine and one in NOT_OF_HEAVY_WALLS:
-            continue
         works = any(word == "works" for (_wall, capability), word in known.items() if capability == one)
         assert works == (knows.sentence(ENGINES[engine], name) is None), one
     for wall, name in OF_WALLS.items():

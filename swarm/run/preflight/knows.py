@@ -408,7 +408,10 @@ CAPABILITIES = (
     }, True),
     Capability("contact_step", _argument("contact_step", 0.0), {
         (BODIES,): Refusal("contact_step must be 0 with bodies, got {got}: their impacts are exact", "leave it out"),
-        _RIGID_BALLS: Refusal("contact_step must be 0 where particles have a radius, got {got}", "leave it out"),
+        _RIGID_BALLS: Refusal(
+            "contact_step must be 0 where particles have a radius, got {got}: an impact of hard balls takes no time",
+            "leave it out",
+        ),
     }, True),
     Capability("gradient", _argument("gradient", "composite"), {
         (SOFT_BODIES, PAPER_BODIES): Refusal(
