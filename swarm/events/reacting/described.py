@@ -62,6 +62,9 @@ def _reacting(compiled: CompiledScene) -> tuple[Reacting, ...]:
 
 def _laws_of(surface: Surface, scene: Scene) -> Laws | None:
     """The laws of a surface that reacts; None where they are a restitution at most."""
+    if not (surface.laws or surface.friction > 0.0 or surface.temperature is not None):
+        # Each frame asks this.
+        return None
     laws = Scene([surface], plane=scene.plane).compiled(None, "walls that react").laws or NONE
     return laws._replace(moving=None) if laws.send_off or laws.friction is not None else None
 
