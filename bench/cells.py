@@ -597,8 +597,6 @@ def meaning(cell: Cell) -> str | None:
         return "Penalty has no such argument"
     if name == "contact step" and engine.method is swarm.AugmentedLagrangian:
         return "AugmentedLagrangian has no such argument"
-    if name in ("contact step", "contact start") and cell.engine in _OF_BALLS:
-        return "an impact of hard balls takes no time"
     if name in ("oscillation", "turning", "path") and "mass" in engine.laws:
         return "impacts move the wall, so that its motion cannot be given"
     if engine_of_points and name in _OF_WHAT_MEETS:

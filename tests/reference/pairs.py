@@ -2,7 +2,7 @@
 
     python tests/reference/pairs.py --write            writes pairs.json and refusals.json
     python tests/reference/pairs.py --write union      writes the cells whose names have this word
-    python tests/reference/pairs.py --write refused    writes the cells that were refused: a minute
+    python tests/reference/pairs.py --write refused    writes the cells that were refused, and new ones: minutes
     python tests/reference/pairs.py --write declared   writes what `knows` declares, and runs nothing
 
 pairs.json has, for each engine and wall, one letter a capability: "w" works, "r" is refused, "!" is a third outcome,
@@ -88,7 +88,7 @@ def main():
     """Write the lists, and name the third outcomes."""
     names = [str(cell) for cell in cells.CELLS]
     words = [word for word in sys.argv[1:] if word != "--write"]
-    groups = {"declared": [], "refused": [name for name in names if KNOWN.get(name) == "refused"]}
+    groups = {"declared": [], "refused": [name for name in names if KNOWN.get(name, "refused") == "refused"]}
     wanted = (
         groups[words[0]]
         if words[:1] and words[0] in groups
