@@ -11,7 +11,7 @@ from swarm.bodies.body_run import threads_with
 LARGE = """
 import numba
 import numpy as np
-from swarm.kernel import arrays
+from swarm.kernel import arrays, machine_code
 from swarm.bodies.body_run import threads_with
 
 @numba.njit(nogil=True)
