@@ -19,7 +19,8 @@ polynomial: places of impact are within 4 roundings of 50 digits.
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,
 checksums, and what the machine is. Each is "exact", if its arithmetic is + - * / and the square root alone, or "libm":
-then golden.json has its end too, and where `libm` is another one it is compared to 1e-9.
+then golden.json has its end too, and where `libm` is another one it is compared to 1e-9. The machine "each its own"
+stands with a run that has other last bits on another processor though its arithmetic is exact.
 
 The kernels give the same bits compiled and in plain Python; plain Python runs these runs without as many
 compilations. Still each step costs a thousand times its compiled time, so the runs are as short as they can be and meet
