@@ -161,3 +161,12 @@ def test_a_contact_lasts_in_a_composed_step():
     require_balance(result)
     height = 1e-3 * math.sin(2.0 * math.pi * 10.0 * 3e-3)
     assert centre(result.bodies)[0] == pytest.approx([0.0, 0.0, 0.5 * SIZE + height], abs=1e-12)
+
+
+def test_the_path_of_a_wall_covers_the_run():
+    cup = swarm.Box((0.5, 0.5, 0.5), motion=swarm.Path((0.0, 0.5), ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0))))
+    start = swarm.place(
+        swarm.Scene([cup]), swarm.rigid(0.05 * np.vstack([np.zeros(3), np.eye(3)]), 1e3), 1, speed=0.0, seed=1
+    )
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].motion.times must cover the run from 0 to 1 s"):
+        swarm.simulate(swarm.Scene([cup]), start, swarm.Impact(dt=1e-3), until=1.0)

@@ -94,7 +94,18 @@ def silo(width, is_shut=False):
 
 
 def test_a_silo_that_a_source_fills_runs_out_as_beverloo_says():
-    """With C = 0.58 and k = 1.4 of the literature, in the form for the area of an orifice: 4 C/pi rho sqrt(g D) A."""
+    """With C = 0.58 and k = 1.4 of the literature, in the form for the area of an orifice: 4 C/pi rho sqrt(g D) A.
+
+    An orifice of four grains lets them out by fits and starts: a run of 0.6 s is 0.9 to 1.4 times the law, so the mean
+    of four seeds counts, within three standard errors.
+    """
+    flow, law = np.transpose([_flow_and_law_of_the_poured_silo(seed) for seed in (1, 2, 3, 4)])
+    error = flow.std(ddof=1) / np.sqrt(len(flow))
+    assert abs(flow.mean() - law.mean()) < 3.0 * error
+
+
+def _flow_and_law_of_the_poured_silo(seed):
+    """Grains a second, of a run whose numbers of grains are checked, and by the law for its packing."""
     job = read(SCENES / "poured_silo.toml")
     numbers = {
         "below": lambda snapshot: float((snapshot.position[2] < -0.05).sum()),
@@ -102,7 +113,7 @@ def test_a_silo_that_a_source_fills_runs_out_as_beverloo_says():
             ((abs(snapshot.position[:2]) < 0.04).all(axis=0) & (abs(snapshot.position[2] + 0.0225) < 0.0125)).sum()
         ),
     }
-    options = {"until": 1.6, "every": 0.02, "sources": job.run.sources, "seed": 1, "observables": numbers}
+    options = {"until": 1.6, "every": 0.02, "sources": job.run.sources, "seed": seed, "observables": numbers}
     options["counters"] = job.run.counters
     result = swarm.simulate(job.scene, None, job.method, **options)
     seen, there = result.observables, result.particles.born().position
@@ -114,7 +125,7 @@ def test_a_silo_that_a_source_fills_runs_out_as_beverloo_says():
     flows, shut = seen["time"] >= 1.0, (seen["time"] > 0.8) & (seen["time"] < 0.9)
     packing = seen["bed"][shut].mean() * ball / (0.08 * 0.08 * 0.025)
     rate = 4.0 * 0.58 / np.pi * packing / ball * np.sqrt(9.81 * size) * size**2
-    assert np.polyfit(seen["time"][flows], seen["below"][flows], 1)[0] == pytest.approx(rate, rel=0.1)
+    return np.polyfit(seen["time"][flows], seen["below"][flows], 1)[0], rate
 
 
 def test_a_silo_runs_out_as_beverloo_says():

@@ -45,6 +45,7 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
             raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
     require_known(Asked(scene, particles, method, options))
     if isinstance(particles, TiedParticles):
+        _require_motions(scene, options.times.until)
         task: Task = engines.wing("bodies.admission").task_of(scene, particles, method, options)
         return task
     # The arrays of Particles may have been changed since it checked them.
