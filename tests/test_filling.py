@@ -181,7 +181,8 @@ def test_balls_overlap_neither_one_another_nor_walls(scene, packing):
 
 def test_balls_are_not_placed_in_what_they_may_not_meet():
     for place in (swarm.fill, swarm.pack):
-        scene = swarm.Scene([swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)), side="outside")])
+        tip = swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)), side="outside")
+        scene = swarm.Scene([tip, swarm.Box((1.0, 1.0, 1.0))])
         with pytest.raises(swarm.SceneError, match=r"surfaces\[0\] must be one that particles with a radius may meet"):
             place(scene, 5, speed=1.0, radius=0.05)
 

@@ -150,7 +150,7 @@ _OF_CLASS: dict[tuple[str, str], Form] = {
 _NOT_NEGATIVE = "barrier", "density", "edge", "length", "mass", "speed", "spin", "temperature", "time", "young"
 
 
-class Key(NamedTuple):
+class TableKey(NamedTuple):
     """A key of a table.
 
     Attributes:
@@ -181,7 +181,7 @@ class Table(NamedTuple):
     place: str
     kind: str
     meaning: str
-    keys: tuple[Key, ...]
+    keys: tuple[TableKey, ...]
 
 
 def form_of(kind: Any, owner: str, name: str) -> Form:
@@ -220,7 +220,7 @@ def _form(kind: Any) -> Form | None:
     return _PLAIN.get(kind)
 
 
-def keys_of(cls: type[Any], meanings: Mapping[str, str] | None = None) -> tuple[Key, ...]:
+def keys_of(cls: type[Any], meanings: Mapping[str, str] | None = None) -> tuple[TableKey, ...]:
     """The keys of a class with objects that a table describes, with what `meanings` says of them, or its docstring."""
     known, found = meanings_of(cls) if meanings is None else meanings, []
     for field in kept_fields(cls):
@@ -228,7 +228,7 @@ def keys_of(cls: type[Any], meanings: Mapping[str, str] | None = None) -> tuple[
         default = None if field.default is dataclasses.MISSING else field.default
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         meaning = known.get(name, "") or known.get(field.name, "") or _MORE.get(name, "")
-        found.append(Key(name, form_of(field.type, cls.__name__, name), needed, default, meaning))
+        found.append(TableKey(name, form_of(field.type, cls.__name__, name), needed, default, meaning))
     return tuple(found)
 
 
@@ -242,7 +242,7 @@ _MORE = {
     "mesh_error": "written by from_mesh: how far the samples are off the mesh at most [m].",
     "mesh_weld": "written with a mesh: how far a corner was moved at most [m].",
 }
-_FILE = Key("file", TEXT, meaning="a file beside the scene file.")
+_FILE = TableKey("file", TEXT, meaning="a file beside the scene file.")
 
 
 @functools.cache
@@ -273,19 +273,19 @@ def _kinds(place: str, kinds: Mapping[str, Any]) -> tuple[Table, ...]:
     return tuple(Table(place, kind, first_line(cls), keys_of(cls)) for kind, cls in kinds.items())
 
 
-def _top() -> tuple[Key, ...]:
+def _top() -> tuple[TableKey, ...]:
     known = meanings_of(Scene)
     lengths = {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"const": False}]}
     return (
-        Key("gravity", VECTOR, meaning=known["gravity"]),
-        Key("period", listed(lengths, 3, 3), meaning=f"{known['period']} In a file false in place of None."),
-        Key("plane", {"enum": ["x", "y", "z"]}, meaning=known["plane"]),
+        TableKey("gravity", VECTOR, meaning=known["gravity"]),
+        TableKey("period", listed(lengths, 3, 3), meaning=f"{known['period']} In a file false in place of None."),
+        TableKey("plane", {"enum": ["x", "y", "z"]}, meaning=known["plane"]),
     )
 
 
-def _run(known: Mapping[str, str]) -> tuple[Key, ...]:
+def _run(known: Mapping[str, str]) -> tuple[TableKey, ...]:
     code = {"type": "object", "additionalProperties": CODE}
-    own = Key("observables", code, meaning='user-defined observables by their names, "module:function".')
+    own = TableKey("observables", code, meaning='user-defined observables by their names, "module:function".')
     return (*keys_of(RunOptions, known), own)
 
 
@@ -293,11 +293,15 @@ def _surface(kind: str, cls: type[Surface], common: Table) -> Table:
     mine = {key.name for key in common.keys}
     keys = [key for key in keys_of(cls) if key.name not in mine]
     if kind in ALL_FIELDS:
-        keys.insert(0, Key("from", TEXT, meaning="a .csv file that holds them, a row each, in place of the arrays."))
+        keys.insert(
+            0, TableKey("from", TEXT, meaning="a .csv file that holds them, a row each, in place of the arrays.")
+        )
     if kind in ("sampled", "mesh"):
         keys.insert(0, _FILE)
     if kind == "mesh":
-        keys.append(Key("spacing", _OF_KEYS["spacing"], meaning="of samples in place of triangles, see `from_mesh`."))
+        keys.append(
+            TableKey("spacing", _OF_KEYS["spacing"], meaning="of samples in place of triangles, see `from_mesh`.")
+        )
     return Table("surface", kind, first_line(cls), tuple(keys))
 
 
@@ -320,7 +324,7 @@ def _bounded(name: str) -> Form:
 def _law(kind: str, cls: Any) -> Table:
     known = meanings_of(cls)
     keys = tuple(
-        Key(
+        TableKey(
             name,
             _OF_CLASS.get((cls.__name__, name), _bounded(name)),
             name not in cls._field_defaults,
@@ -332,17 +336,17 @@ def _law(kind: str, cls: Any) -> Table:
     return Table("surface.laws", kind, first_line(cls), keys)
 
 
-def _opening() -> tuple[Key, ...]:
+def _opening() -> tuple[TableKey, ...]:
     known = meanings_of(Opening)
     return (
-        Key("times", SPANS, meaning=known["times"]),
-        Key("between", {"type": "boolean"}, False, False, known["between"]),
+        TableKey("times", SPANS, meaning=known["times"]),
+        TableKey("between", {"type": "boolean"}, False, False, known["between"]),
     )
 
 
-def _counter() -> tuple[Key, ...]:
+def _counter() -> tuple[TableKey, ...]:
     known = meanings_of(Counter)
     return (
-        Key("surface", named("place"), True, meaning=known.get("surface", "")),
-        Key("inside", named("place"), meaning=known.get("inside", "")),
+        TableKey("surface", named("place"), True, meaning=known.get("surface", "")),
+        TableKey("inside", named("place"), meaning=known.get("inside", "")),
     )

@@ -48,7 +48,7 @@ _PYTHON, _COMPILING, _BEGINNING = 1e-4, 1.2, 0.5
 _MOST = 200_000
 
 
-class Load(NamedTuple):
+class Workload(NamedTuple):
     """The work of a run.
 
     Attributes:
@@ -210,7 +210,7 @@ def _about(seconds: float) -> str:
     return f"{seconds:.1g} s" if seconds < 10.0 else f"{seconds:.0f} s"
 
 
-def _loads(task: Task) -> list[Load]:
+def _loads(task: Task) -> list[Workload]:
     """The work of a run, as far as its start shows it."""
     options, method, n = task.options, task.method, len(task.particles)
     engine = knows.engine_of(knows.Asked(task.scene, task.bodies or task.particles, method, options))
@@ -219,18 +219,18 @@ def _loads(task: Task) -> list[Load]:
     if task.bodies is not None:
         body = task.bodies.body
         parts = len(body) + len(body.links) + len(body.springs)
-        return [Load(steps * len(task.bodies), "steps of bodies", _PART * parts)]
+        return [Workload(steps * len(task.bodies), "steps of bodies", _PART * parts)]
     if engine == knows.GRAINS:
-        return [Load(steps * n, "steps of balls", _GRAIN, shared=False)]
+        return [Workload(steps * n, "steps of balls", _GRAIN, shared=False)]
     impacts = _impacts(task)
     if engine in (knows.BALLS, knows.HEAVY):
         noun = "impacts and collisions before balls settle" if _settles(task) else "impacts and collisions"
-        return [Load(impacts + _collisions(task), noun, _BALLS, shared=False)]
+        return [Workload(impacts + _collisions(task), noun, _BALLS, shared=False)]
     if engine in (knows.SOFT, knows.BASELINE):
-        return [Load(steps * n, "steps of particles", _SPRING)]
+        return [Workload(steps * n, "steps of particles", _SPRING)]
     if engine == knows.PAPER:
-        return [Load(impacts, "contacts", _SWEEPS)]
-    flights = Load(impacts, "impacts", _cost_of_an_impact(task), engine != knows.MASSIVE)
+        return [Workload(impacts, "contacts", _SWEEPS)]
+    flights = Workload(impacts, "impacts", _cost_of_an_impact(task), engine != knows.MASSIVE)
     return [flights, *_sliding(task)]
 
 
@@ -240,14 +240,14 @@ def _settles(task: Task) -> bool:
     return task.scene.gravity is not None and laws is not None and laws.restitution is not None
 
 
-def _sliding(task: Task) -> list[Load]:
+def _sliding(task: Task) -> list[Workload]:
     """The steps of particles that come to slide."""
     scene = task.scene
     if scene.gravity is None or not _settles(task):
         return []
     crossing = math.sqrt(scene.finite_size() / math.hypot(*scene.gravity))
     steps = len(task.particles) * task.options.until / crossing * _STEPS_A_CROSSING
-    return [Load(steps, "steps of sliding at most", _SLIDING)]
+    return [Workload(steps, "steps of sliding at most", _SLIDING)]
 
 
 def _impacts(task: Task) -> float:

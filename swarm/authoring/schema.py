@@ -5,7 +5,7 @@ from typing import Any
 from ..fleet.plan import COMBINE, MAKERS, WAYS
 from ..scene_file import SWEEP
 from ..surfaces import ALL_FIELDS, ALL_SURFACES
-from .keys import CODE, INTEGER, Form, Key, Table, either, listed, named, tables
+from .keys import CODE, INTEGER, Form, Table, TableKey, either, listed, named, tables
 
 # JSON Schema, draft 2020-12.
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -88,7 +88,7 @@ def _definitions(known: dict[tuple[str, str], Table]) -> Form:
     return made
 
 
-def _only_default(key: Key) -> Any:
+def _only_default(key: TableKey) -> Any:
     """The form of a key that may have no other value than that where it is left out."""
     return {"const": key.default} if isinstance(key.default, float) else False
 

@@ -7,6 +7,7 @@ import typer
 
 
 def docs(
+    context: typer.Context,
     folder: Annotated[
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="Of the pages; index.html is the first.")
     ] = Path("swarm-docs"),
@@ -15,15 +16,13 @@ def docs(
     """Write the reference: pages of all public names, observables, keys of scene files and commands."""
     from ..authoring.reference import write
 
-    print(f"written to {write(folder, commands(), overwrite)}")
+    print(f"written to {write(folder, commands(context.find_root().command), overwrite)}")
 
 
-def commands() -> tuple[Any, ...]:
+def commands(group: Any) -> tuple[Any, ...]:
     """Every command of the command line, with its arguments and options."""
     from ..authoring.reference import Command
-    from .cli import app
 
-    group: Any = typer.main.get_command(app)
     found = []
     for name, command in group.commands.items():
         options = tuple(_option(one) for one in command.params if one.name != "help")

@@ -9,6 +9,7 @@ modules with code that the file may name, and `options` are keywords of
     result = swarm.run("scene.toml", until=2.0)
 """
 
+import pkgutil
 import sys
 from types import ModuleType
 from typing import Any
@@ -22,6 +23,10 @@ class _Called(ModuleType):
         from .engines import wing  # Numba only where something runs
 
         return wing("authoring.file_run").run(path, output, plugins=plugins, **options)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By its name, as any module is pickled with code that a cluster is sent."""
+        return pkgutil.resolve_name, (self.__name__,)
 
 
 sys.modules[__name__].__class__ = _Called

@@ -25,7 +25,7 @@ MADE = {"mesh_weld", "args", "kwargs", "common"}
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     target = tmp_path_factory.mktemp("docs") / "pages"
-    write(target, commands())
+    write(target, commands(get_command(app)))
     return target
 
 

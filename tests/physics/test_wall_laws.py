@@ -303,8 +303,8 @@ def test_bad_laws_are_refused_in_one_sentence(laws, sentence):
 def test_what_knows_no_laws_says_so():
     wall = swarm.Sphere(1.0, laws=[Restitution(0.9)])
     start = swarm.Particles((0, 0, 0), (1, 0, 0))
-    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws must be .* with Penalty"):
-        swarm.simulate(swarm.Scene([wall]), start, swarm.Penalty(dt=1e-3, penalty=1e6), until=1.0)
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws must be .* with Verlet"):
+        swarm.simulate(swarm.Scene([wall]), start, swarm.Verlet(dt=1e-3, penalty=1e6), until=1.0)
     with pytest.raises(swarm.SceneError, match="contact_step must be 0 where"):
         swarm.simulate(swarm.Scene([wall]), start, swarm.Impact(contact_step=1e-3), until=1.0)
     scene = swarm.Scene([wall])
