@@ -46,7 +46,7 @@ class Path(Given):
         times: at least two, ascending [s].
         positions: for each time three numbers, the displacement from where the wall is given [m].
 
-    The second derivative is 0 at both ends (the natural spline); there is no motion beyond them.
+    The second derivative is 0 at both ends (the natural spline). The times must cover the run.
 
     Raises:
         SceneError: an argument is out of its range.
