@@ -93,15 +93,13 @@ def silo(width, is_shut=False):
     return swarm.Scene([vessel, *floor], gravity=(0.0, 0.0, -G), pairs=swarm.Pairs(**LAWS))
 
 
+@pytest.mark.xfail(
+    strict=True, reason="with four seeds the flow is 372, 241, 288, 302 a second, and the law 264 to 271"
+)
 def test_a_silo_that_a_source_fills_runs_out_as_beverloo_says():
-    """With C = 0.58 and k = 1.4 of the literature, in the form for the area of an orifice: 4 C/pi rho sqrt(g D) A.
-
-    An orifice of four grains lets them out by fits and starts: a run of 0.6 s is 0.9 to 1.4 times the law, so the mean
-    of four seeds counts, within three standard errors.
-    """
-    flow, law = np.transpose([_flow_and_law_of_the_poured_silo(seed) for seed in (1, 2, 3, 4)])
-    error = flow.std(ddof=1) / np.sqrt(len(flow))
-    assert abs(flow.mean() - law.mean()) < 3.0 * error
+    """With C = 0.58 and k = 1.4 of the literature, in the form for the area of an orifice: 4 C/pi rho sqrt(g D) A."""
+    flow, law = np.mean([_flow_and_law_of_the_poured_silo(seed) for seed in (1, 2, 3, 4)], axis=0)
+    assert flow == pytest.approx(law, rel=0.1)
 
 
 def _flow_and_law_of_the_poured_silo(seed):
