@@ -1,5 +1,6 @@
 """Particles: arrays with one row per component."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -43,7 +44,7 @@ class Particles:
     2
     """
 
-    volume: float | None = None
+    _volume: float | Callable[[], float] | None = None
     # The births of the particles in a run with sources.
     births: "Births | None" = None
 
@@ -65,8 +66,20 @@ class Particles:
     def copy(self) -> "Particles":
         """The same particles, checked again, with arrays of their own."""
         made = Particles(self.position, self.velocity, self.mass, self.image, self.radius, self.spin)
-        made.volume = self.volume
+        made._volume = self._volume
         return made
+
+    @property
+    def volume(self) -> float | None:
+        """The volume that the particles were filled into [m^3], in a plane the area [m^2]; None if not known."""
+        if callable(self._volume):
+            self._volume = self._volume()
+        return self._volume
+
+    @volume.setter
+    def volume(self, volume: float | Callable[[], float] | None) -> None:
+        """Set the volume, or a function that returns it when it is first asked for."""
+        self._volume = volume
 
     def __len__(self) -> int:
         return int(self.position.shape[1])

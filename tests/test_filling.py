@@ -2,11 +2,13 @@
 
 import importlib
 import math
+import pickle
 
 import numpy as np
 import pytest
 
 import swarm
+from swarm.placing import filling
 from swarm.placing.cells import overlaps_of
 
 # The statistics of N points are off by a few 1/sqrt(N).
@@ -220,3 +222,24 @@ def test_points_have_the_bits_that_they_had():
 def test_balls_that_do_not_fit_are_one_sentence(scene, n, radius, sentence):
     with pytest.raises(swarm.SceneError, match=sentence):
         swarm.fill(BALLS[scene], n, speed=1.0, radius=radius)
+
+
+@pytest.mark.parametrize("n", [1, 20, 3000])
+@pytest.mark.parametrize(
+    "scene",
+    [
+        swarm.Scene([swarm.Box((0.4, 0.3, 0.2))]),
+        swarm.Scene([swarm.Cylinder(0.3, length=1.0)], plane="z"),
+        swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.49, side="outside")]),
+    ],
+    ids=["all trials", "plane", "few trials"],
+)
+def test_few_particles_have_the_bits_of_a_whole_batch(scene, n, monkeypatch):
+    """Points, velocities and the volume, which is computed when it is first asked for."""
+    few = swarm.fill(scene, n, temperature=1.0, seed=n)
+    kept = pickle.loads(pickle.dumps(few.copy()))
+    monkeypatch.setattr(filling, "_few_points", lambda *_: None)
+    whole = swarm.fill(scene, n, temperature=1.0, seed=n)
+    np.testing.assert_array_equal(few.position, whole.position)
+    np.testing.assert_array_equal(few.velocity, whole.velocity)
+    assert few.volume == kept.volume == whole.volume

@@ -1,5 +1,8 @@
 """Random particles, uniform in the admissible volume of a scene."""
 
+import functools
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -12,6 +15,8 @@ from .fitting_shapes import require_shapes
 from .sequential import VolumeBox, place_balls, require_packing, require_size
 
 _BATCH = 1 << 18
+# Trials for each point that is asked for, before a whole batch is looked at.
+_TRIALS_A_POINT, _FEWEST_TRIALS = 8, 64
 # The search ends after this many points if fewer than one in a million was admissible.
 _TRIES = 20_000_000
 # Of balls the volume is estimated from as many admissible points, to 0.1 %.
@@ -70,11 +75,12 @@ def fill(
     random = np.random.default_rng(seed)
     # Checks the masses too; velocities follow, since a Maxwellian needs the masses.
     if radius is None:
-        points, volume = _points(scene, n, random)
+        points, volume = _few_points(scene, n, seed, random) or _points(scene, n, random)
         particles = Particles(points, np.zeros((3, n)), mass)
+        particles.volume = volume
     else:
-        particles, volume = _balls(scene, Particles(np.zeros((3, n)), np.zeros((3, n)), mass, None, radius), random)
-    particles.volume = volume
+        particles = Particles(np.zeros((3, n)), np.zeros((3, n)), mass, None, radius)
+        particles.volume = _place(scene, particles, random)
     particles.image = None if scene.period is None else np.zeros((3, n), np.int64)
     fill_velocities(scene, particles, speed, temperature, exact, random)
     return particles
@@ -113,15 +119,15 @@ def fill_velocities(
         particles.velocity = normal * np.sqrt(temperature / particles.mass)
 
 
-def _balls(scene: Scene, particles: Particles, random: np.random.Generator) -> tuple[Particles, float]:
-    """Balls where they overlap nothing, and the volume."""
+def _place(scene: Scene, particles: Particles, random: np.random.Generator) -> float:
+    """Put balls where they overlap nothing; returns the volume."""
     assert particles.radius is not None
     require_shapes(scene, particles.radius)
     require_size(scene, particles.radius)
     room = room_of(scene, random, "fill")
     require_packing(scene, particles.radius, room)
     particles.position = place_balls(scene, particles.radius, room, random)
-    return particles, room.volume
+    return room.volume
 
 
 def room_of(scene: Scene, random: np.random.Generator, user: str) -> VolumeBox:
@@ -139,6 +145,35 @@ def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]
             f"give {instead}"
         )
     return low, high
+
+
+def _few_points(
+    scene: Scene, n: int, seed: int, random: np.random.Generator
+) -> tuple[Floats, Callable[[], float]] | None:
+    """What `_points` returns, from the first trials of its batch, with the volume for later.
+
+    Returns None, with nothing drawn, if n admissible points are not among those trials.
+    """
+    trials = max(_FEWEST_TRIALS, _TRIALS_A_POINT * n)
+    if trials >= _BATCH:
+        return None
+    low, high = bounding_box(scene, "fill", _INSTEAD)
+    bits = np.random.PCG64()
+    bits.state = random.bit_generator.state  # type: ignore[assignment]
+    trial = np.zeros((3, trials))
+    for axis in scene.axes():
+        trial[axis] = low[axis] + (high - low)[axis] * np.random.Generator(bits).random(trials)
+        bits.advance(_BATCH - trials)
+    inside = trial[:, scene.admits(trial)]
+    if inside.shape[1] < n:
+        return None
+    random.bit_generator.state = bits.state
+    return inside[:, :n], functools.partial(_volume_of, scene, seed)
+
+
+def _volume_of(scene: Scene, seed: int) -> float:
+    """The volume [m^3], in a plane the area, from the first batch of random points of a seed."""
+    return _points(scene, 1, np.random.default_rng(seed))[1]
 
 
 def _points(scene: Scene, n: int, random: np.random.Generator, user: str = "fill") -> tuple[Floats, float]:
