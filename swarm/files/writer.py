@@ -112,7 +112,9 @@ class TrajectoryWriter(AppendedFile):
         # The end, the threads and the clock of the run, set before the context begins.
         self.course: Course | None = None
         self._wall_time: Any = None
-        self._radius, self._turns, self._volume = particles.radius, particles.spin is not None, particles.volume
+        self._radius, self._turns = particles.radius, particles.spin is not None
+        # That of points is not written, and would be computed to be asked for.
+        self._volume = None if particles.radius is None else particles.volume
         self._columns = columns_of(scene, particles, storage)
         self._edges: Any = None
         # None of a file of an older version.
@@ -181,7 +183,7 @@ class TrajectoryWriter(AppendedFile):
         if self._bodies is not None:
             parameters["body"] = tomli_w.dumps(view("bodies").table_of(self._bodies.body))
             parameters["copies"] = self._bodies.position.shape[2]
-        if self._radius is not None and self._volume is not None:
+        if self._volume is not None:
             parameters["volume"] = self._volume
 
     def _make_particles(self, name: str, shape: tuple[int, ...], kind: Any) -> None:
