@@ -86,8 +86,10 @@ class RowSums:
         file[_COLUMNS] = np.bytes_(
             "\n".join(f"{name} {count} {block}" for name, (count, block) in blocks.items()).encode()
         )
-        sums = {name: checksum_of(_value(file[name])) for name in constants(file) if name not in other}
-        file[_CONSTANTS] = np.bytes_(_serialized(sums | _attributes(file)))
+        objects = _objects(file)
+        known = {name: one for name, one in objects if _is_constant(name, one) and name not in other}
+        sums = {name: checksum_of(_value(known[name])) for name in sorted(known)}
+        file[_CONSTANTS] = np.bytes_(_serialized(sums | _attributes(objects)))
         # From a full disk nothing can be read back.
         return cls(file, blocks)
 
@@ -128,16 +130,20 @@ def checksum_of_attribute(group: Any, name: str) -> int:
     return checksum_of("\n".join(map(str, np.ravel(group.attrs[name]))))
 
 
-def _attributes(file: Any) -> dict[str, int]:
+def _objects(file: Any) -> list[tuple[str, Any]]:
+    """The names of groups and datasets, and these: each once, though links give some of them several names."""
+    found: list[tuple[str, Any]] = []
+    file.visititems(lambda *named: found.append(named))
+    return found
+
+
+def _attributes(objects: list[tuple[str, Any]]) -> dict[str, int]:
     """The checksums of the attributes with texts in the heap, by GROUP@NAME."""
     found = {}
-
-    def look(name: str, one: Any) -> None:
-        kinds = {key: one.attrs.get_id(key).dtype for key in one.attrs}
-        texts = [key for key, kind in kinds.items() if h5py.check_string_dtype(kind)]
-        found.update({f"{name}@{key}": checksum_of_attribute(one, key) for key in texts})
-
-    file.visititems(look)
+    for name, one in objects:
+        for key in one.attrs if h5py.h5a.get_num_attrs(one.id) else ():
+            if h5py.check_string_dtype(one.attrs.get_id(key).dtype):
+                found[f"{name}@{key}"] = checksum_of_attribute(one, key)
     return found
 
 
@@ -159,18 +165,16 @@ def replace(file: Any, values: dict[str, Any]) -> None:
             file.flush()
 
 
+def _is_constant(name: str, one: Any) -> bool:
+    """Whether an object of a file is a dataset that does not grow, and is not one of checksums."""
+    if not isinstance(one, h5py.Dataset) or name.startswith(GROUP):
+        return False
+    return one.shape == () or (one.maxshape[0] is not None and not one.is_virtual)
+
+
 def constants(file: Any) -> list[str]:
     """The names of the datasets that do not grow."""
-    found = []
-
-    def look(name: str, one: Any) -> None:
-        if not isinstance(one, h5py.Dataset) or one.is_virtual or name.startswith(GROUP):
-            return
-        if one.shape == () or one.maxshape[0] is not None:
-            found.append(name)
-
-    file.visititems(look)
-    return sorted(found)
+    return sorted(name for name, one in _objects(file) if _is_constant(name, one))
 
 
 class Checked:
