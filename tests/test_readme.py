@@ -159,11 +159,15 @@ def test_ci_runs_the_readme_test_command():
 
 
 def copy_examples(folder, count):
-    """The scenes and sweeps of the examples with few particles, two seeds and long steps: how they run is tested."""
+    """The scenes and sweeps of the examples with few particles and births, two seeds and long steps.
+
+    How they run is tested.
+    """
     for name in ("scenes", "sweeps"):
         shutil.copytree(ROOT / "examples" / name, folder / "examples" / name)
         for path in (folder / "examples" / name).glob("*.toml"):
             text = re.sub(r"^count = [\d_]+", f"count = {count}", path.read_text(), flags=re.MULTILINE)
+            text = re.sub(r"^rate = \S+", "rate = 20.0", text, flags=re.MULTILINE)
             text = re.sub(r"^dt = (\S+)", lambda found: f"dt = {10.0 * float(found[1])}", text, flags=re.MULTILINE)
             text = text.replace('kind = "impact"', 'kind = "impact"\nsliding_tolerance = 1e-4')
             path.write_text(re.sub(r"range = \d+", "range = 2", text))
