@@ -162,6 +162,9 @@ def member(members, m):
 
 def gathered(like, table, m, k):
     """Numbers of one kind with `like`, from row m of a table, from column k on."""
+    # Numbers first: plain Python asks in this order.
+    if not isinstance(like, tuple):
+        return None if like is None else table[m, k]
     if isinstance(like, GrownLike):
         return gathered(like.body, table, m, k).grown(like.radius)
     if isinstance(like, SphereNumbers):
@@ -170,8 +173,6 @@ def gathered(like, table, m, k):
         return made(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3])
     if isinstance(like, (*AXES, Shared)):
         return like if isinstance(like, Shared) else type(like)(1.0)  # type: ignore[call-arg]
-    if not isinstance(like, tuple):
-        return None if like is None else table[m, k]
     parts: tuple[Any, ...] = ()
     for part in like:
         parts = (*parts, gathered(part, table, m, k))
@@ -181,11 +182,13 @@ def gathered(like, table, m, k):
 
 def width(like):
     """The number of columns: a constant for the compiler."""
+    if not isinstance(like, tuple):
+        return 0 if like is None else 1
     if isinstance(like, GrownLike):
         return width(like.body)
     if isinstance(like, (SphereNumbers, Shared)):
         return 4 if isinstance(like, SphereNumbers) else 0
-    return sum(map(width, like)) if isinstance(like, tuple) else 0 if like is None else 1
+    return sum(map(width, like))
 
 
 def table_of(bodies: Sequence[Any]) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ written from the tree of the derivatives.
 """
 
 import collections
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -13,6 +14,7 @@ from typing import Any
 from ...common import checks
 from ...common.checks import Vector
 from ...errors import SceneError
+from ..surface import Box
 from .code import class_of
 from .derivatives import derived
 from .expression import COORDINATES, FUNCTIONS
@@ -74,25 +76,36 @@ class Formula(FormSurface):
         checks.assign(self, parameters=_checked(self.parameters))
         if not isinstance(self.formula, str):
             raise SceneError(f"phi must be a formula in quotes, got {checks.shown(self.formula)}")
-        names, values = tuple(self.parameters or ()), tuple((self.parameters or {}).values())
-        code = derived(self.formula, names)
-        exact = code.with_values(values)
-        box, size = self.box or exact.found_box(), self.length
-        if size is None:
-            size = math.inf if box is None else min(b - a for a, b in zip(*box, strict=True)) / 2.0
-        make: Any = collections.namedtuple("Parameters", [f"p{i}" for i in range(len(values))])  # type: ignore[misc]
-        base = base_of(code.along, self.side == "outside" and box is not None)
-        phi, gradient, hessian = code.functions
-        kind = class_of(make(*values), phi, gradient, hessian, code.along, base)
-        kind.same_in_python = all(part.same_in_python for part in code.functions)
-        form = Form(kind, values, box, size, self.side)
-        if box is not None:
-            form.check()
-        exact.check(form, needs_box=self.curvature is None)
-        form = replace(form, bend=exact.bend(form) if self.curvature is None else Bend.of_magnitude(self.curvature))
-        if box is not None:
-            form.check_bend()
-        return form
+        parameters = tuple((self.parameters or {}).items())
+        return _form_of(self.formula, parameters, self.box, self.length, self.side, self.curvature)
+
+
+# A scene is made again in each process, run and copy, and bounds by intervals take 0.1 s.
+@functools.lru_cache(maxsize=64)
+def _form_of(
+    formula: str, parameters: tuple[tuple[str, float], ...], box: Box | None, size: float | None, side: str,
+    curvature: float | None,
+) -> Form:  # fmt: skip
+    """The form of a formula, with the box, the size and the bend that are not given."""
+    names, values = tuple(name for name, _value in parameters), tuple(value for _name, value in parameters)
+    code = derived(formula, names)
+    exact = code.with_values(values)
+    box = box or exact.found_box()
+    if size is None:
+        size = math.inf if box is None else min(b - a for a, b in zip(*box, strict=True)) / 2.0
+    make: Any = collections.namedtuple("Parameters", [f"p{i}" for i in range(len(values))])  # type: ignore[misc]
+    base = base_of(code.along, side == "outside" and box is not None)
+    phi, gradient, hessian = code.functions
+    kind = class_of(make(*values), phi, gradient, hessian, code.along, base)
+    kind.same_in_python = all(part.same_in_python for part in code.functions)
+    form = Form(kind, values, box, size, side)
+    if box is not None:
+        form.check()
+    exact.check(form, needs_box=curvature is None)
+    form = replace(form, bend=exact.bend(form) if curvature is None else Bend.of_magnitude(curvature))
+    if box is not None:
+        form.check_bend()
+    return form
 
 
 def _checked(parameters: Any) -> dict[str, float] | None:
