@@ -172,7 +172,7 @@ def gathered(like, table, m, k):
         made = cavity if isinstance(like, SphereCavity) else ball
         return made(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3])
     if isinstance(like, (*AXES, Shared)):
-        return like if isinstance(like, Shared) else type(like)(1.0)  # type: ignore[call-arg]
+        return like if isinstance(like, Shared) else type(like)(1.0)  # type: ignore[arg-type]
     parts: tuple[Any, ...] = ()
     for part in like:
         parts = (*parts, gathered(part, table, m, k))
