@@ -599,6 +599,8 @@ def meaning(cell: Cell) -> str | None:
         return "AugmentedLagrangian has no such argument"
     if name in ("oscillation", "turning", "path") and "mass" in engine.laws:
         return "impacts move the wall, so that its motion cannot be given"
+    if name == "door" and cell.wall == "planes" and cell.engine == "balls, heavy wall":
+        return "planes have no rooms that a door could be between, and these flights are cut nowhere"
     if engine_of_points and name in _OF_WHAT_MEETS:
         return "a point neither meets another one nor turns"
     if name == "contact duration" and engine.method is swarm.Penalty:

@@ -25,7 +25,7 @@ from .surfaces.pieces import Images, Pieces, pieces_of
 from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.presence.doors import instants_of
 from .surfaces.presence.openings import require_few
-from .surfaces.surface import UNBOUNDED, Box, Surface
+from .surfaces.surface import UNBOUNDED, Box, Surface, held_opening
 from .surfaces.union import Place
 
 # The number of points with gaps found at once.
@@ -429,5 +429,6 @@ class Scene:
                 turn = tuple(np.array(orientations)[i].tolist())
                 rows = tuple(map(tuple, rotations.matrix(turn).tolist()))
                 held = motions.Placed(tuple(np.array(positions)[i].tolist()), turn, rows)
-                surfaces[i] = replace(surface, mass=None, inertia=None, motion=held)
+                openings = tuple(held_opening(one, held) for one in surface.openings)
+                surfaces[i] = replace(surface, mass=None, inertia=None, motion=held, openings=openings)
         return Scene(surfaces, self.gravity, self.period, self.plane, self.pairs)

@@ -482,10 +482,12 @@ REFUSED = {
     r"openings must be a list of surfaces such as swarm.Sphere, got Sphere": lambda: swarm.Sphere(0.5, openings=HOLE),
     r"openings\[1\] must be a surface such as swarm.Sphere, got 3": lambda: swarm.Sphere(0.5, openings=[HOLE, 3]),
     r"openings\[0\].openings must be left out": nested,
-    r"openings must be of a wall at rest, got 1 of a Sphere": lambda: swarm.Sphere(
+    r"openings must be of a wall at rest, or of one with a mass, got 1 of a Sphere": lambda: swarm.Sphere(
         0.5, openings=[HOLE], motion=swarm.Translation((1.0, 0.0, 0.0))
     ),
-    r"openings must be of a wall at rest, got 1 of a Plane": lambda: swarm.Plane((0, 0, 1), openings=[HOLE], mass=1.0),
+    r"openings must be of a wall at rest, or of one with a mass, got 1 of a Plane": lambda: swarm.Plane(
+        (0, 0, 1), openings=[HOLE], motion=swarm.Translation((1.0, 0.0, 0.0))
+    ),
     r"surfaces\[0\].openings\[1\] must reach the wall that it opens, got Sphere\(radius=0.1\), in which": lambda: (
         swarm.Scene([swarm.Sphere(0.5, openings=[HOLE, swarm.Sphere(0.1)])])
     ),
@@ -516,11 +518,13 @@ def test_methods_that_know_no_openings(name):
         run(scene, swarm.fill(scene, 2, speed=1.0, seed=1), method=getattr(swarm, name)(dt=0.01, penalty=1e4))
 
 
-def test_openings_are_not_supported_beside_walls_with_a_mass():
-    vessel = swarm.Sphere(0.5, openings=[HOLE])
+def test_an_opening_of_a_vessel_beside_a_wall_with_a_mass():
+    vessel = swarm.Sphere(0.5, openings=[swarm.Plane((0.0, 0.0, -1.0), 0.0)])
     scene = swarm.Scene([vessel, swarm.Sphere(0.1, side="outside", mass=1.0)])
-    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].openings must be left out where a wall has a mass"):
-        run(scene, swarm.fill(scene, 2, speed=1.0, seed=1))
+    result = run(scene, swarm.fill(scene, 20, speed=1.0, seed=1), until=20.0)
+    np.testing.assert_allclose(np.sqrt((result.particles.position**2).sum(axis=0)), 0.5, rtol=1e-14)
+    assert np.isfinite(result.escape_time).all()
+    assert result.particles.position[2].min() >= 0.0
     with pytest.raises(swarm.SceneError, match=r"cavities\[0\]\[0\] must have no motion, mass, inertia or openings"):
         swarm.Body([(0, 0, 0), (0, 0, 0.1)], [1.0, 1.0], cavities=[(vessel, 0, 1)])
 

@@ -24,6 +24,7 @@ from ..run.preflight.counting import counters_of, crossed_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
+from ..scene import Scene
 from ..state import Balls, Floats, State
 from .colliding import events
 from .colliding.bounce import Gates
@@ -72,10 +73,8 @@ class CollidingRun(BaseRun):
         feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
         if openings is not None or ends or feed is not None:
             gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
-        self._box = self._with_heavy(compiled, box)._replace(
-            window=None if self._windows is None else self._windows.numbers,
-            gates=gates,
-        )  # fmt: skip
+        box = box._replace(window=None if self._windows is None else self._windows.numbers, gates=gates)
+        self._box = self._with_heavy(compiled, box)
         if any(one.send_off for one in every):
             self._box = self._box._replace(source=RandomSource(seeding.signed(), seeding.first))
         super().__init__(compiled, method, n, threads, Tier(compile, self._box, n), seeding, watched)
@@ -194,8 +193,12 @@ class CollidingRun(BaseRun):
         self._set_window()
         if instant is not None and (came := comers(self._scene, instant)).any():
             self._show_at(now)
-            require_free(self._scene, self._seen_state(), came, self._deepest, instant, self._first)
+            require_free(self._scene_at(instant), self._seen_state(), came, self._deepest, instant, self._first)
         self._look_anew(now)
+
+    def _scene_at(self, instant: float) -> Scene:
+        """The scene, as far as its motions do not say where its walls are at an instant [s]."""
+        return self._scene
 
     def _look_anew(self, now: float) -> None:
         """Find what is next for every ball from a time of the epoch on [s]; negative: at the start."""

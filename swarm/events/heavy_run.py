@@ -9,6 +9,7 @@ from ..contact.laws import Laws
 from ..kernel.vector import ZERO, vec
 from ..run.base import Arrays, named
 from ..run.observed import Observed
+from ..scene import Scene
 from ..state import Floats
 from .balls_run import CollidingRun
 from .colliding.heavy import COUNTS, Heavy
@@ -42,7 +43,18 @@ class HeavyRun(CollidingRun):
             np.zeros(n, np.int64),
         )  # fmt: skip
         self._flock = self._flock._replace(freedoms=self._freedoms)
-        return box._replace(heavy=self._heavy, owners=scenery.owners)
+        gates = None if box.gates is None else box.gates._replace(openings=scenery.openings)
+        return box._replace(heavy=self._heavy, owners=scenery.owners, gates=gates)
+
+    def _set_window(self) -> None:
+        if self._windows is not None:
+            self._heavy = self._heavy._replace(walls=self._windows.reacting())
+            self._box = self._box._replace(heavy=self._heavy)
+        super()._set_window()
+
+    def _scene_at(self, instant: float) -> Scene:
+        self._walls_seen(instant)
+        return self._scene.placed(self._observed.position, self._observed.orientation)
 
     def _begin(self) -> None:
         for freedom in self._heavy.ways:

@@ -17,6 +17,7 @@ from ..methods.base import Method
 from ..particles import Particles
 from ..run import failures
 from ..run.base import Arrays, BaseRun, named
+from ..run.doors import comers, require_free
 from ..run.impacts import ThreadLog
 from ..run.observed import Observed
 from ..run.preflight.counting import counters_of, with_counters
@@ -32,7 +33,7 @@ from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule, SceneWalls
 # Of a clock, how many events were taken where no lease is made yet: so much less for each particle that is predicted.
 _ALL_AHEAD = -1.0
 # Of a queue, what a checkpoint has under other names, or finds again.
-_NOT_KEPT = "heap", "mass", "heat", "crossed", "watchers", "image", "absorbed"
+_NOT_KEPT = "heap", "mass", "heat", "crossed", "watchers", "image", "absorbed", "escape_time"
 
 
 class ReactingRun(BaseRun):
@@ -56,6 +57,8 @@ class ReactingRun(BaseRun):
         if any(laws.may_end for laws in self._scenery.each_laws()):
             absorbed_time, absorbed_wall = np.full(n, math.nan), np.full(n, -1, np.int32)
             self.state = self.state._replace(absorbed_time=absorbed_time, absorbed_wall=absorbed_wall)
+        if compiled.openings() is not None:
+            self.state = self.state._replace(escape_time=np.full(n, math.nan))
         tier = Tier(compile, (self._scenery, gravity), n)
         super().__init__(compiled, method, n, threads, tier, seeding, watched)
         counters = counters_of(self._scene, watched.counters, logs=True)
@@ -66,8 +69,9 @@ class ReactingRun(BaseRun):
             np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool),
             np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
             Heap(np.zeros(n), number.copy(), number.copy()), state.heat, state.crossed, self._watchers(counters),
-            absorbed=state.absorbed,
+            absorbed=state.absorbed, escape_time=state.escape_time,
         )  # fmt: skip
+        self._instants = self._scene.instants if self._scene.has_doors() else None
         self._freedoms = freedoms_of(compiled, particles.velocity)
         self._clock = np.zeros(CLOCK)
         self._show(0.0)
@@ -83,6 +87,11 @@ class ReactingRun(BaseRun):
         if not self._cut_short:
             self._clock[NOW] = 0.0
             self._clock[TAKEN] = _ALL_AHEAD
+
+    def _switch(self, instant: float) -> None:
+        if (came := comers(self._scene, instant)).any():
+            scene = self._scene.placed(self._observed.position, self._observed.orientation)
+            require_free(scene, self.state, came, self._deepest, instant, self._first)
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
         rule, page = ReactionRule(span, self._watch.passes, moment), self._open_page(moment)
@@ -187,6 +196,7 @@ class ReactingRun(BaseRun):
         queue |= {} if self.state.heat is None else {"heat": self.state.heat}
         absorbed = self.state.absorbed
         queue |= {} if absorbed is None else {"absorbed_time": absorbed.time, "absorbed_wall": absorbed.wall}
+        queue |= {} if self.state.escape_time is None else {"escape_time": self.state.escape_time}
         return {**queue, **named("walls", self._freedoms), "key": self._queue.heap.key, "clock": self._clock}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:

@@ -50,8 +50,13 @@ class Windows:
         return scenery_of(compiled, moment).given if compiled.scene.reacts() else compiled.walls(moment)
 
     def openings(self) -> Any:
-        """The openings in it."""
-        return self._compiled.openings(float(self.numbers[MOMENT]))
+        """The openings in it of the walls that have no mass."""
+        moment, compiled = float(self.numbers[MOMENT]), self._compiled
+        return scenery_of(compiled, moment).openings if compiled.scene.reacts() else compiled.openings(moment)
+
+    def reacting(self) -> Any:
+        """The walls in it that have a mass."""
+        return scenery_of(self._compiled, float(self.numbers[MOMENT])).reacting
 
 
 def windows_of(compiled: CompiledScene, clock: Floats) -> Windows | None:

@@ -50,7 +50,8 @@ def _openings(name: str, value: Any) -> "tuple[Surface | Opening, ...]":
                     f"{name}[{k}].present must be left out, an opening is no wall, got {came!r:.200}; say when it is "
                     "open as swarm.Opening(surface, times=...)"
                 )
-            if law.name != "rotation" and came != law.default:
+            is_held = law.name == "motion" and isinstance(came, motions.Placed)
+            if law.name != "rotation" and came != law.default and not is_held:
                 raise SceneError(f"{name}[{k}].{law.name} must be left out, an opening is no wall, got {came!r:.200}")
     return given
 
@@ -79,7 +80,8 @@ class Surface(Validated):
             above 0. With a mass as well it is a pendulum with its weight at its `center`; without, on the axis.
         openings: surfaces without openings, laws and motion, inside which the wall is not there (with side "outside":
             outside of which; of many bodies, such as `Spheres`: in each of them). A particle that reaches the wall
-            there has escaped, and stays as it is then. Of a wall at rest. An `Opening` is open for some times only.
+            there has escaped, and stays as it is then. Of a wall at rest, or of one with a mass, with which they move.
+            An `Opening` is open for some times only.
         present: pairs (t0, t1) [s] that ascend, from 0 s on: the wall is there from t0 on, and no longer from t1 on,
             which is infinite in the last pair if it stays. None: it is always there.
     """
@@ -124,10 +126,10 @@ class Surface(Validated):
                 f"mass must be None where an inertia is given to a {type(self).__name__}, which has no center that its "
                 f"weight could be at, got {self.mass:g}"
             )
-        if self.openings and (self.motion is not None or self.reacts()):
+        if self.openings and not (self.motion is None or self.reacts() or isinstance(self.motion, motions.Placed)):
             raise SceneError(
-                f"openings must be of a wall at rest, got {len(self.openings)} of a {type(self).__name__} with a "
-                "motion, a mass or an inertia; leave these out, or the openings"
+                f"openings must be of a wall at rest, or of one with a mass, got {len(self.openings)} of a "
+                f"{type(self).__name__} with a motion; leave that out, or the openings"
             )
 
     def __repr__(self) -> str:
@@ -455,6 +457,13 @@ def is_along(direction: Vector, axis: Vector) -> bool:
 def volume_of(opening: Surface | Opening) -> Surface:
     """The volume of an opening, present while that is open."""
     return replace(opening.surface, present=opening.times) if isinstance(opening, Opening) else opening
+
+
+def held_opening(opening: Surface | Opening, held: motions.Placed) -> Surface | Opening:
+    """An opening where a run has moved its wall."""
+    if isinstance(opening, Opening):
+        return replace(opening, surface=replace(opening.surface, motion=held))
+    return replace(opening, motion=held)
 
 
 def _turned_opening(opening: Surface | Opening, turn: rotations.Quaternion) -> Surface | Opening:

@@ -49,10 +49,7 @@ def bounce(box, flock, books, clock, i, now):
     if box.gates is not None and box.gates.openings is not None:
         closed = _closed_wall(box, walls, wall, i, r, v)
         if closed < 0.0:
-            box.gates.escape_time[index(i)] = moment_of(clock, now)
-            settle(box, books, clock, i, now, r, v)
-            flock.put(i, now, r, v)
-            box.watchers.hit(books.image, Struck(i, box.owner(wall), moment_of(clock, now), r, v, v, 0.0))
+            let_out(box, flock, books, clock, box.owner(wall), (i, now, r, v))
             return GONE
         wall = closed
     after = _turned(box, flock, books, walls, wall, (i, now, r, v))
@@ -71,6 +68,15 @@ def bounce(box, flock, books, clock, i, now):
     struck = box.watchers.with_slip(box.laws, walls, struck)
     box.watchers.hit(books.image, struck._replace(wall=box.owner(wall)))
     return ended
+
+
+def let_out(box, flock, books, clock, owner, ball):
+    """A ball has escaped through a wall with this number in the scene; it is given as in `_turned`."""
+    i, now, r, v = ball
+    box.gates.escape_time[index(i)] = moment_of(clock, now)
+    settle(box, books, clock, i, now, r, v)
+    flock.put(i, now, r, v)
+    box.watchers.hit(books.image, Struck(i, owner, moment_of(clock, now), r, v, v, 0.0))
 
 
 def _end(box, clock, wall, i, now, after):

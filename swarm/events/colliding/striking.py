@@ -11,10 +11,10 @@ from ...kernel.jit import outlined, select
 from ...kernel.vector import ZERO, square
 from ...lanes.watching.log import Struck
 from ..reacting.freedoms import TOO_LONG, TOO_SHORT, ParticleFlight
-from ..reacting.strikes import Turner, all_stay, strike, with_energy
+from ..reacting.strikes import Turner, all_stay, exit_at, strike, with_energy
 from .again import aim_again, queue_both, vanish
 from .aim import find_wall
-from .bounce import FLIES
+from .bounce import FLIES, let_out
 from .clock import EVENTS, moment_of
 from .followed import follow
 from .heavy import LISTED, SINCE, STRIKES, first_number
@@ -30,6 +30,14 @@ def strike_heavy(box, flock, books, clock, i, now):
     wall = flock.event[index(FLOATS * i + WALL)] - first_number(box)
     follow(box, flock, books, clock, i, now)
     r, v = flock.at(box.pull, i, now)
+    if box.gates is not None and box.gates.escape_time is not None:
+        radius = box.kinds.radius_of(i)
+        flight = ParticleFlight(r, v, ZERO, now, 0.0)
+        out = exit_at(heavy.grown(radius), wall, heavy.freedoms, flight, radius)
+        if out >= 0.0:
+            let_out(box, flock, books, clock, out, (i, now, r, v))
+            vanish(box, flock, i)
+            return FLIES
     twice = flock.kept.at(i, flock.stamp(i), square(v) + 2.0 * potential(box.pull, r))
     blow = _blow(box, flock, wall, ParticleFlight(r, v, ZERO, now, 0.0), (i, books.impacts[index(i)]))
     left, fall = twice - 2.0 * (blow.given + blow.lost) / m, 2.0 * potential(box.pull, blow.r)

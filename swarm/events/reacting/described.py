@@ -13,6 +13,7 @@ from ...motion import Guide, Rotation, Translation, pose, unit_axis
 from ...run.observed import Observed
 from ...scene import Scene
 from ...surfaces.presence.doors import walls_then
+from ...surfaces.presence.openings import openings_in
 from ...surfaces.surface import Surface
 from ...surfaces.walls import Walls
 from .freedoms import WIDTH, Freedoms, Shifted
@@ -35,25 +36,29 @@ def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:
         Walls(()) if given is None else given.walls(moment),
         (given.laws if given else None) or NONE,
         np.flatnonzero(~reacts),
-        _reacting(compiled),
+        _reacting(compiled, moment),
         scene.pull(),
+        scene.finite_size(),
+        openings=None if given is None else given.openings(moment),
     )
 
 
-def _reacting(compiled: CompiledScene) -> tuple[Reacting, ...]:
+def _reacting(compiled: CompiledScene, moment: float) -> tuple[Reacting, ...]:
     """The walls that react, in the order of the scene's walls; rows of freedoms are in that of its surfaces."""
     scene = compiled.scene
     rows = [i for i, surface in enumerate(scene.surfaces) if surface.reacts()]
     made, number = list[Reacting](), 0
     for i in dict.fromkeys(compiled.numbering.surfaces_of_rows):
         surface = scene.surfaces[i]
-        walls = walls_then(surface, 0.0, compiled.largest)
+        walls = walls_then(surface, moment, compiled.largest)
         if surface.reacts():
             freedom = _freedom(surface, rows.index(i), scene.gravity or (0.0, 0.0, 0.0))
             laws = _laws_of(surface, scene)
             absorbs = 1.0 if laws is not None and laws.may_end else None
+            piece, pieces = compiled.pieces.owners.index(i), compiled.pieces
+            openings = openings_in([(piece, len(walls))], (pieces.volumes, pieces.doorways), moment) or None
             made += [
-                Reacting(wall, freedom, number + k, surface.restitution, laws, float(k), absorbs)
+                Reacting(wall, freedom, number + k, surface.restitution, laws, float(k), absorbs, openings)
                 for k, wall in enumerate(walls)
             ]
         number += len(walls)
@@ -122,7 +127,7 @@ def freedoms_of(compiled: CompiledScene, velocity: Floats) -> Freedoms:
         widths[k] = width if surface.inertia is None else width / size
     series = np.zeros((3 * TERMS, count))
     made = Freedoms(shift, velocity, rest, angle, rate, rate_rest, series, time, middle, turning, widths, until)
-    for wall in _reacting(compiled):
+    for wall in _reacting(compiled, 0.0):
         if isinstance(wall.freedom, Pendulum):
             wall.freedom.expand(made)
     return made

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...common.status import Status
+from ...contact.absence import hit_wall, lets_through
 from ...contact.laws import Laws
 from ...contact.wall_impact import Arriving, book, impact_on_wall
 from ...kernel.arrays import index
@@ -19,13 +20,14 @@ from ...kernel.gravity import accelerated, displacement, potential
 from ...kernel.heap import Heap, build, change
 from ...kernel.jit import Array, long_kernel, outlined, select
 from ...kernel.vector import ZERO, column, put
-from ...lanes.watching.crossings import Flown
+from ...lanes.watching.crossings import Flown, ParticleMoment
 from ...lanes.watching.log import Struck, is_full
-from ...lanes.watching.watchers import Watchers
+from ...lanes.watching.watchers import Followed, Watchers
+from ...state import is_gone
 from ...surfaces.in_motion.moving import Marched
 from ...surfaces.time_of_impact import flights, safe
 from .freedoms import ParticleFlight
-from .strikes import all_stay, first_hit, reach_of_all, strike, with_energy
+from .strikes import all_stay, exit_at, first_hit, reach_of_all, strike, with_energy
 
 # What is next for a particle besides the impact on a wall that reacts (its number is 0 or more): nothing that was
 # found, so that it is looked at again.
@@ -47,7 +49,9 @@ class SceneWalls(NamedTuple):
     owners: Array  # (given walls,)
     reacting: Any
     pull: Any  # gravity, or None
+    size: float = 1.0  # of the scene [m]
     source: Any = None  # `RandomSource` where walls send particles off by a law
+    openings: Any = None  # None, or each `Opened` of the walls that do not react
 
     def each_laws(self) -> list[Laws]:
         """The laws of the walls without a mass, and of each that reacts and has some."""
@@ -79,6 +83,7 @@ class Queue(NamedTuple):
     watchers: Watchers = Watchers()
     image: Any = None
     absorbed: Any = None  # `Absorbed`, where a wall may absorb particles
+    escape_time: Any = None  # (N,) [s], where walls have openings
 
 
 class ReactionRule(NamedTuple):
@@ -102,13 +107,17 @@ def _aim(scenery, queue, i, end):
     queue.wait[i], queue.due[i], queue.wall[i] = hit.time, t + hit.time, hit.wall
 
 
-def _is_absorbed(queue, i):
-    """Whether a wall has absorbed particle i: it stays where it is, and nothing is next for it."""
-    return False if queue.absorbed is None else not math.isnan(queue.absorbed.time[i])
-
-
 def _absorb(queue, i, owner, time):
     queue.absorbed.time[i], queue.absorbed.wall[i] = time, np.int32(owner)
+
+
+def _escape(queue, i, owner, rule, now):
+    """Particle i has escaped by an opening: it stays where it is, and nothing is next for it."""
+    r, v, time = column(queue.position, 0, i), column(queue.velocity, 0, i), rule.moment - (rule.end - now)
+    queue.escape_time[i] = time
+    if queue.watchers.counters is not None:
+        queue.watchers.counters.settle(Followed(queue, queue.watchers.log), i, ParticleMoment(r, v, rule.end - now))
+    queue.watchers.hit(None, Struck(i, owner, time, r, v, v, 0.0))
 
 
 def _seen(scenery, queue, i, now, end):
@@ -121,7 +130,7 @@ def _seen(scenery, queue, i, now, end):
 
 def _next(scenery, walls, queue, i, now, end, soon):
     """The time at which something may happen to particle i: by its reach if that is far, else as it is now."""
-    if _is_absorbed(queue, i):
+    if is_gone(queue, i):
         queue.near[i], queue.struck[i] = False, NONE
         return math.inf
     flight = _seen(scenery, queue, i, now, end)
@@ -158,6 +167,11 @@ def _bounce(scenery, queue, i, wall, rule, now):
     if laws.send_off:
         random = scenery.source.of_impact(i, queue.impacts[i], laws)
     walls = scenery.given.at(rule.end - now)
+    if scenery.openings is not None:
+        wall = hit_wall(scenery.openings, scenery, walls, (r, v), wall, 0.0)
+        if lets_through(scenery.openings, walls, wall, r, 0.0):
+            _escape(queue, i, float(scenery.owners[index(int(wall))]), rule, now)
+            return
     bounce = impact_on_wall(laws, walls, scenery.pull, wall, arriving, random)
     owner, v1, time = index(scenery.owners[int(wall)]), bounce.v, rule.moment - (rule.end - now)
     if queue.absorbed is not None and bounce.wait == math.inf:
@@ -175,10 +189,15 @@ def _bounce(scenery, queue, i, wall, rule, now):
 def _strike(scenery, walls, queue, i, rule, now):
     """The impact of particle i on a wall that reacts."""
     r, v, m = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i]
-    random = None
+    random, flight = None, ParticleFlight(r, v, ZERO, now, 0.0)
+    if queue.escape_time is not None:
+        out = exit_at(scenery.reacting, queue.struck[i], walls, flight)
+        if out >= 0.0:
+            _escape(queue, i, out, rule, now)
+            return
     if scenery.source is not None:
         random = scenery.source.of_impact(i, queue.impacts[i], scenery.laws)
-    blow = strike(scenery.reacting, queue.struck[i], walls, ParticleFlight(r, v, ZERO, now, 0.0), m, random)
+    blow = strike(scenery.reacting, queue.struck[i], walls, flight, m, random)
     left = 2.0 * queue.energy[i] - 2.0 * (blow.given + blow.lost) / m
     if queue.heat is not None:
         left += 2.0 * blow.heat / m
@@ -219,7 +238,7 @@ def predict(scenery, freedoms, queue, clock, rule, first, last):
         i = index(k)
         if now == 0.0:
             queue.time[i], queue.hits[i] = 0.0, 0
-            if not _is_absorbed(queue, i):
+            if not is_gone(queue, i):
                 _aim(scenery, queue, i, rule.end)
         queue.heap.key[i] = _next(scenery, freedoms, queue, i, now, rule.end, _soon(clock))
 
@@ -230,7 +249,7 @@ def arrive(scenery, queue, rule, first, last):
     for k in range(first, last):
         if is_full(queue.watchers.log):
             return k
-        if not _is_absorbed(queue, index(k)):
+        if not is_gone(queue, index(k)):
             _fly(scenery, queue, index(k), rule.end, rule.end - queue.time[index(k)], rule.end)
     return last
 
@@ -286,7 +305,7 @@ def _carry_out(scenery, freedoms, queue, i, now, rule):
         _bounce(scenery, queue, i, queue.wall[i], rule, now)
     if scenery.source is not None and math.isnan(queue.velocity[0, i]):
         return Status.SENT_WRONG.value
-    if not _is_absorbed(queue, i):
+    if not is_gone(queue, i):
         _aim(scenery, queue, i, rule.end)
     return select(queue.hits[i] <= MOST_HITS, Status.DONE.value, Status.STALLED.value)
 

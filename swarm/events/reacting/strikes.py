@@ -4,11 +4,13 @@ import math
 from typing import Any, NamedTuple
 
 from ...ball_numbers import INERTIA
+from ...contact.absence import lets_through
 from ...contact.wall_impact import Arriving, by_law
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec, cross, dot, either, norm, square, with_square
 from ...surfaces.time_of_impact.flights import NEVER, sooner
+from ...surfaces.walls import Walls
 
 # The energy is that which is left where the square of the speed is off by no more than this part.
 _NEAR = 1e-9
@@ -73,11 +75,18 @@ class Reacting(Record):
     laws: Any = None  # None, or the `Laws` of the surface, where they are more than a restitution
     number: float = 0.0  # among the walls of the surface
     absorbs: Any = None  # 1 where a law may absorb particles
+    openings: Any = None  # None, or each `Opened`, which move with the wall
 
     @property
     def sends_off(self):
         """Whether it sends particles off by a law: a constant for the compiler."""
         return self.laws is not None and self.laws.send_off
+
+    def lets_out(self, walls, flight, radius):
+        """Whether it is open where a particle meets it, or a ball of this radius."""
+        surface = self.freedom.posed(self.body, walls, flight.time)
+        foot = surface.own_place(flight.r + radius * surface.unit_normal(flight.r))
+        return lets_through(self.openings, Walls((self.body,)), self.number, foot, 0.0)
 
     def strike(self, walls, flight, mass, random=None, turner=None):
         """The impact of a particle on it: its `WallImpact`."""
@@ -175,6 +184,15 @@ def first_hit(reacting, gravity, walls, flight):
         time, found = wall.freedom.hit(wall.body, gravity, walls, flight)
         hit = sooner(time, found, float(k), hit)
     return hit
+
+
+def exit_at(reacting, wall, walls, flight, radius=0.0):
+    """The number in the scene of the wall with this number, where it is open to a particle that meets it; else -1."""
+    owner = -1.0
+    for k, one in enumerate(reacting):
+        if one.openings is not None:
+            owner = select((wall == k) & one.lets_out(walls, flight, radius), float(one.owner), owner)
+    return owner
 
 
 def strike(reacting, wall, walls, flight, mass, random=None, turner=None):

@@ -557,10 +557,6 @@ CAPABILITIES = (
     Capability("opening", _of_walls("openings", ()), {
         (SOFT_BODIES, PAPER_BODIES): _with_method("openings", "left out", "count"),
         (BASELINE,): _with_method("openings", "left out", "count"),
-        (MASSIVE, HEAVY): Refusal(
-            "surfaces[{i}].openings must be left out where a wall has a mass, got {count}",
-            "give the wall a motion instead of a mass",
-        ),
     }),
     Capability("opening for a time", _doors, {
         (CHORDS,): _CHANGES,
@@ -569,10 +565,6 @@ CAPABILITIES = (
         (SOFT_BODIES, PAPER_BODIES): _with_method("present", "None"),
         (BASELINE,): _with_method("present", "None"),
         (CHORDS,): _CHANGES,
-        (MASSIVE, HEAVY): Refusal(
-            "surfaces[{i}].present must be None where a wall has a mass, got {got}",
-            "give the wall a motion instead of a mass",
-        ),
     }),
     Capability("motion", _of_walls("motion", None), {
         (SOFT_BODIES, PAPER_BODIES): Refusal(

@@ -157,6 +157,9 @@ class Present(Unturned):
     def _hit(self, time, hits):
         return self._if_there(time, math.inf), hits | (not self.there > 0.0)
 
+    def reach(self, lease):
+        return self._if_there(self.body.reach(lease), math.inf)
+
     def straight_hit(self, end, r0, r1):
         return self._hit(*self.body.straight_hit(end.body, r0, r1))
 
