@@ -1,6 +1,6 @@
 """What particles with a radius do to one another."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from .common.validated import Magnitude, Part, Validated
@@ -24,17 +24,21 @@ class Pairs(Validated):
             of the time in which the smallest particle flies its diameter, under gravity 1e-3 of that in which it flies
             or falls so far. Balls that rest under gravity collide without end, about once in this time: a run says so,
             and a longer time, or `Penalty`, makes it shorter.
+        rolling: the resistance to rolling, of Penalty, 0 or more: an angular impulse against the relative angular
+            velocity across the normal, of at most this times R_i R_j/(R_i + R_j) times the normal impulse, and at most
+            what stops the rolling. With friction.
 
     Raises:
         SceneError: an argument is out of its range.
 
     >>> Pairs(restitution=0.9)
-    Pairs(restitution=0.9, friction=0.0, contact_duration=None)
+    Pairs(restitution=0.9, friction=0.0, contact_duration=None, rolling=0.0)
     """
 
     restitution: Part = 1.0
     friction: Magnitude = 0.0
     contact_duration: Magnitude | None = None
+    rolling: Magnitude = field(default=0.0, metadata={"younger": True})
 
 
 def checked_pairs(value: Any) -> Pairs | None:

@@ -1,5 +1,6 @@
 """Dataclasses with fields that are checked as their annotations declare: `radius: Length`."""
 
+import dataclasses
 import functools
 import operator
 from collections.abc import Callable
@@ -81,3 +82,8 @@ def bare(kind: Any) -> Any:
         if hasattr(one, "__metadata__"):
             return functools.reduce(operator.or_, map(bare, kind.__args__))
     return kind
+
+
+def is_left_out(described: Any, field: dataclasses.Field[Any]) -> bool:
+    """Whether a field is at the default that it has in files that are older than it: then files leave it out."""
+    return bool(field.metadata.get("younger")) and getattr(described, field.name) == field.default

@@ -31,11 +31,13 @@ from .grain_arrays import (
     END,
     GAP,
     IMPULSE,
+    KEPT_ROLL,
     LIGHTNESS,
     LISTED,
     LOST,
     PUSH,
     RADIUS,
+    ROLL,
     SIZE,
     START,
     X,
@@ -96,6 +98,8 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             if law.friction is not None:
                 rows[c, LISTED] = k
                 set_vector(rows, c, DRAG, vector_at(near.wall_drag, index(k), 0) * lasting(rows[c, GAP]))
+            if law.rolling is not None:
+                set_vector(rows, c, ROLL, vector_at(near.wall_drag, index(k), KEPT_ROLL) * lasting(rows[c, GAP]))
             count += 1
     touches.wall_spans[1, number] = count
     return count - known

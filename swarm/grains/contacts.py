@@ -26,11 +26,13 @@ from .grain_arrays import (
     GAIN,
     GAP,
     IMPULSE,
+    KEPT_ROLL,
     LIGHTNESS,
     LISTED,
     LOST,
     PUSH,
     RADIUS,
+    ROLL,
     SIZE,
     START,
     X,
@@ -47,7 +49,8 @@ class Losses(Record):
     """What is lost at a contact."""
 
     damping: Any  # None, or what is multiplied with the root of the mass that moves
-    friction: Any  # None, or Coulomb's coefficient
+    friction: Any  # None, or Coulomb's coefficient; 0 where only rolling is resisted
+    rolling: Any = None  # None, or the coefficient of rolling.py
 
 
 class Matter(Record):
@@ -67,6 +70,11 @@ class Matter(Record):
     def rubs(self):
         """Whether there is any friction: a constant for the compiler."""
         return any(one.friction is not None for one in (self.pairs, *self.walls))
+
+    @property
+    def rolls(self):
+        """Whether any rolling is resisted: a constant for the compiler."""
+        return any(one.rolling is not None for one in (self.pairs, *self.walls))
 
 
 # --- The law of a contact --------------------------------------------------------------------------------
@@ -197,6 +205,8 @@ def gather_pairs(matter, grains, near, touches):
                 if matter.pairs.friction is not None:
                     rows[c, LISTED] = k
                     set_vector(rows, c, DRAG, vector_at(near.drag, index(k), 0) * lasting(rows[c, GAP]))
+                if matter.pairs.rolling is not None:
+                    set_vector(rows, c, ROLL, vector_at(near.drag, index(k), KEPT_ROLL) * lasting(rows[c, GAP]))
                 count += 1
     touches.used[0] = count
     return count - known

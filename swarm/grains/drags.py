@@ -1,4 +1,4 @@
-"""The impulses of friction of the last step, carried over when lists are made anew."""
+"""The impulses of friction and of rolling of the last step, carried over when lists are made anew."""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ class Drags(NamedTuple):
     """The impulses that are not 0, by their pairs of particles, in ascending order; and those at walls."""
 
     pair: NDArray[np.int64]
-    drag: NDArray[np.float64]  # (pairs, 3) on the particle with the smaller number
+    drag: NDArray[np.float64]  # (pairs, 3 or 6) on the particle with the smaller number
     at_wall: NDArray[np.int64]
     wall_drag: NDArray[np.float64]
 
@@ -69,6 +69,6 @@ def set_drags(world: Any, kept: Drags | None) -> None:
 
 def _found(key: NDArray[np.int64], known: NDArray[np.int64], drag: NDArray[np.float64]) -> NDArray[np.float64]:
     if not known.size:
-        return np.zeros((key.size, 3))
+        return np.zeros((key.size, drag.shape[1]))
     place = np.minimum(np.searchsorted(known, key), known.size - 1)
     return np.where((known[place] == key)[:, None], drag[place], 0.0)

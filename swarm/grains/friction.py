@@ -38,7 +38,7 @@ from .grain_arrays import (
 from .vessel import met, moves
 
 # 1/(2/5), of the moment of inertia of a ball.
-_ROUNDNESS = 2.5
+ROUNDNESS = 2.5
 _TINY = 1e-300
 
 
@@ -81,14 +81,14 @@ def rub_pairs(matter, grains, touches, share):
         arm = arm_of(way, rows[c, SIZE], way.change, radius + other)
         slip = across(v - u - cross(_turning(grains, i, j, AFTER), arm), way.along)
         before, limit = vector_at(rows, c, DRAG), matter.pairs.friction * rows[c, PUSH]
-        new = rubbed(across(before, way.along), slip, rows[c, EASE] * (1.0 + _ROUNDNESS * square(arm)), limit)
+        new = rubbed(across(before, way.along), slip, rows[c, EASE] * (1.0 + ROUNDNESS * square(arm)), limit)
         more, part = changed(rows, c, DRAG, new, share)
         one, two = place[i, LIGHTNESS], place[j, LIGHTNESS]
         set_vector(speed, i, AFTER, v + part * one)
         set_vector(speed, j, AFTER, u - part * two)
         twist = cross(arm, part)
-        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (_ROUNDNESS * one / radius))
-        set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (_ROUNDNESS * two / other))
+        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (ROUNDNESS * one / radius))
+        set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (ROUNDNESS * two / other))
         rubbing = relative(matter, more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
         worst = worse(rubbing, worse(off, worst))
     return worst
@@ -104,8 +104,8 @@ def twist_pairs(matter, grains, touches):
         move = vector_at(rows, c, COAST) + half * (vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
         twist = twist_of(rows, c, move, place[i, RADIUS] + place[j, RADIUS])
         one, two = place[i, LIGHTNESS] / place[i, RADIUS], place[j, LIGHTNESS] / place[j, RADIUS]
-        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (_ROUNDNESS * one))
-        set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (_ROUNDNESS * two))
+        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (ROUNDNESS * one))
+        set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (ROUNDNESS * two))
 
 
 def twist_of(rows, c, move, reach):
@@ -154,10 +154,10 @@ def rub_wall(matter, law, wall, grains, touches, number, share):
         n, (_both, last) = _facing(own, way, radius, vector_at(rows, c, START), move)
         slip = across(v - last - radius * cross(w, n), n)
         before = across(vector_at(rows, c, DRAG), n)
-        new = rubbed(before, slip, ease * (1.0 + _ROUNDNESS), law.friction * rows[c, PUSH])
+        new = rubbed(before, slip, ease * (1.0 + ROUNDNESS), law.friction * rows[c, PUSH])
         more, part = changed(rows, c, DRAG, new, share)
         set_vector(speed, i, AFTER, v + part * ease)
-        set_vector(spin, i, AFTER, w - cross(n, part) * (_ROUNDNESS * ease / radius))
+        set_vector(spin, i, AFTER, w - cross(n, part) * (ROUNDNESS * ease / radius))
         worst = worse(relative(matter, more, rows[c, PUSH], size_of(v), ease), worse(off, worst))
     return worst
 
@@ -172,7 +172,7 @@ def twist_wall(matter, wall, grains, touches, number):
         i = index(touches.wall_ends[c])
         move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
         n, _velocities = _faced(wall, grains, touches, c, i, move)
-        turned = cross(n, vector_at(rows, c, DRAG)) * (_ROUNDNESS * rows[c, EASE] / grains.place[i, RADIUS])
+        turned = cross(n, vector_at(rows, c, DRAG)) * (ROUNDNESS * rows[c, EASE] / grains.place[i, RADIUS])
         set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - turned)
 
 

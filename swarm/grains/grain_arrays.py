@@ -18,8 +18,8 @@ BEFORE, AFTER = 0, 3
 # Columns of `Touches.rows`: s0, from one centre to the other at the start of a step, or the centre; |s0|, or the inner
 # function of the wall; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
 # inverse of the mass that moves; the damping; the gain of a Newton step; and where there is friction its
-# impulse, and the place in the lists.
-START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED = (
+# impulse, the place in the lists, and the angular impulse of the resistance to rolling.
+START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED, ROLL = (
     0,
     3,
     4,
@@ -32,8 +32,11 @@ START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED
     15,
     16,
     19,
+    20,
 )
 COLUMNS, COLUMNS_OF_FRICTION = 16, 24
+# Columns of `Neighbours.drag`: where the angular impulse of the resistance to rolling is kept.
+KEPT_ROLL = 3
 # Columns of `Neighbours.spans`: where those of a field begin in `listed` and end, and of which face they are.
 BEGIN, END, FACE = 0, 1, 2
 # Of a clock: the steps of the frame that are done, those since pairs were listed, and those since the run was halted
@@ -60,7 +63,9 @@ class Neighbours(NamedTuple):
     wall_first: Array  # (walls + 1,)
     slot: Array  # (room of walls,) int32
     wall_is_on: Array
-    drag: Any  # (room, 3) the impulse of friction of each pair in the last step, or None
+    drag: (
+        Any  # (room, 3) the impulse of friction of each pair in the last step, (room, 6) with that of rolling, or None
+    )
     wall_drag: Any
     # Of a scene with fields, else None
     spans: Any = None  # (room of walls, 3) int32, what of a field is near
@@ -112,11 +117,13 @@ def beside(grains: Grains, more: Grains) -> Grains:
 
 
 def near_of(
-    n: int, walls: int, pairs: int, touching: int, has_friction: bool = False, members: int | None = None,
-    opens: bool = False,
+    n: int, walls: int, pairs: int, touching: int, kept: int = 0, members: int | None = None, opens: bool = False,
 ) -> Neighbours:  # fmt: skip
-    """Room for so many pairs, for so many balls at walls, and so many members of fields, where there are any."""
-    drags = (np.zeros((pairs, 3)), np.zeros((touching, 3))) if has_friction else (None, None)
+    """Room for so many pairs, for so many balls at walls, and so many members of fields, where there are any.
+
+    Of each contact so many numbers of friction are kept from step to step.
+    """
+    drags = (np.zeros((pairs, kept)), np.zeros((touching, kept))) if kept else (None, None)
     made = Neighbours(
         np.zeros(n + 1, np.int64), np.zeros(pairs, np.int32), np.zeros(pairs, np.bool_),
         np.zeros(walls + 1, np.int64), np.zeros(touching, np.int32), np.zeros(touching, np.bool_), *drags,

@@ -241,8 +241,9 @@ class GrainsRun(BaseRun):
 
     def _room(self, n: int, pairs: int, touching: int, members: int | None) -> tuple[arrays.Neighbours, arrays.Touches]:
         """Arrays for n balls, so many pairs, balls at walls, and members of fields near them, None without fields."""
-        walls, rubs = len(self._owners), self._matter.rubs
-        near = arrays.near_of(n, walls, pairs, touching, rubs, members, self._matter.openings is not None)
+        walls, matter = len(self._owners), self._matter
+        rubs, kept = matter.rubs, (6 if matter.rolls else 3) if matter.rubs else 0
+        near = arrays.near_of(n, walls, pairs, touching, kept, members, matter.openings is not None)
         return near, arrays.touches_of(walls, pairs, touching, rubs, near.listed)
 
     def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Neighbours:

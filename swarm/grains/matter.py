@@ -47,7 +47,8 @@ def _limits(least: float, longest: float | None) -> Limits:
 
 def _losses(alpha: float, given: Pairs | Surface) -> Losses:
     """What is lost at contacts of pairs, or with a surface."""
-    return Losses(damping_of(alpha, given.restitution), given.friction or None)
+    friction = given.friction if given.friction or given.rolling else None
+    return Losses(damping_of(alpha, given.restitution), friction, given.rolling or None)
 
 
 def contact_time(scene: Scene, particles: Particles, method: Method) -> float:

@@ -21,6 +21,7 @@ from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twi
 from .grain_arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
 from .overlaps import look_at_pairs, look_at_wall
 from .passing import count_moves
+from .rolling import book_rolling, book_rolling_pairs, roll_pairs, roll_wall, turn_pairs, turn_wall
 from .vessel import SweptWall, moves, sweep_of
 
 # A sweep that changes no impulse by more than this part is the last one; also one that gains no more than half of the
@@ -104,6 +105,11 @@ def _push(matter, walls, world):
         for k, wall in enumerate(walls.each):
             if matter.walls[k].friction is not None:
                 twist_wall(matter, wall, grains, touches, k)
+    if matter.pairs.rolling is not None:
+        turn_pairs(grains, touches)
+    for k in range(len(walls.each)):
+        if matter.walls[k].rolling is not None:
+            turn_wall(grains, touches, k)
 
 
 def _sweep(matter, walls, world, share):
@@ -120,9 +126,13 @@ def _rub(matter, walls, world, share):
     grains, touches = world.grains, world.touches
     rub_or_sweep = sweep_pairs if matter.pairs.friction is None else rub_pairs
     worst = rub_or_sweep(matter, grains, touches, share)
+    if matter.pairs.rolling is not None:
+        worst = worse(roll_pairs(matter, grains, touches, share), worst)
     for k, wall in enumerate(walls.each):
         rub_or_sweep_wall = sweep_wall if matter.walls[k].friction is None else rub_wall
         worst = worse(rub_or_sweep_wall(matter, matter.walls[k], wall, grains, touches, k, share), worst)
+        if matter.walls[k].rolling is not None:
+            worst = worse(roll_wall(matter, matter.walls[k], wall, grains, touches, k, share), worst)
     return worst
 
 
@@ -220,12 +230,16 @@ def _book(matter, walls, world):
     deepest = book_pairs(matter, grains, touches, books)
     if matter.pairs.friction is not None:
         book_rubbing_pairs(matter, grains, near, touches, books)
+    if matter.pairs.rolling is not None:
+        book_rolling_pairs(grains, near, touches, books)
     for k, wall in enumerate(walls.each):
         deepest = max(book_wall(matter, matter.walls[k], wall, grains, touches, books, k), deepest)
         if world.members is not None:
             count_members(matter, wall, grains, touches, world.members, k)
         if matter.walls[k].friction is not None:
             book_rubbing(matter, wall, grains, near, touches, books, k)
+        if matter.walls[k].rolling is not None:
+            book_rolling(wall, grains, near, touches, books, k)
     books.overlap[0] = max(deepest, books.overlap[0])
     return deepest
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.checks import closest, listed, one_of
-from ..common.validated import bare
+from ..common.validated import bare, is_left_out
 from ..errors import SceneError
 from ..methods import ALL_METHODS, Method
 from ..motion import table_of as motion_table
@@ -84,9 +84,11 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
         return _with_nested(described.table(), described, arrays)
     kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
     given = {
-        field.metadata.get("key", field.name): getattr(described, field.name) for field in kept_fields(type(described))
+        field.metadata.get("key", field.name): getattr(described, field.name)
+        for field in kept_fields(type(described))
+        if not is_left_out(described, field)
     }
-    table = {key: value for key, value in given.items() if value is not None and not _is_left_out(described, key)}
+    table = {key: value for key, value in given.items() if value is not None}
     table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
     mine = type(described)
     kind = kinds.get(mine, f"{mine.__module__}:{mine.__qualname__}")
@@ -149,15 +151,13 @@ def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str,
     # TOML has no None.
     period = {} if scene.period is None else {"period": [length or False for length in scene.period]}
     plane = {} if scene.plane is None else {"plane": scene.plane}
-    given = {} if scene.pairs is None else {key: one for key, one in vars(scene.pairs).items() if one is not None}
-    pairs = {} if scene.pairs is None else {"pairs": given}
+    pairs = {} if scene.pairs is None else {"pairs": _table_of_pairs(scene.pairs)}
     return {**gravity, **period, **plane, **pairs, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
 
 
-def _is_left_out(described: Surface | Method, key: str) -> bool:
-    """Whether an argument is at the default that it has in files that are older than it."""
-    field = next((one for one in dataclasses.fields(described) if one.name == key), None)
-    return field is not None and field.metadata.get("younger", False) and getattr(described, key) == field.default
+def _table_of_pairs(pairs: Pairs) -> dict[str, Any]:
+    given = {one.name: getattr(pairs, one.name) for one in dataclasses.fields(pairs) if not is_left_out(pairs, one)}
+    return {key: value for key, value in given.items() if value is not None}
 
 
 def kept_fields(cls: type[Any]) -> list[dataclasses.Field[Any]]:

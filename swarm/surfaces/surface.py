@@ -67,6 +67,8 @@ class Surface(Validated):
         restitution: e in [0, 1]: an impact turns the normal velocity v_n into -e v_n. 1 keeps the energy.
         friction: Coulomb's coefficient, 0 or more: the tangential impulse, or force, opposes the slip; it is at most
             this times the normal one, and at most what stops the slip.
+        rolling: the resistance to rolling of particles with a radius, of `Penalty`, 0 or more: an angular impulse
+            against the angular velocity across the normal, of at most this times the radius times the normal impulse.
         temperature: k_B T of a thermal wall [J], as in `fill`, 0 or more; None: the wall exchanges no heat.
         accommodation: in [0, 1], with which probability a particle leaves a thermal wall with a velocity of the wall's
             temperature (diffusely), instead of specularly.
@@ -89,6 +91,7 @@ class Surface(Validated):
     rotation: Annotated[Any, rotations.quaternion] = field(default=None, kw_only=True)
     restitution: Part = field(default=1.0, kw_only=True)
     friction: Magnitude = field(default=0.0, kw_only=True)
+    rolling: Magnitude = field(default=0.0, kw_only=True, metadata={"younger": True})
     temperature: Magnitude | None = field(default=None, kw_only=True)
     accommodation: Part = field(default=1.0, kw_only=True)
     laws: Annotated[Any, checked_laws] = field(default=(), kw_only=True)

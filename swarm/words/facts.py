@@ -186,7 +186,8 @@ def _of_space(scene: Scene) -> list[Statement]:
         stated.append(Statement("plane", f"two dimensions, {scene.plane} = 0"))
     if scene.pairs is not None:
         restitution, friction = plain(scene.pairs.restitution), plain(scene.pairs.friction)
-        stated.append(Statement("impacts of two", f"restitution {restitution}, friction {friction}"))
+        rolling = f", rolling {plain(scene.pairs.rolling)}" if scene.pairs.rolling else ""
+        stated.append(Statement("impacts of two", f"restitution {restitution}, friction {friction}{rolling}"))
     return stated
 
 

@@ -134,6 +134,8 @@ def laws_of(surface: Surface) -> list[str]:
         texts.append(f"restitution {plain(surface.restitution)}")
     if surface.friction:
         texts.append(f"friction {plain(surface.friction)}")
+    if surface.rolling:
+        texts.append(f"rolling {plain(surface.rolling)}")
     if surface.temperature is not None:
         part = "" if surface.accommodation == 1.0 else f" for {plain(100.0 * surface.accommodation)} % of the impacts"
         texts.append(f"warm, k_B T = {amount(surface.temperature, 'J')}{part}")

@@ -196,6 +196,12 @@ def _duration(asked: Asked) -> Found:
         yield {"got": f"{pairs.contact_duration:g}"}
 
 
+def _rolls(asked: Asked) -> Found:
+    pairs = asked.scene.pairs
+    if pairs is not None and pairs.rolling > 0.0:
+        yield {"got": f"{pairs.rolling:g}"}
+
+
 def _spins(asked: Asked) -> Found:
     if isinstance(asked.particles, Particles) and asked.particles.spin is not None:
         yield {}
@@ -299,6 +305,7 @@ _TO_EXACT = "use Impact() with contact_step = 0"
 _NO_STEP = "leave contact_step out"
 _WITH_PENALTY = "particles that have a radius and Penalty"
 _LASTS = "its contacts last for a time, and have no instant at which a wall could send a particle off"
+_AT_AN_INSTANT = "Impact: balls that meet at an instant do not roll on one another"
 _NO_METHOD = Refusal(
     "bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {whole}",
     "use Impact(dt=...), with dt in seconds",
@@ -320,6 +327,10 @@ def _with_method(name: str, without: str, got: str = "got") -> Refusal:
 
 def _with_bodies(name: str, without: str, remedy: str = "use particles") -> Refusal:
     return Refusal(f"surfaces[{{i}}].{name} must be {without} with bodies, got {{got}}", remedy)
+
+
+def _without_rolling(name: str, with_what: str) -> Refusal:
+    return Refusal(f"{name} must be 0 with {with_what}, got {{got}}", f"leave it out, or use {_WITH_PENALTY}")
 
 
 def _of_one_room(what: str, remedy: str) -> Refusal:
@@ -503,6 +514,14 @@ CAPABILITIES = (
         (SOFT_BODIES, PAPER_BODIES): _with_method("friction", "0"),
         (CHORDS,): _LOSES,
     }),
+    Capability("rolling", _of_walls("rolling", 0.0), {
+        _ALONE: _without_rolling("surfaces[{i}].rolling", "particles without a radius: a point does not roll"),
+        _RIGID_BALLS: _without_rolling("surfaces[{i}].rolling", _AT_AN_INSTANT),
+        _EVERY_BODY: _without_rolling("surfaces[{i}].rolling", "bodies, which turn by the forces at their points"),
+    }),
+    Capability("rolling of pairs", _rolls, {
+        _RIGID_BALLS: _without_rolling("pairs.rolling", _AT_AN_INSTANT),
+    }, within="law of pairs"),
     Capability("temperature", _of_walls("temperature", None), {
         _EVERY_BODY: _with_bodies("temperature", "None"),
         (BASELINE,): _with_method("temperature", "None"),

@@ -8,6 +8,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ...common.checks import Vector
+from ...common.validated import is_left_out
 from ...errors import SceneError
 from ...kernel.cache import is_disabled
 from ...kernel.jit import kernel
@@ -110,7 +111,7 @@ class OwnSurface(FormSurface):
         """Its table in a file: enough to recognise it, not to make it again."""
         given = {"code": self._form.kind.__name__, "parameters": self.parameters._asdict(), "size": self.length}
         given |= {"bounds": self.box, "center": self.center, "side": self.side, "curvature": self.curvature}
-        given |= {one.name: getattr(self, one.name) for one in fields(Surface)}
+        given |= {one.name: getattr(self, one.name) for one in fields(Surface) if not is_left_out(self, one)}
         return {"kind": "own", **{key: value for key, value in given.items() if value is not None}}
 
 

@@ -1,0 +1,147 @@
+"""Resistance to rolling at the contacts of a step.
+
+A contact with the normal impulse J resists the angular velocity w_i - w_j across its normal, or that relative to a
+wall, by an angular impulse of at most rolling R J, with R = R_i R_j/(R_i + R_j), or the radius at a wall. It stops the
+rolling where less is enough, and is opposite for both balls, so that angular momentum is conserved. This is the model
+of a directional constant torque of Zhou, Wright, Yang, Xu & Yu, Physica A 269 (1999) 536-553. With Coulomb's friction
+that holds a ball rolls on a plane with a deceleration of 5/7 rolling G.
+"""
+
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
+from ..kernel.vector import ZERO, dot, square
+from ..surfaces.in_motion.posed import Posed
+from .contacts import changed, relative, size_of, worse
+from .friction import ROUNDNESS, across, rubbed
+from .grain_arrays import (
+    AFTER,
+    BEFORE,
+    EASE,
+    IMPULSE,
+    KEPT_ROLL,
+    LIGHTNESS,
+    LISTED,
+    PUSH,
+    RADIUS,
+    ROLL,
+    set_vector,
+    vector_at,
+)
+from .vessel import met, moves
+
+
+def _ease(place, i):
+    """1/I of a ball."""
+    return ROUNDNESS * place[i, LIGHTNESS] / (place[i, RADIUS] * place[i, RADIUS])
+
+
+def _resist(matter, rows, c, rolling, sizes, share):
+    """The change of the angular impulse of a contact, and the error: of the rolling at the end of the step.
+
+    `sizes` are the radius R, 1/I, and the sum of the speeds of what touches.
+    """
+    (radius, ease, speeds), n = sizes, vector_at(rows, c, IMPULSE)
+    if not square(n) > 0.0:
+        n = vector_at(rows, c, ROLL)
+        set_vector(rows, c, ROLL, ZERO)
+        return -1.0 * n, 0.0
+    new = rubbed(across(vector_at(rows, c, ROLL), n), across(rolling[0], n), ease, rolling[1] * radius * rows[c, PUSH])
+    more, part = changed(rows, c, ROLL, new, share)
+    return part, relative(matter, more * (1.0 / radius), rows[c, PUSH], speeds, rows[c, EASE])
+
+
+# --- Of pairs --------------------------------------------------------------------------------------------
+
+
+@outlined
+def roll_pairs(matter, grains, touches, share):
+    """Improve the angular impulse of each pair in turn; the largest change, relative to what moves there."""
+    rows, place, speed, spin, worst = touches.rows, grains.place, grains.speed, grains.spin, 0.0
+    for k in range(touches.used[0]):
+        c = index(k)
+        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
+        w, u, one, two = vector_at(spin, i, AFTER), vector_at(spin, j, AFTER), _ease(place, i), _ease(place, j)
+        radius = place[i, RADIUS] * place[j, RADIUS] / (place[i, RADIUS] + place[j, RADIUS])
+        speeds = size_of(vector_at(speed, i, AFTER)) + size_of(vector_at(speed, j, AFTER))
+        rolling = w - u, matter.pairs.rolling
+        part, off = _resist(matter, rows, c, rolling, (radius, one + two, speeds), share)
+        set_vector(spin, i, AFTER, w + part * one)
+        set_vector(spin, j, AFTER, u - part * two)
+        worst = worse(off, worst)
+    return worst
+
+
+@outlined
+def turn_pairs(grains, touches):
+    """Add the angular impulses of all pairs to the spins at the end of the step."""
+    rows, place, spin = touches.rows, grains.place, grains.spin
+    for k in range(touches.used[0]):
+        c = index(k)
+        i, j, roll = index(touches.ends[c, 0]), index(touches.ends[c, 1]), vector_at(rows, c, ROLL)
+        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) + roll * _ease(place, i))
+        set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - roll * _ease(place, j))
+
+
+@outlined
+def book_rolling_pairs(grains, near, touches, books):
+    """Book what the resistance takes of pairs, and keep its angular impulses for the next step."""
+    rows, spin = touches.rows, grains.spin
+    for k in range(touches.used[0]):
+        c = index(k)
+        i, j, roll = index(touches.ends[c, 0]), index(touches.ends[c, 1]), vector_at(rows, c, ROLL)
+        set_vector(near.drag, index(int(rows[c, LISTED])), KEPT_ROLL, roll)
+        turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
+        turned = turned - (vector_at(spin, j, BEFORE) + vector_at(spin, j, AFTER))
+        lost = -0.25 * dot(roll, turned)
+        books.dissipated[index(grains.number[i])] += lost
+        books.dissipated[index(grains.number[j])] += lost
+
+
+# --- Of walls --------------------------------------------------------------------------------------------
+
+
+def _spin_of(wall, grains, touches, c, i):
+    """The angular velocity of the wall at a contact."""
+    own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
+    return own.drive.spin if isinstance(own, Posed) and own.drive.spin is not None else ZERO
+
+
+@outlined
+def roll_wall(matter, law, wall, grains, touches, number, share):
+    """Improve the angular impulse of each ball at a wall; the largest change, as for pairs."""
+    rows, place, spin, begin, worst = touches.wall_rows, grains.place, grains.spin, touches.wall_spans[0, number], 0.0
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        w, ease, speeds = vector_at(spin, i, AFTER), _ease(place, i), size_of(vector_at(grains.speed, i, AFTER))
+        rolling = w - _spin_of(wall, grains, touches, c, i), law.rolling
+        part, off = _resist(matter, rows, c, rolling, (place[i, RADIUS], ease, speeds), share)
+        set_vector(spin, i, AFTER, w + part * ease)
+        worst = worse(off, worst)
+    return worst
+
+
+@outlined
+def turn_wall(grains, touches, number):
+    """Add the angular impulses of a wall to the spins at the end of the step."""
+    rows, spin, begin = touches.wall_rows, grains.spin, touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) + vector_at(rows, c, ROLL) * _ease(grains.place, i))
+
+
+@outlined
+def book_rolling(wall, grains, near, touches, books, number):
+    """Book what the resistance takes of balls at a wall, what the wall gives by it, and keep it."""
+    rows, spin, begin = touches.wall_rows, grains.spin, touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        one, roll = index(grains.number[i]), vector_at(rows, c, ROLL)
+        set_vector(near.wall_drag, index(int(rows[c, LISTED])), KEPT_ROLL, roll)
+        gained = 0.5 * dot(roll, vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER))
+        given = dot(roll, _spin_of(wall, grains, touches, c, i))
+        books.dissipated[one] += given - gained
+        if moves(wall):
+            books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given
