@@ -330,7 +330,7 @@ def _with_bodies(name: str, without: str, remedy: str = "use particles") -> Refu
 
 
 def _without_rolling(name: str, with_what: str) -> Refusal:
-    return Refusal(f"{name} must be 0 with {with_what}, got {{got}}", f"leave it out, or use {_WITH_PENALTY}")
+    return Refusal(f"{name} must be 0 with {with_what}, got {{got}}", "leave it out, or use particles with a radius and Penalty")
 
 
 def _of_one_room(what: str, remedy: str) -> Refusal:
