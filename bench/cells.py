@@ -405,6 +405,12 @@ def _door(draft: Draft) -> None:
     draft.laws["openings"] = [swarm.Opening(half, times=[(0.2, 0.5)], between=True)]
 
 
+def _present(draft: Draft) -> None:
+    # Points push a field of a mass away from them, and meet it no more after a second.
+    end = 0.5 if draft.cell[:2] == ("points, heavy wall", "field") else 1.0
+    draft.laws["present"] = [(0.0, end)]
+
+
 # What has no centre turns about the origin.
 _ABOUT_THE_ORIGIN = ("planes", "own surface", "union", "intersection", "field", "foam")
 
@@ -538,7 +544,7 @@ CAPABILITIES: dict[str, Capability] = {
     "opening": Capability(_opening, shown="escaped"),
     "timed opening": Capability(_timed_opening, _long, "escaped"),
     "door": Capability(_door),
-    "present": Capability(_law(present=[(0.0, 1.0)]), _long),
+    "present": Capability(_present, _long),
     "period": Capability(_period, _alone, "cells"),
     "rotation": Capability(_rotated),
     "side": Capability(_other_side),

@@ -58,7 +58,7 @@ class Numbering:
         pieces_of_rows: the piece of each row, (rows,).
         surfaces_of_rows: the surface of each row.
         parts_of_rows: the part of each row; None where no surface has parts.
-        pieces_of_walls: the piece of each wall, (walls,).
+        pieces_of_walls, rows_of_walls: the piece and the row of each wall, (walls,).
         members: the surface of each wall, and its number in a field, else its part, else -1: (2, walls).
     """
 
@@ -73,6 +73,7 @@ class Numbering:
             known = part_of[self.pieces_of_rows]
             self.parts_of_rows = PartsOfRows(tuple(np.where(known < 0, len(parts), known).tolist()), len(parts))
         self.pieces_of_walls = np.repeat(rows[:, 0], rows[:, 1])
+        self.rows_of_walls = np.repeat(np.arange(len(rows)), rows[:, 1])
         self.members = np.array(
             [np.array(pieces.owners, np.int64)[self.pieces_of_walls], part_of[self.pieces_of_walls]]
         )

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import motion as motions
 from .common import checks, notebook
-from .compiled_scene import MOST_WALLS, CompiledScene
+from .compiled_scene import CompiledScene
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .pairs import Pairs, checked_pairs
@@ -35,11 +35,6 @@ _BATCH = 4096
 _THIN = 1e-6
 # Planes nearer to the origin than an atom's nucleus is wide [m] are at it: a scene of them has no extent.
 _AT_ORIGIN = 1e-15
-# Of a field, and of a union of rooms, in a scene in which impacts move a surface.
-BESIDE_MASS = "surfaces[{i}] must not be {kind} where a wall has a mass or an inertia, got {got}"
-INSTEAD_OF_MASS = (
-    f"give that wall a motion instead, or list the solids of a field one by one, at most {MOST_WALLS} walls in all"
-)
 
 
 def _surfaces(value: Any) -> tuple[Surface, ...]:
@@ -112,9 +107,6 @@ class Scene:
         checks.assign(self, pieces=pieces_of(surfaces, lengths))
         compiled = self.compiled()
         require_few(compiled.openings() or ())
-        for i in (*compiled.fields(), *compiled.unions()) if self.reacts() else ():
-            message = BESIDE_MASS.format(i=i, kind=type(surfaces[i]).__name__, got=surfaces[i])
-            raise SceneError(f"{message}; {INSTEAD_OF_MASS}")
         if plane is not None:
             planes.require_all(plane, surfaces, pull, lengths)
         self._require_alone()

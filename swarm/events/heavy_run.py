@@ -11,10 +11,11 @@ from ..run.base import Arrays, named
 from ..run.observed import Observed
 from ..scene import Scene
 from ..state import Floats
+from ..surfaces.depth import penetration
 from .balls_run import CollidingRun
 from .colliding.heavy import COUNTS, Heavy
 from .reacting.described import freedoms_of, observed, scenery_of, walls_now
-from .reacting.freedoms import Freedoms
+from .reacting.freedoms import Freedoms, alone
 
 
 class HeavyRun(CollidingRun):
@@ -25,9 +26,8 @@ class HeavyRun(CollidingRun):
 
     def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
         r, now = vec(place), self._since(moment)
-        bodies = [(wall, wall.body.grown(radius)) for wall in self._heavy.walls]
-        posed = [(body, wall.freedom.posed(body, self._freedoms, now)) for wall, body in bodies]
-        return all(body.distance(one.own_place(r)) <= 0.0 for body, one in posed)
+        walls = [wall.grown(radius) for wall in self._heavy.walls]
+        return all(penetration(alone(wall.freedom.posed(wall.body, self._freedoms, now)), r) <= 0.0 for wall in walls)
 
     def _every_laws(self, compiled: CompiledScene, box: Any) -> list[Laws]:
         return scenery_of(compiled, 0.0).each_laws()
@@ -44,7 +44,7 @@ class HeavyRun(CollidingRun):
         )  # fmt: skip
         self._flock = self._flock._replace(freedoms=self._freedoms)
         gates = None if box.gates is None else box.gates._replace(openings=scenery.openings)
-        return box._replace(heavy=self._heavy, owners=scenery.owners, gates=gates)
+        return box._replace(heavy=self._heavy, owners=scenery.owners, rows=scenery.rows, gates=gates)
 
     def _set_window(self) -> None:
         if self._windows is not None:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -254,9 +253,7 @@ def _outside_then(scene: Scene, i: int, times: Floats, position: Floats) -> Floa
     if surface.motion is not None and scene.period is None:
         # In the frame in which it rests.
         rows = [motions.pose(surface.motion, t).given(position[:, [k]]) for k, t in enumerate(times.tolist())]
-        depths = side_of(surface) * distances(
-            replace(surface, motion=None), np.concatenate([position[:, :0], *rows], 1)
-        )
+        depths = side_of(surface) * distances(surface.at_rest(), np.concatenate([position[:, :0], *rows], 1))
         return np.where([surface.is_there(t) for t in times.tolist()], depths, -np.inf)
     depths = np.empty(len(times))
     # Between instants what does not move is as it is.

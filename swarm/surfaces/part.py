@@ -9,7 +9,10 @@ from .shapes.plane import Plane
 from .surface import Surface
 
 # What is given to the whole holds for those of its parts that leave it at its default.
-_HANDED_DOWN = ("restitution", "friction", "rolling", "temperature", "accommodation", "laws", "motion", "present")
+_HANDED_DOWN = (
+    "restitution", "friction", "rolling", "temperature", "accommodation", "laws", "motion", "present", "mass",
+    "inertia",
+)  # fmt: skip
 
 
 def checked_parts(value: Any, name: str) -> tuple[Surface, ...]:

@@ -182,6 +182,10 @@ class Surface(Validated):
         """Whether impacts move it."""
         return self.mass is not None or self.inertia is not None
 
+    def at_rest(self) -> "Surface":
+        """The same that nothing moves."""
+        return self if self.motion is None else replace(self, motion=None, mass=None, inertia=None)
+
     def own_center(self) -> Vector:
         """The centre in the surface's own frame, which is turned about the origin."""
         return rotations.turned_back(self.rotation, self.center)  # type: ignore[attr-defined]
@@ -326,7 +330,7 @@ class Surface(Validated):
         """The level set of every smooth wall, in order; of a solid with edges those of what it fills."""
         whole = self.filled()
         if type(whole).phi is not Surface.phi:
-            still = replace(whole, motion=None)
+            still = whole.at_rest()
             return [(lambda points: still.phi(points.T), lambda points: still.gradient(points.T).T)]
         return [_level_set(wall) for wall in whole.walls()]
 

@@ -38,8 +38,6 @@ class Joined(Surface):
     parts: Any = field(metadata={"key": "part"})
     side: str = "inside"
 
-    refused: ClassVar[tuple[str, ...]] = ("mass", "inertia")
-    instead: ClassVar[str] = "give it to each of its parts"
     # The operation of the gaps of parts, and where the wall of one is: inside of the others (1), or outside (-1).
     _of_gaps: ClassVar[Any] = None
     wall_in_others: ClassVar[float] = 1.0
@@ -70,6 +68,7 @@ class Joined(Surface):
             )
         if len(self.rooms) > 1:
             _require_alone(self)
+            _require_still(self)
         _require_room(self)
 
     def _turn(self) -> None:
@@ -188,7 +187,7 @@ class Joined(Surface):
         if self.is_solid():
             return UNBOUNDED
         # The bounds do not include the motion of the whole.
-        still = [[replace(one, motion=None) if self.motion is not None else one for one in room] for room in self.rooms]
+        still = [[one.at_rest() if self.motion is not None else one for one in room] for room in self.rooms]
         boxes = [room_bounds(lasting(room)) for room in still]
         low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
         return tuple(low.tolist()), tuple(high.tolist())
@@ -345,6 +344,16 @@ def _require_alone(whole: Joined) -> None:
             raise SceneError(
                 f"parts must be known everywhere, got {surface!r:.200}, which reaches the border of its grid; sample "
                 "it in a larger box"
+            )
+
+
+def _require_still(whole: Joined) -> None:
+    """Raise a `SceneError` where impacts would move several rooms."""
+    for name in ("mass", "inertia"):
+        if (value := getattr(whole, name)) is not None:
+            raise SceneError(
+                f"{name} must be None for {type(whole).__name__} of several rooms, got {value}; a surface without "
+                "re-entrant edges, or a mesh of the whole, may have it"
             )
 
 

@@ -102,6 +102,10 @@ class Walls(Record):
             number = number + (wall.count() if isinstance(wall, Field) else 1.0)
         return found
 
+    def total(self):
+        """How many walls there are, with those of the fields."""
+        return self.count_in_fields() + float(sum(not isinstance(wall, Field) for wall in self.each))
+
     def fields(self):
         """`numbered` of the fields."""
         return tuple((number, wall) for number, wall in self.numbered() if isinstance(wall, Field))

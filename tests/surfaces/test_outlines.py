@@ -315,7 +315,7 @@ BAD = {
     "radius": (lambda: swarm.Stadium(-1.0, 1.0), ["radius must be above 0"]),
     "length": (lambda: swarm.Stadium(1.0, -1.0), ["length must be 0 or more"]),
     "axis": (lambda: swarm.Polygon(L, axis=(0, 0, 0)), ["axis must not be of length 0"]),
-    "mass": (lambda: swarm.Polygon(L, mass=1.0), ["mass must be None for Polygon"]),
+    "mass": (lambda: swarm.Polygon(L, mass=-1.0), ["mass must be above 0"]),
     "an opening": (
         lambda: swarm.Scene([swarm.Sphere(1.0, openings=[swarm.Polygon(L)])]),
         ["openings[0] must be a volume", "got Polygon"],

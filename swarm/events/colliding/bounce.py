@@ -54,7 +54,7 @@ def bounce(box, flock, books, clock, i, now):
         wall = closed
     after = _turned(box, flock, books, walls, wall, (i, now, r, v))
     owner = box.owner(wall)
-    row = index(int(walls.row(wall) if box.owners is None else owner))
+    row = index(int(walls.row(wall) if box.rows is None else box.rows[index(int(wall))]))
     heat = book(box.laws, books, (row, 0, index(i)), box.kinds.mass_of(i), after)
     if box.watchers.counts is not None:
         box.watchers.counts.give(owner, heat, 0.0)

@@ -27,6 +27,7 @@ class Domain(Record):
     repose: Any = None  # None, or `Repose` where balls may come to rest
     turning: Any = None  # None, or `BallSpins` of balls that have a spin
     owners: Any = None  # the number in the scene of each wall without a mass; None where none has one
+    rows: Any = None  # and its row of the books
 
     def owner(self, wall):
         """The number of a wall in the scene."""

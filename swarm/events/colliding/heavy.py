@@ -35,7 +35,7 @@ class Heavy(Record):
 
     def grown(self, radius):
         """The walls that the centre of a ball meets."""
-        return tuple(wall._replace(body=wall.body.grown(radius)) for wall in self.walls)
+        return tuple(wall.grown(radius) for wall in self.walls)
 
     def soon(self, now):
         """The mean time from one strike to the next.
@@ -47,7 +47,7 @@ class Heavy(Record):
 
 def first_number(box):
     """The number of the first wall with a mass."""
-    return float(len(box.walls.each))
+    return box.walls.total()
 
 
 def meet_heavy(box, flock, i, now, hit):

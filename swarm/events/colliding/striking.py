@@ -87,12 +87,12 @@ def _blow(box, flock, wall, flight, ball):
 
 
 def _book(box, books, i, blow):
-    owner = index(blow.owner)
-    books.impulse[owner, 0] += blow.impulse
+    row = index(blow.row)
+    books.impulse[row, 0] += blow.impulse
     if books.dissipated.size > 0:
         books.dissipated[index(i)] += blow.lost
     if books.heat is not None:
-        books.heat[owner, 0] += blow.heat
+        books.heat[row, 0] += blow.heat
         if box.watchers.counts is not None:
             box.watchers.counts.give(float(blow.owner), blow.heat, 0.0)
     books.impacts[index(i)] += blow.impulse > 0.0

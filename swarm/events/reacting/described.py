@@ -12,10 +12,11 @@ from ...kernel.vector import Vec, vec
 from ...motion import Guide, Rotation, Translation, pose, unit_axis
 from ...run.observed import Observed
 from ...scene import Scene
+from ...surfaces.fields.members import Members
 from ...surfaces.presence.doors import walls_then
 from ...surfaces.presence.openings import openings_in
 from ...surfaces.surface import Surface
-from ...surfaces.walls import Walls
+from ...surfaces.walls import Field, Walls
 from .freedoms import WIDTH, Freedoms, Shifted
 from .pendulum import TERMS, Hinged, Pendulum
 from .queue import SceneWalls
@@ -30,12 +31,13 @@ def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:
     rest, given = [surface for surface in scene.surfaces if not surface.reacts()], None
     if rest:
         given = Scene(rest, scene.gravity, plane=scene.plane).compiled(largest, "walls that react")
-    reacts = np.array([surface.reacts() for surface in scene.surfaces])
-    reacts = reacts[compiled.numbering.surfaces_of_rows]
+    reacts, numbering = np.array([surface.reacts() for surface in scene.surfaces]), compiled.numbering
+    stay = np.flatnonzero(~reacts[numbering.members[0]])
     return SceneWalls(
         Walls(()) if given is None else given.walls(moment),
         (given.laws if given else None) or NONE,
-        np.flatnonzero(~reacts),
+        stay,
+        numbering.rows_of_walls[stay],
         _reacting(compiled, moment),
         scene.pull(),
         scene.finite_size(),
@@ -45,24 +47,28 @@ def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:
 
 def _reacting(compiled: CompiledScene, moment: float) -> tuple[Reacting, ...]:
     """The walls that react, in the order of the scene's walls; rows of freedoms are in that of its surfaces."""
-    scene = compiled.scene
-    rows = [i for i, surface in enumerate(scene.surfaces) if surface.reacts()]
-    made, number = list[Reacting](), 0
-    for i in dict.fromkeys(compiled.numbering.surfaces_of_rows):
-        surface = scene.surfaces[i]
-        walls = walls_then(surface, moment, compiled.largest)
-        if surface.reacts():
-            freedom = _freedom(surface, rows.index(i), scene.gravity or (0.0, 0.0, 0.0))
-            laws = _laws_of(surface, scene)
-            absorbs = 1.0 if laws is not None and laws.may_end else None
-            piece, pieces = compiled.pieces.owners.index(i), compiled.pieces
-            openings = openings_in([(piece, len(walls))], (pieces.volumes, pieces.doorways), moment) or None
-            made += [
-                Reacting(wall, freedom, number + k, surface.restitution, laws, float(k), absorbs, openings)
-                for k, wall in enumerate(walls)
-            ]
-        number += len(walls)
+    scene, pieces, made = compiled.scene, compiled.pieces, list[Reacting]()
+    heavy = [i for i, surface in enumerate(scene.surfaces) if surface.reacts()]
+    numbers, rows = compiled.numbering.pieces_of_walls, compiled.numbering.rows_of_walls
+    for p in dict.fromkeys(compiled.numbering.pieces_of_rows.tolist()):
+        piece, surface = pieces.each[p], scene.surfaces[pieces.owners[p]]
+        if not surface.reacts():
+            continue
+        walls = [_loosened(wall, scene) for wall in walls_then(piece, moment, compiled.largest)]
+        freedom = _freedom(surface, heavy.index(pieces.owners[p]), scene.gravity or (0.0, 0.0, 0.0))
+        laws, mine = _laws_of(piece, scene), np.flatnonzero(numbers == p).tolist()
+        absorbs = 1.0 if laws is not None and laws.may_end else None
+        openings = openings_in([(p, len(mine))], (pieces.volumes, pieces.doorways), moment) or None
+        made += [
+            Reacting(wall, freedom, mine[k], int(rows[mine[k]]), piece.restitution, laws, float(k), absorbs, openings)
+            for k, wall in enumerate(walls)
+        ]
     return tuple(made)
+
+
+def _loosened(wall: Any, scene: Scene) -> Any:
+    """A wall, or a field that may be moved as far as the scene reaches, which places have the round-off of."""
+    return wall.loosened(scene.extent()) if isinstance(wall, Members) else wall
 
 
 def _laws_of(surface: Surface, scene: Scene) -> Laws | None:
@@ -167,6 +173,7 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
 def walls_now(compiled: CompiledScene, scenery: SceneWalls, freedoms: Freedoms) -> Walls:
     """All walls of a scene, in its order, at the end of the frame of `scenery`."""
     given = iter(scenery.given.at(0.0).each)
-    reacting = (wall.freedom.posed(wall.body, freedoms, 0.0) for wall in scenery.reacting)
+    posed = (wall.freedom.posed(wall.body, freedoms, 0.0) for wall in scenery.reacting)
+    reacting = (Field(wall) if isinstance(wall.body, Members) else wall for wall in posed)
     owned = [compiled.scene.surfaces[i] for i in compiled.numbering.surfaces_of_rows]
     return Walls(tuple(next(reacting if surface.reacts() else given) for surface in owned))

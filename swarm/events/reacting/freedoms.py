@@ -8,15 +8,17 @@ import math
 from typing import Any, NamedTuple
 
 from ...kernel.arrays import index
+from ...kernel.gravity import Gravity, as_vector
 from ...kernel.jit import Array, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec, column, dot, norm, put, square
+from ...surfaces.fields.members import Members
 from ...surfaces.in_motion.drive import Drive, PoseDerivatives, Swing
 from ...surfaces.in_motion.moving import Moving
 from ...surfaces.in_motion.posed import Posed
 from ...surfaces.time_of_impact import flights, safe
 from ...surfaces.time_of_impact.rising import flight_of
-from ...surfaces.walls import Walls
+from ...surfaces.walls import Field, Walls
 
 # The first leases have this part of the particles' speed as their width. They are too narrow where they end before so
 # many events a particle, and too wide where they last longer than that many.
@@ -78,6 +80,10 @@ class Falling(Posed):
     def falling_hit(self, r, v, pull):
         way, speed = r - self.pose.shift, v - self.pose.velocity
         return self.body.falling_hit(way, speed, pull - self.pose.acceleration)
+
+    def field_hit(self, gravity, r, v):
+        felt = None if gravity is None else Gravity(*(as_vector(gravity) - self.pose.acceleration))
+        return self.body.field_hit(felt, r - self.pose.shift, v - self.pose.velocity)
 
 
 _AT_REST = Drive(ZERO, ZERO, (), None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf, 0.0, ZERO)
@@ -181,14 +187,18 @@ class Freedom(Record):
         raise NotImplementedError
 
     def hit(self, body, gravity, walls, flight):
-        """When a flight meets the wall: (time, whether it does then)."""
+        """The `Hit` of a flight with the wall, number 0, or a wall of a field."""
         return march(Moving(body, self.drive(walls, flight.time)), flight, flight.longest)
 
 
 def march(wall, flight, longest):
     """`Freedom.hit` of a wall that is met by safe steps, within so long [s]."""
-    found = safe.march_moving(Walls((wall,)), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
-    return found.time, found.wall >= 0.0
+    return safe.march_moving(alone(wall), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
+
+
+def alone(wall):
+    """The walls of a scene that has only this one, or field."""
+    return Walls((Field(wall) if isinstance(wall.body, Members) else wall,))
 
 
 # --- Without turning -------------------------------------------------------------------------------------
@@ -290,7 +300,7 @@ class Shifted(Freedom):
     def hit(self, body, gravity, walls, flight):
         if self.rate is not None:
             return super().hit(body, gravity, walls, flight)
-        return flights.hit(gravity, self.posed(body, walls, flight.time), flight.r, flight.v)
+        return flights.first_hit(alone(self.posed(body, walls, flight.time)), gravity, flight.r, flight.v)
 
 
 def exact_sum(a, b):

@@ -103,6 +103,12 @@ class Swaying(Record):
     walls: Any
     start: float
 
+    accelerates = True
+
+    def count(self):
+        """The number of walls of a field."""
+        return self.body.count()
+
     def seen(self, flight, t):
         """A particle as safe steps to the pendulum see it."""
         freedom, walls, time = self.freedom, self.walls, self.start + t

@@ -47,6 +47,7 @@ class SceneWalls(NamedTuple):
     given: Any  # None, or the walls
     laws: Laws
     owners: Array  # (given walls,)
+    rows: Array  # (given walls,) of the books of the scene
     reacting: Any
     pull: Any  # gravity, or None
     size: float = 1.0  # of the scene [m]
@@ -178,7 +179,7 @@ def _bounce(scenery, queue, i, wall, rule, now):
         _absorb(queue, i, owner, time)
         v1 = v
     put(queue.velocity, 0, i, v1)
-    book(laws, queue, (owner, i, i), m, bounce)
+    book(laws, queue, (index(scenery.rows[int(wall)]), i, i), m, bounce)
     queue.energy[i] = 0.5 * bounce.twice_energy
     struck = Struck(i, wall, time, r, v, v1, m * bounce.impulse)
     struck = queue.watchers.with_slip(laws, walls, struck)
@@ -201,7 +202,7 @@ def _strike(scenery, walls, queue, i, rule, now):
     left = 2.0 * queue.energy[i] - 2.0 * (blow.given + blow.lost) / m
     if queue.heat is not None:
         left += 2.0 * blow.heat / m
-        queue.heat[index(blow.owner), i] += blow.heat
+        queue.heat[index(blow.row), i] += blow.heat
     v1, kept = with_energy(blow.v, left, 2.0 * potential(scenery.pull, blow.r))
     time = rule.moment - (rule.end - now)
     if queue.absorbed is not None and not blow.stays:
@@ -210,7 +211,7 @@ def _strike(scenery, walls, queue, i, rule, now):
     put(queue.position, 0, i, blow.r)
     put(queue.velocity, 0, i, v1)
     queue.energy[i] = 0.5 * kept
-    queue.impulse[index(blow.owner), i] += blow.impulse
+    queue.impulse[index(blow.row), i] += blow.impulse
     queue.dissipated[i] += blow.lost
     queue.impacts[i] += blow.impulse > 0.0
     queue.watchers.hit(None, Struck(i, float(blow.owner), time, blow.r, v, v1, blow.impulse, blow.slip))

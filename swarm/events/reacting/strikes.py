@@ -9,7 +9,8 @@ from ...contact.wall_impact import Arriving, by_law
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec, cross, dot, either, norm, square, with_square
-from ...surfaces.time_of_impact.flights import NEVER, sooner
+from ...surfaces.fields.members import Members
+from ...surfaces.time_of_impact.flights import NEVER, soonest
 from ...surfaces.walls import Walls
 
 # The energy is that which is left where the square of the speed is off by no more than this part.
@@ -24,7 +25,8 @@ class WallImpact(NamedTuple):
     impulse: float
     given: float  # energy that the wall gains, and the spin of a ball [J]
     lost: float  # energy that is dissipated [J]
-    owner: int
+    owner: Any
+    row: int  # of the books
     slip: Vec  # velocity relative to the wall along it, before [m/s]
     heat: float = 0.0  # energy that the wall's law gives besides [J]
     stays: Any = True  # False where the law absorbs the particle, which keeps its velocity
@@ -70,7 +72,8 @@ class Reacting(Record):
 
     body: Any
     freedom: Any  # how it may move
-    owner: int  # its number among all walls of the scene
+    owner: Any  # its number among all walls of the scene
+    row: int  # that of the books of the scene
     restitution: float
     laws: Any = None  # None, or the `Laws` of the surface, where they are more than a restitution
     number: float = 0.0  # among the walls of the surface
@@ -81,6 +84,22 @@ class Reacting(Record):
     def sends_off(self):
         """Whether it sends particles off by a law: a constant for the compiler."""
         return self.laws is not None and self.laws.send_off
+
+    def count(self):
+        """How many walls it is."""
+        return self.body.count() if isinstance(self.body, Members) else 1.0
+
+    def grown(self, radius):
+        """The wall that the centre of a ball meets."""
+        return self._replace(body=self.body.grown(radius))
+
+    def one(self, number):
+        """Of a field one of its walls."""
+        if not isinstance(self.body, Members):
+            return self
+        return self._replace(
+            body=self.body.wall(number), owner=self.owner + int(number), number=self.number + number
+        )  # fmt: skip
 
     def lets_out(self, walls, flight, radius):
         """Whether it is open where a particle meets it, or a ball of this radius."""
@@ -109,7 +128,7 @@ class Reacting(Record):
         if self.laws is None:
             freedom.push(walls, flight.time, impulse * n, arm)
             given = impulse * (speed + 0.5 * impulse * give)
-            return WallImpact(r, flight.v - (impulse / mass) * n, impulse, given, lost, self.owner, slip)
+            return WallImpact(r, flight.v - (impulse / mass) * n, impulse, given, lost, self.owner, self.row, slip)
         whole, heat, turned, happens = impulse * n, 0.0, 0.0, False
         law: Any = None
         if self.laws.send_off:
@@ -132,7 +151,7 @@ class Reacting(Record):
             stays = law.stays | (not happens)
             more, less = (given, 0.0) if self.laws.give_heat else (0.0, -given)
             v1, heat, lost = either(stays, v1, flight.v), select(stays, heat, more), select(stays, lost, less)
-        return WallImpact(r, v1, impulse, given, lost, self.owner, slip, heat, stays)
+        return WallImpact(r, v1, impulse, given, lost, self.owner, self.row, slip, heat, stays)
 
     def _by_law(self, r, n, w, at, random):
         """Whether a law acts on a particle of the relative velocity w, and the `LawImpulse` then."""
@@ -177,30 +196,46 @@ def reach_of_all(reacting, walls, flight):
     return time
 
 
+def numbered(reacting):
+    """(number, `Reacting`) of each; of a field it is that of its first wall."""
+    found: Any = ()
+    number = 0.0
+    for wall in reacting:
+        found = (*found, (number, wall))
+        number = number + wall.count()
+    return found
+
+
+def is_of(wall, number, one):
+    """Whether the wall with a number is this one, which has the number, or one of its field."""
+    return (wall >= number) & (wall < number + one.count()) if isinstance(one.body, Members) else wall == number
+
+
 def first_hit(reacting, gravity, walls, flight):
     """The first `Hit` of a flight, if nothing else strikes the walls before."""
     hit = NEVER
-    for k, wall in reversed(tuple(enumerate(reacting))):
-        time, found = wall.freedom.hit(wall.body, gravity, walls, flight)
-        hit = sooner(time, found, float(k), hit)
+    for number, wall in reversed(numbered(reacting)):
+        hit = soonest(wall.freedom.hit(wall.body, gravity, walls, flight), number, hit)
     return hit
 
 
 def exit_at(reacting, wall, walls, flight, radius=0.0):
     """The number in the scene of the wall with this number, where it is open to a particle that meets it; else -1."""
     owner = -1.0
-    for k, one in enumerate(reacting):
-        if one.openings is not None:
-            owner = select((wall == k) & one.lets_out(walls, flight, radius), float(one.owner), owner)
+    for number, several in numbered(reacting):
+        if several.openings is not None:
+            one = several.one(wall - number)
+            here = is_of(wall, number, several) & one.lets_out(walls, flight, radius)
+            owner = select(here, float(one.owner), owner)
     return owner
 
 
 def strike(reacting, wall, walls, flight, mass, random=None, turner=None):
     """The impact of a particle on the wall with this number: its `WallImpact`."""
-    for k, one in enumerate(reacting):
-        if wall == k:
-            return one.strike(walls, flight, mass, random, turner)
-    return WallImpact(flight.r, flight.v, 0.0, 0.0, 0.0, -1, ZERO)
+    for number, one in numbered(reacting):
+        if is_of(wall, number, one):
+            return one.one(wall - number).strike(walls, flight, mass, random, turner)
+    return WallImpact(flight.r, flight.v, 0.0, 0.0, 0.0, -1, -1, ZERO)
 
 
 def with_energy(v, left, fall):
@@ -216,7 +251,7 @@ def with_energy(v, left, fall):
 
 def all_stay(reacting, wall, walls):
     """Whether the wall with this number, which was just struck, is within its lease."""
-    for k, one in enumerate(reacting):
-        if wall == k:
+    for number, one in numbered(reacting):
+        if is_of(wall, number, one):
             return one.freedom.stays(walls)
     return True

@@ -14,7 +14,7 @@ from ...methods import AugmentedLagrangian, Impact, Penalty
 from ...methods.base import Method
 from ...methods.fixed_step import SoftWalls
 from ...particles import Particles, TiedParticles
-from ...scene import BESIDE_MASS, INSTEAD_OF_MASS, Scene
+from ...scene import Scene
 from ...surfaces.in_motion.drive import drive_of
 from ...surfaces.laws.sticky import Sticky
 from ...surfaces.periodic.images import MASS_AND_PERIOD, WITHOUT_PERIOD
@@ -404,13 +404,12 @@ CAPABILITIES = (
         (BALLS, GRAINS): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
         (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
         (CHORDS,): _of_one_room("a contact_step", _NO_STEP),
-        (MASSIVE, HEAVY): Refusal(BESIDE_MASS, INSTEAD_OF_MASS),
+        (HEAVY,): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
     }),
     Capability("field", _fields, {
         (SOFT_BODIES, PAPER_BODIES): _listed("bodies and soft walls", "use Impact(dt=...)"),
         (*_FIXED_STEPS, OTHER_POINTS): _listed("{method}", _TO_EXACT),
         (CHORDS,): _listed("a contact_step", _NO_STEP),
-        (MASSIVE, HEAVY): Refusal(BESIDE_MASS, INSTEAD_OF_MASS),
     }),
     Capability("dt of Impact", _argument("dt", None), {
         (*_RIGID_POINTS, *_RIGID_BALLS): Refusal(

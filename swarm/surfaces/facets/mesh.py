@@ -107,17 +107,15 @@ class Mesh(Surface):
     open: Flag = field(default=False, kw_only=True, metadata={"younger": True})
     _made: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
 
-    refused = ("mass", "inertia")
-    instead = "impacts move no mesh: give it a motion"
-
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.open:
-            if self.motion is not None:
-                raise SceneError(
-                    f"motion must be None for a Mesh with open=True, got {self.motion!r:.200}; give its sheets a "
-                    "thickness, as a closed mesh, or leave the motion out"
-                )
+            for name in ("motion", "mass", "inertia"):
+                if (value := getattr(self, name)) is not None:
+                    raise SceneError(
+                        f"{name} must be None for a Mesh with open=True, got {value!r:.200}; give its sheets a "
+                        f"thickness, as a closed mesh, or leave the {name} out"
+                    )
             checks.assign(self, side="outside", nouns=_NOUNS_OF_SHEETS)
             if self.openings:
                 raise SceneError(
@@ -132,6 +130,11 @@ class Mesh(Surface):
             own = dict(zip(("vertices", "triangles", "group", "names"), given, strict=True))
             checks.assign(self, **own, **settled, _made=made._replace(given=given))
         object.__setattr__(self, "groups", self._checked_groups())
+        if self.groups and self.reacts():
+            raise SceneError(
+                f"groups must be None for a Mesh with a mass or an inertia, got {self.groups!r:.200}; give the "
+                "whole mesh one law, or a motion instead"
+            )
 
     def _mended(self) -> _Made:
         """The triangles of the file or the arrays."""

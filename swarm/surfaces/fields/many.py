@@ -54,8 +54,6 @@ class Many(Surface):
 
     is_field = True
     centers: Any
-    refused: ClassVar[tuple[str, ...]] = ("mass", "inertia")
-    instead = "give it to a body that is a surface of the scene by itself"
     # Of one body
     kind: ClassVar[type[Surface]]
     # The corners of the cell that repeats, in a scene in which one does.
@@ -70,8 +68,9 @@ class Many(Surface):
         side, name = getattr(self, "side", "outside"), type(self).__name__
         if side != "outside" and not (self.may_be_foam and side == "inside"):
             raise SceneError(f'side must be "outside" for {name}, which are solids, got {side!r}')
-        if self.is_foam() and self.motion is not None:
-            raise SceneError(f'motion must be left out for {name} with side="inside", got {self}')
+        for moved in ("motion", "mass", "inertia") if self.is_foam() else ():
+            if getattr(self, moved) is not None:
+                raise SceneError(f'{moved} must be left out for {name} with side="inside", got {self}')
         object.__setattr__(self, "centers", (balls if self.kind is Sphere else bodies)("centers", self.centers))
         for what in [field.name for field in fields(self) if field.name in _ROWS and field.name != "centers"]:
             if (value := getattr(self, what)) is not None:

@@ -11,7 +11,7 @@ from ...kernel.arrays import aligned_copy, index
 from ...kernel.grid import Grid, cell_of, entries_at, entries_of, layer_of, number_of, until_next
 from ...kernel.jit import Array, kernel, outlined, select
 from ...kernel.record import Record
-from ...kernel.vector import Vec, column, put
+from ...kernel.vector import Vec, column, norm, put
 from ..facets.facet import Shared
 from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers
@@ -20,6 +20,7 @@ from ..shapes.slab import AXES, SlabNumbers
 from ..shapes.solid import SolidNumbers
 from ..shapes.sphere import SphereCavity, SphereNumbers, ball, cavity
 from ..time_of_impact import flights
+from ..time_of_impact.course import rise_time
 
 # The rows of a rotation that turns nothing.
 _UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
@@ -92,6 +93,18 @@ class Members(Record):
         last = self.table.shape[0] - 1.0
         return member(self, index(int(select(number < 0.0, 0.0, select(number > last, last, number)))))
 
+    def far(self, r):
+        """A lower bound of the distance of a place from all of them: that from the end of a cell with none."""
+        cell = cell_of(self.grid, r)
+        first, stop = entries_of(self.grid, cell.number)
+        if not cell.inside or first < stop:
+            return 0.0
+        return _until_side(self, cell, r)
+
+    def reach(self, lease):
+        """A time during which a particle surely meets none of them, as `Smooth.reach`."""
+        return rise_time(-self.far(lease.r), 0.5 * (norm(lease.v) + lease.width), 0.5 * norm(lease.a))
+
     def is_in_another(self, number, r):
         """Whether a point is in any but the one with this number."""
         return _is_in_another(self, number, r)
@@ -153,6 +166,12 @@ class Few(Members):
 
     def in_cells(self):
         return Members(*self)
+
+
+def _until_side(members, cell, r):
+    """The distance of a place from the nearest face of its cell, or of the block of free cells around it."""
+    ahead, back = (members.until_out(cell, None, r, Vec(way, way, way)) for way in (1.0, -1.0))
+    return min(ahead, back)
 
 
 def member(members, m):

@@ -47,8 +47,6 @@ class Outlined(Many):
     center: Vector
     side: str
     height: Any = None
-    refused = ("mass", "inertia")
-    instead = "its walls end at its corners: give it a motion, or build it of surfaces without edges"
     face_noun: ClassVar[str] = "side"
     # The argument that gives the outline.
     given: ClassVar[str] = "outline"

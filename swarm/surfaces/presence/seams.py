@@ -181,7 +181,7 @@ def seams_of(rooms: Sequence[Room]) -> list[Seam]:
 
 def _still(room: Iterable[Surface]) -> tuple[Surface, ...]:
     """A room as it is given, before it moves."""
-    return tuple(one if one.motion is None else replace(one, motion=None) for one in room)
+    return tuple(one.at_rest() for one in room)
 
 
 def _between(rooms: Sequence[Room], pair: tuple[int, int], box: tuple[Floats, Floats], size: float) -> list[Seam]:

@@ -169,7 +169,7 @@ WRONG = {
     "an unknown group": (lambda p: swarm.Mesh(p, groups={"lid": {}}), r"got 'lid'; there are 'walls', 'shutter'"),
     "an unknown law": (lambda p: swarm.Mesh(p, groups={"walls": {"colour": 1}}), r"groups\['walls'\] must be one of"),
     "no table": (lambda p: swarm.Mesh(p, groups={"walls": 3}), r"groups\['walls'\] must be a table of laws, got 3"),
-    "a mass": (lambda p: swarm.Mesh(p, mass=1.0), r"mass must be None for Mesh"),
+    "a mass": (lambda p: swarm.Mesh(p, open=True, mass=1.0), r"mass must be None for a Mesh with open=True"),
     "no file": (lambda p: swarm.Mesh(p.parent / "no.stl"), r"cannot read the mesh .*no.stl"),
     "both": (lambda p: swarm.Mesh(p, FACES), r"triangles must be None with the path of a file"),
     "no triangles": (lambda p: swarm.Mesh(CORNERS), r"triangles must be \(T, 3\) numbers of corners, got None"),
