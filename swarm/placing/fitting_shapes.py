@@ -24,8 +24,8 @@ def require_shapes(scene: Scene, radius: Floats) -> None:
             raise SceneError(
                 f"surfaces[{i}] must be one that particles with a radius may meet, got {type(surface).__name__}, "
                 f"{why}; they may meet Sphere, Plane, Slab, Box, Cylinder, Capsule, Torus, Cone, Ellipsoid, Quadric, "
-                "Paraboloid, Formula, OwnSurface, Polygon, Stadium, Prism and Mesh, fields and intersections of these; "
-                "make it of such surfaces, or leave the radius out"
+                "Paraboloid, Formula, OwnSurface, Sampled, Polygon, Stadium, Prism and Mesh, fields and intersections "
+                "of these; make it of such surfaces, or leave the radius out"
             )
         largest = int(radius.argmax())
         lid = _nearest_lid(scene, surface)

@@ -13,24 +13,25 @@ import swarm
 WAVES = "x**4 + 2*y**4 + exp(z*z/2) - 1.4 + 0.2*x*y*z"
 
 
-def foot_in_high_precision(y):
-    """The distance of a place from the cavity of that formula: the least of Newton's methods from many starts."""
+def waves(x, y, z):
+    """phi of that formula, and its gradient."""
+    fifth = mpmath.mpf(0.2)
+    steep = mpmath.exp(z * z / 2)
+    value = x**4 + 2 * y**4 + steep - mpmath.mpf(1.4) + fifth * x * y * z
+    return value, (4 * x**3 + fifth * y * z, 8 * y**3 + fifth * x * z, z * steep + fifth * x * y)
+
+
+def foot_in_high_precision(y, value_and_slope, starts=6):
+    """The distance of a place from a surface: the least of Newton's methods from many starts."""
     with mpmath.workdps(40):
         place = [mpmath.mpf(float(x)) for x in y]
 
-        def phi(x, y, z):
-            return x**4 + 2 * y**4 + mpmath.exp(z * z / 2) - mpmath.mpf(1.4) + mpmath.mpf(0.2) * x * y * z
-
         def equations(x, y, z, k):
-            slope = (
-                4 * x**3 + mpmath.mpf(0.2) * y * z,
-                8 * y**3 + mpmath.mpf(0.2) * x * z,
-                z * mpmath.exp(z * z / 2) + mpmath.mpf(0.2) * x * y,
-            )
-            return [a - b - k * s for a, b, s in zip((x, y, z), place, slope, strict=True)] + [phi(x, y, z)]
+            value, slope = value_and_slope(x, y, z)
+            return [a - b - k * s for a, b, s in zip((x, y, z), place, slope, strict=True)] + [value]
 
         rng, found = np.random.default_rng(2), []
-        for _start in range(6):
+        for _start in range(starts):
             u = rng.normal(size=3)
             first = [float(a) + 0.4 * b / math.hypot(*u) for a, b in zip(y, u, strict=True)]
             try:
@@ -50,8 +51,81 @@ def test_the_foot_is_that_of_a_solver_in_high_precision():
         if found is None or not 0.01 < found.away < largest:
             continue
         assert found.sure
-        assert abs(found.away - foot_in_high_precision(y)) <= 4e-16
+        assert abs(found.away - foot_in_high_precision(y, waves)) <= 4e-16
         checked += 1
+
+
+TICKS = np.linspace(-1.0, 1.0, 9)
+
+
+def wavy(side="inside", **laws):
+    """A cavity of samples that are no polynomial."""
+    x, y, z = TICKS[:, None, None], TICKS[:, None], TICKS
+    values = x * x + 1.2 * y * y + z * z + 0.1 * np.sin(3.0 * x) * np.cos(2.0 * y) * np.sin(2.0 * z) - 0.5
+    return swarm.Sampled(values, 0.25, (-1.0,) * 3, side, **laws)
+
+
+def spline_in_high_precision(surface):
+    """phi of a sampled surface and its gradient, by the sum of the pieces of each basis function."""
+    table = surface.numbers().spline.coefficients
+
+    def pieces(x):
+        u = (x + 1) * 4
+        k = min(max(int(mpmath.floor(u)), 0), 7)
+        t = u - k
+        s = 1 - t
+        values = (s**3, 3 * t**3 - 6 * t**2 + 4, 3 * s**3 - 6 * s**2 + 4, t**3)
+        slopes = (-3 * s**2, 9 * t**2 - 12 * t, 12 * s - 9 * s**2, 3 * t**2)
+        return k, [one / 6 for one in values], [4 * one / 6 for one in slopes]
+
+    def value_and_slope(x, y, z):
+        (i, a, da), (j, b, db), (k, c, dc) = pieces(x), pieces(y), pieces(z)
+        block = [[[mpmath.mpf(float(v)) for v in row] for row in one] for one in table[i : i + 4, j : j + 4, k : k + 4]]
+
+        def total(u, v, w):
+            return mpmath.fsum(
+                u[p] * v[q] * mpmath.fsum(w[r] * block[p][q][r] for r in range(4)) for p in range(4) for q in range(4)
+            )
+
+        return total(a, b, c), (total(da, b, c), total(a, db, c), total(a, b, dc))
+
+    return value_and_slope
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_the_foot_at_samples_is_that_of_a_solver_in_high_precision(side):
+    surface, rng = wavy(side), np.random.default_rng(5)
+    wall, largest, checked = surface.by_foot(0.0), surface.largest_ball(), 0
+    while checked < 2:
+        y = rng.uniform(-0.9, 0.9, 3)
+        inside = (surface.phi(y[:, None])[0] < 0.0) == (side == "inside")
+        found = call(wall.foot, y) if inside else None
+        if found is None or not 0.01 < found.away < 0.9 * largest:
+            continue
+        assert found.sure
+        assert abs(found.away - foot_in_high_precision(y, spline_in_high_precision(surface), 3)) <= 1e-15
+        checked += 1
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_no_bound_at_samples_of_a_distance_is_above_the_distance(side):
+    """Second derivatives of a distance grow without end: their bound holds near the surface only."""
+    x = np.linspace(-1.0, 1.0, 17)
+    phi = np.sqrt(x[:, None, None] ** 2 + x[:, None] ** 2 + x**2) - 0.6
+    surface = swarm.Sampled(phi, 0.125, (-1.0,) * 3, side)
+    wall, largest, rng = surface.by_foot(0.0), surface.largest_ball(), np.random.default_rng(6)
+    assert 0.0 < wall.known < math.inf
+    assert largest > 0.03
+    sign = 1.0 if side == "inside" else -1.0
+    for _place in range(60):
+        y = rng.uniform(-1.3, 1.3, 3)
+        if sign * surface.phi(y[:, None])[0] >= 0.0:
+            continue
+        found, (near, _normal) = call(wall.foot, y), call(wall.at_least, y)
+        directions = rng.normal(size=(3, 400))
+        directions *= (1.0 - 1e-9) * max(found.away, near) / np.sqrt((directions**2).sum(axis=0))
+        assert (sign * surface.phi(y[:, None] + directions)).max() <= 1e-12
+        assert found.sure or found.away >= (1.0 - 1e-3) * largest
 
 
 def test_a_foot_that_is_far_has_a_lower_bound_above_every_radius():
@@ -90,6 +164,10 @@ def test_an_ellipsoid_by_its_formula_is_an_ellipsoid(side):
             assert np.array(found.normal) == pytest.approx(sign * np.array(expected[1]), abs=4e-15)
 
 
+def _squares(a, b, c):
+    return a * (TICKS**2)[:, None, None] + b * (TICKS**2)[:, None] + c * TICKS**2
+
+
 class Size(NamedTuple):
     """Of a user-defined surface."""
 
@@ -107,8 +185,17 @@ def ball_gradient(p, x, y, z):
 WALLS = {
     "formula": swarm.Formula("x**4 + y**4/0.5 + z**2/0.6 + 0.3*x*y - 0.6"),
     "quadric": swarm.Quadric(((1.5, 0.2, 0.0), (0.2, 2.0, 0.3), (0.0, 0.3, 3.0)), constant=-1.0),
+    "sampled": wavy(rotation={"axis": (1.0, -2.0, 3.0), "angle": 0.7}),
     "own": swarm.OwnSurface(Size(0.7), ball_phi, ball_gradient, size=0.7, bounds=((-0.8,) * 3, (0.8,) * 3)),
 }
+
+
+# To fill what samples enclose takes three seconds: each of many points is looked at.
+PLACED = swarm.Particles(
+    np.array([(0.3, -0.3, 0.1, -0.1), (0.1, 0.2, -0.3, -0.1), (-0.1, 0.1, 0.2, -0.3)]),
+    1.5 * np.array([(1.0, -0.8, 0.2, 0.1), (0.1, 0.3, -0.9, -0.2), (-0.2, 0.5, 0.3, 0.9)]),
+    radius=0.06,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("gravity", [None, (0.2, 0.1, -1.0)], ids=["straight", "falling"])
@@ -116,7 +203,7 @@ WALLS = {
 def test_balls_in_it_keep_their_energy_and_overlap_by_round_off(name, gravity):
     surface, depths = WALLS[name], []
     scene = swarm.Scene([surface], gravity=gravity)
-    start = swarm.fill(scene, 6, speed=1.0, radius=0.06, seed=2)
+    start = swarm.fill(scene, 6, speed=1.0, radius=0.06, seed=2) if name != "sampled" else PLACED
 
     def depth(frame):
         reach = surface.reaching_outside(frame.position, start.radius)
@@ -157,9 +244,13 @@ def test_balls_of_a_formula_fly_as_those_of_the_ellipsoid_that_it_is():
         ),
         (swarm.Paraboloid(0.1, center=(0.0, 0.0, -0.5)), r"radius must be below 0.2 m, .*at \(0, 0, -0.5\)"),
         (swarm.Formula("x**4 + y**4 + z**4 - 1"), r"radius must be below 0.25\d* m, .*use smaller balls"),
+        (
+            swarm.Sampled(_squares(1.0, 2.0, 1.5) - 0.25, 0.25, (-1.0,) * 3),
+            r"radius must be below 0.25 m, .*at \(-?0.5, .*\), of surfaces\[0\] \(Sampled\)",
+        ),
         (swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))), r"a tip at \(0, 0, 0\)"),
     ],
-    ids=["quadric", "paraboloid", "formula", "tip"],
+    ids=["quadric", "paraboloid", "formula", "sampled", "tip"],
 )
 def test_a_ball_that_is_too_large_is_refused_in_a_sentence(surface, words):
     ball = swarm.Particles((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), radius=0.26)

@@ -8,6 +8,9 @@ it is nearer, where 2 m k <= 1: up to |grad f|/(2 m), which is no more than the 
 quadric is the smallest one. Deeper, or before a foot is found, places on the way to it say a lower bound, with k up to
 1/(2 m) so large a one as the least such radius. So no foot needs to be searched for: the one that is found is nearest,
 or the wall is farther than any ball is large.
+
+Where that bound of f'' holds within a distance from the wall only, no place says more than half of this: the lines from
+places within it to the nearest point of the wall, which these bounds are about, stay where it holds.
 """
 
 import math
@@ -53,6 +56,7 @@ class ByFoot(contract.Smooth):
     bend: float  # the smallest radius of curvature that is certain
     low: Vec  # corners of a box around the wall
     high: Vec
+    known: float  # a distance up to twice which from the wall m is certain
 
     side = 1.0
 
@@ -132,9 +136,10 @@ class ByFoot(contract.Smooth):
         """What a place by itself says: how far the wall is at least, and the unit vector to where it may be."""
         p = self.within(r)
         side = self.side_of_body()
-        n = side * self.body.gradient(p)
+        f, n = side * self.body.phi(p), side * self.body.gradient(p)
         size = norm(n)
-        return _free(self, r, p, side * self.body.phi(p), n), n * (1.0 / select(size > _TINY, size, 1.0))
+        near = _certain(self, r, f, _free(self, r, p, f, n))
+        return near, n * (1.0 / select(size > _TINY, size, 1.0))
 
     def passed(self, r, v):
         low, high, far = self.low, self.high, self.radius
@@ -163,6 +168,13 @@ def _free(wall, y, p, f, n):
     return select(level < 0.0, rise_time(level, 0.5 * norm(n + (2.0 * m) * e), m), 0.0)
 
 
+def _certain(wall, y, f, away):
+    """What of such a bound is certain, up to `known`, or what the body says of the place, where f there is below 0."""
+    if wall.known < math.inf:
+        return max(min(away, wall.known), select(f < 0.0, wall.body.clearance(y), 0.0))
+    return away
+
+
 def _matrix(wall, z, share):
     """I - k grad grad f"""
     h, k = wall.body.hessian(z), -2.0 * share * wall.side_of_body()
@@ -189,7 +201,7 @@ def _foot(wall, y):
     body, side = wall.body, wall.side_of_body()
     p = wall.within(y)
     f, n = side * body.phi(p), side * body.gradient(p)
-    away, size = _free(wall, y, p, f, n), norm(n)
+    away, size, first = _free(wall, y, p, f, n), norm(n), f
     # From there so far along the normal
     ahead = rise_time(f, 0.5 * size, wall.most)
     ahead = select((ahead < math.inf) & (f < 0.0), ahead, -f / select(size > _TINY, size, 1.0))
@@ -199,7 +211,8 @@ def _foot(wall, y):
     for sweep in range(_SWEEPS):
         f, n = side * body.phi(z), side * body.gradient(z)
         d, n2 = z - y, square(n)
-        away = max(away, _free(wall, y, z, f, n))
+        if norm(d) <= wall.known:
+            away = max(away, _free(wall, y, z, f, n))
         if sweep == 0:
             share = min(dot(d, n) / select(n2 > _TINY, n2, 1.0), largest)
         inverse = _inverse(_matrix(wall, z, share))
@@ -219,4 +232,5 @@ def _foot(wall, y):
     size = norm(n)
     size = select(size > _TINY, size, 1.0)
     here = (dot(z - y, n) - f) / size
-    return Foot(select(sure, here, away), n * (1.0 / size), z, share, sure)
+    sure = sure & (here <= wall.known)
+    return Foot(select(sure, here, _certain(wall, y, first, away)), n * (1.0 / size), z, share, sure)

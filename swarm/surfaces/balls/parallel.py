@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 
 # Points that are moved to where the surface is steepest least, their first step and the last one, in parts of its size.
 _STARTS, _FIRST, _SHORTEST, _SHORTER, _MOVES = 16, 0.05, 1e-6, 0.7, 3
+# A point this close to a surface, in parts of its size, is on it; it is moved there so often at most.
+_NEAR, _ONTO = 1e-6, 30
 
 
 class Parallel(Surface):
@@ -55,15 +57,28 @@ class Parallel(Surface):
         return found + radius
 
 
-def foot_of(numbers: Any, most: float, bend: float, box: Box = UNBOUNDED) -> ByFoot:
-    """The wall of balls of these numbers: the side H is at most so much, and the surface is in a box."""
+def foot_of(numbers: Any, most: float, bend: float, box: Box = UNBOUNDED, known: float = math.inf) -> ByFoot:
+    """The wall of balls of these numbers: side H is at most so much up to twice `known` from it; it is in a box."""
     low, high = (Vec(*map(float, corner)) for corner in box)
-    return ByFoot(numbers, 0.0, float(most), float(bend), low, high)
+    return ByFoot(numbers, 0.0, float(most), float(bend), low, high, float(known))
+
+
+def onto(points: Floats, value: Any, slope: Any) -> Floats:
+    """Points (3, N) moved onto a surface along the gradient; those that come to it near where they were."""
+    size, to = np.ptp(points, axis=1).max(), points
+    for _move in range(_ONTO):
+        normal = slope(to)
+        with np.errstate(all="ignore"):
+            to = to - value(to) / (normal**2).sum(axis=0) * normal
+    with np.errstate(all="ignore"):
+        found = np.abs(value(to)) <= _NEAR * size * np.sqrt((slope(to) ** 2).sum(axis=0))
+    return to[:, found & (np.abs(to - points).max(axis=0) <= 0.1 * size)]
 
 
 def tightest_of(points: Floats, value: Any, slope: Any, most: float) -> tuple[float, Vector]:
     """The least |grad phi|/(2 most) of a surface, and where, from points (3, N) on it: by shorter and shorter steps."""
     steep = np.sqrt((slope(points) ** 2).sum(axis=0))
+    near = _NEAR * float(steep.max()) * float(np.ptp(points, axis=1).max())
     best = points[:, np.argsort(steep)[:_STARTS]]
     steep = np.sort(steep)[:_STARTS]
     step = _FIRST * float(np.ptp(points, axis=1).max())
@@ -75,7 +90,7 @@ def tightest_of(points: Floats, value: Any, slope: Any, most: float) -> tuple[fl
             with np.errstate(all="ignore"):
                 trial = trial - value(trial) / (normal**2).sum(axis=0) * normal
         there = np.sqrt((slope(trial) ** 2).sum(axis=0))
-        less = there < steep
+        less = (there < steep) & (np.abs(value(trial)) <= near)
         best, steep = np.where(less, trial, best), np.where(less, there, steep)
         if not less.any():
             step *= _SHORTER

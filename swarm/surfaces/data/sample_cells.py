@@ -4,6 +4,8 @@ In a cell a cubic is between the least and the largest of its Bernstein coeffici
 coefficients are differences of these: bounds that hold, not samples.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -107,15 +109,21 @@ def _bends(c: Floats, width: Floats, of: Mask) -> tuple[Floats, Floats]:
     """Bounds of the entries of H in these cells, (6, cells along x, y, z) each; of no value in the others."""
     low, high = np.full((6, *of.shape), np.inf), np.full((6, *of.shape), -np.inf)
     for places in _batches(np.argwhere(of)):
-        b = bernstein(c, places)
-        for n, (i, j) in enumerate(_SECOND):
-            # 3 (b[i+1] - b[i]) along each of two axes, or 6 (b[i+2] - 2 b[i+1] + b[i]) along one
-            second = np.diff(np.diff(b, axis=1 + i), axis=1 + j).reshape(len(places), -1)
-            factor = (6.0 if i == j else 9.0) * 0.5 / (width[i] * width[j])
-            noise = 8.0 * COEFFICIENT * np.abs(b).reshape(len(places), -1).max(axis=1)
-            index = (n, *places.T)
-            low[index] = factor * (second.min(axis=1) - noise)
-            high[index] = factor * (second.max(axis=1) + noise)
+        index = (slice(None), *places.T)
+        low[index], high[index] = _bends_at(c, width, places)
+    return low, high
+
+
+def _bends_at(c: Floats, width: Floats, places: Places) -> tuple[Floats, Floats]:
+    """Those of the cells at these places, (6, cells) each."""
+    b = bernstein(c, places)
+    low, high = np.empty((2, 6, len(places)))
+    noise = 8.0 * COEFFICIENT * np.abs(b).reshape(len(places), -1).max(axis=1)
+    for n, (i, j) in enumerate(_SECOND):
+        # 3 (b[i+1] - b[i]) along each of two axes, or 6 (b[i+2] - 2 b[i+1] + b[i]) along one
+        second = np.diff(np.diff(b, axis=1 + i), axis=1 + j).reshape(len(places), -1)
+        factor = (6.0 if i == j else 9.0) * 0.5 / (width[i] * width[j])
+        low[n], high[n] = factor * (second.min(axis=1) - noise), factor * (second.max(axis=1) + noise)
     return low, high
 
 
@@ -142,6 +150,36 @@ def eigenvalues(cells: SampleCells) -> tuple[float, float]:
     bends = cells.bends.astype(np.float64)
     values, spread = np.linalg.eigvalsh(bends[:, _MATRIX].reshape(-1, 3, 3)), bends[:, SPREAD] * (1.0 + COEFFICIENT)
     return float((values[:, 0] - spread).min()), float((values[:, 2] + spread).max())
+
+
+def most_bent_within(
+    coefficients: Floats, width: Floats, cells: SampleCells, side: float, steepness: float
+) -> tuple[float, float, float]:
+    """What makes the largest balls certain: (m, `known` of `ByFoot`, the smallest radius of curvature).
+
+    Of a spline, side 1 or -1, where |grad phi| on the surface is as large as the steepness: side H is at most m up to
+    twice `known` from the surface. Cells are looked at from the surface outwards, as far as a larger radius may come.
+    """
+    found, most = (0.0, 0.0, 0.0), 0.0
+    layer = np.maximum(cells.clear.astype(np.float64) - 1.0, 0.0) // _PARTS
+    for k in range(int(layer.max()) + 1):
+        for places in _batches(np.argwhere(layer == k)):
+            most = max(most, _largest_bend(*_bends_at(coefficients, width, places), side))
+        known = math.inf if k == layer.max() else 0.5 * (k + 1.0) * _PARTS * cells.unit
+        radius = 0.5 * steepness / most if most > 0.0 else math.inf
+        if min(known, radius) > found[2]:
+            found = most, known, min(known, radius)
+        if radius <= known:
+            break
+    return found
+
+
+def _largest_bend(low: Floats, high: Floats, side: float) -> float:
+    """The largest eigenvalue of side H at most, by bounds of its entries in cells; not below 0."""
+    middle, off = (part[_MATRIX].T.reshape(-1, 3, 3) for part in (0.5 * (low + high), 0.5 * (high - low)))
+    # |E| is at most the largest sum of a row.
+    values = np.linalg.eigvalsh(side * middle)[:, 2] + off.sum(axis=2).max(axis=1)
+    return float(values.max(initial=0.0)) * (1.0 + COEFFICIENT)
 
 
 def _neighbours(values: Floats, axis: int, which: np.ufunc) -> Floats:

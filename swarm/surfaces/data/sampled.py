@@ -15,11 +15,13 @@ from ...common.validated import Point
 from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations
+from ..balls.by_foot import ByFoot
+from ..balls.parallel import Parallel, foot_of, onto, tightest_of
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
 from . import spline
 from .arrays import read_samples
 from .flight import SampledNumbers
-from .sample_cells import SampleCells, cells_of, eigenvalues, least_at_border
+from .sample_cells import SampleCells, cells_of, eigenvalues, least_at_border, most_bent_within
 from .spline import Spline
 
 Floats = NDArray[np.float64]
@@ -30,6 +32,8 @@ _RIPPLE = 0.1
 # Of what phi changes in a cell where it does most: a sample that is nearer to 0 is on the surface, whatever sign its
 # round-off has. That of meshes in float32 is 1e-7 of their size.
 _ON = 1e-4
+# Places at which the gradient on the surface is looked at, at most about so many at first.
+_MOST_POINTS = 4096
 # The width of a cell along an axis on which phi does not depend [m]: no particle leaves it.
 _ENDLESS = 1e150
 
@@ -42,7 +46,7 @@ def _spacing(name: str, value: Any) -> Vector:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Sampled(Surface):
+class Sampled(Parallel):
     """The surface where samples of phi on a regular grid are 0, joined by a tricubic spline (C2).
 
     In a scene file: kind = "sampled" and file = "phi.npy" or "phi.h5", relative to the scene file, for the values.
@@ -108,14 +112,26 @@ class Sampled(Surface):
         return SampledNumbers(self._spline(), made.cells, sign, float(made.is_closed), made.most_bent[int(sign < 0.0)])
 
     def _spline(self) -> Spline:
-        made = self._made
-        low = np.array(rotations.turned_back(self.rotation, self._middle())) - 0.5 * made.widths
-        # Along an axis on which phi does not depend, all points are at the first sample of one cell.
-        width, cells = np.where(made.endless, _ENDLESS, self.spacing), np.array(self.values.shape) - 1.0
-        first, wide, inverse, shape = (
-            vec(row.tolist()) for row in (low, width, np.where(made.endless, 0.0, 1.0 / width), cells)
-        )
-        return Spline(first, wide, inverse, shape, made.steepness, made.coefficients)
+        made: Samples = self._made
+        return made.spline(np.array(rotations.turned_back(self.rotation, self._middle())) - 0.5 * made.widths)
+
+    def tightest(self) -> tuple[float, Vector | None]:
+        (_most, _known, radius), where = self._made.roundness[self.side == "outside"], self._made.least_steep[1]
+        if math.isinf(radius):
+            return radius, None
+        x, y, z = rotations.turned(self.rotation, (where - 0.5 * self._made.widths).tolist())
+        a, b, c = self._middle()
+        return radius, (a + x, b + y, c + z)
+
+    def by_foot(self, largest: float) -> ByFoot:
+        made, numbers = self._made, self.numbers()
+        most, known, radius = made.roundness[self.side == "outside"]
+        first = np.array(numbers.spline.low)
+        low, high = np.where(made.endless, [[-math.inf], [math.inf]], [first, first + made.widths]).tolist()
+        return foot_of(numbers, most, radius, (tuple(low), tuple(high)), known)
+
+    def framed_alike(self, wall: Any) -> Any:
+        return rotations.rotated(self.rotation, wall)
 
     def _middle(self) -> Vector:
         x, y, z = (np.array(self.origin) + 0.5 * self._made.widths).tolist()
@@ -166,6 +182,37 @@ class Samples:
         self.widths = (np.array(values.shape) - 1.0) * width
         self.coefficients = spline.coefficients(values)
         self.steepness = float(max(np.abs(np.diff(values, axis=k)).max() / width[k] for k in range(3)))
+
+    def spline(self, low: Floats) -> Spline:
+        """The spline with its first sample at a place."""
+        # Along an axis on which phi does not depend, all points are at the first sample of one cell.
+        width, cells = np.where(self.endless, _ENDLESS, self.spacing), np.array(self.values.shape) - 1.0
+        first, wide, inverse, shape = (
+            vec(row.tolist()) for row in (low, width, np.where(self.endless, 0.0, 1.0 / width), cells)
+        )
+        return Spline(first, wide, inverse, shape, self.steepness, self.coefficients)
+
+    @cached_property
+    def least_steep(self) -> tuple[float, Floats]:
+        """The least |grad phi| on the surface, and where, from the first sample on."""
+        spline = self.spline(np.zeros(3))
+        places = np.argwhere(self.cells.clear == 0)
+        points = ((places[:: 1 + len(places) // _MOST_POINTS] + 0.5) * np.array(self.spacing)).T
+
+        def value(points: Floats) -> Floats:
+            return np.asarray(spline.value(vec(points)))
+
+        def slope(points: Floats) -> Floats:
+            return np.array(spline.value_and_slope(vec(points))[1])
+
+        half, where = tightest_of(onto(points, value, slope), value, slope, 1.0)
+        return 2.0 * half, np.array(where)
+
+    @cached_property
+    def roundness(self) -> list[tuple[float, float, float]]:
+        """What `most_bent_within` says of a cavity and of a solid."""
+        width, (steepness, _where) = np.array(self.spacing), self.least_steep
+        return [most_bent_within(self.coefficients, width, self.cells, side, steepness) for side in (1.0, -1.0)]
 
     @cached_property
     def cells(self) -> SampleCells:
