@@ -111,7 +111,8 @@ class CompiledScene:
 
     def __init__(self, scene: "Scene", largest: float | None = None, apart: str | None = None) -> None:
         self.scene, self.largest, self._apart = scene, largest, apart
-        self.pieces = scene.pieces if largest is None else scene.pieces_of_balls(largest)
+        reach = scene.reach_of_steps() if apart is not None and largest is None else largest
+        self.pieces = scene.pieces if reach is None else scene.pieces_of_balls(reach)
         self.order = order_of(self.pieces.each, apart is None, self.pieces.rooms(), largest is not None)
         walls = len(self._spans)
         if walls > MOST_WALLS:

@@ -20,7 +20,7 @@ from .surfaces import plane as planes
 from .surfaces import required
 from .surfaces import rotation as rotations
 from .surfaces.instant import box_of, distances_of, gaps_of, gradient_of, has_room, planes_of
-from .surfaces.periodic.images import Lengths, cell_of, into_cell, lengths_of
+from .surfaces.periodic.images import Lengths, cell_of, into_cell, is_same_along, lengths_of
 from .surfaces.pieces import Images, Pieces, pieces_of
 from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.presence.doors import instants_of
@@ -35,6 +35,8 @@ _BATCH = 4096
 _THIN = 1e-6
 # Planes nearer to the origin than an atom's nucleus is wide [m] are at it: a scene of them has no extent.
 _AT_ORIGIN = 1e-15
+# Of the shortest period, how far outside of the cell a step of points that meets images of solids may end.
+_REACH_OF_STEPS = 0.05
 
 
 def _surfaces(value: Any) -> tuple[Surface, ...]:
@@ -231,6 +233,19 @@ class Scene:
         found = [np.max(values(several, rows), axis=0) if one.is_there(time) else away for one, several in each]
         return np.array(found).reshape(len(found), *away.shape)
 
+    def reach_of_steps(self) -> float | None:
+        """How far outside of the cell a step of points may end [m]; None where it meets no images there."""
+        return self._reach_of_steps
+
+    @cached_property
+    def _reach_of_steps(self) -> float | None:
+        period = self.period or (None, None, None)
+        repeats = [k for k, length in enumerate(period) if length is not None]
+        for one in self.surfaces if repeats else ():
+            if one.is_solid() and not all(is_same_along(one, k, period) for k in repeats):
+                return _REACH_OF_STEPS * min(length for length in period if length is not None)
+        return None
+
     @cached_property
     def _pieces_by_radius(self) -> dict[float, Pieces]:
         return {}
@@ -405,7 +420,8 @@ class Scene:
         Raises:
             SceneError: it has too many walls.
         """
-        if largest is None and (apart is None or not self._of_points.order.groups):
+        in_steps = apart is not None and (self.reach_of_steps() is not None or bool(self._of_points.order.groups))
+        if largest is None and not in_steps:
             return self._of_points
         return CompiledScene(self, largest, apart)
 

@@ -20,7 +20,7 @@ from .contact_ends import end_contacts, end_hard_contacts, impulses_before
 from .escape import meet_openings, step_out, step_out_lanes
 from .flight import go
 from .hit_member import of_lane, pick, picks
-from .periodic import return_lanes
+from .periodic import return_lanes, return_stepped, return_stepped_lanes
 from .sending import send_off
 from .solve import count_sweeps, keep_failure, solution, solve
 from .table import LANES, LOOK, marked_lanes, with_distances
@@ -151,6 +151,7 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
                 end_hard_contacts(method, walls, gravity, share, lanes, i, lane.v, kept)
                 if lanes.stand is not None:
                     step_out(method, walls, share, lanes, i)
+            return_stepped(method, walls, share, lanes, i)
             if share.counts is not None:
                 share.counts.add(wall, contact.hits)
             if lanes.lane(i).hits > hard.most_hits:
@@ -172,8 +173,7 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
     go(method, walls, gravity, lanes, live)
     if counters is not None:
         counters.count_flights(method, gravity, share, lanes, live)
-    if lanes.period is not None:
-        return_lanes(lanes.period, state, lanes, live)
+    return_lanes(method, walls, gravity, state, lanes, live)
     if state.openings is not None:
         meet_openings(state.openings, method, walls, gravity, share, lanes, live)
     if method.solves is not None:
@@ -191,6 +191,7 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
     some_arrived = step_out_lanes(method, walls, share, lanes, live) | some_arrived
     for watch in watches:
         watch.add_rows(method, walls, state, lanes, live)
+    return_stepped_lanes(method, walls, share, lanes, live)
     return some_arrived, some_hard, some_wrong
 
 

@@ -8,6 +8,7 @@ from ..surfaces.time_of_impact import flights, safe, strides
 from ..surfaces.time_of_impact.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.time_of_impact.polynomial import POLYNOMIAL_STEPS
 from .field_hits import hit_of_lane, keep_hit, seek
+from .periodic import cut_steps
 from .table import marked_lanes
 
 # Safe steps to walls in any motion that all lanes take in a pass after the first.
@@ -128,7 +129,7 @@ def _flight(method, walls, gravity, lanes, i, hit):
         if walls.inset is not None:
             end = end._replace(r=inside_of(walls.at(end.remaining), end.wall, end.r))
     else:
-        end = method.flight(walls, gravity, lane)
+        end = cut_steps(lanes.period, method, walls, gravity, lane, method.flight(walls, gravity, lane))
     if method.asks_flown:
         lanes.flown[i] = lane.remaining - end.remaining
     lanes.lane(i).put_end(end)

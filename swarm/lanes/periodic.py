@@ -3,10 +3,11 @@
 import numpy as np
 
 from ..contact.events import ARRIVED, EDGE, FLYING, HELD
-from ..kernel.arrays import index
-from ..kernel.jit import outlined
+from ..kernel.arrays import index, kept
+from ..kernel.jit import outlined, select
 from ..kernel.vector import column, dot, put
-from ..surfaces.periodic.axes import length_of
+from ..methods.contract import HARD
+from ..surfaces.periodic.axes import least, length_of, pulls, time_to_leave
 from ..surfaces.periodic.period import has_left, into, keeps_walls
 from .sliding import AGAIN
 from .table import marked_lanes
@@ -16,8 +17,14 @@ from .table import marked_lanes
 _ON_THE_WALL = 1e-12
 
 
-def return_lanes(period, state, lanes, live):
-    """The lanes that their flight has brought out of the cell; what they meet there they meet in the next pass."""
+def return_lanes(method, walls, gravity, state, lanes, live):
+    """The lanes that their flight has brought out of the cell; what they meet there they meet in the next pass.
+
+    What goes by steps into walls takes its step in this pass, from the walls that it touches in the cell.
+    """
+    period = lanes.period
+    if period is None:
+        return
     for i in range(index(live)):
         lanes.marked[i] = has_left(period, lanes.lane(i).r)
     for k in range(marked_lanes(lanes, live)):
@@ -29,6 +36,8 @@ def return_lanes(period, state, lanes, live):
         lane.twice = _come_through(period, state, p, back.images, lane.twice)
         if not keeps_walls(period, r):
             lanes.wall[i] = -1.0
+            if method.steps_into_walls and lane.remaining > 0.0:
+                lanes.wall[i] = method.touched(walls, gravity, lanes.given(method, i))
 
 
 def _come_through(period, state, p, images, twice):
@@ -49,6 +58,65 @@ def _come_through(period, state, p, images, twice):
     state.carry[p] = (after - before) - change
     state.energy[p] = after
     return 2.0 * after - (2.0 * before - twice)
+
+
+# --- Of steps into walls ---------------------------------------------------------------------------------
+
+
+def cut_steps(period, method, walls, gravity, lane, end):
+    """The `FlightEnd` of free steps, or of those of them that stay in the cell: the step out of it may meet images."""
+    if period is None:
+        return end
+    (r, v), (gx, gy, gz) = (lane.r, lane.v), pulls(gravity)
+    x, y = time_to_leave(period.x, r.x, v.x, gx), time_to_leave(period.y, r.y, v.y, gy)
+    steps = np.floor(least(x, y, time_to_leave(period.z, r.z, v.z, gz)) / method.dt)
+    taken = lane.remaining - end.remaining
+    sooner = method.flown(walls, gravity, lane, select(steps < taken, steps, taken))
+    cut = steps < taken
+    return end._replace(
+        r=select(cut, sooner.r, kept(end.r)), v=select(cut, sooner.v, kept(end.v)),
+        remaining=select(cut, sooner.remaining, end.remaining), wall=select(cut, sooner.wall, end.wall),
+    )  # fmt: skip
+
+
+def return_stepped_lanes(method, walls, share, lanes, live):
+    """The lanes that their steps have brought out of the cell."""
+    if lanes.period is None or not method.contacts_take_time:
+        return
+    for i in range(index(live)):
+        # A hard lane has not taken its step yet.
+        if lanes.wall[i] > HARD:
+            return_stepped(method, walls, share, lanes, i)
+
+
+def return_stepped(method, walls, share, lanes, i):
+    """A lane that its step has brought out of the cell, at the end of this step: its contacts go on with images."""
+    if has_left(lanes.period, lanes.lane(i).r):
+        _return_stepped(method, walls, share, lanes, i)
+
+
+@outlined
+def _return_stepped(method, walls, share, lanes, i):
+    lane, p, state, counters = lanes.lane(i), index(lanes.particle[i]), share.state, share.counters
+    r, back = lane.r, into(lanes.period, lane.r)
+    lane.r = back.r
+    lane.twice = _come_through(lanes.period, state, p, back.images, lane.twice)
+    if method.laws_at_ends is not None:
+        _hand_on(lanes.period, method.at_start(walls, lane.remaining), state, p, r, back.r)
+    if counters is not None:
+        counters.come_back_lane(method, share, lanes, i, r)
+
+
+def _hand_on(period, walls, state, p, r, back):
+    """The impulse of each contact that goes on with another image of its wall to that."""
+    for k in range(walls.length()):
+        if state.pressed[k, p] == 0.0:
+            continue
+        for j in range(walls.length()):
+            if j != k and _is_image(period, walls, (float(k), r), (float(j), back)):
+                state.pressed[j, p] += state.pressed[k, p]
+                state.pressed[k, p] = 0.0
+                break
 
 
 # --- Along walls -----------------------------------------------------------------------------------------
@@ -88,11 +156,14 @@ def return_particle(period, walls, state, p):
 @outlined
 def _are_there(period, walls, first, second, r, back):
     """Whether the walls that hold a particle at r are those that hold it in the cell, not images of others."""
-    near = _ON_THE_WALL * (length_of(period.x) + length_of(period.y) + length_of(period.z))
-    return _is_there(walls, first, r, back, near) and (second < 0.0 or _is_there(walls, second, r, back, near))
+    there = _is_image(period, walls, (first, r), (first, back))
+    return there and (second < 0.0 or _is_image(period, walls, (second, r), (second, back)))
 
 
 @outlined
-def _is_there(walls, wall, r, back, near):
-    same = dot(walls.unit_normal(wall, r), walls.unit_normal(wall, back)) > 0.5
-    return same and abs(walls.distance(wall, back) - walls.distance(wall, r)) <= near
+def _is_image(period, walls, before, after):
+    """Whether a wall (number, place) is to one place as another one, or itself, is to another place."""
+    (wall, r), (other, back) = before, after
+    near = _ON_THE_WALL * (length_of(period.x) + length_of(period.y) + length_of(period.z))
+    same = dot(walls.unit_normal(wall, r), walls.unit_normal(other, back)) > 0.5
+    return same and abs(walls.distance(other, back) - walls.distance(wall, r)) <= near

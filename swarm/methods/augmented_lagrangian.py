@@ -122,6 +122,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         base.check_bends(scene)
         if self.adaptive:
             base.check_crossing("dt", self.dt, scene, particles)
+            fixed_step.check_reach("dt", self.dt, scene, particles.fastest())
         else:
             fixed_step.check_instants(scene, self.dt)
             fixed_step.check_solids(scene, particles, self.dt)
@@ -144,7 +145,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
             self.max_sweeps,
             _ACCELERATIONS[self.acceleration],
             _POLICIES[self.on_unconverged],
-            None if self.adaptive else fixed_step.longest_step(scene, self.dt),
+            scene.reach_of_steps() if self.adaptive else fixed_step.longest_step(scene, self.dt),
             fixed_step.moves(scene),
             fixed_step.laws_at_ends(scene),
         )

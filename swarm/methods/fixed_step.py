@@ -80,6 +80,9 @@ class SoftWalls(base.Method):
     def parts(self, durations: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.round(durations / self.dt)
 
+    def knows_period(self) -> bool:
+        return True
+
     def seldom_hard(self, scene: Scene) -> bool:
         return len(_of_rows(scene)) == 1 and not scene.surfaces[0].is_solid()
 
@@ -124,6 +127,7 @@ def check_instants(scene: Scene, dt: float) -> None:
 def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
     """Raise a `SceneError` where the fastest particle can jump over a solid in one step, or a solid over it."""
     longest, fastest = longest_step(scene, dt), particles.fastest()
+    check_reach("dt", dt, scene, fastest)
     if longest is not None and fastest * dt > longest:
         thickness, i = _thinnest(scene, dt)
         speed = fastest + _pace(scene.surfaces[i])
@@ -135,12 +139,24 @@ def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
         )
 
 
+def check_reach(name: str, step: float, scene: Scene, fastest: float) -> None:
+    """Raise a `SceneError` where the fastest particle [m/s] may go farther over a face in a step than walls are."""
+    reach = scene.reach_of_steps()
+    if reach is not None and fastest * step > reach:
+        raise SceneError(
+            f"{name} must be so small that no particle flies farther than {reach:.3g} m in a step, a part of the "
+            f"shortest period, got {name} = {step:g} s, in which the fastest flies {fastest * step:.3g} m; use {name} "
+            f"< {reach / fastest:.2g} s, or Impact"
+        )
+
+
 def longest_step(scene: Scene, dt: float) -> float | None:
     """The longest flight in a step that jumps over no solid [m]; None without solids."""
     if not any(surface.is_solid() for surface in scene.surfaces):
         return None
     thickness, i = _thinnest(scene, dt)
-    return thickness - _pace(scene.surfaces[i]) * dt
+    reach = scene.reach_of_steps()
+    return min(thickness - _pace(scene.surfaces[i]) * dt, math.inf if reach is None else reach)
 
 
 def _half_widths(scene: Scene) -> tuple[float, ...] | None:
@@ -274,8 +290,11 @@ class Steps(contract.MethodNumbers):
         dt = self.dt
         # One too many by round-off starts a contact 1e-16 deep: harmless.
         steps = np.floor(safe.free_time_moving(walls, gravity, lane.r, lane.v, lane.remaining * dt) * (1.0 / dt))
-        steps = select(steps < lane.remaining, steps, lane.remaining)
-        t = steps * dt
+        return self.flown(walls, gravity, lane, select(steps < lane.remaining, steps, lane.remaining))
+
+    def flown(self: Any, walls, gravity, lane, steps):
+        """The `FlightEnd` after so many free steps."""
+        t = steps * self.dt
         start = contract.Lane(
             lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.remaining - steps,
             lane.hits, lane.own,
@@ -298,7 +317,7 @@ class SoftNumbers(Steps):
 
     dt: float
     law: Any
-    longest: Any  # step that jumps over no solid [m]; None without solids
+    longest: Any  # step that jumps over no solid, and out of a cell to known walls alone [m]; None without solids
     factor: float  # of 1/mass in what a lane keeps
     form: Any  # of the discrete gradient, or None
     moving: Any  # None, or `Moves` where a wall moves

@@ -47,7 +47,7 @@ class StepNumbers(penalty.GradientSteps):
     max_sweeps: int
     acceleration: float
     policy: int
-    longest: Any  # step that jumps over no solid [m]; None without solids
+    longest: Any  # step that jumps over no solid, and out of a cell to known walls alone [m]; None without solids
     moving: Any  # None, or `Moves` where a wall moves, in fixed steps
     ends: Any  # None, or the `Laws` of its walls, which act where a contact ends
 
@@ -241,7 +241,8 @@ class CutSteps(StepNumbers):
     def is_alone(self, walls, wall, start, r1, kappa):
         # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free
         # flight ends outside it again) was hit all the same.
-        return (flights.other_hit(walls, wall, start.r, r1 - start.r).time > 1.0) & (kappa != 0.0)
+        free = (flights.other_hit(walls, wall, start.r, r1 - start.r).time > 1.0) & (kappa != 0.0)
+        return free & (not self.is_too_fast(r1 - start.r))
 
     def is_blocked(self, walls, wall, start, h):
         r, p = start.r, h * start.v
@@ -307,7 +308,8 @@ class CentredSteps(CutSteps):
         return select(there, kappa, 0.0), there
 
     def is_alone(self, walls, wall, start, r1, kappa):
-        return (start.remaining > 0.0) & _is_free(walls, start, r1) & (kappa != 0.0)
+        free = (start.remaining > 0.0) & _is_free(walls, start, r1) & (kappa != 0.0)
+        return free & (not self.is_too_fast(r1 - start.r))
 
     def is_blocked(self, walls, wall, start, h):
         if not h > 0.0:

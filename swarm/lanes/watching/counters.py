@@ -214,6 +214,14 @@ class Counters(Record):
                 across = abs(d1 - d0) / time if time > 0.0 else 0.0
                 book_crossing(one, c, share, p, there, across, ZERO)
 
+    def come_back_lane(self, method, share, lanes, i, end):
+        """As `come_back`, of lane i, of which a contact since `keep_before` has left the cell at `end`."""
+        lane, began, p = lanes.lane(i), Began(lanes.began, i), index(lanes.particle[i])
+        before = ParticleMoment(began.r, began.v, began.remaining)
+        self.come_back(share, p, before, end, ParticleMoment(lane.r, lane.v, method.seconds(lane.remaining)))
+        for c in range(len(self.each)):
+            lanes.began[row_of_counter(c), i] = sign_of_side(share.state, c, p)
+
     @outlined
     def come_back(self, share, p, before, end, after):
         """The sides of particle p: its step has left the cell at `end`, and it is back in the cell `after`."""

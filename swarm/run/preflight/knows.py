@@ -330,7 +330,8 @@ def _with_bodies(name: str, without: str, remedy: str = "use particles") -> Refu
 
 
 def _without_rolling(name: str, with_what: str) -> Refusal:
-    return Refusal(f"{name} must be 0 with {with_what}, got {{got}}", "leave it out, or use particles with a radius and Penalty")
+    remedy = "leave it out, or use particles with a radius and Penalty"
+    return Refusal(f"{name} must be 0 with {with_what}, got {{got}}", remedy)
 
 
 def _of_one_room(what: str, remedy: str) -> Refusal:
@@ -453,7 +454,7 @@ CAPABILITIES = (
         ),
     }, True),
     Capability("period", _period, {
-        (CHORDS, *_FIXED_STEPS, OTHER_POINTS): Refusal(
+        (CHORDS, OTHER_POINTS): Refusal(
             "period must be None with {whole}, got {got}: its steps do not end where a particle leaves the cell",
             _TO_EXACT,
         ),
