@@ -14,6 +14,7 @@ from ..kernel.gravity import potential
 from ..kernel.heap import Heap
 from ..kernel.vector import vec
 from ..methods.base import Method
+from ..observables import CHUNK
 from ..particles import Particles
 from ..run import failures
 from ..run.base import Arrays, BaseRun, named
@@ -21,6 +22,7 @@ from ..run.doors import comers, require_free
 from ..run.impacts import ThreadLog
 from ..run.observed import Observed
 from ..run.preflight.counting import counters_of, with_counters
+from ..run.present import Presence
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
@@ -33,7 +35,7 @@ from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule, SceneWalls
 # Of a clock, how many events were taken where no lease is made yet: so much less for each particle that is predicted.
 _ALL_AHEAD = -1.0
 # Of a queue, what a checkpoint has under other names, or finds again.
-_NOT_KEPT = "heap", "mass", "heat", "crossed", "watchers", "image", "absorbed", "escape_time"
+_NOT_KEPT = "heap", "mass", "heat", "crossed", "watchers", "image", "absorbed", "escape_time", "starts"
 
 
 class ReactingRun(BaseRun):
@@ -59,6 +61,11 @@ class ReactingRun(BaseRun):
             self.state = self.state._replace(absorbed_time=absorbed_time, absorbed_wall=absorbed_wall)
         if compiled.openings() is not None:
             self.state = self.state._replace(escape_time=np.full(n, math.nan))
+        births = particles.births
+        if births is not None or any(laws.may_end for laws in self._scenery.each_laws()):
+            self.state = self.state._replace(starts=np.zeros(n) if births is None else births.time.copy())
+        self._present = Presence(births, n, CHUNK)
+        self._present.start(self.state)
         tier = Tier(compile, (self._scenery, gravity), n)
         super().__init__(compiled, method, n, threads, tier, seeding, watched)
         counters = counters_of(self._scene, watched.counters, logs=True)
@@ -69,7 +76,7 @@ class ReactingRun(BaseRun):
             np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool),
             np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
             Heap(np.zeros(n), number.copy(), number.copy()), state.heat, state.crossed, self._watchers(counters),
-            absorbed=state.absorbed, escape_time=state.escape_time,
+            absorbed=state.absorbed, escape_time=state.escape_time, starts=state.starts,
         )  # fmt: skip
         self._instants = self._scene.instants if self._scene.has_doors() else None
         self._freedoms = freedoms_of(compiled, particles.velocity)
@@ -84,6 +91,7 @@ class ReactingRun(BaseRun):
 
     def _prepare(self, span: float, moment: float) -> None:
         self._scenery = self._scenery_of(self._compiled, moment)
+        self._present.reach(moment)
         if not self._cut_short:
             self._clock[NOW] = 0.0
             self._clock[TAKEN] = _ALL_AHEAD
@@ -180,7 +188,14 @@ class ReactingRun(BaseRun):
         yield events.settle, (self._scenery, self._freedoms, 0.0)
         yield observables.observe, self._observing()
 
+    def _summary(self) -> dict[str, Any]:
+        return super()._summary() | self._present.observed()
+
+    def _seen_state(self) -> State:
+        return self._present.seen(self.state)
+
     def _show(self, moment: float) -> None:
+        self._present.reach(moment)
         self._observed = observed(self._scene, self._freedoms, moment)
         self._walls = walls_now(self._compiled, self._scenery, self._freedoms)
 
@@ -196,6 +211,7 @@ class ReactingRun(BaseRun):
         queue |= {} if self.state.heat is None else {"heat": self.state.heat}
         absorbed = self.state.absorbed
         queue |= {} if absorbed is None else {"absorbed_time": absorbed.time, "absorbed_wall": absorbed.wall}
+        queue |= {} if self.state.starts is None else {"starts": self.state.starts}
         queue |= {} if self.state.escape_time is None else {"escape_time": self.state.escape_time}
         return {**queue, **named("walls", self._freedoms), "key": self._queue.heap.key, "clock": self._clock}
 

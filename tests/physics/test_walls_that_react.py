@@ -383,7 +383,7 @@ WRONG = [
     (lambda: swarm.Guide(UP, speed=math.nan), "speed must be"),
     (lambda: swarm.Guide(UP) + swarm.Translation(UP), "a sum of motions must have at most 0 Guide, got 1"),
     (
-        lambda: run(swarm.Scene([swarm.Box((2.0, 2.0, 2.0), laws=[swarm.Sticky(0.5)]), piston(1.0)]), ONE, 1.0),
+        lambda: run(swarm.Scene([swarm.Box((2.0, 2.0, 2.0), laws=[swarm.Sticky(0.5)], mass=1.0)]), ONE, 1.0),
         r"surfaces\[0\].laws\[0\] must not let particles wait where a wall moves",
     ),
     (

@@ -32,6 +32,8 @@ from .strikes import all_stay, exit_at, first_hit, reach_of_all, strike, with_en
 # What is next for a particle besides the impact on a wall that reacts (its number is 0 or more): nothing that was
 # found, so that it is looked at again.
 NONE = -1.0
+# Of the walls that do not react: it waits at one, or is not born yet.
+WAITS = -2.0
 # Of a clock: the time in the frame; of the run, the time before the frame and the strikes of walls that react; how many
 # events were taken since the leases began.
 NOW, BEFORE, STRIKES, TAKEN, CLOCK = 0, 1, 2, 3, 4
@@ -85,6 +87,7 @@ class Queue(NamedTuple):
     image: Any = None
     absorbed: Any = None  # `Absorbed`, where a wall may absorb particles
     escape_time: Any = None  # (N,) [s], where walls have openings
+    starts: Any = None  # (N,) from when each flies [s], where some are born later, or wait at a wall
 
 
 class ReactionRule(NamedTuple):
@@ -106,6 +109,24 @@ def _aim(scenery, queue, i, end):
     else:
         hit = flights.first_hit(walls.at(end - t), scenery.pull, r, v)
     queue.wait[i], queue.due[i], queue.wall[i] = hit.time, t + hit.time, hit.wall
+
+
+def _waits(queue, i):
+    """Whether particle i is not born yet, or waits at a wall: it stays where it is until it is due."""
+    return False if queue.starts is None else queue.wall[i] == WAITS
+
+
+def _set_out(scenery, queue, i, rule):
+    """Particle i at the start of a frame, which it flies from there, or later."""
+    queue.time[i], queue.hits[i] = 0.0, 0
+    if is_gone(queue, i):
+        return
+    if queue.starts is not None:
+        later = queue.starts[i] - (rule.moment - rule.end)
+        if later > 0.0:
+            queue.wait[i], queue.due[i], queue.wall[i] = later, later, WAITS
+            return
+    _aim(scenery, queue, i, rule.end)
 
 
 def _absorb(queue, i, owner, time):
@@ -134,6 +155,9 @@ def _next(scenery, walls, queue, i, now, end, soon):
     if is_gone(queue, i):
         queue.near[i], queue.struck[i] = False, NONE
         return math.inf
+    if _waits(queue, i):
+        queue.near[i], queue.struck[i] = False, NONE
+        return queue.due[i]
     flight = _seen(scenery, queue, i, now, end)
     target = now + flight.longest
     free = reach_of_all(scenery.reacting, walls, flight)
@@ -178,6 +202,9 @@ def _bounce(scenery, queue, i, wall, rule, now):
     if queue.absorbed is not None and bounce.wait == math.inf:
         _absorb(queue, i, owner, time)
         v1 = v
+    elif queue.starts is not None and bounce.wait > 0.0:
+        queue.starts[i] = time + bounce.wait
+        queue.wait[i], queue.due[i], queue.wall[i] = bounce.wait, now + bounce.wait, WAITS
     put(queue.velocity, 0, i, v1)
     book(laws, queue, (index(scenery.rows[int(wall)]), i, i), m, bounce)
     queue.energy[i] = 0.5 * bounce.twice_energy
@@ -238,9 +265,7 @@ def predict(scenery, freedoms, queue, clock, rule, first, last):
     for k in range(first, last):
         i = index(k)
         if now == 0.0:
-            queue.time[i], queue.hits[i] = 0.0, 0
-            if not is_gone(queue, i):
-                _aim(scenery, queue, i, rule.end)
+            _set_out(scenery, queue, i, rule)
         queue.heap.key[i] = _next(scenery, freedoms, queue, i, now, rule.end, _soon(clock))
 
 
@@ -250,7 +275,7 @@ def arrive(scenery, queue, rule, first, last):
     for k in range(first, last):
         if is_full(queue.watchers.log):
             return k
-        if not is_gone(queue, index(k)):
+        if not is_gone(queue, index(k)) and not _waits(queue, index(k)):
             _fly(scenery, queue, index(k), rule.end, rule.end - queue.time[index(k)], rule.end)
     return last
 
@@ -296,6 +321,10 @@ def _look_again(scenery, freedoms, queue, clock, rule, close):
 
 def _carry_out(scenery, freedoms, queue, i, now, rule):
     """The impact of particle i that is due, and when it meets the next wall that does not react: a status."""
+    if _waits(queue, i):
+        queue.time[i] = now
+        _aim(scenery, queue, i, rule.end)
+        return Status.DONE.value
     queue.hits[i] += select(now > queue.time[i], 1, AT_ONCE)
     # The time of the frame has fewer digits than the flight.
     way = select(queue.struck[i] >= 0.0, now - queue.time[i], queue.wait[i])
@@ -306,7 +335,7 @@ def _carry_out(scenery, freedoms, queue, i, now, rule):
         _bounce(scenery, queue, i, queue.wall[i], rule, now)
     if scenery.source is not None and math.isnan(queue.velocity[0, i]):
         return Status.SENT_WRONG.value
-    if not is_gone(queue, i):
+    if not is_gone(queue, i) and not _waits(queue, i):
         _aim(scenery, queue, i, rule.end)
     return select(queue.hits[i] <= MOST_HITS, Status.DONE.value, Status.STALLED.value)
 

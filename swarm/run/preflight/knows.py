@@ -139,7 +139,10 @@ def _waits(asked: Asked) -> Found:
 
 
 def _waits_beside_motions(asked: Asked) -> Found:
-    yield from _waits(asked) if asked.scene.moves() else ()
+    if any(piece.motion is not None and not asked.scene.surfaces[i].reacts() for i, piece in _walls(asked)):
+        yield from _waits(asked)
+    else:
+        yield from (one for one in _waits(asked) if asked.scene.surfaces[one["i"]].reacts())
 
 
 def _sticky(asked: Asked) -> Found:
@@ -383,7 +386,6 @@ CAPABILITIES = (
             "sources must be left out with {whole!r:.200}, got {count}: particles are born at any time, not at the end "
             "of a step", _TO_EXACT,
         ),
-        (MASSIVE,): Refusal("sources must be left out where a wall has a mass, got {count}", _TO_MOTION),
     }),
     Capability("log of impacts", _option("impacts"), {
         _EVERY_BODY: Refusal(
@@ -555,10 +557,6 @@ CAPABILITIES = (
         _RIGID_BALLS: Refusal(
             "surfaces[{i}].laws[{k}] must not let particles with a radius wait, got {got!r:.200}",
             "use a law without a wait, such as Lambert, or leave the radius out",
-        ),
-        (MASSIVE,): Refusal(
-            "surfaces[{i}].laws[{k}] must not let particles wait where a wall has a mass, got {got!r:.200}",
-            f"use a law without a wait, such as Lambert, or {_TO_MOTION}",
         ),
     }, within="law of a wall"),
     Capability("mass of a wall", _masses, {
