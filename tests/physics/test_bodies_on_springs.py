@@ -134,7 +134,7 @@ def test_a_pin_in_a_soft_cavity_keeps_the_energy():
         (loop(on_unconverged="impact"), SPHERE, 'on_unconverged must be "raise" or "count"'),
         (SPRINGS["linear"], [swarm.Sphere(1.0, restitution=0.5)], "restitution must be 1"),
         (swarm.Verlet(dt=1e-3, penalty=1e4), SPHERE, "bodies need the method"),
-        (swarm.Impact(dt=1e-3), [swarm.Prism([(0, 0), (1, 0), (0, 1)], 1.0)], "must not be Prism with bodies"),
+        (SPRINGS["linear"], [swarm.Prism([(0, 0), (1, 0), (0, 1)], 1.0)], "must not be Prism with bodies and soft"),
         (swarm.Impact(dt=1e-3), [swarm.Union([*SPHERE, swarm.Sphere(1.0, (1, 0, 0))])], "of several rooms with bodies"),
     ],
 )

@@ -14,6 +14,7 @@ from .newton import BRIEF, solve
 from .passages import Passages, look_back
 from .penalty_contact import SoftContacts
 from .persistent_contact import HardContacts
+from .through import have_ends
 
 # A step longer than the frame that is left by this part is the last of it.
 _SAME = 1.0 + 1e-9
@@ -78,6 +79,10 @@ def advance_bodies(body, walls, rule, state, ticket, size, halt):
                     if pace.body[k] >= 0:
                         _store(contacts, state, k)
                 return status, number
+        if contacts.passages is not None and have_ends(contacts.walls):
+            for i in range(count):
+                if pace.body[i] >= 0 and (pace.action[i] == impact_time.COMMIT or pace.action[i] == impact_time.STRIKE):
+                    contacts.come_back(i)
         _commit(contacts)
         for i in range(count):
             if pace.action[i] != impact_time.AGAIN:
@@ -260,6 +265,10 @@ def _look(contacts, scene, c):
         for i in range(count):
             out = scene.at(pace.remaining[i] - pace.step[i]).outside(-1.0, column(c, 0, i))
             pace.out[i] = pace.out[i] | (out & (not contacts.is_free(k, i)))
+        if have_ends(contacts.walls):
+            for i in range(count):
+                ahead = contacts.passed(k, column(c, 0, i), contacts.rule.room, i)
+                pace.out[i] = pace.out[i] | ((ahead.wall >= 0.0) & (not contacts.is_free(k, i)))
     # Cavities that points carry are checked one by one. Each has one surface, never a wall of thousands of bodies.
     for k in range(touching.points + touching.guides, touching.plain.size):
         wall = float(touching.walls + k - touching.points)

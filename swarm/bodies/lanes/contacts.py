@@ -9,6 +9,8 @@ from ...kernel.jit import outlined
 from ...kernel.limits import EPSILON
 from ...kernel.vector import Vec, column, cross, dot, norm, put
 from .constraints import Constrained
+from .passages import BEHIND, OUT
+from .through import Passed, have_ends, is_of_ends, passed
 
 # A contact this many times round-off away from its wall is at it.
 NEAR = 64.0
@@ -16,6 +18,8 @@ NEAR = 64.0
 MOST_CONTACTS = 16
 # How far outside a contact that lasts may end, in units of round-off.
 ROOM = 64.0
+# A contact point that starts farther outside of a wall that ends, in these units, is behind it.
+_AT = 4.0 * ROOM
 
 
 class BodyContacts(Constrained):
@@ -170,12 +174,14 @@ class BodyContacts(Constrained):
         k, wall = contact
         if k >= self.touching.points or not self.passages.takes(walls, float(wall), c, NEAR * self.rule.room):
             return False
-        self.passages.free[k, self.pace.body[i]] = 1
+        ends = is_of_ends(walls, float(wall))
+        self.passages.free[k, self.pace.body[i]] = BEHIND if ends else OUT
         return True
 
     def is_back(self, k, i):
         """Whether a free point is inside of all walls again, or at one that is not open there."""
-        walls, room, back = self.walls_now(i), self.rule.room, True
+        walls, room = self.walls_now(i), self.rule.room
+        back = self.passages.free[k, self.pace.body[i]] != BEHIND
         c, met = self.touching.place(self.lanes.r, k, i), self.touching.span(k)
         for j in range(count_at(walls, met, c)):
             w = float(wall_at(walls, met, j, c))
@@ -183,6 +189,25 @@ class BodyContacts(Constrained):
             if gap >= -2.0 * NEAR * room:
                 back = back and gap <= 2.0 * ROOM * room and not self.passages.takes(walls, w, c, NEAR * room)
         return back
+
+    # --- At walls that end
+
+    def passed(self, k, c, room, i):
+        """What a contact point goes through in a trial that it ends at c, by more than `room`."""
+        if not have_ends(self.walls) or k >= self.touching.points:
+            return Passed(math.inf, -1.0, -math.inf)
+        start, limits = self.touching.place(self.lanes.r, k, i), (_AT * self.rule.room, room, 0.0)
+        return passed(self.walls_now(i), self.walls_then(i), start, c, limits)
+
+    def come_back(self, i):
+        """Note which points that are behind walls that end come back through one of these in this step of a lane."""
+        at, free, number = _AT * self.rule.room, self.passages.free, self.pace.body[i]
+        for k in range(self.touching.points):
+            if free[k, number] == BEHIND:
+                start, end = self.touching.place(self.lanes.r, k, i), self.touching.place(self.lanes.r1, k, i)
+                # A way back from there: what starts at a wall and leaves it inwards comes back through it.
+                way = passed(self.walls_then(i), self.walls_now(i), end, start, (at, at, 2.0 * at))
+                free[k, number] = OUT if way.wall >= 0.0 else BEHIND
 
     # --- At their walls
 

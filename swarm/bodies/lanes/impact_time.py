@@ -42,9 +42,10 @@ def look(bodies, i, larger):
         if bodies.is_free(k, i):
             continue
         c, met = touching.place(lanes.r1, k, i), touching.span(k)
-        for j in range(count_at(walls, met, c)):
-            w = wall_at(walls, met, j, c)
-            gap = walls.distance(float(w), c)
+        near, ahead = count_at(walls, met, c), bodies.passed(k, c, room, i)
+        for j in range(near + int(ahead.wall >= 0.0)):
+            w = wall_at(walls, met, j, c) if j < near else int(ahead.wall)
+            gap = walls.distance(float(w), c) if j < near else ahead.gap
             if not gap <= room or not _rests(bodies, k, w, i):
                 worst = max(worst, gap)
             if not gap <= room and not _stays(bodies, k, w, gap, i):

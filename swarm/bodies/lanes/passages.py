@@ -6,12 +6,15 @@ from ...contact.absence import lets_through
 from ...kernel.jit import outlined
 from ...kernel.record import Record
 
+# Where a contact point is: it has passed an opening, and that of a wall that ends and is not back through one.
+OUT, BEHIND = 1, 2
+
 
 class Passages(Record):
     """The openings of the walls, and the contact points outside of these."""
 
     openings: Any  # each `Opened` of the walls
-    free: Any  # (K, n) int8, whether a contact point has passed one
+    free: Any  # (K, n) int8, whether a contact point has passed one: 0, or OUT or BEHIND
     escape_time: Any  # (n,) when all those of a body had [s], NaN of bodies that are inside
 
     def takes(self, walls, wall, c, near):

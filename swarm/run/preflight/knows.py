@@ -609,12 +609,7 @@ CAPABILITIES = (
             'use fixed steps with on_unconverged="count", Penalty, or Impact',
         ),
     }, True),
-    Capability("mesh or outline", _faces, {
-        _EVERY_BODY: Refusal(
-            "surfaces[{i}] must not be {kind} with bodies, got {got!r:.200}",
-            "use particles, or from_mesh with a spacing",
-        ),
-    }, within="field"),
+    Capability("mesh or outline", _faces, {}, within="field"),
     Capability("cavity with losses", _lossy_cavities, {
         (SOFT_BODIES, PAPER_BODIES): Refusal(
             "cavities[{k}] must be elastic with {method}, got {got}", "use Impact(dt=...)"

@@ -1,0 +1,76 @@
+"""Walls that end, such as the facets of a mesh: which one the straight way of a contact point goes through.
+
+Such a wall is there as far as its edges, and its distance says nothing of places deep behind it or in other cells: what
+a step of a body may have passed is known by the way from its start to its end.
+"""
+
+import math
+
+from ...contact.path import members_of
+from ...kernel.arrays import index
+from ...kernel.grid import block_of, over_entries
+from ...kernel.jit import outlined, select
+from ...kernel.record import Record
+from ...kernel.vector import Vec, highest, lowest
+from ...surfaces.fields.members import member
+from ...surfaces.in_motion.posed import Posed
+from ...surfaces.presence.patched import Patched
+
+
+class Passed(Record):
+    """The first wall that a way goes through."""
+
+    time: float  # the part of the way after which it does
+    wall: float  # its number, -1: it goes through none
+    gap: float  # how far the end of the way is from it [m]
+
+
+def have_ends(walls):
+    """Whether any wall of a scene ends: a constant for the compiler."""
+    return any(isinstance(members_of(field.members), Patched) for _number, field in walls.fields())
+
+
+def is_of_ends(walls, wall):
+    """Whether the wall with this number ends."""
+    found = False
+    for number, field in walls.fields():
+        if isinstance(members_of(field.members), Patched):
+            found = found | ((wall >= number) & (wall < number + field.count()))
+    return found
+
+
+def passed(before, after, start, end, limits):
+    """The first `Passed` of a way from its start, where the walls are `before`, to its end, where they are `after`.
+
+    `limits`: a start so little outside is at a wall; an end so near to one is at it; each wall is so much farther away.
+    """
+    found = Passed(math.inf, -1.0, -math.inf)
+    for (number, field), (_number, then) in reversed(tuple(zip(before.fields(), after.fields(), strict=True))):
+        if isinstance(members_of(field.members), Patched):
+            found = _first(field.members, then.members, number, found, start, end, limits)
+    return found
+
+
+@outlined
+def _first(field, then, number, found, start, end, limits):
+    members = members_of(field)
+    if isinstance(field, Posed):
+        start, end = field.own_place(start), then.own_place(end)
+    far = limits[0] + limits[2]
+    room = Vec(far, far, far)
+    block = block_of(members.grid, lowest(start, end) - room, highest(start, end) + room)
+    return over_entries(members.grid, block, found, _pass, members, number, start, end, limits)
+
+
+def _pass(found, m, members, number, start, end, limits):
+    wall, (near, room, farther) = member(members, index(m)), limits
+    outside = wall.level_of(wall.inner(start))
+    back = select((outside > 0.0) & (outside <= near), outside, 0.0)
+    begin = start - back * wall.unit_normal(start)
+    stop = end + farther * wall.unit_normal(end)
+    time, _hits = wall.first_hit(begin, stop - begin)
+    gap = abs(wall.level_of(wall.inner(stop)))
+    sooner = (time <= 1.0) & (gap > room) & (time < found.time)
+    return Passed(
+        select(sooner, time, found.time), select(sooner, number + m, found.wall), select(sooner, gap, found.gap)
+    )
