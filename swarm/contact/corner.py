@@ -88,8 +88,8 @@ def add_reaction_impulses(reactions, h, impulse, lane):
 
 
 @outlined
-def add_reaction_works(moving, walls, factor, reactions, impulse, lane):
-    """Add the work per mass of each wall, `factor` reaction.displacement, to its row of `impulse`; the sum.
+def add_reaction_works(moving, walls, factor, reactions, ends, impulse, lane):
+    """Add the work per mass of each wall in a step, `factor` reaction.swept(*ends), to its row of `impulse`; the sum.
 
     The rows of work follow the rows of impulses; without moving walls `impulse` has no rows of work.
     """
@@ -97,7 +97,7 @@ def add_reaction_works(moving, walls, factor, reactions, impulse, lane):
     if moving is None:
         return found
     for k, wall in reversed(tuple(enumerate(walls.each))):
-        work = factor * dot(_reaction_of(reactions, k), wall.displacement())
+        work = factor * dot(_reaction_of(reactions, k), wall.swept(*ends))
         impulse[reactions.shape[0] + k, lane] += work
         found = work + found
     return found

@@ -173,7 +173,11 @@ def _of_rows(scene: Scene) -> list[Surface]:
 
 def _pace(surface: Surface) -> float:
     """A bound of the speed with which a surface moves [m/s]."""
-    return 0.0 if surface.motion is None else drive_of(surface, 0.0).fastest
+    if surface.motion is None:
+        return 0.0
+    drive = drive_of(surface, 0.0)
+    fastest: float = drive.fastest + drive.angular_speed() * (surface.extent() + math.hypot(*drive.center))
+    return fastest
 
 
 def _thinnest(scene: Scene, dt: float) -> tuple[float, int]:
@@ -281,9 +285,9 @@ class Steps(contract.MethodNumbers):
         """Whether a step with free displacement p could jump over a solid. Only its ends are looked at."""
         return False if self.longest is None else square(p) > self.longest * self.longest
 
-    def work_along(self: Any, over, wall, force):
-        """The work of a force of this wall over a step with these walls; 0 where no wall moves."""
-        return 0.0 if self.moving is None else dot(force, over.displacement(wall))
+    def work_along(self: Any, over, wall, force, ends):
+        """The work of a force of this wall in a step with these walls and ends, r0 and r1; 0 where no wall moves."""
+        return 0.0 if self.moving is None else dot(force, over.swept(wall, *ends))
 
     def flight(self: Any, walls, gravity, lane):
         """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""
@@ -332,7 +336,7 @@ class SoftNumbers(Steps):
         before, over, after = self.times(walls, lane.remaining)
         way = r - lane.r
         if self.moving is not None:
-            way = way - over.displacement(wall)
+            way = way - over.swept(wall, lane.r, r)
         return medial.passes((before, lane.r), (after, r), wall, way, self.dt * (lane.v - v), self.half_widths)
 
     def _passes_any(self, walls, lane, r, v):

@@ -156,7 +156,7 @@ class RuleNumbers(fixed_step.SoftNumbers):
         inside = not before.outside(-1.0, lane.r)
         new = inside & (touching | after.outside(-1.0, step.r))
         # One wall alone has a part in the kick.
-        work = self.work_along(over, wall, -1.0 / self.dt * step.kick)
+        work = self.work_along(over, wall, -1.0 / self.dt * step.kick, (lane.r, step.r))
         taken = fixed_step.Taken(step.r, step.v, solved, select(touching, norm(step.kick), 0.0), new, work)
         return fixed_step.contact(lane, wall, taken)
 
@@ -188,7 +188,7 @@ class MidpointNumbers(RuleNumbers):
         h = self.dt
         corner.add_reaction_impulses(reactions, 0.5 * h, impulse, i)
         return corner.add_reaction_works(
-            self.moving, self.over(walls, lane.remaining), -4.0 / (h * h), reactions, impulse, i
+            self.moving, self.over(walls, lane.remaining), -4.0 / (h * h), reactions, (lane.r, lane.r), impulse, i
         )
 
 
@@ -212,7 +212,7 @@ class TrapezoidalNumbers(RuleNumbers):
         factor = 2.0 * lane.own.over_mass / h
         add_impulses(before, law, factor, lane.r, impulse, i)
         work = add_works(moving, over, before, law, factor / h, lane.r, impulse, i)
-        return work + corner.add_reaction_works(moving, over, -2.0 / (h * h), reactions, impulse, i)
+        return work + corner.add_reaction_works(moving, over, -2.0 / (h * h), reactions, (lane.r, lane.r), impulse, i)
 
 
 # --- As users describe them ------------------------------------------------------------------------------

@@ -41,8 +41,8 @@ class Penalty(fixed_step.SoftWalls):
     look at the gap at their ends only: a solid thinner than |v| dt is refused, but a step can miss a chord through the
     edge of a solid that is shorter than |v| dt. A particle that gets through the middle of a solid ends the run with an
     error that names a penalty which holds it.
-    Walls may move without turning: the step is that of the frame of each wall, and with the energy less the work of the
-    walls it conserves the same. Where walls move in any way but uniformly, free steps are jumped over in several parts.
+    Walls may move: the step is that of the frame of each wall, and with the energy less the work of the walls it
+    conserves the same; one that turns takes the push of a few at rest. Where walls move in any way but uniformly, free steps are jumped over in several parts.
     Laws of walls, such as `restitution`, `friction`, `temperature` and `laws`, act on points where a contact ends: they
     make of it what they make of an impact on a rigid wall, and what they take or give is booked. Friction is that of
     the whole impulse of a contact. A contact that a weight makes last is rubbed each time that it swings back.
@@ -156,7 +156,7 @@ class GradientSteps(fixed_step.Steps):
         # v1 = v0 + h G - (2 kappa/h) D; the equal 2 (r1 - r0)/h - v0 cancels
         g = over.discrete_gradient(wall, step.r, r1)
         f = select(touching, 2.0 / h * kappa, 0.0)
-        v1, work = accelerated(gravity, lane.v, h) - f * g, self.work_along(over, wall, -f / h * g)
+        v1, work = accelerated(gravity, lane.v, h) - f * g, self.work_along(over, wall, -f / h * g, (step.r, r1))
         given = abs(f) * norm(g)
         end = self._restored(walls, gravity, lane, h, Pushed(r1, v1, over, None, given, work, False), 1.0 / h * given)
         return end._replace(v=select(touching, end.v, v1))
@@ -165,7 +165,7 @@ class GradientSteps(fixed_step.Steps):
         """The `Pushed` step with these reactions of all walls; adds their impulses and works to `impulse`."""
         over, reaction = self.over(walls, lane.remaining), corner.total(reactions)
         corner.add_reaction_impulses(reactions, h, impulse, i)
-        work = corner.add_reaction_works(self.moving, over, -2.0 / (h * h), reactions, impulse, i)
+        work = corner.add_reaction_works(self.moving, over, -2.0 / (h * h), reactions, (lane.r, end), impulse, i)
         v1 = accelerated(gravity, lane.v, h) - 2.0 / h * reaction
         force = 1.0 / h * (2.0 / h * norm(reaction))
         return self._restored(walls, gravity, lane, h, Pushed(end, v1, over, None, 0.0, work, False), force)

@@ -277,7 +277,7 @@ class Walls(Record):
 
 # What is asked of one wall by its number, and any value of the type of the answer.
 _ASKED = {
-    **dict.fromkeys(("velocity", "acceleration", "carry", "mean_velocity", "displacement"), ZERO),
+    **dict.fromkeys(("velocity", "acceleration", "carry", "mean_velocity", "displacement", "swept"), ZERO),
     **dict.fromkeys(("unit_normal", "project", "push", "discrete_gradient", "step_normal", "chord_normal"), ZERO),
     **dict.fromkeys(("distance", "outward_acceleration", "chord_guess", "chord_improve"), 0.0),
     "flat": False,

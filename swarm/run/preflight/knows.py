@@ -131,6 +131,10 @@ def _rotations(asked: Asked) -> Found:
             yield {"i": i, "got": wall.motion}
 
 
+def _rotations_of_mean_values(asked: Asked) -> Found:
+    yield from _rotations(asked) if getattr(asked.method, "gradient", "") == "mean-value" else ()
+
+
 def _waits(asked: Asked) -> Found:
     for i, wall in _walls(asked):
         for k, law in enumerate(wall.laws):
@@ -597,12 +601,18 @@ CAPABILITIES = (
         ),
     }, True),
     Capability("rotation", _rotations, {
-        _FIXED_STEPS: Refusal(
-            "surfaces[{i}].motion must not turn the surface with {method}, got {got}: its step has no closed form in "
-            "the frame of a wall that turns",
-            "use Impact, a Translation, Oscillation or Path, or a rotation that leaves the surface as it is",
+        (BASELINE,): Refusal(
+            "surfaces[{i}].motion must not turn the surface with {method}, got {got}: it takes its force in the frame "
+            "of a wall that does not turn",
+            "use Penalty or Impact, or a rotation that leaves the surface as it is",
         ),
     }, within="motion"),
+    Capability("rotation with the mean-value form", _rotations_of_mean_values, {
+        (SOFT, PAPER): Refusal(
+            'gradient must be "composite" where surfaces[{i}].motion turns the surface, got "mean-value"',
+            "leave it out",
+        ),
+    }, True),
     Capability("gravity at cut steps", _gravity_at_impacts, {
         (PAPER,): Refusal(
             "gravity must be None with {cut}, got {got}",

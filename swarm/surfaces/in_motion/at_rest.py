@@ -42,6 +42,10 @@ class AtRest(Record):
         """The displacement of the wall in a step."""
         return ZERO
 
+    def swept(self, r0, r1):
+        """The displacement of the wall in a step, of what of it is in the middle of the step from r0 to r1."""
+        return self.displacement()
+
     def end_inner(self, r):
         """The inner function at the end of a step, where the wall may be elsewhere."""
         return self.inner(r)

@@ -16,6 +16,7 @@ from ..surface import Surface
 from ..walls import Field, Following, Walls
 from .drive import Drive, drive_of
 from .posed import Drifting, Posed
+from .turned import Turned
 
 
 class Moving(Record):
@@ -44,6 +45,12 @@ class Moving(Record):
         """A particle as safe steps to the wall see it after a time of its flight: None where none are needed."""
         remaining = flight.remaining - t
         return flight.seen(t, self.during(remaining, remaining), flight.pull)
+
+
+class Turning(Moving):
+    """A wall that turns, with or without another motion."""
+
+    posed = Turned
 
 
 class Translated(Moving):
@@ -106,7 +113,7 @@ def carried(
         return Walls(all_walls)
     if fields:
         return Marched(all_walls)
-    marched = [walls for walls in of_surfaces if type(walls[0]) is Moving]
+    marched = [walls for walls in of_surfaces if type(walls[0]) in (Moving, Turning)]
     if not marched:
         return Carried(all_walls)
     return (Strided if all(map(_may_stride, marched)) else Marched)(all_walls)
@@ -125,7 +132,8 @@ def walls_of(surface: Surface, moment: float, largest: float | None = None) -> l
     drive = drive_of(surface, moment)
     if isinstance(first, Members):
         first = first.loosened(drive.late + norm(drive.shift) + norm(drive.center))
-    return [(Translated if _is_uniform(drive) else Moving)(first, drive), *map(Following, others)]
+    kind = Translated if _is_uniform(drive) else Moving if drive.turn is None else Turning
+    return [kind(first, drive), *map(Following, others)]
 
 
 def _is_uniform(drive: Drive) -> bool:

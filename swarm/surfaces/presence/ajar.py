@@ -12,6 +12,9 @@ class Ajar(Present):
     def displacement(self):
         return self.body.displacement()
 
+    def swept(self, r0, r1):
+        return self.body.swept(r0, r1)
+
     def place_scale(self, s):
         return self.body.place_scale(s)
 

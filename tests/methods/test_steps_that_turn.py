@@ -1,0 +1,136 @@
+"""Soft walls that turn: the energy is that of the work, the order is 2, and a plain loop goes the same way."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+
+H, ALPHA, RATE = 0.01, 300.0, 2.0
+TURN = swarm.Rotation((0.3, 0.5, 1.0), RATE, (0.02, -0.01, 0.0))
+SWING = swarm.Oscillation((0.05, 0.03, 0.08), 0.7)
+WALLS = {
+    "ellipsoid": lambda motion: [swarm.Ellipsoid((0.5, 0.6, 0.4), motion=motion)],
+    "swinging ellipsoid": lambda motion: [swarm.Ellipsoid((0.5, 0.6, 0.4), motion=SWING + motion)],
+    "paddle": lambda motion: [
+        swarm.Sphere(0.8), swarm.Ellipsoid((0.1, 0.3, 0.2), (0.3, 0.0, 0.0), side="outside", motion=motion),
+    ],
+    "wedge": lambda motion: [swarm.Plane((s, 0.3, -1.0), 0.2, motion=motion) for s in (-1.0, 1.0)],
+}  # fmt: skip
+
+
+def run(surfaces, method, until=1.0, gravity=None, start=None, **given):
+    start = swarm.fill(swarm.Scene([swarm.Sphere(0.1)]), 3, speed=1.0, seed=3) if start is None else start
+    return swarm.simulate(
+        swarm.Scene(surfaces, gravity), start, method, until=until, every=0.5 * until, compile="never", **given
+    )
+
+
+def imbalance(result):
+    seen = result.observables
+    kept = seen["total_energy"] - seen["wall_work"].sum(axis=1)
+    kept = kept + seen["dissipated_energy"] if "dissipated_energy" in seen else kept
+    return np.abs(kept - kept[0]).max() / np.abs(seen["total_energy"]).max()
+
+
+# --- Work ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -2.0)], ids=["straight", "falling"])
+@pytest.mark.parametrize("name", [*WALLS, "fast ellipsoid", "hertz"])
+def test_energy_is_that_of_the_work(name, gravity):
+    motion = swarm.Rotation((0.3, 0.5, 1.0), 30.0) if name == "fast ellipsoid" else TURN
+    method = swarm.Penalty(H, 3e3, exponent=1.5) if name == "hertz" else swarm.Penalty(0.2 * H, 20.0 * ALPHA)
+    start = swarm.Particles(np.array([[-0.1, 0.0], [0.0, 0.1], [0.0, 0.05]]), np.array([[1, 1], [0, 0.1], [0, 0]]), 1.0)
+    result = run(WALLS.get(name, WALLS["ellipsoid"])(motion), method, 1.0, gravity, start if name == "paddle" else None)
+    assert result.observables["impacts"][-1] >= 1
+    assert imbalance(result) <= 1e-12
+    assert np.abs(result.observables["wall_work"][-1]).max() > 1e-3
+
+
+def test_laws_take_what_is_dissipated():
+    surface = swarm.Ellipsoid((0.5, 0.6, 0.4), motion=TURN, restitution=0.8, friction=0.2)
+    result = run([surface], swarm.Penalty(H, ALPHA), 2.0)
+    assert result.observables["dissipated_energy"][-1] > 0.0
+    assert imbalance(result) <= 1e-12
+
+
+def test_the_loop_of_multipliers_ends_on_a_wall_that_turns():
+    """Its step from the wall converges; the energy then is that of the work up to the tolerance."""
+    wall = swarm.Plane((0.0, 0.0, -1.0), 0.0, motion=swarm.Rotation((0.0, 1.0, 0.0), 0.5))
+    start = swarm.Particles([0.2, 0.0, 0.0], [0.1, 0.0, -1.0], 1.0)
+    result = run([wall], swarm.AugmentedLagrangian(H, 1e6, tolerance=1e-26, max_sweeps=500), 10.0 * H, start=start)
+    assert result.observables["unconverged"][-1] == 0
+    assert imbalance(result) <= 1e-11
+    # The wall goes down there, by 0.5 rad/s times 0.2 m, and takes what it does not give back.
+    assert result.observables["wall_work"][-1].sum() < -0.1
+
+
+# --- Against other ways to compute it --------------------------------------------------------------------
+
+
+def test_the_order_is_2():
+    walls = WALLS["swinging ellipsoid"](TURN)
+    ends = [run(walls, swarm.Penalty(0.008 / k, ALPHA), 0.8).particles.position for k in (1, 2, 4)]
+    first, second = (np.abs(one - other).max() for one, other in itertools.pairwise(ends))
+    assert 3.6 < first / second < 4.4
+
+
+def test_the_limit_is_that_of_rigid_walls():
+    exact = run(WALLS["ellipsoid"](TURN), swarm.Impact(), 0.6).particles.position
+    misses = []
+    for alpha in (1e3, 1e5):
+        soft = swarm.Penalty(0.1 / math.sqrt(10.0 * alpha), alpha)
+        misses.append(np.abs(run(WALLS["ellipsoid"](TURN), soft, 0.6).particles.position - exact).max())
+    assert misses[1] < 0.2 * misses[0] < 0.05
+
+
+def turned(angle, a):
+    """A vector turned about the z axis."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([c * a[0] - s * a[1], s * a[0] + c * a[1], a[2]])
+
+
+def plain_step(r, v, time):
+    """One step of eq. (5) at the plane n(t).r = 0.2 that turns about z: with its work, which nothing else measures."""
+    n = np.array([1.0, 0.0, 0.0])
+    a, b = turned(RATE * time, n), turned(RATE * (time + H), n)
+    # n of the scene: M^-T n = M S^-2 n, with M = (A0 + A1)/2 and S = cos(w h/2) across the axis
+    d = 0.5 * (a + b) / math.cos(0.5 * RATE * H) ** 2
+    g0 = a @ r - 0.2
+
+    def kappa_of(g1):
+        y0, y1 = max(g0, 0.0), max(g1, 0.0)
+        slope = (y1 - y0) / (g1 - g0) if g1 != g0 else 1.0
+        return 0.5 * H * H * ALPHA * 0.5 * (y0 + y1) * slope
+
+    free = b @ (r + H * v) - 0.2
+    low, high = min(g0, free) - 1.0, free
+    for _i in range(200):
+        g1 = 0.5 * (low + high)
+        low, high = (low, g1) if g1 - (free - kappa_of(g1) * (b @ d)) > 0.0 else (g1, high)
+    r1 = r + H * v - kappa_of(high) * d
+    return r1, 2.0 / H * (r1 - r) - v
+
+
+def test_a_plain_loop_goes_the_same_way():
+    wall = swarm.Plane((1.0, 0.0, 0.0), 0.2, motion=swarm.Rotation((0.0, 0.0, 1.0), RATE))
+    r, v = np.array([0.0, 0.1, 0.0]), np.array([1.0, 0.4, 0.2])
+    result = run([wall], swarm.Penalty(H, ALPHA), 0.8, start=swarm.Particles(r, v, 1.0))
+    for k in range(80):
+        r, v = plain_step(r, v, k * H)
+    assert result.observables["impacts"][-1] >= 1
+    assert np.allclose(result.particles.position[:, 0], r, atol=1e-10)
+
+
+def test_a_jump_over_a_blade_that_turns_is_refused():
+    blade = swarm.Ellipsoid((0.02, 0.4, 0.4), side="outside", motion=swarm.Rotation((0.0, 0.0, 1.0), 30.0))
+    with pytest.raises(swarm.SceneError, match="no particle jumps over a solid in one step"):
+        run([swarm.Sphere(0.8), blade], swarm.Penalty(H, ALPHA), start=swarm.Particles([0.5, 0, 0], [0.0, 1, 0], 1.0))
+
+
+def test_the_mean_value_form_does_not_turn():
+    with pytest.raises(swarm.SceneError, match=r'gradient must be "composite" where surfaces\[0\]\.motion turns'):
+        run(WALLS["ellipsoid"](TURN), swarm.Penalty(H, ALPHA, exponent=2.0, gradient="mean-value"))
