@@ -161,6 +161,11 @@ class CompiledScene:
         )
         return None if laws == NONE else laws.in_plane(self.scene.across())
 
+    def lawful(self) -> list[Surface]:
+        """What says the laws of each wall."""
+        runs = [run for i, walls in self._spans for run in self.pieces.each[i].runs(walls)]
+        return [surface for surface, walls in runs for _wall in range(walls)]
+
     def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
         """The openings of every wall in the frame that ends at a moment [s], or None."""
         return openings_in(self._spans, (self.pieces.volumes, self.pieces.doorways), moment) or None

@@ -100,8 +100,8 @@ def touching_of(body: Body, ties: Ties, compiled: CompiledScene) -> Touching:
     b = _combinations(body)
     single = ((b != 0.0).sum(axis=1) == 1) & (b.max(axis=1, initial=0.0) == 1.0)
     plain = np.where(single, b.argmax(axis=1), -1).astype(np.int64)
-    of_walls = compiled.numbering.members[0]
-    surfaces = [compiled.scene.surfaces[i] for i in of_walls] + own_surfaces(body)
+    of_walls = compiled.lawful()
+    surfaces = of_walls + own_surfaces(body)
     restitution = np.array([surface.restitution for surface in surfaces])
     friction = np.array([surface.friction for surface in surfaces])
     return Touching(

@@ -165,7 +165,7 @@ class Walls(Record):
         """The numbers of the walls near a point, in an array of the function that asks."""
         near = len(self.shared()) - len(self.fields())
         for rooms in self.joined():
-            near = self._count_in_owner(rooms, r) + near
+            near = self.count_in_owner(rooms, r) + near
         for _number, field in reversed(self.fields()):
             near = field.members.count_in_cell(r) + near
         number = scratch(near, np.float64)
@@ -190,12 +190,20 @@ class Walls(Record):
                         k += 1
 
     @outlined
-    def _count_in_owner(self, rooms, r):
+    def count_in_owner(self, rooms, r):
         """The number of walls of the room of a union that is asked for those near a point."""
         owner, count = owner_of(self, rooms, r), 0
         for i, room in enumerate(rooms):
             count = select(i == owner, len(room), count)
         return count
+
+    @outlined
+    def first_in_owner(self, rooms, r):
+        """The number of the first of these walls."""
+        owner, first = owner_of(self, rooms, r), 0.0
+        for i, room in enumerate(rooms):
+            first = select(i == owner, room[0][0], first)
+        return first
 
     def until_others(self, r, v):
         """When a straight flight may meet a wall that is not near its start."""

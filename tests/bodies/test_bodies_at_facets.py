@@ -1,4 +1,4 @@
-"""Bodies at meshes and outlines: a body of one point is a particle, and a dumbbell flies as in a plain loop."""
+"""Bodies at meshes, outlines, unions and foams: one point is a particle, and a dumbbell flies as in a plain loop."""
 
 import math
 
@@ -23,7 +23,23 @@ def mesh_of_outline():
     return swarm.Mesh(corners, faces)
 
 
+def union_of(*spans):
+    """Boxes as one room, each from and to these places in the plane."""
+    boxes = [((x0, y0), (x1, y1)) for x0, y0, x1, y1 in spans]
+    return swarm.Union([
+        swarm.Box((*(0.5 * np.subtract(high, low)), 0.4), (*(0.5 * np.add(low, high)), 0.0)) for low, high in boxes
+    ])  # fmt: skip
+
+
+def foam_of_three():
+    """Balls that overlap."""
+    return swarm.Spheres([(0.5, 0.5, 0.0), (1.0, 0.6, 0.1), (0.4, 1.0, -0.1)], [0.5, 0.4, 0.45], side="inside")
+
+
 ROOMS = {
+    "union": lambda: union_of((0.0, 0.0, 2.0, 1.0), (0.0, 0.0, 1.0, 2.0)),
+    "touching union": lambda: union_of((0.0, 0.0, 2.0, 1.0), (0.0, 1.0, 1.0, 2.0)),
+    "foam": foam_of_three,
     "polygon": lambda **laws: swarm.Polygon(OUTLINE, **laws),
     "stadium": lambda **laws: swarm.Stadium(0.5, 0.8, center=(0.5, 0.5, 0.0), **laws),
     "prism": lambda **laws: swarm.Prism(OUTLINE, 0.8, **laws),
@@ -94,7 +110,7 @@ def flown(until):
     return centre, angle, hits
 
 
-@pytest.mark.parametrize("room", ["polygon", "prism", "mesh"])
+@pytest.mark.parametrize("room", ["polygon", "prism", "mesh", "union", "touching union"])
 def test_a_dumbbell_flies_as_in_a_plain_loop(room):
     out = HALF * np.array([math.cos(0.4), math.sin(0.4), 0.0])
     across = np.array([-out[1], out[0], 0.0])
@@ -169,3 +185,37 @@ def test_rods_pass_an_opening_and_come_back_as_at_a_box():
         np.testing.assert_array_equal(other.observables["escaped"], box.observables["escaped"])
         assert other.observables["energy_error"].max() < 1e-12
     assert 0 < box.observables["escaped"][-1] < n
+
+
+def test_rooms_that_touch_at_a_wall_are_refused():
+    gate = swarm.Opening(swarm.Box((0.2, 0.2, 0.2), (0.5, 1.0, 0.0)), between=True)
+    boxes = [swarm.Box((1.0, 0.5, 0.4), (1.0, 0.5, 0.0)), swarm.Box((0.5, 0.5, 0.4), (0.5, 1.5, 0.0), openings=[gate])]
+    body = swarm.Body([(0.0, 0.0, 0.0)], mass=[1.0])
+    start = swarm.Bodies(body, np.full((3, 1, 1), 0.3), np.ones((3, 1, 1)))
+    with pytest.raises(swarm.SceneError, match="must not have rooms that touch at a wall between them with bodies"):
+        swarm.simulate(swarm.Scene([swarm.Union(boxes)]), start, swarm.Impact(dt=0.1), until=1.0)
+
+
+def test_a_union_beside_a_cavity_of_the_body_is_refused():
+    body = swarm.Body(
+        [(0.0, 0.0, 0.0), (0.02, 0.0, 0.0)], mass=[1.0, 0.5], contacts=[0], cavities=[(swarm.Sphere(0.05), 0, 1)]
+    )
+    start = swarm.Bodies(body, np.array([[0.3, 0.32], [0.3, 0.3], [0.0, 0.0]])[..., None], np.zeros((3, 2, 1)))
+    with pytest.raises(swarm.SceneError, match="with a body that has guides or cavities"):
+        swarm.simulate(swarm.Scene([ROOMS["union"]()]), start, swarm.Impact(dt=0.1), until=1.0)
+
+
+@pytest.mark.parametrize("kind", [swarm.Union, swarm.Intersection])
+def test_each_part_has_its_own_restitution(kind):
+    """A point meets the part that loses energy, and that which does not."""
+    parts = [swarm.Sphere(1.0, (x, 0.0, 0.0), restitution=e) for x, e in ((-0.2, 0.5), (0.2, 1.0))]
+    body = swarm.Body([(0.0, 0.0, 0.0)], mass=[2.0])
+    lost = []
+    for way in (-1.0, 1.0):
+        start = swarm.Bodies(body, np.zeros((3, 1, 1)), np.array([way, 0.0, 0.0])[:, None, None])
+        done = swarm.simulate(
+            swarm.Scene([kind(parts)]), start, swarm.Impact(dt=0.1), until=1.4, every=0.7, compile="never"
+        )
+        assert done.observables["impacts"][-1] == 1
+        lost.append(done.observables["dissipated_energy"][-1])
+    np.testing.assert_allclose(sorted(lost), [0.0, 0.75], atol=1e-12)

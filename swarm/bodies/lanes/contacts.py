@@ -10,7 +10,7 @@ from ...kernel.limits import EPSILON
 from ...kernel.vector import Vec, column, cross, dot, norm, put
 from .constraints import Constrained
 from .passages import BEHIND, OUT
-from .through import Passed, have_ends, is_of_ends, passed
+from .through import WayThrough, have_ends, is_of_ends, passed
 
 # A contact this many times round-off away from its wall is at it.
 NEAR = 64.0
@@ -195,7 +195,7 @@ class BodyContacts(Constrained):
     def passed(self, k, c, room, i):
         """What a contact point goes through in a trial that it ends at c, by more than `room`."""
         if not have_ends(self.walls) or k >= self.touching.points:
-            return Passed(math.inf, -1.0, -math.inf)
+            return WayThrough(math.inf, -1.0, -math.inf)
         start, limits = self.touching.place(self.lanes.r, k, i), (_AT * self.rule.room, room, 0.0)
         return passed(self.walls_now(i), self.walls_then(i), start, c, limits)
 
@@ -241,31 +241,38 @@ class BodyContacts(Constrained):
 
 
 def count_at(walls, span, c):
-    """The number of walls of a span that a point may be at: of a field those of its cell."""
+    """The number of walls of a span that a point may be at: of a field those of its cell, of a union one room's."""
     first, last = span
-    fields = walls.fields()
-    if len(fields) == 0 or first > 0:
+    fields, unions = walls.fields(), walls.joined()
+    if (len(fields) == 0 and len(unions) == 0) or first > 0:
         return last - first
-    found = 0
+    found = last - int(walls.count_in_fields()) - sum(len(room) for rooms in unions for room in rooms)
     for _number, field in reversed(fields):
         found = int(field.members.count_in_cell(c)) + found
-    return found + last - int(walls.count_in_fields())
+    for rooms in unions:
+        found = int(walls.count_in_owner(rooms, c)) + found
+    return found
 
 
 def wall_at(walls, span, j, c):
     """One of these walls."""
-    if len(walls.fields()) == 0 or span[0] > 0:
+    if (len(walls.fields()) == 0 and len(walls.unions) == 0) or span[0] > 0:
         return span[0] + j
-    return _wall_of_cells(walls, j, c)
+    return _wall_of_cells(walls, span, j, c)
 
 
 @outlined
-def _wall_of_cells(walls, j, c):
-    """The same of a scene with fields."""
+def _wall_of_cells(walls, span, j, c):
+    """The same of a scene with fields, or unions."""
     for number, field in walls.fields():
         here = int(field.members.count_in_cell(c))
         if j < here:
             return int(number) + int(field.members.one_in_cell(j, c))
+        j = j - here
+    for rooms in walls.joined():
+        here = int(walls.count_in_owner(rooms, c))
+        if j < here:
+            return int(walls.first_in_owner(rooms, c)) + j
         j = j - here
     return int(walls.count_in_fields()) + j
 

@@ -12,12 +12,13 @@ from ...kernel.grid import block_of, over_entries
 from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, highest, lowest
+from ...surfaces.fields.foam import Foam
 from ...surfaces.fields.members import member
 from ...surfaces.in_motion.posed import Posed
 from ...surfaces.presence.patched import Patched
 
 
-class Passed(Record):
+class WayThrough(Record):
     """The first wall that a way goes through."""
 
     time: float  # the part of the way after which it does
@@ -27,26 +28,32 @@ class Passed(Record):
 
 def have_ends(walls):
     """Whether any wall of a scene ends: a constant for the compiler."""
-    return any(isinstance(members_of(field.members), Patched) for _number, field in walls.fields())
+    return any(_has_ends(field) for _number, field in walls.fields())
+
+
+def _has_ends(field):
+    # Of a foam the nearest cavity says whether a place is outside.
+    members = members_of(field.members)
+    return isinstance(members, Patched) and not isinstance(members, Foam)
 
 
 def is_of_ends(walls, wall):
     """Whether the wall with this number ends."""
     found = False
     for number, field in walls.fields():
-        if isinstance(members_of(field.members), Patched):
+        if _has_ends(field):
             found = found | ((wall >= number) & (wall < number + field.count()))
     return found
 
 
 def passed(before, after, start, end, limits):
-    """The first `Passed` of a way from its start, where the walls are `before`, to its end, where they are `after`.
+    """The first `WayThrough` of a way from its start, where the walls are `before`, to its end, where they are `after`.
 
     `limits`: a start so little outside is at a wall; an end so near to one is at it; each wall is so much farther away.
     """
-    found = Passed(math.inf, -1.0, -math.inf)
+    found = WayThrough(math.inf, -1.0, -math.inf)
     for (number, field), (_number, then) in reversed(tuple(zip(before.fields(), after.fields(), strict=True))):
-        if isinstance(members_of(field.members), Patched):
+        if _has_ends(field):
             found = _first(field.members, then.members, number, found, start, end, limits)
     return found
 
@@ -71,6 +78,6 @@ def _pass(found, m, members, number, start, end, limits):
     time, _hits = wall.first_hit(begin, stop - begin)
     gap = abs(wall.level_of(wall.inner(stop)))
     sooner = (time <= 1.0) & (gap > room) & (time < found.time)
-    return Passed(
+    return WayThrough(
         select(sooner, time, found.time), select(sooner, number + m, found.wall), select(sooner, gap, found.gap)
     )

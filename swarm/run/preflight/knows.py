@@ -172,6 +172,21 @@ def _rooms(asked: Asked) -> Found:
             yield {"i": i, "got": surface}
 
 
+def _unions(asked: Asked) -> Found:
+    yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().unions())
+
+
+def _rooms_that_touch(asked: Asked) -> Found:
+    if any(_unions(asked)) and asked.scene.compiled().walls().inset is not None:
+        yield from _unions(asked)
+
+
+def _unions_beside_own(asked: Asked) -> Found:
+    body = asked.particles.body if isinstance(asked.particles, TiedParticles) else None
+    if body is not None and (body.guides or body.cavities):
+        yield from _unions(asked)
+
+
 def _fields(asked: Asked) -> Found:
     yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().fields())
 
@@ -407,12 +422,25 @@ CAPABILITIES = (
         (CHORDS,): Refusal("counters must be left out with a contact_step of {step:g}, got {count}", _NO_STEP),
     }),
     Capability("union", _rooms, {
-        _EVERY_BODY: _of_one_room("bodies", "use particles and Impact()"),
+        (SOFT_BODIES, PAPER_BODIES): _of_one_room("bodies and soft walls", "use Impact(dt=...)"),
         (BALLS, GRAINS): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
         (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
         (CHORDS,): _of_one_room("a contact_step", _NO_STEP),
         (HEAVY,): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
     }),
+    Capability("union with walls between its rooms", _rooms_that_touch, {
+        (BODIES,): Refusal(
+            "surfaces[{i}] must not have rooms that touch at a wall between them with bodies, got {got!r:.200}: a step "
+            "that ends in the next room would not be seen to have passed it",
+            "leave a space between the rooms, let them overlap, or use particles and Impact()",
+        ),
+    }, within="union"),
+    Capability("union beside guides and cavities", _unions_beside_own, {
+        (BODIES,): Refusal(
+            "surfaces[{i}] must not be a {kind} of several rooms with a body that has guides or cavities, got "
+            "{got!r:.200}", "use a body without them",
+        ),
+    }, within="union"),
     Capability("field", _fields, {
         (SOFT_BODIES, PAPER_BODIES): _listed("bodies and soft walls", "use Impact(dt=...)"),
         (*_FIXED_STEPS, OTHER_POINTS): _listed("{method}", _TO_EXACT),
@@ -546,6 +574,9 @@ CAPABILITIES = (
         ),
     }),
     Capability("laws of groups of a mesh", _groups, {
+        _EVERY_BODY: Refusal(
+            "surfaces[{i}].groups must be None with bodies, got laws of {got}", "give the whole mesh one law"
+        ),
         (GRAINS,): Refusal(
             f"surfaces[{{i}}].groups must be None with {_WITH_PENALTY}, got laws of {{got}}",
             "give the whole mesh one law, or use Impact",
