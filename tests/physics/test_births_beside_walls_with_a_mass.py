@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 import swarm
+from swarm.run.machine import run_of
+from swarm.run.options import RunOptions
+from swarm.run.preflight.admission import task_of
 from swarm.surfaces.wall_law import Leave, mirrored
 
 RIGHT, LEFT = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
@@ -91,3 +94,49 @@ def test_no_point_waits_at_a_wall_with_a_mass():
     for walls in ([heavy], [swarm.Plane(LEFT, 1.0, laws=[swarm.Sticky(0.1)]), piston(), shaken]):
         with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws\[0\] must not let particles wait where a wall"):
             run(walls, start, 1.0)
+
+
+@pytest.mark.parametrize("radius", [None, 0.03])
+def test_halts_change_no_bit_where_much_changes(radius):
+    """With a mesh that is moved and open for a time, a wall that goes, births, and points that wait."""
+    hole = swarm.Opening(swarm.Plane((0.0, 0.0, -1.0), 0.3), times=[(0.4, 0.8)])
+    moved = swarm.Prism(
+        [(-0.4, -0.45), (0.4, -0.45), (0.4, 0.45), (-0.4, 0.45)], 1.0, mass=5.0, openings=[hole], present=[(0.0, 1.1)]
+    )
+    law = {} if radius else {"laws": [swarm.Sticky(0.2)]}
+    scene = swarm.Scene([moved, swarm.Plane((0.0, 0.0, 1.0), 0.15, **law)])
+    size = {} if radius is None else {"radius": radius}
+    source = swarm.Source(swarm.Sphere(0.1), volume=True, times=[0.2, 0.4], speed=1.0, mass=1.0, **size)
+    start = swarm.Particles(0.25 * np.array([(x, y, -0.4) for x in (-1, 1) for y in (-1, 1)]).T, np.ones((3, 4)), 1.0)
+    start.velocity[0, :2] = -0.7
+    start.radius = None if radius is None else np.full(4, radius)
+    options = RunOptions(until=1.5, compile="never", sources=(source,), seed=3)
+
+    def new():
+        return run_of(task_of(scene, start, swarm.Impact(), options))
+
+    def carried(run, steps):
+        """The run after its frames, halted after every event of the first piece of each, and how often it was."""
+        run.observe()
+        halts, before = 0, 0.0
+        for moment in (0.3, 0.5, 0.6, 0.65, 0.8, 0.9, 1.2, 1.5):
+            run.halt(1 if steps else 2**40)
+            while not run.advance(moment - before, moment):
+                kept = {name: array.copy() for name, array in run.arrays().items()}
+                run.__exit__()
+                run, halts = new(), halts + 1
+                run.restore(kept, cut_short=True)
+                run.halt(1)
+            before = moment
+        run.__exit__()
+        return run, halts
+
+    (whole, _none), (one, halts) = carried(new(), False), carried(new(), True)
+    assert halts > 8
+    seen, known = one.seen(), whole.seen()
+    assert known["born"].tolist() == [2]
+    assert known["escaped"] > 0
+    assert known["energy_error"] <= 1e-14
+    for name in ("total_energy", "impacts", "escaped", "wall_position", "wall_velocity", "born"):
+        assert np.array_equal(seen[name], known[name]), name
+    assert np.array_equal(one.state.position, whole.state.position)
