@@ -183,6 +183,14 @@ class CompiledScene:
         """The walls for bodies at a moment, as `walls`, and those of a body's own surfaces, at rest, after them."""
         return self._made(moment, own)
 
+    @cached_property
+    def of_no_mass(self) -> "CompiledScene | None":
+        """The scene of the surfaces that impacts do not move, None where impacts move all."""
+        scene = self.scene
+        rest = [surface for surface in scene.surfaces if not surface.reacts()]
+        made = type(scene)(rest, scene.gravity, plane=scene.plane) if rest else None
+        return None if made is None else made.compiled(self.largest, "walls that react")
+
     def cell(self) -> Period | None:
         """The cell that repeats."""
         period, gravity = self.scene.period, self.scene.gravity

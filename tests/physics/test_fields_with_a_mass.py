@@ -115,6 +115,7 @@ def test_beside_a_wall_with_a_mass(kind, radius):
     np.testing.assert_allclose(one.observables["impulse"], other.observables["impulse"], rtol=0.0, atol=1e-8)
     np.testing.assert_allclose(one.observables["wall_position"], other.observables["wall_position"], atol=1e-8)
     assert one.observables["energy_error"].max() <= 1e-12
+    assert one.observables["max_penetration"].max() <= 1e-12
 
 
 def test_groups_of_a_mesh_with_a_mass():
@@ -122,3 +123,20 @@ def test_groups_of_a_mesh_with_a_mass():
     names = {"group": np.zeros(12, int), "names": ("all",), "groups": {"all": {"restitution": 0.5}}}
     with pytest.raises(swarm.SceneError, match="groups must be None for a Mesh with a mass or an inertia, got"):
         swarm.Mesh(made.vertices, made.triangles, mass=1.0, **names)
+
+
+@pytest.mark.parametrize("gravity", [None, (0.1, -0.3, -1.0)])
+def test_rooms_with_a_door_between_them_beside_a_wall_with_a_mass(gravity):
+    """As without that wall, which is far away; through a hole in the outer wall some escape."""
+    hole, door = swarm.Sphere(0.4, (1.0, 0.0, 0.0)), swarm.Opening(swarm.Sphere(0.3), [(0.3, 3.0)], between=True)
+    rooms = swarm.Union([swarm.Box((0.5, 0.4, 0.3), (x, 0.0, 0.0)) for x in (-0.5, 0.5)], openings=[hole, door])
+    far = swarm.Plane((1.0, 0.0, 0.0), 50.0, mass=2.0, motion=swarm.Guide((1.0, 0.0, 0.0)))
+    places = np.array([(-0.5, 0.0, 0.0), (0.5, 0.1, 0.05), (-0.5, 0.3, 0.2), (0.5, -0.2, 0.1)]).T
+    particles = swarm.Particles(places, np.array([(1, 0, 0), (1, 0.1, 0), (1, 0.2, -0.3), (-1, 0.3, 0.2)]).T, 1.0)
+    one, other = (run(walls, particles, until=2.0, gravity=gravity) for walls in ([rooms, far], [rooms]))
+    assert 0 < other.observables["escaped"][-1] < 4
+    assert (one.particles.position[0] * places[0] < 0.0).any()
+    np.testing.assert_allclose(one.escape_time, other.escape_time, rtol=1e-9)
+    np.testing.assert_allclose(one.particles.position, other.particles.position, rtol=0.0, atol=1e-8)
+    assert one.observables["max_penetration"].max() <= 1e-12
+    assert one.observables["energy_error"].max() <= 1e-12

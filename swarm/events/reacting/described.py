@@ -27,10 +27,7 @@ Floats = NDArray[np.float64]
 
 def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:
     """The walls of a scene in the frame that ends at a moment [s]."""
-    scene, largest = compiled.scene, compiled.largest
-    rest, given = [surface for surface in scene.surfaces if not surface.reacts()], None
-    if rest:
-        given = Scene(rest, scene.gravity, plane=scene.plane).compiled(largest, "walls that react")
+    scene, given = compiled.scene, compiled.of_no_mass
     reacts, numbering = np.array([surface.reacts() for surface in scene.surfaces]), compiled.numbering
     stay = np.flatnonzero(~reacts[numbering.members[0]])
     return SceneWalls(
@@ -172,8 +169,11 @@ def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
 
 def walls_now(compiled: CompiledScene, scenery: SceneWalls, freedoms: Freedoms) -> Walls:
     """All walls of a scene, in its order, at the end of the frame of `scenery`."""
-    given = iter(scenery.given.at(0.0).each)
+    still = scenery.given.at(0.0)
+    given = iter(still.each)
     posed = (wall.freedom.posed(wall.body, freedoms, 0.0) for wall in scenery.reacting)
     reacting = (Field(wall) if isinstance(wall.body, Members) else wall for wall in posed)
     owned = [compiled.scene.surfaces[i] for i in compiled.numbering.surfaces_of_rows]
-    return Walls(tuple(next(reacting if surface.reacts() else given) for surface in owned))
+    # Those of unions, which have no mass, are last.
+    every = tuple(next(reacting if surface.reacts() else given) for surface in owned)
+    return Walls(every, still.unions, still.slack, still.inset)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...common.status import Status
-from ...contact.absence import hit_wall, lets_through
+from ...contact.absence import closeness, hit_wall, lets_through, through
 from ...contact.laws import Laws
 from ...contact.wall_impact import Arriving, book, impact_on_wall
 from ...kernel.arrays import index
@@ -25,6 +25,7 @@ from ...lanes.watching.log import Struck, is_full
 from ...lanes.watching.watchers import Followed, Watchers
 from ...state import is_gone
 from ...surfaces.in_motion.moving import Marched
+from ...surfaces.presence.rooms import inside_of, leads_on
 from ...surfaces.time_of_impact import flights, safe
 from .freedoms import ParticleFlight
 from .strikes import all_stay, exit_at, first_hit, reach_of_all, strike, with_energy
@@ -188,14 +189,23 @@ def _fly(scenery, queue, i, t, way, end):
 def _bounce(scenery, queue, i, wall, rule, now):
     """The impact of particle i on a wall that does not react."""
     r, v, m, twice = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i], 2.0 * queue.energy[i]
+    walls = scenery.given.at(rule.end - now)
+    if walls.inset is not None:
+        r = inside_of(walls, wall, r)
+        put(queue.position, 0, i, r)
     arriving, laws, random = Arriving(r, v, twice, m), scenery.laws, None
     if laws.send_off:
         random = scenery.source.of_impact(i, queue.impacts[i], laws)
-    walls = scenery.given.at(rule.end - now)
     if scenery.openings is not None:
-        wall = hit_wall(scenery.openings, scenery, walls, (r, v), wall, 0.0)
-        if lets_through(scenery.openings, walls, wall, r, 0.0):
-            _escape(queue, i, float(scenery.owners[index(int(wall))]), rule, now)
+        near = closeness(walls)
+        wall = hit_wall(scenery.openings, scenery, walls, (r, v), wall, near)
+        if lets_through(scenery.openings, walls, wall, r, near):
+            if leads_on(walls, wall, r):
+                r, v = through(walls, scenery.pull, wall, (r, v))
+                put(queue.position, 0, i, r)
+                put(queue.velocity, 0, i, v)
+            else:
+                _escape(queue, i, float(scenery.owners[index(int(wall))]), rule, now)
             return
     bounce = impact_on_wall(laws, walls, scenery.pull, wall, arriving, random)
     owner, v1, time = index(scenery.owners[int(wall)]), bounce.v, rule.moment - (rule.end - now)
