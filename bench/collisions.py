@@ -123,6 +123,45 @@ def _exact(n: int, collisions: float, frames: int) -> list[Row]:
     ]
 
 
+# Cavities of about the same size: what an event costs of balls in each, beside points in it, and balls in a box.
+CAVITIES = {
+    "a box": swarm.Box((0.9, 0.9, 0.9)),
+    "an ellipsoid": swarm.Ellipsoid((1.0, 0.9, 0.95)),
+    "a formula": swarm.Formula("x**4 + y**4 + z**4 - 1"),
+}
+
+
+def _event(surface: swarm.surfaces.Surface, radius: float | None, count: int, until: float) -> Callable[[], float]:
+    """Microseconds of processor time an impact or a collision, on one thread, at a packing of a few thousandths."""
+    scene = swarm.Scene([surface])
+    start = swarm.fill(scene, count, speed=1.0, radius=radius, seed=1)
+
+    def measure() -> float:
+        began = time.process_time()
+        seen = swarm.simulate(scene, start, swarm.Impact(), until=until, every=until, threads=1).observables
+        events = seen["impacts"][-1] + (seen["collisions"][-1] if radius is not None else 0)
+        return (time.process_time() - began) / float(events) * 1e6
+
+    return measure
+
+
+def _cavities(quick: bool) -> list[Row]:
+    """An event of balls in cavities of several kinds, over that of points there, which take up to eight at once."""
+    count, until = (3, 2.0) if quick else (500, 150.0)
+    measures = {}
+    for name, surface in CAVITIES.items():
+        measures[name, "point"] = _event(surface, None, count, until if quick else 40.0 * until)
+        measures[name, "ball"] = _event(surface, 0.02, count, until)
+    found = in_turn({f"{kind} in {name}": measure for (name, kind), measure in measures.items()}, 1 if quick else 5)
+    rows = []
+    for what, (best, median) in found.items():
+        point = found[what.replace("ball", "point")][0]
+        rows.append(Row(f"{what}, an event", best, median, "us", "", best / point if "ball" in what else None))
+    box, formula = found["ball in a box"], found["ball in a formula"]
+    over = formula[0] / box[0]
+    return [*rows, Row("ball in a formula over a ball in a box", over, formula[1] / box[1], "")]
+
+
 def main(quick: bool = False) -> None:
     """Measure and report."""
     # 10^6 balls are in so many collisions first, and only then have velocities of a gas.
@@ -135,6 +174,7 @@ def main(quick: bool = False) -> None:
     small, large = (float(child(_MEMORY, str(k), tier())) for k in ((8, 64) if quick else (1000, 1_000_000)))
     each = (large - small) / (64 if quick else 1_000_000)
     rows.append(Row("memory, packing 0.3", each, each, "bytes/particle", "250"))
+    rows += _cavities(quick)
     rows += _exact(*((27, 100.0, 5) if quick else (1000, 1e8, 1000)))
     if not quick:
         with tempfile.TemporaryDirectory() as folder:

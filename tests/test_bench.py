@@ -251,7 +251,8 @@ def test_laws_quick(printed):
 @pytest.mark.slow
 def test_collisions_quick(printed):
     table = printed("collisions")
-    for row in ("8788 balls, packing 0.4, box, a collision", "momentum along the cell", "overlap at 5 frames"):
+    rows = ("8788 balls, packing 0.4, box, a collision", "momentum along the cell", "overlap at 5 frames")
+    for row in (*rows, "ball in a formula, an event", "ball in a formula over a ball in a box"):
         assert row in table
 
 

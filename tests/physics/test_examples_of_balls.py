@@ -1,9 +1,9 @@
-"""The examples of balls that meet: an equation of state, Haff's law, cradles, and a break shot."""
+"""The examples of balls that meet: Haff's law, cradles, a break shot, and two kinds in a formula's cavity."""
 
 import numpy as np
 import pytest
 
-from examples import break_shot, cooling_gas, newton_cradle
+from examples import balls_in_formula, break_shot, cooling_gas, newton_cradle
 
 pytestmark = pytest.mark.physics
 
@@ -45,3 +45,14 @@ def test_a_break_shot():
         assert not game.position[:, 2].any()
         assert game.pocketed[-1] == np.isfinite(game.escape_time).sum()
     assert np.abs(games[0].position[-1] - games[1].position[-1]).max() > 0.1
+
+
+def test_heavy_and_light_balls_in_a_formula_share_the_energy():
+    """Equal mean energies within 3 standard errors, from 8 to 1; the whole is kept, and no ball is in the wall."""
+    found = balls_in_formula.run(count=120, until=60.0)
+    ratio, error = balls_in_formula.late_ratio(found)
+    assert found.heavy[0] / found.light[0] == pytest.approx(8.0)
+    assert abs(ratio - 1.0) < 3.0 * error
+    assert error < 0.15
+    assert found.balance < 1e-12
+    assert found.outside < 1e-15
