@@ -256,3 +256,28 @@ def test_a_ball_that_is_too_large_is_refused_in_a_sentence(surface, words):
     ball = swarm.Particles((0.0, 0.0, 0.2), (1.0, 0.0, 0.0), radius=0.26)
     with pytest.raises(swarm.SceneError, match=words):
         swarm.simulate(swarm.Scene([surface]), ball, swarm.Impact(), until=1.0)
+
+
+@pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(2e-3, 2e4)], ids=["balls", "grains"])
+def test_balls_and_grains_fall_on_a_floor_of_samples_that_ends_with_its_grid(method):
+    """A box keeps them within the grid; the floor goes through its border."""
+    x, y, z = TICKS[:, None, None], TICKS[:, None], TICKS
+    floor = swarm.Sampled(0.08 * np.cos(3.0 * x) * np.cos(2.0 * y) - z - 0.4, 0.25, (-1.0,) * 3)
+    position = np.array([(-0.8, 0.3, 0.85), (0.1, -0.8, 0.85), (-0.25, -0.3, -0.24)])
+    start = swarm.Particles(position, np.array([(0.3, -0.2, 0.1), (0.1, 0.3, -0.2), (-1.0,) * 3]), radius=0.07)
+    scene, depths = swarm.Scene([floor, swarm.Box((0.95,) * 3)], gravity=(0.0, 0.0, -1.0)), []
+
+    def depth(frame):
+        depths.append(floor.reaching_outside(frame.position, start.radius).max())
+        return depths[-1]
+
+    result = swarm.simulate(
+        scene, start, method, until=0.4, every=0.04, seed=1, progress=False, observables={"depth": depth}
+    )
+    energy = result.observables["total_energy"]
+    assert result.observables["impacts"][-1] >= 2
+    assert abs(energy - energy[0]).max() <= 1e-12
+    if isinstance(method, swarm.Impact):
+        assert max(depths) <= 4.0 * np.finfo(float).eps
+    else:
+        assert 0.0 < max(depths) < 0.02
