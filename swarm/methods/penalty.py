@@ -42,7 +42,7 @@ class Penalty(fixed_step.SoftWalls):
     edge of a solid that is shorter than |v| dt. A particle that gets through the middle of a solid ends the run with an
     error that names a penalty which holds it.
     Walls may move: the step is that of the frame of each wall, and with the energy less the work of the walls it
-    conserves the same. A wall that turns costs seven pushes of one at rest in each evaluation of a contact. Where walls
+    conserves the same. A wall that turns costs some pushes of one at rest in each evaluation of a contact. Where walls
     move in any way but uniformly, free steps are jumped over in several parts.
     In a cell that repeats what a step brings out of it comes back at its end; among solids that have images a step may
     go a twentieth of the shortest period.

@@ -9,12 +9,13 @@ that of the body at rest but for Q, which is nearly the identity: the body's pus
 again, each time nearer by about the angle of the step and what the surface bends in it.
 """
 
+from ...kernel.limits import EPSILON
 from ...kernel.record import Record
-from ...kernel.vector import Vec, absolute, dot, total
+from ...kernel.vector import Vec, absolute, dot, largest, total
 from .posed import Posed
 
-# Pushes of the body until its end no longer moves.
-_PUSHES = 6
+# Most pushes of the body until its end no longer moves; few steps take more than three.
+_PUSHES = 12
 
 
 class TurnedStep(Record):
@@ -42,8 +43,10 @@ class Turned(Posed):
         for _i in range(_PUSHES):
             gradient = self.body.discrete_gradient(start, end)
             rest = gradient - self.end.back(self.normal_out(gradient))
-            way = free + kappa * rest
+            way, before = free + kappa * rest, end
             end = self.body.push(start, way, kappa)
+            if largest(end - before) <= 4.0 * EPSILON * largest(end):
+                break
         return TurnedStep(end, way, rest)
 
     def push(self, r, p, kappa):
