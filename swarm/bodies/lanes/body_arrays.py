@@ -223,6 +223,8 @@ class HeldContacts(NamedTuple):
     stages: Counts  # (B, C) in how many stages of the step it pushes
     lost: Floats  # (B,) to friction in the step [J]
     multiplier: Floats  # (B, C) lambda of walls that are springs
+    guess: Floats  # (B, 3 C) the forces with which every trial of the step begins
+    guess_frame: Floats  # (B, C, 3, 3) and their directions
 
 
 def arrays_of_held(lanes, most):
@@ -230,5 +232,6 @@ def arrays_of_held(lanes, most):
     whole, real, some = np.int64, np.float64, (lanes, most)
     return (
         ((lanes, most, 2), whole), ((lanes, most, 3, 3), real), ((lanes, 3 * most), real), ((lanes, 3 * most), real),
-        (some, real), (some, real), (some, whole), (lanes, real), (some, real),
+        (some, real), (some, real), (some, whole), (lanes, real), (some, real), ((lanes, 3 * most), real),
+        ((lanes, most, 3, 3), real),
     )  # fmt: skip

@@ -35,6 +35,12 @@ class HardContacts(BodyContacts):
         # In a step they press as in the step before where they are the same.
         pace, active = self.pace, self.active
         if not (pace.fresh[i] or not pace.solved[i]):
+            # All trials of a step begin alike. Friction is solved to `_CREEP`, not to round-off: from the forces of the
+            # trial before, one that ended inside ends outside when it is made again, and no time would be the impact's.
+            for a in range(pace.active[i]):
+                for d in range(3):
+                    active.press[i, 3 * a + d] = active.guess[i, 3 * a + d]
+                    put_direction(active.frame[i], a, d, direction(active.guess_frame[i], a, d))
             return
         name, frame, before, found = active.name[i], active.frame[i], pace.active[i], 0
         fresh = scratch((MOST_CONTACTS, 2), np.int64)
@@ -57,6 +63,10 @@ class HardContacts(BodyContacts):
                 for d in range(3):
                     active.press[i, 3 * a + d] = 0.0
                     put_direction(frame, a, d, direction(turned, a, d))
+        for a in range(found):
+            for d in range(3):
+                active.guess[i, 3 * a + d] = active.press[i, 3 * a + d]
+                put_direction(active.guess_frame[i], a, d, direction(frame, a, d))
 
     @outlined
     def turn(self: Any, i, r1):
