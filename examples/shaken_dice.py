@@ -55,7 +55,8 @@ def path(until: float = 2.0, seed: int = 1) -> swarm.Path:
 def axes_of(bodies: swarm.Bodies) -> np.ndarray:
     """The turns (3, 3, n) of the dice from how they are made."""
     centre = bodies.position.mean(axis=1, keepdims=True)
-    return np.einsum("xpn,py->xyn", bodies.position - centre, np.linalg.pinv(bodies.body.points).T)
+    turned: np.ndarray = np.einsum("xpn,py->xyn", bodies.position - centre, np.linalg.pinv(bodies.body.points).T)
+    return turned
 
 
 def run(count: int = 60, until: float = 2.0, every: float = 0.02, compiling: str = "auto") -> Thrown:
