@@ -267,8 +267,8 @@ def _look(contacts, scene, c):
             pace.out[i] = pace.out[i] | (out & (not contacts.is_free(k, i)))
         if have_ends(contacts.walls):
             for i in range(count):
-                ahead = contacts.passed(k, column(c, 0, i), contacts.rule.room, i)
-                pace.out[i] = pace.out[i] | ((ahead.wall >= 0.0) & (not contacts.is_free(k, i)))
+                if pace.body[i] >= 0 and not pace.out[i] and not contacts.is_free(k, i):
+                    pace.out[i] = contacts.passed(k, column(c, 0, i), contacts.rule.room, i).wall >= 0.0
     # Cavities that points carry are checked one by one. Each has one surface, never a wall of thousands of bodies.
     for k in range(touching.points + touching.guides, touching.plain.size):
         wall = float(touching.walls + k - touching.points)

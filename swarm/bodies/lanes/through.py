@@ -71,12 +71,16 @@ def _first(field, then, number, found, start, end, limits):
 
 def _pass(found, m, members, number, start, end, limits):
     wall, (near, room, farther) = member(members, index(m)), limits
+    stop = end + farther * wall.unit_normal(end)
+    gap = wall.level_of(wall.inner(stop))
+    if wall.flat and not gap > room:
+        return found
     outside = wall.level_of(wall.inner(start))
     back = select((outside > 0.0) & (outside <= near), outside, 0.0)
     begin = start - back * wall.unit_normal(start)
-    stop = end + farther * wall.unit_normal(end)
     time, _hits = wall.first_hit(begin, stop - begin)
-    gap = abs(wall.level_of(wall.inner(stop)))
+    # A way may go through the whole of a round wall.
+    gap = abs(gap)
     sooner = (time <= 1.0) & (gap > room) & (time < found.time)
     return WayThrough(
         select(sooner, time, found.time), select(sooner, number + m, found.wall), select(sooner, gap, found.gap)
