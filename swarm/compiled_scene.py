@@ -113,6 +113,8 @@ class CompiledScene:
         self.scene, self.largest, self._apart = scene, largest, apart
         reach = scene.reach_of_steps() if apart is not None and largest is None else largest
         self.pieces = scene.pieces if reach is None else scene.pieces_of_balls(reach)
+        if largest is None and apart is not None:
+            self.pieces = self.pieces.as_walls()
         self.order = order_of(self.pieces.each, apart is None, self.pieces.rooms(), largest is not None)
         walls = len(self._spans)
         if walls > MOST_WALLS:

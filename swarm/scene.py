@@ -415,12 +415,14 @@ class Scene:
     def compiled(self, largest: float | None = None, apart: str | None = None) -> CompiledScene:
         """The scene as kernels take it, for points, or balls with radii up to the largest one [m].
 
-        `apart` names what does not support listed solids of one kind as a field; then each is a wall by itself.
+        `apart` names what does not support listed solids of one kind as a field; then each is a wall by itself, and so
+        is each field.
 
         Raises:
             SceneError: it has too many walls.
         """
-        in_steps = apart is not None and (self.reach_of_steps() is not None or bool(self._of_points.order.groups))
+        order = self._of_points.order
+        in_steps = apart is not None and (self.reach_of_steps() is not None or bool(order.groups or order.fields))
         if largest is None and not in_steps:
             return self._of_points
         return CompiledScene(self, largest, apart)

@@ -76,6 +76,10 @@ class Smooth(AtRest):
         """H = grad grad q/2, a `Symmetric`: of steps in contact that have no closed form."""
         raise NotImplementedError
 
+    def step_bend(self, r0, d):
+        """H for a step from r0 by d: that of its middle."""
+        return self.hessian(r0 + 0.5 * d)
+
     def hessian_bounds(self, r):
         """Bounds of the eigenvalues of side H: (the largest one at most, their magnitude, the distance within which).
 

@@ -22,18 +22,18 @@ def rise(surface, r0, p, kappa):
     r1 = r0 + d
     g = surface.discrete_gradient(r0, r1)
     # dr1/dkappa = -(I + kappa H)^-1 D, H of the midpoint: the derivative is as good as the step is short.
-    f = _unpushed(surface, r0 + 0.5 * d, kappa, g)
+    f = _unpushed(surface.step_bend(r0, d), kappa, g)
     return dot(g, d), -dot(f, surface.inner_gradient(r1))
 
 
 @outlined
 def _moved(surface, r0, p, kappa):
     """r1 - r0 = p - kappa D(r0, r1) with the H of the midpoint; NaN where it does not converge."""
-    d = _unpushed(surface, r0, kappa, p)
+    d = _unpushed(surface.hessian(r0), kappa, p)
     size, previous = largest(p), math.inf
     for _i in range(_ITERATIONS):
         g = surface.discrete_gradient(r0, r0 + d)
-        f = _unpushed(surface, r0 + 0.5 * d, kappa, d - p + kappa * g)
+        f = _unpushed(surface.step_bend(r0, d), kappa, d - p + kappa * g)
         d, change = d - f, largest(f)
         if _converged(change, previous, max(size, abs(kappa) * largest(g))):
             return d
@@ -47,7 +47,7 @@ def resolve(surface, r, strength):
     s, size, previous = r, largest(r), math.inf
     for _i in range(_ITERATIONS):
         g = surface.inner_gradient(s)
-        f = _unpushed(surface, s, 2.0 * strength, s - r + strength * g)
+        f = _unpushed(surface.hessian(s), 2.0 * strength, s - r + strength * g)
         s, change = s - f, largest(f)
         if _converged(change, previous, max(size, abs(strength) * largest(g))):
             return s
@@ -55,9 +55,8 @@ def resolve(surface, r, strength):
     return Vec(math.nan, math.nan, math.nan)
 
 
-def _unpushed(surface, r, strength, f):
-    """(I + strength H)^-1 f, H at a point, by the adjugate."""
-    h = surface.hessian(r)
+def _unpushed(h, strength, f):
+    """(I + strength H)^-1 f by the adjugate."""
     a, b, c = 1.0 + strength * h.xx, 1.0 + strength * h.yy, 1.0 + strength * h.zz
     d, e, g = strength * h.xy, strength * h.yz, strength * h.zx
     aa, ab, ac = b * c - e * e, g * e - d * c, d * e - g * b

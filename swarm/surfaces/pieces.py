@@ -41,6 +41,10 @@ class Pieces:
         """The pieces, each with the number of its surface."""
         return zip(self.owners, self.each, strict=True)
 
+    def as_walls(self) -> "Pieces":
+        """The same, where each field is one wall."""
+        return replace(self, each=tuple(piece.as_one_wall() for piece in self.each))
+
     def rooms(self) -> list[tuple[tuple[int, ...], ...]]:
         """Of each union of several rooms the numbers of the pieces of every room."""
         found, first = [], 0

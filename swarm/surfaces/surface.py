@@ -233,6 +233,8 @@ class Surface(Validated):
     is_convex = False
     # Whether it is many bodies, or sides, of one kind, which kernels take as one field.
     is_field = False
+    # Of a field, whether kernels take it as one wall, into which points go.
+    is_one_wall = False
     # Of walls that are faces between edges, what one of them is called.
     face_noun: ClassVar[str] = ""
     # Whether a solid of it has edges, and whether its wall may have a point without a normal.
@@ -282,6 +284,10 @@ class Surface(Validated):
     def solids(self) -> list["Surface"]:
         """Every body as a surface of its own."""
         return [self]
+
+    def as_one_wall(self) -> "Surface":
+        """The surface as soft walls take it: a field as one wall."""
+        return self
 
     def body_count(self) -> int:
         """The number of bodies of a field, else 0."""

@@ -325,8 +325,8 @@ BAD = {
         ["must be within the cell", "period[0] = 1.5", "from 0 to 2"],
     ),
     "a soft wall": (
-        lambda: swarm.simulate(scene_of(L), swarm.fill(scene_of(L), 1, speed=1.0), swarm.Penalty(1e-3, 1e4), until=1.0),
-        ["surfaces[0] must not be Polygon with Penalty"],
+        lambda: swarm.simulate(scene_of(L), swarm.fill(scene_of(L), 1, speed=1.0), swarm.Verlet(1e-3, 1e4), until=1.0),
+        ["surfaces[0] must not be Polygon with Verlet"],
     ),
 }
 

@@ -191,6 +191,14 @@ def _fields(asked: Asked) -> Found:
     yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().fields())
 
 
+def _sheets(asked: Asked) -> Found:
+    yield from ({"i": i, "got": one} for i, one in _walls(asked) if getattr(one, "open", False))
+
+
+def _members_of_fields(asked: Asked) -> Found:
+    yield from _fields(asked) if asked.options.member_impacts else ()
+
+
 def _faces(asked: Asked) -> Found:
     yield from ({"i": i, "got": one} for i, one in _walls(asked) if one.face_noun)
 
@@ -328,6 +336,7 @@ _NO_STEP = "leave contact_step out"
 _WITH_PENALTY = "particles that have a radius and Penalty"
 _LASTS = "its contacts last for a time, and have no instant at which a wall could send a particle off"
 _AT_AN_INSTANT = "Impact: balls that meet at an instant do not roll on one another"
+_ONE_LAW = "give the whole mesh one law, or use Impact"
 _NO_METHOD = Refusal(
     "bodies need the method Impact with a step, Penalty or AugmentedLagrangian, got {whole}",
     "use Impact(dt=...), with dt in seconds",
@@ -443,7 +452,7 @@ CAPABILITIES = (
     }, within="union"),
     Capability("field", _fields, {
         (SOFT_BODIES, PAPER_BODIES): _listed("bodies and soft walls", "use Impact(dt=...)"),
-        (*_FIXED_STEPS, OTHER_POINTS): _listed("{method}", _TO_EXACT),
+        (PAPER, BASELINE, OTHER_POINTS): _listed("{method}", _TO_EXACT),
         (CHORDS,): _listed("a contact_step", _NO_STEP),
     }),
     Capability("dt of Impact", _argument("dt", None), {
@@ -578,9 +587,9 @@ CAPABILITIES = (
             "surfaces[{i}].groups must be None with bodies, got laws of {got}", "give the whole mesh one law"
         ),
         (GRAINS,): Refusal(
-            f"surfaces[{{i}}].groups must be None with {_WITH_PENALTY}, got laws of {{got}}",
-            "give the whole mesh one law, or use Impact",
+            f"surfaces[{{i}}].groups must be None with {_WITH_PENALTY}, got laws of {{got}}", _ONE_LAW,
         ),
+        (SOFT,): Refusal("surfaces[{i}].groups must be None with {method}, got laws of {got}", _ONE_LAW),
     }, within="law of a wall"),
     Capability("wait beside walls that move", _waits_beside_motions, {
         (*_RIGID_POINTS, SOFT, PAPER, *_RIGID_BALLS): Refusal(
@@ -651,12 +660,24 @@ CAPABILITIES = (
         ),
     }, True),
     Capability("mesh or outline", _faces, {}, within="field"),
+    Capability("sheet", _sheets, {
+        (SOFT,): Refusal(
+            "surfaces[{i}] must not be an open mesh with {method}, got {got!r:.200}: a sheet has no inside, into which "
+            "a spring could let points", "use a closed mesh, give the particles a radius, or use Impact",
+        ),
+    }, within="mesh or outline"),
     Capability("cavity with losses", _lossy_cavities, {
         (SOFT_BODIES, PAPER_BODIES): Refusal(
             "cavities[{k}] must be elastic with {method}, got {got}", "use Impact(dt=...)"
         ),
     }),
     Capability("impacts on members", _option("member_impacts"), {}),
+    Capability("impacts on members of a field", _members_of_fields, {
+        (SOFT,): Refusal(
+            "member_impacts must be False with {method} at surfaces[{i}], got True: a soft wall is one spring, in "
+            "which several of its members may take part", "leave it out, or use Impact",
+        ),
+    }, within="impacts on members"),
     Capability("impacts on members beside cavities", _members_beside_cavities, {
         _EVERY_BODY: Refusal(
             "member_impacts must be False with bodies that have cavities, got True: a cavity is no surface of the "

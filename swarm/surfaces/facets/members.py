@@ -14,6 +14,7 @@ from ..time_of_impact import flights
 from .facet import ROOM, Shared
 from .facet_cells import here_in, may_pass, passes, way_in
 from .free_room import FULL, KIND, room_of
+from .nearest import foot_on
 
 # So many cells and blocks of cells are crossed before a flight is said to be free so far.
 _MOST = 4000
@@ -27,6 +28,9 @@ class Facets(Members, Patched):
 
     def field_hit(self, gravity, r, v):
         return _first_hit(self, gravity, r, v)
+
+    def foot(self, tree, r):
+        return foot_on(self, tree, r)
 
     def is_in_another(self, number, r):
         return _is_behind_another(self, number, r)

@@ -21,6 +21,7 @@ from ...kernel.vector import Vec
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region, of_triangles
 from ..fields.members import Members
+from ..fields.whole import Whole, one_wall
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
 from .facet import OVERLAP, ROOM, THIN, FacetNumbers, Shared, SheetSide
@@ -212,8 +213,11 @@ class Mesh(Surface):
     def _tree(self) -> tuple[Floats, Indices, Floats]:
         return self.corners, self.triangles, boxes_of(self.corners[self.triangles])
 
-    def walls(self) -> tuple[Facets]:
-        return (self.members,)
+    def walls(self) -> tuple[Any]:
+        return (Whole(self.members, self._tree) if self.is_one_wall else self.members,)
+
+    def as_one_wall(self) -> Surface:
+        return one_wall(self)
 
     def walls_of_balls(self, largest: float) -> tuple[Members]:
         made: dict[float, Members] = self.__dict__.setdefault("_of_balls", {})
@@ -238,6 +242,8 @@ class Mesh(Surface):
         return list(range(len(self)))
 
     def runs(self, walls: int = 0) -> list[tuple[Surface, int]]:
+        if self.is_one_wall:
+            return super().runs(walls)
         counts = np.bincount(self.group, minlength=len(self.names)) * (walls // len(self) or 1)
         given = self.groups or {}
         return [

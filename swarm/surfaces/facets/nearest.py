@@ -9,6 +9,7 @@ from ...kernel.grid import cell_of
 from ...kernel.jit import kernel, outlined
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, cross, dot, norm, put, square
+from ..fields.members import Foot
 from .free_room import FREE, FULL, KIND
 
 # Of a squared distance, the part by which those from two triangles that share a corner or an edge differ, and that of
@@ -35,6 +36,16 @@ class NearestTriangle(Record):
         return dot(self.normal, r - self.foot)
 
 
+@outlined
+def foot_on(facets, mesh, r):
+    """The `Foot` of a point: the signed distance along the normals of the facets, and its gradient."""
+    near = _nearest(facets, mesh, r)
+    normal, height = _row(facets.table, int(near.which)), near.height(r)
+    away = norm(r - near.foot)
+    sign = 1.0 if height > 0.0 else -1.0
+    return Foot(sign * away, (r - near.foot) * (sign / away) if away > 0.0 and height != 0.0 else normal)
+
+
 @kernel
 def nearest(facets, mesh, points, found):
     """The gradient and the signed distance of the points (3, N), in the rows of `found`.
@@ -42,13 +53,9 @@ def nearest(facets, mesh, points, found):
     `mesh` are the vertices (V, 3), the triangles (T, 3) and the `boxes_of` these.
     """
     for i in range(points.shape[1]):
-        r = column(points, 0, i)
-        near = _nearest(facets, mesh, r)
-        normal, height = _row(facets.table, int(near.which)), near.height(r)
-        away = norm(r - near.foot)
-        sign = 1.0 if height > 0.0 else -1.0
-        put(found, 0, i, (r - near.foot) * (sign / away) if away > 0.0 and height != 0.0 else normal)
-        found[3, i] = sign * away
+        foot = foot_on(facets, mesh, column(points, 0, i))
+        put(found, 0, i, foot.normal)
+        found[3, i] = foot.gap
 
 
 @kernel

@@ -96,7 +96,7 @@ def order_of(
     `unions` are those of surfaces, as of `Order`; the walls are those of points, or `of_balls`.
     """
     joined = {i for rooms in unions for room in rooms for i in room}
-    fields = [i for i, surface in enumerate(surfaces) if isinstance(surface, _FIELDS)]
+    fields = [i for i, surface in enumerate(surfaces) if isinstance(surface, _FIELDS) and not surface.is_one_wall]
     rest = [i for i in range(len(surfaces)) if i not in fields and i not in joined]
     of_kind: dict[Any, list[int]] = defaultdict(list)
     together = together and all(surface.motion is None and not surface.reacts() for surface in surfaces)

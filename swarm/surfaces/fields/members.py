@@ -40,6 +40,13 @@ class GrownLike(Record):
         return self.body.lacks_bend
 
 
+class Foot(Record):
+    """The gap of a point at a field as one wall, the signed distance outside, and its gradient."""
+
+    gap: float
+    normal: Vec
+
+
 class Members(Record):
     """The bodies of a field: solids, outside of all of which is admissible."""
 
@@ -157,6 +164,10 @@ class Members(Record):
     def deepest_in_cell(self, r):
         """The largest distance into any of them."""
         return _deepest(self, r)
+
+    def foot(self, tree, r):
+        """The `Foot` of a point on all of them as one wall; `tree` is that of a mesh."""
+        return _foot(self, r)
 
 
 class Few(Members):
@@ -314,23 +325,48 @@ def _first_hit(members, gravity, r, v):
 @kernel
 def nearest(members, points, found):
     """The gradient and phi, in the rows of `found`, of the body with the least phi near each of the points (3, N)."""
+    for i in range(points.shape[1]):
+        best, which = nearest_body(members, column(points, 0, i))
+        put(found, 0, i, member(members, index(which - 1)).gradient(column(points, 0, i)))
+        found[3, i] = best
+
+
+@outlined
+def nearest_body(members, r):
+    """The least phi of the bodies near a point, and the number of that body, from 1 on."""
     grid = members.grid
     cells = max(grid.shape.x, max(grid.shape.y, grid.shape.z))
-    for i in range(points.shape[1]):
-        r = column(points, 0, i)
-        place = cell_of(grid, r).place
-        center = Vec(*(layer_of(layer, count) for layer, count in zip(place, grid.shape, strict=True)))
-        best, which, last, shell = math.inf, 0, cells, 0.0
-        while shell <= last:
-            phi, m = _least_in_shell(members, r, center, shell)
-            # What is one shell farther may be nearer still.
-            if phi < math.inf and which == 0:
-                last = min(last, shell + 1.0)
-            if phi < best:
-                best, which = phi, m + 1
-            shell += 1.0
-        put(found, 0, i, member(members, index(which - 1)).gradient(r))
-        found[3, i] = best
+    place = cell_of(grid, r).place
+    center = Vec(*(layer_of(layer, count) for layer, count in zip(place, grid.shape, strict=True)))
+    best, which, last, shell = math.inf, 0, cells, 0.0
+    while shell <= last:
+        phi, m = _least_in_shell(members, r, center, shell)
+        # What is one shell farther may be nearer still.
+        if phi < math.inf and which == 0:
+            last = min(last, shell + 1.0)
+        if phi < best:
+            best, which = phi, m + 1
+        shell += 1.0
+    return best, which
+
+
+@outlined
+def _foot(members, r):
+    """Of a point in several bodies the root of the sum of the squares of its depths."""
+    best, which = nearest_body(members, r)
+    if not best < math.inf:
+        return Foot(-math.inf, Vec(1.0, 0.0, 0.0))
+    if best >= 0.0:
+        return Foot(-best, -1.0 * member(members, index(which - 1)).gradient(r))
+    first, stop = entries_at(members.grid, r)
+    squares, sums = 0.0, Vec(0.0, 0.0, 0.0)
+    for k in range(first, stop):
+        body = member(members, index(members.grid.entries[k]))
+        depth = -body.phi(r)
+        if depth > 0.0:
+            squares, sums = squares + depth * depth, sums - depth * body.gradient(r)
+    gap = math.sqrt(squares)
+    return Foot(gap, sums * (1.0 / gap))
 
 
 @outlined

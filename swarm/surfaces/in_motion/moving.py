@@ -11,6 +11,7 @@ from ...kernel.record import Record
 from ...kernel.vector import norm
 from ...motion import Guide
 from ..fields.members import Members
+from ..fields.whole import Whole
 from ..presence.doors import walls_then
 from ..surface import Surface
 from ..walls import Field, Following, Walls
@@ -130,7 +131,7 @@ def walls_of(surface: Surface, moment: float, largest: float | None = None) -> l
     if surface.motion is None:
         return [first, *others]
     drive = drive_of(surface, moment)
-    if isinstance(first, Members):
+    if isinstance(first, (Members, Whole)):
         first = first.loosened(drive.late + norm(drive.shift) + norm(drive.center))
     kind = Translated if _is_uniform(drive) else Moving if drive.turn is None else Turning
     return [kind(first, drive), *map(Following, others)]

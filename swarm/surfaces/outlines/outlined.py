@@ -305,9 +305,6 @@ class Outlined(Many):
         room = ON_OUTLINE * (self.extent() + self.boundary.extent)
         return np.ascontiguousarray(placed.min(axis=0) - room), np.ascontiguousarray(placed.max(axis=0) + room)
 
-    def walls(self) -> tuple[Members]:
-        return (self.members,)
-
     def _side(self, k: int) -> Any:
         """The numbers of wall k."""
         s, sign, n = self.boundary.sides, side_sign(self.side), len(self.boundary)

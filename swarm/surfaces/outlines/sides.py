@@ -6,7 +6,7 @@ from ...kernel.arrays import index
 from ...kernel.gravity import as_vector
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, dot, norm, square, times
-from ..fields.members import Members, member
+from ..fields.members import Foot, Members, member
 from ..frames import Unturned
 from ..presence.patched import Patched
 from ..rotation import Rotated
@@ -122,6 +122,18 @@ class Side(Unturned):
         within = self.is_within(d - signed * out, self.slack)
         return select(within, signed, outside), select(within, abs(signed), beyond), within
 
+    def out(self, r):
+        """The unit vector along which the first number of `beside` rises."""
+        signed, out = self.signed(r)
+        d = self.along_plane(r - self.body.center)
+        if self.is_within(d - signed * out, self.slack):
+            return out
+        away, other = d, d - self.end
+        away = away if norm(away) < norm(other) else other
+        size = norm(away)
+        sign = 1.0 if self.beside(r)[0] > 0.0 else -1.0
+        return away * (sign / size) if size > 0.0 else out
+
     def along_plane(self, d):
         """A vector without its part across the plane of the outline."""
         return dot(self.ahead, d) * self.ahead + dot(self.body.b, d) * self.body.b
@@ -152,6 +164,9 @@ class Sides(Members, Patched):
 
     def deepest_in_cell(self, r):
         return _nearest(self, r)[0]
+
+    def foot(self, tree, r):
+        return _foot(self, r)
 
     def is_there(self, number, r, near):
         """Whether a side reaches to a place on its wall, or nearer to it than that."""
@@ -273,3 +288,32 @@ def _is_beyond(sides, number, r):
     """Whether a point is outside of the outline, and nearest to another side."""
     outside, which = _nearest(sides, r)
     return outside > 0.0 and which != number
+
+
+@outlined
+def _foot(sides, r):
+    """Of a point beyond the outline and a lid the root of the sum of the squares of both distances."""
+    least, gap, which = math.inf, -math.inf, 0
+    lid, normal = -math.inf, Vec(0.0, 0.0, 0.0)
+    for m in range(sides.table.shape[0]):
+        side = member(sides, index(m))
+        signed, away, _within = _beside(side, r)
+        if _is_lid(side):
+            if signed > lid:
+                lid, normal = signed, _out_of(side, r)
+        elif away < least:
+            least, gap, which = away, signed, m
+    if lid > 0.0 and gap > 0.0:
+        both = math.sqrt(lid * lid + gap * gap)
+        return Foot(both, (lid / both) * normal + (gap / both) * _out_of(member(sides, index(which)), r))
+    return Foot(lid, normal) if lid > gap else Foot(gap, _out_of(member(sides, index(which)), r))
+
+
+def _is_lid(side):
+    body = side.body if isinstance(side, Rotated) else side
+    return square(body.end) == 0.0
+
+
+def _out_of(side, r):
+    """`out` of a side, which may be turned."""
+    return side.vector_out(side.body.out(side.place_in(r))) if isinstance(side, Rotated) else side.out(r)

@@ -1,0 +1,158 @@
+"""A field as one wall: the distance outside of all of it, of soft walls, into which points go.
+
+A point may be in several bodies, or beyond several sides, at once; each is then a spring, as if it were a wall by
+itself. For the exponent 1 what they store together is that of one spring of the root of the sum of the squares. So the
+gap of the whole is that, and it goes on smoothly where one of them is left. Points outside of a mesh are at its nearest
+place.
+"""
+
+import math
+from copy import copy
+from typing import Any
+
+from ...kernel.gravity import Gravity, accelerated, displacement
+from ...kernel.jit import outlined
+from ...kernel.limits import EPSILON
+from ...kernel.vector import Symmetric, Vec, absolute, dot, norm, square, total
+from .. import newton
+from ..contract import Smooth
+from ..time_of_impact.rising import LevelStep
+
+# So many parts of a flight are looked at before it is said to be free so far.
+_MOST_PARTS = 1000
+# Part of the coordinates over which the gradient is differenced: the cube root of the round-off.
+_SPACING = 6e-6
+# The cosine of the normals at both ends of a step, at an edge and where a wall is smooth.
+_EDGE, _SMOOTH = 0.5, 0.9
+
+
+class Whole(Smooth):
+    """All members of a field as one surface; phi is the gap, the signed distance outside."""
+
+    members: Any
+    tree: Any  # of a mesh, how the nearest triangle is found; else None
+
+    side = 1.0
+
+    def phi(self, r):
+        return _foot(self, r).gap
+
+    def gradient(self, r):
+        return _foot(self, r).normal
+
+    def distance(self, r):
+        # Of bodies phi need not be the distance.
+        foot = _foot(self, r)
+        return foot.gap / norm(foot.normal)
+
+    def hessian(self, r):
+        return _bend(self, r)
+
+    def step_bend(self, r0, d):
+        # Of the end that is deeper: between the two there may be an edge.
+        r1 = r0 + d
+        return self.hessian(r1 if self.phi(r1) > self.phi(r0) else r0)
+
+    def farthest_push(self):
+        # phi is about the distance: no pole within a push.
+        return math.inf
+
+    def first_hit(self, r, v):
+        return _first_hit(self.members, None, r, v)
+
+    def falling_hit(self, r, v, pull):
+        return _first_hit(self.members, Gravity(pull.x, pull.y, pull.z), r, v)
+
+    def safe_time(self, r, v, pull):
+        return _safe_time(self, r, v, pull)
+
+    def moving_step(self, seen, longest):
+        # No farther than the nearest place
+        speed, gap = seen.bounds(longest).speed, self.distance(seen.r)
+        return LevelStep(gap, 0.0, min(longest, max(-gap, 0.0) / speed) if speed > 0.0 else longest)
+
+    def loosened(self, reach):
+        """The same where places in its frame have round-off of so much more than its own size [m]."""
+        return self._replace(members=self.members.loosened(reach))
+
+    def clearance(self, r):
+        return max(-self.distance(r), 0.0)
+
+    def discrete_gradient(self, r0, r1):
+        return _discrete_gradient(self, r0, r1)
+
+    def push(self, r0, p, kappa):
+        # Without a push there is nothing to solve.
+        return newton.push(self, r0, p, kappa) if kappa != 0.0 else r0 + p
+
+    def rise(self, r0, p, kappa):
+        return newton.rise(self, r0, p, kappa) if kappa != 0.0 else _free_rise(self, r0, r0 + p)
+
+
+def one_wall(surface: Any) -> Any:
+    """The same field, of which kernels take all as one wall."""
+    made = copy(surface)
+    object.__setattr__(made, "is_one_wall", True)
+    return made
+
+
+@outlined
+def _foot(whole, r):
+    return whole.members.foot(whole.tree, r)
+
+
+@outlined
+def _discrete_gradient(whole, r0, r1):
+    """Gonzalez's, with the mean of the gradients at both ends by how deep they are, which corners do not make jump.
+
+    Where these turn by more than a wall does in a step, as at an edge towards the points, it is that of the start.
+    """
+    one, other = _foot(whole, r0), _foot(whole, r1)
+    a, b = max(one.gap, 0.0), max(other.gap, 0.0)
+    if a + b == 0.0:
+        a, b = (1.0, 0.0) if one.gap > other.gap else (0.0, 1.0)
+    if a > 0.0:
+        cosine = dot(one.normal, other.normal) / (norm(one.normal) * norm(other.normal))
+        b *= min(max((cosine - _EDGE) / (_SMOOTH - _EDGE), 0.0), 1.0)
+    g, d = (a / (a + b)) * one.normal + (b / (a + b)) * other.normal, r1 - r0
+    d2, rest = square(d), (other.gap - one.gap) - dot(g, d)
+    return g + (rest / d2) * d if d2 > 0.0 else g
+
+
+def _free_rise(whole, r0, r1):
+    """`rise` of a step that is not pushed."""
+    g = whole.discrete_gradient(r0, r1)
+    return dot(g, r1 - r0), -dot(g, whole.gradient(r1))
+
+
+@outlined
+def _bend(whole, r):
+    h = _SPACING * total(absolute(r)) + EPSILON
+    x, y, z = _turn(whole, r, Vec(h, 0.0, 0.0)), _turn(whole, r, Vec(0.0, h, 0.0)), _turn(whole, r, Vec(0.0, 0.0, h))
+    f = 0.25 / h
+    return Symmetric(f * x.x, f * y.y, f * z.z, f * x.y, f * y.z, f * x.z)
+
+
+def _turn(whole, r, step):
+    return whole.gradient(r + step) - whole.gradient(r - step)
+
+
+@outlined
+def _first_hit(members, gravity, r, v):
+    """When the flight meets the first of the members: (time, whether it does then), from cell to cell."""
+    t, place, pace = 0.0, r, v
+    for _part in range(_MOST_PARTS):
+        hit = members.field_hit(gravity, place, pace)
+        t += hit.time
+        if hit.wall >= 0.0 or not t < math.inf:
+            return t, True
+        place, pace = r + displacement(gravity, v, t), accelerated(gravity, v, t)
+    return t, False
+
+
+@outlined
+def _safe_time(whole, r, v, pull):
+    """When a fall may meet a member, or is in another cell; 0 where it is in contact."""
+    if whole.phi(r) > 0.0:
+        return 0.0
+    return whole.members.field_hit(Gravity(pull.x, pull.y, pull.z), r, v).time
