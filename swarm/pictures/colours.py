@@ -99,7 +99,8 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
         SceneError: energy errors are asked for where walls dissipate or give energy.
     """
     law = method.law()
-    at_start = observables.energies(scene.compiled(), law, start.mass, start.position, start.velocity)
+    compiled = scene.compiled(apart=method.apart())
+    at_start = observables.energies(compiled, law, start.mass, start.position, start.velocity)
     scale = observables.energy_scale(scene, at_start)
     if by == "speed":
         there = scale[~np.isnan(scale)]
@@ -120,7 +121,7 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
     before, inverse = at_start.total(), 1.0 / np.maximum(scale, np.finfo(np.float64).tiny)
 
     def errors(position: Floats, velocity: Floats) -> Floats:
-        now = observables.energies(scene.compiled(), law, start.mass, position, velocity).total()
+        now = observables.energies(compiled, law, start.mass, position, velocity).total()
         return np.asarray(np.log10(np.maximum(np.abs(now - before) * inverse, 10.0 ** _DECADES[0])))
 
     return Scale("log10 of the relative energy error", *_DECADES), errors
