@@ -24,6 +24,11 @@ class ContactTotals(NamedTuple):
     overlap: Array  # (1,) the largest overlap since the frame before [m]
     failed: Array  # (4,) what a step was refused for, see overlaps.py
     escape_time: Any = None  # (N,) [s], of a scene with openings
+    # Where walls send balls off:
+    heat: Any = None  # (walls, N) [J]
+    ended: Any = None  # (N,) int64, contacts with walls that have ended, as random numbers count them
+    absorbed_time: Any = None  # (N,) [s], and the number of the wall, where a law absorbs balls
+    absorbed_wall: Any = None
 
 
 class MemberCounts(NamedTuple):

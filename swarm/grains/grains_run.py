@@ -11,6 +11,8 @@ from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
+from ..contact.laws import NONE
+from ..contact.wall_impact import RandomSource
 from ..errors import RunError
 from ..lanes.watching.watchers import Followed
 from ..methods import Penalty
@@ -35,6 +37,7 @@ from .grain_arrays import BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X
 from .matter import matter_of
 from .overlaps import COLUMNS
 from .passing import Passing
+from .sent_off import Sender
 from .step import MarchRule, World, march
 
 # The first skin of the lists, of the radius of the smallest ball. In a skin a ball may move by half of it.
@@ -65,12 +68,18 @@ class GrainsRun(BaseRun):
         feed = None if particles.births is None else Feed(scene, particles, seeding.seed)
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
         loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
+        laws = compiled.laws or NONE
+        ends = laws.may_end
+        loses = loses or laws.may_dissipate or ends
         # What contacts store with a wall that goes is lost.
         openings = self._matter.openings
         loses = loses or scene.has_doors() or openings is not None
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
-            np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None, balls=balls,
+            np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None,
+            heat=np.zeros((walls, n)) if laws.give_heat else None, balls=balls,
+            absorbed_time=np.full(n, math.nan) if ends else None,
+            absorbed_wall=np.full(n, -1, np.int32) if ends else None,
             escape_time=None if openings is None else np.full(n, math.nan), openings=openings,
         )  # fmt: skip
         if particles.image is not None:
@@ -96,6 +105,10 @@ class GrainsRun(BaseRun):
             np.zeros(1),
             np.zeros(COLUMNS),
             state.escape_time,
+            state.heat,
+            np.zeros(n, np.int64) if laws.send_off else None,
+            state.absorbed_time,
+            state.absorbed_wall,
         )
         if feed is not None:
             self._feed, self.state = feed, state._replace(born_time=feed.born_time)
@@ -105,6 +118,12 @@ class GrainsRun(BaseRun):
             self._rows_of(there),
             *self._room(len(there), _PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
         )  # fmt: skip
+        if laws.send_off:
+            sender = Sender(
+                laws._replace(restitution=None, friction=None), RandomSource(seeding.signed(), seeding.first),
+                self._fields.places(),
+            )  # fmt: skip
+            self._world = self._world._replace(sender=sender)
         if counters is not None:
             passing = Passing(state.mass, state.crossed, state.period)
             self._world = self._world._replace(followed=Followed(passing, None))
@@ -178,7 +197,7 @@ class GrainsRun(BaseRun):
         """The same, with these impulses of friction of before."""
         matter, clock, kernel = self._matter, self._clock, self._tier.kernel
         self._wrap()
-        self._drop_escaped()
+        self._drop_gone()
         grains, near = self._world.grains, self._world.near
         if near.wall_is_open is not None:
             near.wall_is_open[:] = False
@@ -194,10 +213,10 @@ class GrainsRun(BaseRun):
         set_drags(self._world, kept)
         clock[SINCE] = 0.0
 
-    def _drop_escaped(self) -> None:
-        """Take what has escaped out of the world, and lose what its contacts store."""
-        world, time = self._world, self.state.escape_time
-        if time is None or not (gone := ~np.isnan(time[world.grains.number])).any():
+    def _drop_gone(self) -> None:
+        """Take what has escaped, or was absorbed, out of the world, and lose what its contacts store."""
+        world = self._world
+        if not (gone := self.state.gone()[world.grains.number]).any():
             return
         lost = self._stored_at(self._walls, self._left())[world.grains.number] * gone
         lost += stored_with_others(self._matter, world, gone)
@@ -344,15 +363,21 @@ class GrainsRun(BaseRun):
 
     def _watched_world(self) -> World:
         """The world with the counts of members, of which another is of a run that goes on."""
+        world = self._world
+        if world.sender is not None:
+            # Members are others where the skin has become wider than the images of a cell.
+            world = world._replace(sender=world.sender._replace(places=self._fields.places()))
         if self._tally is None:
-            return self._world
-        return self._world._replace(members=MemberCounts(self._tally.counts(), self._fields.places()))
+            return world
+        return world._replace(members=MemberCounts(self._tally.counts(), self._fields.places()))
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         # Of the step.
         moment -= (self._steps_in(span) - self._clock[DONE]) * self._matter.h
         if status == Status.UNSOLVED:
             return refused.unsolved(moment, self._matter.h)
+        if status == Status.SENT_WRONG:
+            return refused.sent_wrong(self._compiled, self._world, moment + self._matter.h)
         assert isinstance(self._method, Penalty)
         return refused.passed(self._compiled, self._method, self._matter, self._world, status, moment)
 
@@ -415,8 +440,8 @@ class GrainsRun(BaseRun):
         kept = {"clock": self._clock, "image": self._image}
         for name in ("grains", "near", "books"):
             kept |= named(name, getattr(self._world, name))
-        if self.state.escape_time is not None:
-            # Where those are that have escaped, and how fast.
+        if self.state.escape_time is not None or self.state.absorbed_time is not None:
+            # Where those are that are gone, and how fast.
             kept |= {"position": self.state.position, "velocity": self.state.velocity}
             kept |= {} if self.state.spin is None else {"spin": self.state.spin}
         kept |= {} if self.state.crossed is None else named("crossed", self.state.crossed)

@@ -36,6 +36,16 @@ def too_far(grains: Any, most: float, largest: float, dt: float) -> str:
     )
 
 
+def sent_wrong(compiled: CompiledScene, world: Any, moment: float) -> str:
+    """Of a ball to which a law of a wall gave a velocity that may not be, in the step that ends at a moment [s]."""
+    grains, failed = world.grains, world.books.failed
+    i, surface = int(failed[BALL]), compiled.numbering.surfaces_of_rows[int(failed[WALL])]
+    return (
+        f"the step at {moment:.9g} s failed at particle {grains.number[i]}: {Status.SENT_WRONG.sentence}, where it "
+        f"left surfaces[{surface}] ({type(compiled.scene.surfaces[surface]).__name__})"
+    )
+
+
 def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, status: int, moment: float) -> str:
     """Of a ball that passes the surface of another one, or of a wall, in the step at a moment [s]."""
     grains, failed = world.grains, world.books.failed

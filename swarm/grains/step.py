@@ -22,6 +22,7 @@ from .grain_arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_
 from .overlaps import look_at_pairs, look_at_wall
 from .passing import count_moves
 from .rolling import book_rolling, book_rolling_pairs, roll_pairs, roll_wall, turn_pairs, turn_wall
+from .sent_off import send_off
 from .vessel import SweptWall, moves, sweep_of
 
 # A sweep that changes no impulse by more than this part is the last one; also one that gains no more than half of the
@@ -54,6 +55,7 @@ class World(NamedTuple):
     books: Any
     followed: Any = None  # `Followed` of `Passing`, where there are counters
     members: Any = None  # `MemberCounts`, or None
+    sender: Any = None  # `Sender`, or None where no wall sends balls off
 
 
 # --- Of one step -----------------------------------------------------------------------------------------
@@ -268,6 +270,16 @@ def _let_out(matter, walls, world, time):
     return found
 
 
+def _send_off(matter, walls, world, time):
+    """Let the laws of walls act on balls with a contact that has ended in a step, at a time: the `Status`."""
+    status = Status.DONE.value
+    for k, wall in enumerate(walls.each):
+        if status != Status.SENT_WRONG:
+            one = send_off(matter, wall, world, (k, time))
+            status = status if one == Status.DONE else one
+    return status
+
+
 def _swept(matter, walls, listed, grains, skin):
     """The `SweptWall` of all fields that move, which were `listed` so."""
     found = SweptWall(0.0, 0.0)
@@ -328,13 +340,17 @@ def march(matter, walls, world, clock, rule):
         status = _step(matter, now, listed, world, clock[SKIN])
         if status != Status.DONE.value:
             return status
-        escaped = 0 if matter.openings is None else _let_out(matter, now, world, rule.moment - (left - matter.h))
+        time = rule.moment - (left - matter.h)
+        escaped = 0 if matter.openings is None else _let_out(matter, now, world, time)
         if matter.counters is not None:
             count_moves(matter, world.grains, world.followed)
         _arrive(matter, world.grains)
+        sent = Status.DONE.value if world.sender is None else _send_off(matter, now, world, time)
         clock[DONE] += 1.0
         clock[TAKEN] += 1.0
         clock[SINCE] += 1.0
-        if matter.openings is not None and escaped > 0:
+        if world.sender is not None and sent == Status.SENT_WRONG:
+            return sent
+        if (matter.openings is not None and escaped > 0) or (world.sender is not None and sent != Status.DONE):
             return Status.LEASE_ENDED.value
     return Status.DONE.value

@@ -54,11 +54,13 @@ class Penalty(fixed_step.SoftWalls):
     Particles with a radius press on one another and on walls by the same law, with the gap R_i + R_j - |r_i - r_j|:
     all impulses of a step are solved together, so that energy, momentum and angular momentum of the whole are conserved
     at any dt. There `restitution` (0.01 or more) and `friction` of `Pairs` and of surfaces count, walls may move in any
-    way, and what is lost is in "dissipated_energy". A damper that never pulls gives the restitution asked for at any
-    speed; friction sticks where it can, so that a pile comes to rest and stays so, and turns balls; their moment of
-    inertia is 2/5 m R^2, in a plane too. A contact should take 12 steps or more. Energy and momentum are those of the
-    impulses that were used; a step in which the limit of friction, or a damper, is met to fewer digits than others is
-    counted in "unconverged". Balls that roll or spin lose nothing by it: there is no friction of rolling.
+    way, and what is lost is in "dissipated_energy". `temperature` and `laws` of walls act on a ball where a contact
+    ends, on the velocity that its dampers and its friction leave, mirrored; the ball keeps its spin. A damper that
+    never pulls gives the restitution asked for at any speed; friction sticks where it can, so that a pile comes to rest
+    and stays so, and turns balls; their moment of inertia is 2/5 m R^2, in a plane too. A contact should take 12 steps
+    or more. Energy and momentum are those of the impulses that were used; a step in which the limit of friction, or a
+    damper, is met to fewer digits than others is counted in "unconverged". Balls that roll lose energy by `rolling`
+    alone.
     Two balls that meet at the relative speed v overlap by up to v sqrt(m/alpha), for a = 1, with their reduced mass m,
     and a ball and a wall with its own; "largest_overlap" is the largest since the frame before. It should be small
     against the radii, up to a fifth. An overlap of more than the radius of the smaller ball (its centre then has

@@ -129,7 +129,7 @@ def test_friction_at_faces_survives_new_lists():
 @pytest.mark.parametrize(
     ("surfaces", "wrong"),
     [
-        ([GROUPED], "groups must be None"),
+        ([GROUPED], "groups must have no restitution and no friction with .*, got those of a: "),
     ],
 )  # fmt: skip
 def test_what_fields_do_not_know(surfaces, wrong):

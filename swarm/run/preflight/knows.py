@@ -209,6 +209,16 @@ def _groups(asked: Asked) -> Found:
             yield {"i": i, "got": ", ".join(one.groups)}
 
 
+def _lossy_groups(asked: Asked) -> Found:
+    for i, one in enumerate(asked.scene.surfaces):
+        groups: dict[str, dict[str, Any]] = one.groups or {}
+        names = [
+            name for name, given in groups.items() if given.keys() & {"restitution", "friction", "rolling"}
+        ]  # fmt: skip
+        if names:
+            yield {"i": i, "got": f"those of {', '.join(names)}"}
+
+
 def _period(asked: Asked) -> Found:
     is_known = not isinstance(asked.particles, TiedParticles) and asked.method.knows_period()
     if asked.scene.period is not None and not is_known:
@@ -334,7 +344,6 @@ _TO_POINTS = "use particles without a radius"
 _TO_EXACT = "use Impact() with contact_step = 0"
 _NO_STEP = "leave contact_step out"
 _WITH_PENALTY = "particles that have a radius and Penalty"
-_LASTS = "its contacts last for a time, and have no instant at which a wall could send a particle off"
 _AT_AN_INSTANT = "Impact: balls that meet at an instant do not roll on one another"
 _ONE_LAW = "give the whole mesh one law, or use Impact"
 _NO_METHOD = Refusal(
@@ -569,36 +578,33 @@ CAPABILITIES = (
         _EVERY_BODY: _with_bodies("temperature", "None"),
         (BASELINE,): _with_method("temperature", "None"),
         (CHORDS,): _LOSES,
-        (GRAINS,): Refusal(
-            f"surfaces[{{i}}].temperature must be None with {_WITH_PENALTY}, got {{got}}: {_LASTS}", "use Impact"
-        ),
     }),
     Capability("law of a wall", _of_walls("laws", ()), {
         _EVERY_BODY: _with_bodies("laws", "left out"),
         (BASELINE,): _with_method("laws", "left out"),
         (CHORDS,): _LOSES,
-        (GRAINS,): Refusal(
-            f"surfaces[{{i}}].laws must be left out with {_WITH_PENALTY}, got {{got}}: {_LASTS}",
-            "use restitution and friction, or Impact",
-        ),
     }),
     Capability("laws of groups of a mesh", _groups, {
         _EVERY_BODY: Refusal(
             "surfaces[{i}].groups must be None with bodies, got laws of {got}", "give the whole mesh one law"
         ),
-        (GRAINS,): Refusal(
-            f"surfaces[{{i}}].groups must be None with {_WITH_PENALTY}, got laws of {{got}}", _ONE_LAW,
-        ),
         (SOFT,): Refusal("surfaces[{i}].groups must be None with {method}, got laws of {got}", _ONE_LAW),
     }, within="law of a wall"),
+    Capability("losses of groups of a mesh", _lossy_groups, {
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}].groups must have no restitution and no friction with {_WITH_PENALTY}, got {{got}}: they "
+            "act during contacts, of which the whole mesh has one law",
+            "give the whole mesh that restitution and friction, or use Impact",
+        ),
+    }, within="law of a wall"),
     Capability("wait beside walls that move", _waits_beside_motions, {
-        (*_RIGID_POINTS, SOFT, PAPER, *_RIGID_BALLS): Refusal(
+        (*_RIGID_POINTS, SOFT, PAPER, *_EVERY_BALL): Refusal(
             "surfaces[{i}].laws[{k}] must not let particles wait where a wall moves, got {got}: a particle that waits "
             "would have to move with its wall", "leave that law out, or the motions",
         ),
     }, within="law of a wall"),
     Capability("wait", _sticky, {
-        _RIGID_BALLS: Refusal(
+        _EVERY_BALL: Refusal(
             "surfaces[{i}].laws[{k}] must not let particles with a radius wait, got {got!r:.200}",
             "use a law without a wait, such as Lambert, or leave the radius out",
         ),

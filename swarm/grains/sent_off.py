@@ -1,0 +1,108 @@
+"""The laws of walls with soft balls: they act where a contact ends.
+
+The dampers and the friction of a contact have turned round the normal velocity of a ball by then. Temperatures and
+`laws` make of that what they make of a rigid impact at which the ball arrives with the mirrored velocity: without
+losses that is what `Impact` gives, whatever the penalty. They act on the centre, and the ball keeps its spin.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..common.status import Status
+from ..contact.reflection import given
+from ..contact.wall_impact import Arriving, RandomSource, book_energy, by_law
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
+from ..kernel.record import Record
+from ..kernel.vector import ZERO, Vec, dot, square
+from ..surfaces.in_motion.posed import Posed
+from .at_walls import rising
+from .grain_arrays import AFTER, BEFORE, COAST, GAP, LIGHTNESS, RADIUS, SIZE, START, X, set_vector, vector_at
+from .overlaps import BALL, WALL
+from .vessel import met, met_member, moves
+
+
+class Sender(NamedTuple):
+    """What laws of walls need besides the walls."""
+
+    laws: Any  # `Laws` without restitution and friction, which act during a contact
+    source: RandomSource
+    places: Any  # of each wall, of each member its wall in the laws, (members,) int64
+
+
+class _Facing(Record):
+    """A wall where a contact ends: its outward normal and its velocity, None where no wall moves."""
+
+    n: Vec
+    u: Any
+
+    def unit_normal(self, _wall, _r):
+        """The normal."""
+        return self.n
+
+    def velocity(self, _wall, _r):
+        """The velocity."""
+        return self.u
+
+
+@outlined
+def send_off(matter, wall, world, given_time):
+    """Let the laws of a wall act on the balls with a contact that has ended in the step, which is done: the `Status`.
+
+    LEASE_ENDED where it has absorbed any. `given_time` is the number of the wall, and the time [s].
+    """
+    grains, touches, (number, time) = world.grains, world.touches, given_time
+    rows, begin, half, status = touches.wall_rows, touches.wall_spans[0, number], 0.5 * matter.h, Status.DONE.value
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i, gap = index(touches.wall_ends[c]), rows[c, GAP]
+        if gap > 0.0:
+            own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
+            move = vector_at(rows, c, COAST) + half * vector_at(grains.speed, i, AFTER)
+            if gap + rising(own, vector_at(rows, c, START), rows[c, SIZE], move).change <= 0.0:
+                after = own._replace(pose=own.end) if isinstance(own, Posed) else own
+                one = _act(wall, after, world, (number, c, i), time)
+                status = one if status == Status.DONE or one == Status.SENT_WRONG else status
+    return status
+
+
+def _act(wall, own, world, at, time):
+    """Let the laws of a wall act on a ball."""
+    (number, c, i), grains, books, sender = at, world.grains, world.books, world.sender
+    r, radius, v = vector_at(grains.place, i, X), grains.place[i, RADIUS], vector_at(grains.speed, i, BEFORE)
+    # Some normals are of length 1 on the wall alone, and the contact has ended a little off it.
+    n, u = own.unit_normal(r), None
+    n = n * (1.0 / math.sqrt(square(n)))
+    if sender.laws.moving is not None:
+        u = own.velocity(r + radius * n) if isinstance(own, Posed) else ZERO
+    away = -dot(v if u is None else v - u, n)
+    if not away > 0.0:
+        # Another one has pushed it back, or a law.
+        return Status.DONE.value
+    one, touches = index(grains.number[i]), world.touches
+    member = sender.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
+    random = sender.source.of_impact(one, books.ended[one], sender.laws)
+    books.ended[one] += 1
+    before, mass = v + 2.0 * away * n, 1.0 / grains.place[i, LIGHTNESS]
+    arriving = Arriving(r, before, square(before), mass)
+    happens, bounce = by_law(sender.laws, _Facing(n, u), None, float(member), arriving, random)
+    if not happens:
+        return Status.DONE.value
+    if math.isnan(bounce.v.x):
+        books.failed[BALL], books.failed[WALL] = i, number
+        return Status.SENT_WRONG.value
+    set_vector(grains.speed, i, BEFORE, bounce.v)
+    row = index(number)
+    books.impulse[row, one] += mass * (bounce.impulse - 2.0 * away)
+    if moves(wall):
+        turned = given(u, v - before)
+        books.impulse[index(books.impulse.shape[0] // 2) + row, one] += 0.5 * mass * (bounce.work - turned)
+    heat = book_energy(books, (row, one, one), mass, bounce)
+    if world.members is not None:
+        world.members.counts.give(member, heat, bounce.wait)
+    if books.absorbed_time is not None and bounce.wait == math.inf:
+        books.absorbed_time[one], books.absorbed_wall[one] = time, np.int32(member)
+        return Status.LEASE_ENDED.value
+    return Status.DONE.value
