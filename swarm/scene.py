@@ -19,6 +19,7 @@ from .particles import Particles
 from .surfaces import plane as planes
 from .surfaces import required
 from .surfaces import rotation as rotations
+from .surfaces.balls.vault import vault_of
 from .surfaces.instant import box_of, distances_of, gaps_of, gradient_of, has_room, planes_of
 from .surfaces.periodic.images import Lengths, cell_of, into_cell, is_same_along, lengths_of
 from .surfaces.pieces import Images, Pieces, pieces_of
@@ -250,10 +251,18 @@ class Scene:
     def _pieces_by_radius(self) -> dict[float, Pieces]:
         return {}
 
+    @cached_property
+    def _pieces_of_vaults(self) -> Pieces:
+        """The pieces that balls meet: a union of several rooms is one of them."""
+        if not any(len(image.rooms) > 1 for images in self.pieces.images for image in images):
+            return self.pieces
+        images = (image for images in self.pieces.images for image in images)
+        return pieces_of([vault_of(one) if len(one.rooms) > 1 else one for one in images], None)
+
     def pieces_of_balls(self, largest: float) -> Pieces:
         """The pieces that balls in the cell meet, with radii up to the largest one [m]."""
         if self.period is None:
-            return self.pieces
+            return self._pieces_of_vaults
         known = self._pieces_by_radius
         # Those of larger balls are as right.
         largest = min((one for one in known if one >= largest), default=largest)

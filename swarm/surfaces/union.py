@@ -20,6 +20,7 @@ from .. import motion as motions
 from ..common.checks import Vector
 from ..errors import SceneError
 from .area_samples import NEAR, AreaSample, Random, Region, distances
+from .balls.vault import no_balls_in
 from .instant import side_of
 from .part import checked_parts, handed_down, other_side
 from .presence.seams import Seam, joined, seams_of
@@ -166,9 +167,12 @@ class Joined(Surface):
 
     def holds_balls(self) -> str | None:
         if len(self.rooms) > 1:
-            return f"of {len(self.rooms)} rooms, which have edges where they meet, at which balls would turn"
+            return no_balls_in(self)
         whys = ((surface, surface.holds_balls()) for surface in self.surfaces())
         return next((f"with a {type(surface).__name__}, {why}" for surface, why in whys if why is not None), None)
+
+    def largest_ball(self) -> float:
+        return math.inf if len(self.rooms) == 1 else min(surface.size() for surface in self.surfaces())
 
     def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
         there = [surface for surface in self.surfaces() if surface.is_there(time)]

@@ -187,6 +187,18 @@ def _unions_beside_own(asked: Asked) -> Found:
         yield from _unions(asked)
 
 
+def _foams(asked: Asked) -> Found:
+    yield from (one for one in _rooms(asked) if one["got"].is_foam())
+
+
+def _repeated_rooms(asked: Asked) -> Found:
+    yield from _rooms(asked) if asked.scene.period is not None else ()
+
+
+def _rooms_of_a_plane(asked: Asked) -> Found:
+    yield from _rooms(asked) if asked.scene.plane is not None else ()
+
+
 def _fields(asked: Asked) -> Found:
     yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().fields())
 
@@ -441,7 +453,7 @@ CAPABILITIES = (
     }),
     Capability("union", _rooms, {
         (SOFT_BODIES, PAPER_BODIES): _of_one_room("bodies and soft walls", "use Impact(dt=...)"),
-        (BALLS, GRAINS): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
+        (BALLS,): _of_one_room("particles that have a radius and Impact", f"use Penalty, or {_TO_POINTS}"),
         (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
         (CHORDS,): _of_one_room("a contact_step", _NO_STEP),
         (HEAVY,): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
@@ -458,6 +470,15 @@ CAPABILITIES = (
             "surfaces[{i}] must not be a {kind} of several rooms with a body that has guides or cavities, got "
             "{got!r:.200}", "use a body without them",
         ),
+    }, within="union"),
+    Capability("foam", _foams, {
+        (GRAINS,): _of_one_room(_WITH_PENALTY, f"use a Union of its cavities, or {_TO_POINTS}"),
+    }, within="union"),
+    Capability("union in a cell that repeats", _repeated_rooms, {
+        (GRAINS,): _of_one_room(f"{_WITH_PENALTY} and a period", "leave the period out, or use one room"),
+    }, within="union"),
+    Capability("union in a plane", _rooms_of_a_plane, {
+        (GRAINS,): _of_one_room(f"{_WITH_PENALTY} and a plane", "leave the plane out, or use one room"),
     }, within="union"),
     Capability("field", _fields, {
         (SOFT_BODIES, PAPER_BODIES): _listed("bodies and soft walls", "use Impact(dt=...)"),

@@ -1,0 +1,170 @@
+"""A union of several rooms as balls meet it: a surface of which each wall is of faces that join at edges."""
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernel.vector import Vec
+from ..room import room_bounds
+from ..shapes.box import Box
+from ..shapes.cone import Cone
+from ..shapes.cylinder import Cylinder
+from ..shapes.plane import Plane
+from ..shapes.slab import Slab
+from ..shapes.sphere import Sphere
+from ..surface import Box as Bounds
+from ..surface import Surface
+from .vaulted import Edge, Face, Vaulted, crossing, is_seen
+
+# Of the extent: what is round-off of a place, and what is farther than anything.
+_SLACK, _FAR = 1e-11, 1e6
+# Places from which edges are looked for.
+_PLACES = 24
+# What all parts of a union that balls meet have in common.
+_LAWS = "restitution", "friction", "temperature", "accommodation", "laws"
+_AT_REST = "motion", "present"
+_KINDS = Sphere, Plane, Slab, Box, Cylinder, Cone
+
+
+@dataclass(frozen=True, repr=False)
+class Vault(Surface):
+    """A union of several rooms, taken as one surface."""
+
+    rooms_of: Any = ()
+
+    nouns = ("vessel", "compound solid") * 2
+
+    def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
+        return _walls_of(self)
+
+    def walls(self) -> tuple[Any, ...]:
+        return _walls_of(self)
+
+    def size(self) -> float:
+        return float(min(one.size() for room in self.rooms_of for one in room))
+
+    def extent(self) -> float:
+        return float(max(one.extent() for room in self.rooms_of for one in room))
+
+    def bounds(self) -> Bounds:
+        boxes = [room_bounds(room) for room in self.rooms_of]
+        low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
+        return tuple(low.tolist()), tuple(high.tolist())
+
+    def reaching_outside(
+        self, points: NDArray[np.float64], radius: NDArray[np.float64], time: float = 0.0
+    ) -> NDArray[np.float64]:
+        gaps = [[one.reaching_outside(points, 0.0 * radius, time) for one in room] for room in self.rooms_of]
+        outside = np.min([np.max(some, axis=0) for some in gaps], axis=0)
+        found = np.array(outside)
+        for i in np.flatnonzero(outside <= 0.0):
+            at, size = Vec(*points[:, i].tolist()), float(radius[i])
+            found[i] = max(wall.grown(size).phi(at) for wall in self.walls())
+        return np.where(outside > 0.0, outside + radius, found)
+
+
+def vault_of(union: Any) -> Vault:
+    """A union of several rooms as balls meet it."""
+    one = union.surfaces()[0]
+    return Vault(rooms_of=union.rooms, **{name: getattr(one, name) for name in _LAWS})
+
+
+def no_balls_in(union: Any) -> str | None:
+    """None where balls may meet a union of several rooms, else half a sentence that says why they may not."""
+    begin = f"of {len(union.rooms)} rooms, of which "
+    for surface in union.surfaces():
+        name = type(surface).__name__
+        if surface.is_solid() or not isinstance(surface, _KINDS):
+            known = ", ".join(kind.__name__ for kind in _KINDS)
+            return f"{begin}one is made of a {name}, and edges of rooms are known to balls of the insides of {known}"
+        changes = [what for what in _AT_REST if getattr(surface, what) is not None]
+        changes += ["openings"] if surface.openings else []
+        if changes:
+            return f"{begin}a {name} has {changes[0]}, while edges of rooms that balls meet stay as they are"
+    for what in _LAWS:
+        if len({repr(getattr(surface, what)) for surface in union.surfaces()}) > 1:
+            return f"{begin}the parts differ in {what}, while an edge belongs to both"
+    if len(union.rooms) > 2 and _any_corner(vault_of(union)):
+        return f"{begin}three meet at a point, where balls would turn about a tip; they turn about edges of two"
+    return None
+
+
+# --- Its walls -------------------------------------------------------------------------------------------
+
+_KNOWN: dict[Any, tuple[Any, ...]] = {}
+
+
+def _walls_of(vault: Vault) -> tuple[Any, ...]:
+    key = repr(vault.rooms_of)
+    if key not in _KNOWN:
+        _KNOWN.clear()
+        _KNOWN[key] = tuple(_made(vault))
+    return _KNOWN[key]
+
+
+def _made(vault: Vault) -> list[Vaulted]:
+    rooms, extent = _rooms_of(vault), vault.extent()
+    slack, places = _SLACK * extent, _places_in(vault)
+    faces = [Face(wall, room, _without(rooms, k)) for k, room in enumerate(rooms) for wall in room]
+    first = np.cumsum([0, *map(len, rooms)]).tolist()
+    group, edges = list(range(len(faces))), []
+    for edge, (k, a), (m, b) in _edges_of(rooms):
+        if any(_is_on(edge, place, slack) and is_seen(edge, place, slack) for place in _crossings(edge, places)):
+            one, other = group[first[k] + a], group[first[m] + b]
+            group = [one if g == other else g for g in group]
+            edges.append((first[k] + a, edge))
+    return [
+        Vaulted(
+            tuple(face for face, g in zip(faces, group, strict=True) if g == mine),
+            tuple(edge for i, edge in edges if group[i] == mine), 0.0, slack, _FAR * extent,
+        )
+        for mine in dict.fromkeys(group)
+    ]  # fmt: skip
+
+
+def _rooms_of(vault: Vault) -> list[tuple[Any, ...]]:
+    """The walls of every room."""
+    return [tuple(wall.grown(0.0) for one in room for wall in one.walls_of_balls(0.0)) for room in vault.rooms_of]
+
+
+def _places_in(vault: Vault) -> list[Vec]:
+    low, high = (np.clip(end, -vault.extent(), vault.extent()) for end in vault.bounds())
+    return [Vec(*place) for place in np.random.default_rng(0).uniform(low, high, (_PLACES, 3)).tolist()]
+
+
+def _edges_of(rooms: list[Any]) -> Iterator[tuple[Edge, tuple[int, int], tuple[int, int]]]:
+    """What may be an edge between two rooms, and the numbers of both walls."""
+    for k, m in itertools.combinations(range(len(rooms)), 2):
+        for a, b in itertools.product(range(len(rooms[k])), range(len(rooms[m]))):
+            yield Edge(rooms[k][a], rooms[m][b], rooms[k] + rooms[m], _without(rooms, k, m)), (k, a), (m, b)
+
+
+def _without(rooms: list[Any], *some: int) -> tuple[Any, ...]:
+    return tuple(room for k, room in enumerate(rooms) if k not in some)
+
+
+def _crossings(edge: Edge, places: list[Vec]) -> Iterator[Vec]:
+    with np.errstate(all="ignore"):
+        for place in places:
+            yield crossing(edge.one, edge.other, place, math.inf)
+
+
+def _is_on(edge: Edge, x: Vec, slack: float) -> bool:
+    """Whether a place is on both walls."""
+    return bool(max(abs(edge.one.distance(x)), abs(edge.other.distance(x))) <= slack)
+
+
+def _any_corner(vault: Vault) -> bool:
+    """Whether an edge of two rooms goes into a third one."""
+    slack, places = _SLACK * vault.extent(), _places_in(vault)
+    for edge, _one, _other in _edges_of(_rooms_of(vault)):
+        alone = edge._replace(others=())
+        on_it = [x for x in _crossings(edge, places) if _is_on(edge, x, slack) and is_seen(alone, x, slack)]
+        if len({bool(is_seen(edge, x, slack)) for x in on_it}) > 1:
+            return True
+    return False

@@ -1,0 +1,128 @@
+"""Grains in a union of several rooms: a bin and its outlet, boxes joined by a neck, spheres that overlap."""
+
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.kernel.vector import Vec
+
+BIN = swarm.Union([swarm.Cylinder(0.02, length=0.2, center=(0.0, 0.0, 0.1)), swarm.Cylinder(0.01, length=0.2)])
+SPHERES = swarm.Union([swarm.Sphere(0.1, (-0.06, 0.0, 0.0)), swarm.Sphere(0.08, (0.06, 0.0, 0.0))])
+BOXES = swarm.Union([
+    swarm.Box((0.1, 0.1, 0.1), center=(-0.12, 0.0, 0.0)),
+    swarm.Box((0.1, 0.1, 0.1), center=(0.12, 0.0, 0.0)),
+    swarm.Box((0.1, 0.03, 0.03)),
+])  # fmt: skip
+ROOMS = {"bin": BIN, "spheres": SPHERES, "boxes": BOXES}
+
+
+def surface_of_spheres(count):
+    """Places all over the walls of both spheres (3, N), with no use of what is tested."""
+    found = []
+    for surface in SPHERES.parts:
+        points = np.random.default_rng(5).normal(size=(3, count))
+        found.append(surface.radius * points / np.sqrt((points**2).sum(axis=0)) + np.array(surface.center)[:, None])
+    points = np.concatenate(found, axis=1)
+    return points[:, SPHERES.phi(points) > -1e-12]
+
+
+def gap(union, place, radius):
+    """How far a ball reaches beyond the walls."""
+    scene = swarm.Scene([union])
+    return scene.distances_outside(np.array(place, float)[:, None], 0.0, np.array([radius]))[0, 0]
+
+
+def test_a_ball_at_an_outlet_is_as_far_as_the_floor_its_side_or_its_rim():
+    rng = np.random.default_rng(1)
+    for angle in rng.uniform(0.0, 2.0 * math.pi, 40):
+        across, z = 0.01 + rng.uniform(-0.0019, 0.0019), rng.uniform(-0.0019, 0.0019)
+        if across > 0.01:
+            z, exact = abs(z), abs(z)
+        else:
+            exact = 0.01 - across if z < 0.0 else math.hypot(0.01 - across, z)
+        place = across * math.cos(angle), across * math.sin(angle), z
+        assert gap(BIN, place, 2e-3) == pytest.approx(2e-3 - exact, abs=1e-15)
+
+
+def test_a_ball_in_two_spheres_is_as_far_as_the_nearest_place_of_a_dense_sample():
+    rng, sample = np.random.default_rng(2), surface_of_spheres(40_000)
+    places = rng.uniform(-0.1, 0.1, (3, 400))
+    places = places[:, SPHERES.phi(places) < 0.0]
+    nearest = np.array([np.sqrt(((sample.T - place) ** 2).sum(axis=1)).min() for place in places.T])
+    near = np.flatnonzero((nearest > 0.005) & (nearest < 0.03))
+    assert near.size > 20
+    for k in near:
+        # No place of the sample is nearer, and one is almost as near.
+        away = 0.03 - gap(SPHERES, places[:, k], 0.03)
+        assert away - 1e-12 < nearest[k] < away + 1e-3
+
+
+def test_the_normal_is_the_slope_of_the_gap_at_an_edge_too():
+    (wall,) = swarm.Scene([SPHERES]).compiled(0.03).walls().each
+    grown, h = wall.grown(0.03), 1e-6
+    # Both spheres meet in a ring across x.
+    x = (0.08**2 - 0.1**2) / -0.24
+    for place in (Vec(x, math.sqrt(0.1**2 - (x + 0.06) ** 2) - 0.01, 0.0), Vec(-0.06, 0.08, 0.01)):
+        slope = [
+            (grown.phi(place + h * step) - grown.phi(place - h * step)) / (2.0 * h)
+            for step in (Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0))
+        ]
+        assert np.array(grown.gradient(place)) == pytest.approx(slope, abs=1e-8)
+    ring = math.sqrt(0.1**2 - (x + 0.06) ** 2)
+    assert grown.phi(Vec(x, ring - 0.01, 0.0)) == pytest.approx(0.02, abs=1e-15)
+
+
+@pytest.mark.parametrize("name", ROOMS)
+def test_grains_keep_their_energy_at_walls_and_edges(name):
+    scene = swarm.Scene([ROOMS[name]], gravity=(0.0, 0.0, -9.81))
+    place, v = {
+        "bin": ((0.0095, 0.0, 0.004), (0.0, 0.1, 0.0)),
+        "spheres": ((0.0, 0.05, 0.0), (0.1, 0.6, 0.0)),
+        "boxes": ((-0.09, 0.009, -0.002), (0.9, 0.1, 0.0)),
+    }[name]
+    grain = swarm.Particles(place, v, mass=1e-4, radius=2e-3 if name == "bin" else 0.008)
+    method = swarm.Penalty(dt=2e-4, penalty=2e3)
+    result = swarm.simulate(scene, grain, method, until=0.15, every=0.05, progress=False)
+    energy = result.observables["total_energy"]
+    assert result.observables["impacts"][-1] > 0
+    assert energy == pytest.approx(energy[0], rel=1e-12)
+    assert ROOMS[name].phi(result.particles.position)[0] < 0.0
+
+
+def test_losses_at_the_rim_take_energy():
+    union = swarm.Union(BIN.parts, restitution=0.5, friction=0.3)
+    grain = swarm.Particles((0.0085, 0.0, 0.004), (0.0, 0.0, 0.0), mass=1e-4, radius=2e-3)
+    method = swarm.Penalty(dt=2e-4, penalty=2e3)
+    scene = swarm.Scene([union], gravity=(0.0, 0.0, -9.81))
+    result = swarm.simulate(scene, grain, method, until=0.1, every=0.1, progress=False)
+    assert result.observables["dissipated_energy"][-1] > 0.0
+    assert result.observables["energy_error"].max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("union", "words"),
+    [
+        (swarm.Union([BIN.parts[0], swarm.Torus(0.02, 0.005)]), "made of a Torus, and edges of rooms are known"),
+        (
+            swarm.Union([BIN.parts[0], swarm.Cylinder(0.01, length=0.2, restitution=0.5)]),
+            "the parts differ in restitution, while an edge belongs to both",
+        ),
+        (
+            swarm.Union([swarm.Sphere(0.05, (0.03 * math.cos(a), 0.03 * math.sin(a), 0.0)) for a in (0.0, 2.1, 4.2)]),
+            "three meet at a point",
+        ),
+    ],
+    ids=["torus", "laws", "corner"],
+)
+def test_what_no_grain_may_meet_is_refused_in_a_sentence(union, words):
+    grain = swarm.Particles((0.0, 0.0, 0.03), (0.0, 0.0, 0.0), mass=1e-4, radius=2e-3)
+    with pytest.raises(swarm.SceneError, match=words):
+        swarm.simulate(swarm.Scene([union]), grain, swarm.Penalty(1e-4, 2e3), until=0.1, every=0.1, progress=False)
+
+
+def test_a_grain_that_is_larger_than_a_room_is_refused():
+    grain = swarm.Particles((0.0, 0.0, 0.1), (0.0, 0.0, 0.0), mass=1e-4, radius=0.012)
+    with pytest.raises(swarm.SceneError, match=r"radius must be below 0\.01 m"):
+        swarm.simulate(swarm.Scene([BIN]), grain, swarm.Penalty(1e-4, 2e3), until=0.1, every=0.1, progress=False)
