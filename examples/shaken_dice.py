@@ -2,7 +2,7 @@
 
     python -m examples.shaken_dice
 
-The cup is a box whose path is a spline: it goes up, down and aside for a second and then rests. Its walls push, strike
+The path of the cup, a box, is a spline: it goes up, down and aside for a second and then rests. Its walls push, strike
 and rub the dice, and what they do is in `wall_work`: the energy of the dice is that at the start, what the cup has
 given, less what impacts and friction have taken, to round-off. The dice do not notice each other, so that each is a
 throw by itself. Needs the extra `plot`.

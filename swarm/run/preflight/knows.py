@@ -453,7 +453,7 @@ CAPABILITIES = (
     }),
     Capability("union", _rooms, {
         (SOFT_BODIES, PAPER_BODIES): _of_one_room("bodies and soft walls", "use Impact(dt=...)"),
-        (BALLS,): _of_one_room("particles that have a radius and Impact", f"use Penalty, or {_TO_POINTS}"),
+        (BALLS,): _of_one_room("particles that have a radius and Impact", f"{_TO_POINTS}, and Impact()"),
         (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
         (CHORDS,): _of_one_room("a contact_step", _NO_STEP),
         (HEAVY,): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),

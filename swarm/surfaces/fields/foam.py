@@ -10,7 +10,7 @@ from ...kernel.limits import ON_FOAM
 from ...kernel.vector import absolute, total
 from ..presence.patched import Patched
 from ..time_of_impact import flights
-from .members import Foot, Members, member, nearest_body
+from .members import Members, member
 
 # By so many times round-off is a flight inside of another cavity where it goes on.
 _INSIDE = 4.0
@@ -28,10 +28,6 @@ class Foam(Members, Patched):
     def deepest_in_cell(self, r):
         """The distance outside of the nearest one."""
         return _nearest(self, r)[1]
-
-    def foot(self, tree, r):
-        best, which = nearest_body(self, r)
-        return Foot(best, member(self, index(which - 1)).gradient(r))
 
     # What is near a point is the wall of the cavity that it is deepest in.
 

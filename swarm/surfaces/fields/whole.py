@@ -8,7 +8,7 @@ place.
 
 import math
 from copy import copy
-from typing import Any
+from typing import Any, TypeVar
 
 from ...kernel.gravity import Gravity, accelerated, displacement
 from ...kernel.jit import outlined
@@ -17,6 +17,8 @@ from ...kernel.vector import Symmetric, Vec, absolute, dot, norm, square, total
 from .. import newton
 from ..contract import Smooth
 from ..time_of_impact.rising import LevelStep
+
+_Field = TypeVar("_Field")
 
 # So many parts of a flight are looked at before it is said to be free so far.
 _MOST_PARTS = 1000
@@ -89,7 +91,7 @@ class Whole(Smooth):
         return newton.rise(self, r0, p, kappa) if kappa != 0.0 else _free_rise(self, r0, r0 + p)
 
 
-def one_wall(surface: Any) -> Any:
+def one_wall(surface: _Field) -> _Field:
     """The same field, of which kernels take all as one wall."""
     made = copy(surface)
     object.__setattr__(made, "is_one_wall", True)
