@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 # Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
 MOST_WALLS = 24
+# Of a scene in which impacts move a wall, what takes each wall by itself.
+REACTING = "walls that react"
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
 
@@ -92,6 +94,11 @@ class Numbering:
         return np.split(values, np.cumsum(np.maximum(counts, 1))[:-1], axis=-1)
 
 
+def is_in_steps(apart: str | None) -> bool:
+    """Whether what takes each wall by itself goes by steps, which may end outside of walls and of a cell."""
+    return apart is not None and apart != REACTING
+
+
 class CompiledScene:
     """A scene as kernels and engines take it, made from its description.
 
@@ -111,9 +118,10 @@ class CompiledScene:
 
     def __init__(self, scene: "Scene", largest: float | None = None, apart: str | None = None) -> None:
         self.scene, self.largest, self._apart = scene, largest, apart
-        reach = scene.reach_of_steps() if apart is not None and largest is None else largest
+        in_steps = largest is None and is_in_steps(apart)
+        reach = scene.reach_of_steps() if in_steps else largest
         self.pieces = scene.pieces if reach is None else scene.pieces_of_balls(reach)
-        if largest is None and apart is not None:
+        if in_steps:
             self.pieces = self.pieces.as_walls()
         self.order = order_of(self.pieces.each, apart is None, self.pieces.rooms(), largest is not None)
         walls = len(self._spans)
@@ -191,7 +199,7 @@ class CompiledScene:
         scene = self.scene
         rest = [surface for surface in scene.surfaces if not surface.reacts()]
         made = type(scene)(rest, scene.gravity, plane=scene.plane) if rest else None
-        return None if made is None else made.compiled(self.largest, "walls that react")
+        return None if made is None else made.compiled(self.largest, REACTING)
 
     def cell(self) -> Period | None:
         """The cell that repeats."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import motion as motions
 from .common import checks, notebook
-from .compiled_scene import CompiledScene
+from .compiled_scene import CompiledScene, is_in_steps
 from .errors import SceneError
 from .kernel.gravity import Gravity
 from .pairs import Pairs, checked_pairs
@@ -431,8 +431,8 @@ class Scene:
             SceneError: it has too many walls.
         """
         order = self._of_points.order
-        in_steps = apart is not None and (self.reach_of_steps() is not None or bool(order.groups or order.fields))
-        if largest is None and not in_steps:
+        in_steps = is_in_steps(apart) and (self.reach_of_steps() is not None or bool(order.fields))
+        if largest is None and not in_steps and not (apart is not None and order.groups):
             return self._of_points
         return CompiledScene(self, largest, apart)
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiled_scene import CompiledScene
+from ...compiled_scene import REACTING, CompiledScene
 from ...contact.laws import NONE, Laws
 from ...kernel.vector import Vec, vec
 from ...motion import Guide, Rotation, Translation, pose, unit_axis
@@ -73,7 +73,7 @@ def _laws_of(surface: Surface, scene: Scene) -> Laws | None:
     if not (surface.laws or surface.friction > 0.0 or surface.temperature is not None):
         # Each frame asks this.
         return None
-    laws = Scene([surface], plane=scene.plane).compiled(None, "walls that react").laws or NONE
+    laws = Scene([surface], plane=scene.plane).compiled(None, REACTING).laws or NONE
     return laws._replace(moving=None) if laws.send_off or laws.friction is not None else None
 
 
