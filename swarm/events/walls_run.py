@@ -188,8 +188,8 @@ class ReactingRun(BaseRun):
         yield events.settle, (self._scenery, self._freedoms, 0.0)
         yield observables.observe, self._observing()
 
-    def _summary(self) -> dict[str, Any]:
-        return super()._summary() | self._present.observed()
+    def _summed(self) -> dict[str, Any]:
+        return super()._summed() | self._present.observed()
 
     def _seen_state(self) -> State:
         return self._present.seen(self.state)

@@ -33,7 +33,7 @@ def matter_of(compiled: CompiledScene, method: Method, radius: NDArray[np.float6
         _losses(law.alpha, pairs),
         tuple(_losses(law.alpha, surface) for surface in surfaces),
         None if scene.period is None else Lengths(*scene.period),
-        _limits(float(radius.min()), longest_step(scene, dt)),
+        _limits(float(radius.min()), longest_step(scene, dt, balls=True)),
         compiled.openings(),
     )
 

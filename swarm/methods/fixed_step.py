@@ -126,11 +126,13 @@ def check_instants(scene: Scene, dt: float) -> None:
 
 def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
     """Raise a `SceneError` where the fastest particle can jump over a solid in one step, or a solid over it."""
-    longest, fastest = longest_step(scene, dt), particles.fastest()
-    check_reach("dt", dt, scene, fastest)
+    balls = particles.radius is not None
+    longest, fastest = longest_step(scene, dt, balls), particles.fastest()
+    if not balls:
+        check_reach("dt", dt, scene, fastest)
     if longest is not None and fastest * dt > longest:
-        thickness, i = _thinnest(scene, dt)
-        speed = fastest + _pace(scene.surfaces[i])
+        thickness, i = _thinnest(scene, dt, balls)
+        speed = fastest + _pace(scene.surfaces[i], balls)
         moved = "" if scene.surfaces[i].motion is None else ", as it moves"
         raise SceneError(
             f"dt must be so small that no particle jumps over a solid in one step, got dt = {dt:g} s, in which the "
@@ -150,13 +152,13 @@ def check_reach(name: str, step: float, scene: Scene, fastest: float) -> None:
         )
 
 
-def longest_step(scene: Scene, dt: float) -> float | None:
-    """The longest flight in a step that jumps over no solid [m]; None without solids."""
+def longest_step(scene: Scene, dt: float, balls: bool = False) -> float | None:
+    """The longest flight of points, or of balls, in a step that jumps over no solid [m]; None without solids."""
     if not any(surface.is_solid() for surface in scene.surfaces):
         return None
-    thickness, i = _thinnest(scene, dt)
-    reach = scene.reach_of_steps()
-    return min(thickness - _pace(scene.surfaces[i]) * dt, math.inf if reach is None else reach)
+    thickness, i = _thinnest(scene, dt, balls)
+    reach = None if balls else scene.reach_of_steps()
+    return min(thickness - _pace(scene.surfaces[i], balls) * dt, math.inf if reach is None else reach)
 
 
 def _half_widths(scene: Scene) -> tuple[float, ...] | None:
@@ -171,19 +173,20 @@ def _of_rows(scene: Scene) -> list[Surface]:
     return [scene.surfaces[i] for i in scene.compiled(apart="fixed steps").numbering.surfaces_of_rows]
 
 
-def _pace(surface: Surface) -> float:
-    """A bound of the speed with which a surface moves [m/s]."""
+def _pace(surface: Surface, balls: bool = False) -> float:
+    """A bound of the speed with which a surface moves [m/s]; of balls without what turns, which their lists follow."""
     if surface.motion is None:
         return 0.0
     drive = drive_of(surface, 0.0)
-    fastest: float = drive.fastest + drive.angular_speed() * (surface.extent() + math.hypot(*drive.center))
+    turns = 0.0 if balls else drive.angular_speed() * (surface.extent() + math.hypot(*drive.center))
+    fastest: float = drive.fastest + turns
     return fastest
 
 
-def _thinnest(scene: Scene, dt: float) -> tuple[float, int]:
+def _thinnest(scene: Scene, dt: float, balls: bool = False) -> tuple[float, int]:
     """The thickness [m] and the number of the solid that is jumped over first."""
     solids = [(i, surface) for i, surface in enumerate(scene.surfaces) if surface.is_solid()]
-    i, surface = min(solids, key=lambda one: (2.0 * one[1].size() - _pace(one[1]) * dt, one[0]))
+    i, surface = min(solids, key=lambda one: (2.0 * one[1].size() - _pace(one[1], balls) * dt, one[0]))
     return 2.0 * surface.size(), i
 
 

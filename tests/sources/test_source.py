@@ -203,9 +203,6 @@ def test_runs_that_support_no_sources():
     bodies = swarm.place(SPHERE, swarm.dumbbell(0.1, 1.0), 2, speed=1.0)
     with pytest.raises(swarm.SceneError, match="sources must be left out with bodies, got 1; use particles"):
         run(SPHERE, source, bodies, swarm.Impact(dt=1e-2))
-    heavy = swarm.Scene([swarm.Sphere(0.5), swarm.Sphere(0.1, side="outside", mass=1.0)])
-    with pytest.raises(swarm.SceneError, match="sources must be left out where a wall has a mass"):
-        run(heavy, source)
 
 
 def test_a_formula_has_a_volume_to_be_born_in():

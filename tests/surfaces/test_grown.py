@@ -375,7 +375,7 @@ def test_balls_that_are_too_large_for_a_shape(surfaces, plane, words):
     [
         (
             [swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.5, (0.6, 0.0, 0.0))])],
-            r"must not be a Union of several rooms with particles that have a radius and Impact, got Union.*use Pen",
+            r"must not be a Union of several rooms with particles that have a radius and Impact, got Union.*; use part",
         ),
         ([swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)))], "Quadric, which has a tip at"),
     ],

@@ -19,7 +19,7 @@ from ..shapes.slab import Slab
 from ..shapes.sphere import Sphere
 from ..surface import Box as Bounds
 from ..surface import Surface
-from .vaulted import Edge, Face, Vaulted, crossing, is_seen
+from .vaulted import RoomEdge, RoomFace, Vaulted, crossing, is_seen
 
 # Of the extent: what is round-off of a place, and what is farther than anything.
 _SLACK, _FAR = 1e-11, 1e6
@@ -110,7 +110,7 @@ def _walls_of(vault: Vault) -> tuple[Any, ...]:
 def _made(vault: Vault) -> list[Vaulted]:
     rooms, extent = _rooms_of(vault), vault.extent()
     slack, places = _SLACK * extent, _places_in(vault)
-    faces = [Face(wall, room, _without(rooms, k)) for k, room in enumerate(rooms) for wall in room]
+    faces = [RoomFace(wall, room, _without(rooms, k)) for k, room in enumerate(rooms) for wall in room]
     first = np.cumsum([0, *map(len, rooms)]).tolist()
     group, edges = list(range(len(faces))), []
     for edge, (k, a), (m, b) in _edges_of(rooms):
@@ -137,24 +137,24 @@ def _places_in(vault: Vault) -> list[Vec]:
     return [Vec(*place) for place in np.random.default_rng(0).uniform(low, high, (_PLACES, 3)).tolist()]
 
 
-def _edges_of(rooms: list[Any]) -> Iterator[tuple[Edge, tuple[int, int], tuple[int, int]]]:
+def _edges_of(rooms: list[Any]) -> Iterator[tuple[RoomEdge, tuple[int, int], tuple[int, int]]]:
     """What may be an edge between two rooms, and the numbers of both walls."""
     for k, m in itertools.combinations(range(len(rooms)), 2):
         for a, b in itertools.product(range(len(rooms[k])), range(len(rooms[m]))):
-            yield Edge(rooms[k][a], rooms[m][b], rooms[k] + rooms[m], _without(rooms, k, m)), (k, a), (m, b)
+            yield RoomEdge(rooms[k][a], rooms[m][b], rooms[k] + rooms[m], _without(rooms, k, m)), (k, a), (m, b)
 
 
 def _without(rooms: list[Any], *some: int) -> tuple[Any, ...]:
     return tuple(room for k, room in enumerate(rooms) if k not in some)
 
 
-def _crossings(edge: Edge, places: list[Vec]) -> Iterator[Vec]:
+def _crossings(edge: RoomEdge, places: list[Vec]) -> Iterator[Vec]:
     with np.errstate(all="ignore"):
         for place in places:
             yield crossing(edge.one, edge.other, place, math.inf)
 
 
-def _is_on(edge: Edge, x: Vec, slack: float) -> bool:
+def _is_on(edge: RoomEdge, x: Vec, slack: float) -> bool:
     """Whether a place is on both walls."""
     return bool(max(abs(edge.one.distance(x)), abs(edge.other.distance(x))) <= slack)
 

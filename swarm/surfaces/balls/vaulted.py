@@ -21,7 +21,7 @@ _FAR = 4.0
 _PARALLEL = 1e-18
 
 
-class Face(Record):
+class RoomFace(Record):
     """A wall of a room, the walls of that room, and the other rooms."""
 
     wall: Any
@@ -29,7 +29,7 @@ class Face(Record):
     others: Any
 
 
-class Edge(Record):
+class RoomEdge(Record):
     """Walls of two rooms that cross, the walls of both of these, and the other rooms."""
 
     one: Any

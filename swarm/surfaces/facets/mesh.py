@@ -21,7 +21,7 @@ from ...kernel.vector import Vec
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region, of_triangles
 from ..fields.members import Members
-from ..fields.whole import Whole, one_wall
+from ..fields.whole import OneWall, one_wall
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
 from .facet import OVERLAP, ROOM, THIN, FacetNumbers, Shared, SheetSide
@@ -214,7 +214,7 @@ class Mesh(Surface):
         return self.corners, self.triangles, boxes_of(self.corners[self.triangles])
 
     def walls(self) -> tuple[Any]:
-        return (Whole(self.members, self._tree) if self.is_one_wall else self.members,)
+        return (OneWall(self.members, self._tree) if self.is_one_wall else self.members,)
 
     def as_one_wall(self) -> Surface:
         return one_wall(self)

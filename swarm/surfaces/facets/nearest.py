@@ -9,7 +9,7 @@ from ...kernel.grid import cell_of
 from ...kernel.jit import kernel, outlined
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, cross, dot, norm, put, square
-from ..fields.members import Foot
+from ..fields.members import SignedDistance
 from .free_room import FREE, FULL, KIND
 
 # Of a squared distance, the part by which those from two triangles that share a corner or an edge differ, and that of
@@ -38,12 +38,12 @@ class NearestTriangle(Record):
 
 @outlined
 def foot_on(facets, mesh, r):
-    """The `Foot` of a point: the signed distance along the normals of the facets, and its gradient."""
+    """The `SignedDistance` of a point: the signed distance along the normals of the facets, and its gradient."""
     near = _nearest(facets, mesh, r)
     normal, height = _row(facets.table, int(near.which)), near.height(r)
     away = norm(r - near.foot)
     sign = 1.0 if height > 0.0 else -1.0
-    return Foot(sign * away, (r - near.foot) * (sign / away) if away > 0.0 and height != 0.0 else normal)
+    return SignedDistance(sign * away, (r - near.foot) * (sign / away) if away > 0.0 and height != 0.0 else normal)
 
 
 @kernel

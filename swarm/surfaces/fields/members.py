@@ -40,7 +40,7 @@ class GrownLike(Record):
         return self.body.lacks_bend
 
 
-class Foot(Record):
+class SignedDistance(Record):
     """The gap of a point at a field as one wall, the signed distance outside, and its gradient."""
 
     gap: float
@@ -166,7 +166,7 @@ class Members(Record):
         return _deepest(self, r)
 
     def foot(self, tree, r):
-        """The `Foot` of a point on all of them as one wall; `tree` is that of a mesh."""
+        """The `SignedDistance` of a point on all of them as one wall; `tree` is that of a mesh."""
         return _foot(self, r)
 
 
@@ -355,9 +355,9 @@ def _foot(members, r):
     """Of a point in several bodies the root of the sum of the squares of its depths."""
     best, which = nearest_body(members, r)
     if not best < math.inf:
-        return Foot(-math.inf, Vec(1.0, 0.0, 0.0))
+        return SignedDistance(-math.inf, Vec(1.0, 0.0, 0.0))
     if best >= 0.0:
-        return Foot(-best, -1.0 * member(members, index(which - 1)).gradient(r))
+        return SignedDistance(-best, -1.0 * member(members, index(which - 1)).gradient(r))
     first, stop = entries_at(members.grid, r)
     squares, sums = 0.0, Vec(0.0, 0.0, 0.0)
     for k in range(first, stop):
@@ -366,7 +366,7 @@ def _foot(members, r):
         if depth > 0.0:
             squares, sums = squares + depth * depth, sums - depth * body.gradient(r)
     gap = math.sqrt(squares)
-    return Foot(gap, sums * (1.0 / gap))
+    return SignedDistance(gap, sums * (1.0 / gap))
 
 
 @outlined

@@ -28,7 +28,7 @@ _SPACING = 6e-6
 _EDGE, _SMOOTH = 0.5, 0.9
 
 
-class Whole(Smooth):
+class OneWall(Smooth):
     """All members of a field as one surface; phi is the gap, the signed distance outside."""
 
     members: Any

@@ -11,7 +11,7 @@ from ...kernel.record import Record
 from ...kernel.vector import norm
 from ...motion import Guide
 from ..fields.members import Members
-from ..fields.whole import Whole
+from ..fields.whole import OneWall
 from ..presence.doors import walls_then
 from ..surface import Surface
 from ..walls import Field, Following, Walls
@@ -48,7 +48,7 @@ class Moving(Record):
         return flight.seen(t, self.during(remaining, remaining), flight.pull)
 
 
-class Turning(Moving):
+class TurningWall(Moving):
     """A wall that turns, with or without another motion."""
 
     posed = Turned
@@ -114,7 +114,7 @@ def carried(
         return Walls(all_walls)
     if fields:
         return Marched(all_walls)
-    marched = [walls for walls in of_surfaces if type(walls[0]) in (Moving, Turning)]
+    marched = [walls for walls in of_surfaces if type(walls[0]) in (Moving, TurningWall)]
     if not marched:
         return Carried(all_walls)
     return (Strided if all(map(_may_stride, marched)) else Marched)(all_walls)
@@ -131,9 +131,9 @@ def walls_of(surface: Surface, moment: float, largest: float | None = None) -> l
     if surface.motion is None:
         return [first, *others]
     drive = drive_of(surface, moment)
-    if isinstance(first, (Members, Whole)):
+    if isinstance(first, (Members, OneWall)):
         first = first.loosened(drive.late + norm(drive.shift) + norm(drive.center))
-    kind = Translated if _is_uniform(drive) else Moving if drive.turn is None else Turning
+    kind = Translated if _is_uniform(drive) else Moving if drive.turn is None else TurningWall
     return [kind(first, drive), *map(Following, others)]
 
 

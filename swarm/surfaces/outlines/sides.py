@@ -6,7 +6,7 @@ from ...kernel.arrays import index
 from ...kernel.gravity import as_vector
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, dot, norm, square, times
-from ..fields.members import Foot, Members, member
+from ..fields.members import Members, SignedDistance, member
 from ..frames import Unturned
 from ..presence.patched import Patched
 from ..rotation import Rotated
@@ -305,8 +305,8 @@ def _foot(sides, r):
             least, gap, which = away, signed, m
     if lid > 0.0 and gap > 0.0:
         both = math.sqrt(lid * lid + gap * gap)
-        return Foot(both, (lid / both) * normal + (gap / both) * _out_of(member(sides, index(which)), r))
-    return Foot(lid, normal) if lid > gap else Foot(gap, _out_of(member(sides, index(which)), r))
+        return SignedDistance(both, (lid / both) * normal + (gap / both) * _out_of(member(sides, index(which)), r))
+    return SignedDistance(lid, normal) if lid > gap else SignedDistance(gap, _out_of(member(sides, index(which)), r))
 
 
 def _is_lid(side):
