@@ -15,6 +15,7 @@ from ..ball_numbers import balls_volume
 from ..common.checks import PARTICLE, in_bytes
 from ..errors import SceneError
 from ..files import marks
+from ..files.background import CHUNK_FRAMES, waiting_bytes
 from ..files.writer import size_of
 from ..fleet.plan import in_one_line
 from ..fleet.plan import read as plan_of
@@ -155,7 +156,9 @@ def _sizes(task: Task, target: Path, there: str) -> dict[str, str]:
     if options.recording is not None:
         there = _there(options.recording, "recording")
         files.append((f"recording {options.recording}", f"at most {options.record_megabytes:g} MB", there))
-    memory = PARTICLE * n + options.times.in_memory(surfaces)
+    # HDF5 holds a chunk of frames until it is full.
+    held = min(options.times.count, 1 if storage.compression != "none" else CHUNK_FRAMES) * storage.bytes_of(n)
+    memory = PARTICLE * n + options.times.in_memory(surfaces) + held + waiting_bytes(n)
     return {
         "files": "\n".join(f"{name}, {size}{there}" for name, size, there in files),
         "memory": f"about {in_bytes(memory)}, besides the {in_bytes(_PROGRAM)} of Python, Numba and HDF5",

@@ -17,17 +17,31 @@ from .writer import WriteFrames, Written
 
 # Frames are written in batches, up to the end of a chunk of the file (`_CHUNK` in writer.py): with 10 000 particles a
 # single frame takes 2.5 ms, one of a batch of ten 0.9 ms. No frame waits longer than this for others [s].
-_CHUNK_FRAMES = 10
+CHUNK_FRAMES = 10
 _PATIENCE = 0.05
 # Most frames in the queue: half of them are written while the others are computed. More would only hide a slow disk in
 # memory. With very many particles there is one, which is written while the next is computed.
-_COPIES = 20 * _CHUNK_FRAMES
+_COPIES = 20 * CHUNK_FRAMES
 _BYTES = 1 << 26
 # Bytes of a particle that are copied of a state.
 _PARTICLE = 88
 
 Job = Callable[[], None]
 WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
+
+
+def _copies_of(n: int) -> int:
+    """The most frames of n particles that wait to be written."""
+    return max(1, min(_COPIES, _BYTES // (_PARTICLE * max(1, n))))
+
+
+def waiting_bytes(n: int) -> int:
+    """The most bytes of frames of n particles that wait to be written.
+
+    >>> waiting_bytes(1_000_000)
+    88000000
+    """
+    return _copies_of(n) * _PARTICLE * n
 
 
 class Writer(Protocol):
@@ -94,11 +108,11 @@ class Background:
         self._frames: queue.SimpleQueue[Written | threading.Event | Job | None] = queue.SimpleQueue()
         # Bounds the other queue: a frame needs one of these copies.
         self._copies: queue.SimpleQueue[State | None] = queue.SimpleQueue()
-        copies = max(1, min(_COPIES, _BYTES // (_PARTICLE * n)))
+        copies = _copies_of(n)
         for _ in range(copies):
             self._copies.put(None)
         half = max(1, copies // 2)
-        self._at_once = half if half < _CHUNK_FRAMES else half - half % _CHUNK_FRAMES
+        self._at_once = half if half < CHUNK_FRAMES else half - half % CHUNK_FRAMES
         self._problem: BaseException | None = None
         self.seconds = 0.0  # to write a frame of the latest batch
         self.written = self._queued = 0  # frames
