@@ -54,7 +54,8 @@ def pattern(sentence):
 # What a surface, particles or a scene refuse by themselves, before there is a run.
 BY_ITSELF = (
     "spin must be None without a radius, .*", r"(mass|inertia|motion|rotation) must be None for \w+, .*",
-    r"mass must be None where an inertia is given to a \w+, .*", r"mass must be None for \w+ of several rooms, .*",
+    r"mass must be None where an inertia is given to a \w+, .*",
+    r"(mass|inertia) must be None for \w+ of several rooms, .*",
     "motion must be None, a Translation or a Guide where a mass is given, .*", "openings must be of a wall at rest, .*",
     "(motion|mass|inertia) must be left out for Spheres with side=.*", 'side must be "(inside|outside)" for .*',
     r"surfaces\[0\].mass and inertia must be None where the scene has a period, .*",
