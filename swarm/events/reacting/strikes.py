@@ -80,11 +80,6 @@ class Reacting(Record):
     absorbs: Any = None  # 1 where a law may absorb particles
     openings: Any = None  # None, or each `Opened`, which move with the wall
 
-    @property
-    def sends_off(self):
-        """Whether it sends particles off by a law: a constant for the compiler."""
-        return self.laws is not None and self.laws.send_off
-
     def count(self):
         """How many walls it is."""
         return self.body.count() if isinstance(self.body, Members) else 1.0
