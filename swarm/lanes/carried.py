@@ -40,7 +40,7 @@ class Corner(Record):
 
 
 _NONE = Corner(False, ZERO, ZERO, ZERO, 0.0)
-_NOBODY = Three(-1.0, -1.0, -1.0)
+_NO_WALLS = Three(-1.0, -1.0, -1.0)
 
 
 # --- One corner ------------------------------------------------------------------------------------------
@@ -106,7 +106,7 @@ def _find(laws, walls, gravity, r, near, least):
                 corner = _corner(laws, walls, gravity, active, r, least)
                 if corner.holds:
                     return active
-    return _NOBODY
+    return _NO_WALLS
 
 
 @outlined

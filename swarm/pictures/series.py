@@ -30,7 +30,7 @@ class Graph:
         unit: of its values; "" of numbers and relative errors.
         title: of the graph.
         label: of its axis, below a title that says the rest; None: the quantity.
-        is_error: the values are log10 of errors, `NOTHING` of none.
+        is_error: the values are log10 of errors, `NOTHING` where the error is 0.
         is_rare: pictures leave it out where all values are 0.
         is_rate: the values are growths in a second, one for the time from frame to frame.
     """

@@ -21,7 +21,7 @@ from ...kernel.vector import Vec
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region, of_triangles
 from ..fields.members import Members
-from ..fields.whole import OneWall, one_wall
+from ..fields.one_wall import OneWall, one_wall
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
 from .facet import OVERLAP, ROOM, THIN, FacetNumbers, Shared, SheetSide

@@ -20,7 +20,7 @@ from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
 from .grid import grid_of
 from .members import Few, GrownLike, Members, alike, nearest, table_of, touched, within
-from .whole import OneWall, one_wall
+from .one_wall import OneWall, one_wall
 
 # So many bodies are looked at one after the other by all lanes together, where flights are straight: in a sphere an
 # impact among 10, 24 and 40 balls takes 18, 37 and 57 ns, from cell to cell 55, 73 and 91. Of other bodies, which take

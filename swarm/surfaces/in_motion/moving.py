@@ -11,7 +11,7 @@ from ...kernel.record import Record
 from ...kernel.vector import norm
 from ...motion import Guide
 from ..fields.members import Members
-from ..fields.whole import OneWall
+from ..fields.one_wall import OneWall
 from ..presence.doors import walls_then
 from ..surface import Surface
 from ..walls import Field, Following, Walls

@@ -132,7 +132,7 @@ def at_the_end(walls, gravity, v, remaining, hit):
 
 
 def inside_of(walls, number, r):
-    """A place on a wall with this number, or of none, a little inside of it if it is one of a room."""
+    """A place, a little inside of the wall with this number if that is one of a room; else as it is."""
     is_of_room = number >= walls.joined()[0][0][0][0]
     return r - select(is_of_room, walls.inset, 0.0) * walls.unit_normal(number, r)
 

@@ -19,7 +19,7 @@ from ..time_of_impact.approach import place
 from ..time_of_impact.course import under_way
 from ..time_of_impact.rising import LevelStep
 
-# A step that is no hit has a length, even if it is of none.
+# A step that is no hit has a length, even if its time is 0.
 _TINY = float(np.finfo(np.float64).tiny)
 # Round-off of a part's level, in units of the last place of its largest terms.
 _ULPS = 32.0

@@ -35,7 +35,7 @@ class ShortestStep(Record):
     depth: float
 
 
-_NOBODY = ShortestStep(math.inf, -1.0, math.inf, 0.0, -1.0, 0.0)
+_NO_STEP = ShortestStep(math.inf, -1.0, math.inf, 0.0, -1.0, 0.0)
 
 
 # --- Of all walls ----------------------------------------------------------------------------------------
@@ -55,7 +55,7 @@ def seen_by_walls(walls, flight, t):
 
 def _nearest(walls, flight, t, longest):
     """The `ShortestStep` of all walls that are met by safe steps."""
-    found = _NOBODY
+    found = _NO_STEP
     for wall, number, seen in seen_by_walls(walls, flight, t):
         found = _nearer(seen, wall.body, number, found, longest)
     for number, field in reversed(walls.fields()):
