@@ -170,6 +170,10 @@ class Scene:
 
     def finite_size(self) -> float:
         """`size`, or the extent of the surfaces where the volume is open, or too thin to be a length of the motion."""
+        return self._finite_size
+
+    @cached_property
+    def _finite_size(self) -> float:
         size, extent = self.size(), self.extent()
         return size if _THIN * extent < size < math.inf else extent
 
@@ -291,6 +295,10 @@ class Scene:
 
     def is_open(self) -> bool:
         """Whether a particle may fly to infinity, at the start or after a wall disappears."""
+        return self._is_open
+
+    @cached_property
+    def _is_open(self) -> bool:
         at_start = np.isfinite(self.bounds()).all()
         return not (at_start and (not self.has_doors() or np.isfinite(self._bounds_of_lasting(self.surfaces)).all()))
 

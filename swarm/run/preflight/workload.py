@@ -40,9 +40,13 @@ def require_few_impacts(
     # Where energy is lost or given, by heat or by work, the first flights say nothing of the later ones.
     if impact is None or compiled.laws is not None:
         return
+    # A flight of this time [s], and longer ones, give few impacts.
+    enough = max(every / _MOST_A_FRAME, len(particles) * until / _MANY)
     with np.errstate(all="ignore"):
+        if _are_long(compiled, particles, impact, enough):
+            return
         found = _of_particles(compiled, particles, impact)
-        if not _is_much(found, particles, until, every):
+        if found.between >= enough:
             return
         # They may start in a narrow corner and leave it: then the volume around decides.
         found = max(found, _of_volume(compiled, particles, impact))
@@ -68,8 +72,15 @@ def time_between(compiled: CompiledScene, particles: Particles) -> float:
         return _of_particles(compiled, particles, 0.0).between
 
 
-def _is_much(found: Flights, particles: Particles, until: float, every: float) -> bool:
-    return every > _MOST_A_FRAME * found.between or len(particles) * until > _MANY * found.between
+def _are_long(compiled: CompiledScene, particles: Particles, impact: float, enough: float) -> bool:
+    """Whether half of the particles, and so their median, need at least `enough` seconds to the first hit alone."""
+    walls, pull, chosen, long = compiled.walls(), compiled.scene.pull(), _chosen(particles), 0
+    for i in chosen:
+        until, _wall = _hit(walls, pull, particles.position[:, i], particles.velocity[:, i])
+        long += until > 0.0 and impact + until >= enough
+        if 2 * long >= len(chosen):
+            return True
+    return False
 
 
 def _of_particles(compiled: CompiledScene, particles: Particles, impact: float) -> Flights:
