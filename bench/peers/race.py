@@ -1,5 +1,7 @@
 """The same points in the same sphere by every program: steps a second, and the time to a given accuracy.
 
+What others do best is compared in ground.py.
+
 The error is the median distance from where the points of a rigid cavity are at the end. A soft wall is met late, a
 stiff one changes the energy in explicit steps: for each step dt, stiffnesses dt sqrt(alpha / m) of 0.3, 0.1 and 0.03
 are tried, of ten to a hundred steps a contact, and dt is halved until one of them comes near enough.
@@ -16,7 +18,7 @@ from swarm.methods.base import Method
 
 from .. import yardstick
 from ..report import Row, machine, show, write
-from . import Floats, Job
+from . import Floats, Job, ground
 
 PEERS = ("lammps", "openmm", "warp")
 RADIUS, SPEED, UNTIL = 0.5, 0.5, 10.0
@@ -115,6 +117,8 @@ def main(quick: bool) -> None:
         rows.append(Row("  its error", error, error, "m"))
         told, seconds, reached = solution(solver, start, exact, each, 0.1 if quick else _PATIENCE)
         rows.append(Row(told, seconds, seconds, "s", "", seconds / rows[0].best if reached else None))
+    beside, without = ground.rows(quick)
+    rows, missing = rows + beside, missing + without
     show(rows)
     for sentence in missing:
         print(sentence)
