@@ -87,6 +87,7 @@ def _bytes(mesh: Any) -> float:
 
 def nanoseconds(scene: swarm.Scene, start: swarm.Particles, until: float) -> Any:
     """What measures the processor time of an impact, on one thread [ns]."""
+
     def measure() -> float:
         seconds, impacts = [], 0.0
         for span in (1e-3 * until, until):

@@ -58,48 +58,37 @@ def rows(quick: bool) -> tuple[list[Row], list[str]]:
 
 def grains(peer: ModuleType, version: str, quick: bool) -> list[Row]:
     """Grains with linear springs and the same step, as they fall and at rest."""
-    found = []
+    stiffness, found = 0.5 * MASS * (math.pi / (_STEPS * _DT)) ** 2, []
+    method, laws = swarm.Penalty(_DT, stiffness, 1.0), {"stiffness": stiffness, **_LAWS}
+    span, rounds = (20, 1) if quick else (1000, 3)
     for n, across in ((27, 3),) if quick else ((1_000, 10), (10_000, 18)):
         scene, start = hopper(n, across, _LAWS["friction"])
-        stiffness = 0.5 * MASS * (math.pi / (_STEPS * _DT)) ** 2
-        method, span = swarm.Penalty(_DT, stiffness, 1.0), 20 if quick else 1000
         half = float(scene.surfaces[0].half_widths[0])  # type: ignore[attr-defined]
-        laws = {"stiffness": stiffness, **_LAWS}
-
-        def theirs(fall: int, rest: int, start: swarm.Particles = start, half: float = half) -> list[float]:
-            pile = peer.Pile(start.position.T, half, (DIAMETER, MASS), laws, _DT)  # noqa: B023
-            falling = pile.run(fall)
-            pile.run(rest)
-            return [falling, pile.run(fall)]
-
-        def ours(fall: int, rest: int, start: swarm.Particles = start, scene: swarm.Scene = scene) -> list[float]:
-            spent, particles = [], start
-            for steps in (fall, rest, fall):
-                until, began = steps * _DT, time.process_time()
-                particles = swarm.simulate(
-                    scene,
-                    particles,
-                    method,
-                    until=until,
-                    every=until,
-                    threads=1,
-                    compile=tier(),  # noqa: B023
-                ).particles
-                spent.append(time.process_time() - began)
-            return [spent[0], spent[2]]
-
-        rounds = 1 if quick else 3
         # Compiled before it is timed.
-        ours(2, 2)
-        taken = [(ours(span, 20 * span), theirs(span, 20 * span)) for _k in range(rounds)]
-        for k, name in enumerate(("fall", "lie")):
-            mine, other = (sorted(one[who][k] * 1e6 / n / span for one in taken) for who in (0, 1))
+        _of_ours(scene, start, method, 2)
+        taken = []
+        for _k in range(rounds):
+            pile = peer.Pile(start.position.T, half, (DIAMETER, MASS), laws, _DT)
+            taken.append((_of_ours(scene, start, method, span), [pile.run(k * span) for k in (1, 20, 1)]))
+        for k, name in ((0, "fall"), (2, "lie")):
+            mine, other = (sorted(one[side][k] * 1e6 / n / span for one in taken) for side in (0, 1))
             ratio = mine[0] / other[0]
             found += [
                 Row(f"{n} grains that {name}, a grain and step", mine[0], mine[rounds // 2], "us", "2.0", ratio),
                 Row(f"  {version}, gran/hooke/history", other[0], other[rounds // 2], "us"),
             ]
     return found
+
+
+def _of_ours(scene: swarm.Scene, start: swarm.Particles, method: swarm.Penalty, span: int) -> list[float]:
+    """Processor times of so many steps of a fall, of twenty times as many until grains lie, and of as many then [s]."""
+    spent, particles = [], start
+    for steps in (span, 20 * span, span):
+        until, began = steps * method.dt, time.process_time()
+        options = {"until": until, "every": until, "threads": 1, "compile": tier()}
+        particles = swarm.simulate(scene, particles, method, **options).particles
+        spent.append(time.process_time() - began)
+    return spent
 
 
 # --- Meshes ----------------------------------------------------------------------------------------------
