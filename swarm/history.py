@@ -107,6 +107,7 @@ def contact_history(
     check_surfaces(method, scene)
     method.check(scene, particle)
     compiled = scene.compiled(apart="contact_history")
+    _require_one_wall(compiled, method)
     # The functions of kernels, in plain Python; with NumPy's numbers 1/0 is an infinity as in compiled kernels.
     start = CutStep(vec(particle.position[:, 0]), vec(particle.velocity[:, 0]))
     with np.errstate(all="ignore"):
@@ -120,6 +121,16 @@ def contact_history(
             start = _at_the_wall(compiled, start, method.contact_step, method.contact_start)
             return _impact(compiled, start, mass, method)
     raise SceneError(f"method must be AugmentedLagrangian, Penalty or Impact, got {type(method).__name__}")
+
+
+def _require_one_wall(compiled: CompiledScene, method: Method) -> None:
+    """Raise a `SceneError` where a surface is not taken as one wall."""
+    for i, piece in compiled.pieces.owned():
+        if i in compiled.unions() or piece.is_foam() or (isinstance(method, Impact) and piece.is_one_wall):
+            raise SceneError(
+                f"surfaces[{i}] must be one wall for a single contact step with {type(method).__name__}, got "
+                f"{compiled.scene.surfaces[i]!r:.200}; use simulate"
+            )
 
 
 class CutStep(NamedTuple):

@@ -48,7 +48,7 @@ def advance_block(method, walls, gravity, hard, share, lanes):
     Without `hard` the first hard contact ends the call with HARD_CONTACT; a kernel that can do it goes on from there.
     LOG_FULL asks for a call with an empty log and the same lanes, which goes on.
     """
-    lanes, state, picked = with_distances(lanes), share.state, picks(walls)
+    lanes, state, picked = with_distances(lanes), share.state, picks(method, walls)
     place, live, passes = impact_log.gone_on(share.log)
     while live < LANES:
         place = share.following(FLYING, place)

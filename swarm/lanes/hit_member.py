@@ -37,14 +37,16 @@ def _fields(walls):
     return () if isinstance(walls, Carried) else walls.fields()
 
 
-def picks(walls):
-    """Room for the numbers of a body in each lane, of every field."""
+def picks(method, walls):
+    """Room for the numbers of a body in each lane, of every field; none where a contact looks at all bodies."""
+    if method.looks_around:
+        return ()
     return tuple(scratch((STRIDE, width(field.members.like)), np.float64) for _number, field in _fields(walls))
 
 
 def pick(walls, lanes, picked, live):
     """The numbers of the body that each lane has met; of any where it has met none of this field."""
-    for (before, field), rows in zip(_fields(walls), picked, strict=True):
+    for (before, field), rows in zip(_fields(walls) if picked else (), picked, strict=True):
         members, last = field.members, field.count() - 1.0
         for i in range(index(live)):
             wall = lanes.wall[i] - before

@@ -176,6 +176,9 @@ class MethodNumbers(Record):
         """The walls at the start of that step, with so much of the frame left in the method's unit."""
         return walls.at(remaining)
 
+    # Whether `contact` asks other walls than the one that was met: a constant for the compiler.
+    looks_around = False
+
     # --- Flight ---
 
     # Whether contacts ask how long the flight before them was: a constant for the compiler.

@@ -57,7 +57,7 @@ class Impact(base.Method):
     torus, capsule); elsewhere of first order, with an error some times smaller than that of a step from the wall. It
     begins at the earliest where the frame begins or the contact before ends, and ends at the latest with the frame;
     then both of its halves are as much shorter. A step from r* with a wall in its way is replaced by the exact
-    reflection.
+    reflection; so is one along a face of a mesh, a side of an outline or a wall of a room that ends beyond that.
 
     A particle slides along one wall, or the edge of two, by the contact step of the scheme in Suzuki's composition of
     fourth order, and leaves where the wall no longer presses on it, or meets another. Chattering (restitution e < 1)
@@ -128,7 +128,7 @@ class Impact(base.Method):
         return kind(*lasting, scene.compiled(apart=self.apart()).laws or NONE, self.contact_step or None)
 
     def apart(self) -> str | None:
-        return "a contact_step" if self.contact_step > 0.0 else None
+        return None
 
     def time_of_impact(self) -> float:
         # A centred step is a part of the flights before and after it.
@@ -246,6 +246,8 @@ class Reflection(contract.MethodNumbers):
 class Chord(Reflection):
     """The method with a contact step, a chord of the surface; such scenes have no laws."""
 
+    looks_around = True
+
     def step(self, lane):
         """The length of the contact step, which the end of the frame cuts."""
         return select(self.contact_step < lane.remaining, self.contact_step, lane.remaining)
@@ -323,7 +325,7 @@ class Centred(Chord):
         half, turned = self.half(lane), solution.turned
         speed2, half_inverse = speed2_at(gravity, lane.r, lane.own.energy)
         w = restore(gravity, turned.v, speed2, half_inverse)
-        free = flights.first_hit(walls, None, lane.r, accelerated(gravity, w, 0.5 * half)).time > half
+        free = flights.is_free(walls, lane.r, accelerated(gravity, w, 0.5 * half), half)
         hit = wall >= 0.0
         step = hit & free & (turned.impulse > lane.own.slow) & (not solution.unsolved)
         return contract.Contact(

@@ -241,14 +241,14 @@ class CutSteps(StepNumbers):
     def is_alone(self, walls, wall, start, r1, kappa):
         # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free
         # flight ends outside it again) was hit all the same.
-        free = (flights.other_hit(walls, wall, start.r, r1 - start.r).time > 1.0) & (kappa != 0.0)
+        free = (flights.other_hit(walls, wall, start.r, r1 - start.r, 1.0).time > 1.0) & (kappa != 0.0)
         return free & (not self.is_too_fast(r1 - start.r))
 
     def is_blocked(self, walls, wall, start, h):
         r, p = start.r, h * start.v
         kappa = chord(walls, wall, r, p)
         r1 = walls.push(wall, r, p, kappa)
-        other = flights.other_hit(walls, wall, r, r1 - r)
+        other = flights.other_hit(walls, wall, r, r1 - r, 1.0)
         # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
         later = other.time <= 1.0 and not walls.of(other.wall, False, uzawa.has_limit, self.law, r)
         later = later or uzawa.meets_later(walls, wall, self.law, r, p)

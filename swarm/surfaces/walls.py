@@ -242,7 +242,15 @@ class Walls(Record):
 
     def chord_sweeps(self):
         """The most steps of `chord_improve` that any wall takes: a constant for the compiler."""
-        return max((0, *(wall.chord_sweeps for wall in self.each)))
+        each = tuple(wall.members.like if isinstance(wall, Field) else wall for wall in self.each)
+        return max((0, *(wall.chord_sweeps for wall in each)))
+
+    def keeps(self, number, r):
+        """Whether a step along the wall with this number that ends at a place on it ends where that wall is."""
+        found = True
+        for first, field in self.fields():
+            found = field.members.keeps(number - first, r) & found
+        return found
 
     def outside(self, number, r):
         """Whether a point is outside any wall but this one (-1: any at all)."""

@@ -300,7 +300,7 @@ def test_what_a_mesh_does_not_go_with_is_one_sentence():
             r"parts must not be Mesh in a Union of several rooms",
         ),
         (lambda: swarm.simulate(scene, start, swarm.Verlet(1e-3, 1e5), until=1.0), r"must not be Mesh with Verlet"),
-        (lambda: swarm.simulate(scene, start, swarm.Impact(contact_step=1e-3), until=1.0), r"Mesh with a contact_step"),
+        (lambda: swarm.simulate(scene, start, swarm.Trapezoidal(1e-3, 1e5), until=1.0), r"Mesh with Trapezoidal"),
         (
             lambda: swarm.simulate(scene, swarm.place(scene, body, 2, speed=1.0), swarm.Penalty(1e-3, 1e5), until=1.0),
             r"must not be Mesh with bodies and soft walls",

@@ -225,7 +225,7 @@ def test_what_knows_no_fields_says_so():
     field, box = swarm.Spheres([[0.0, 0.0, 0.0]], 0.1), swarm.Box((0.5, 0.5, 0.5))
     scene, start = swarm.Scene([box, field]), swarm.Particles([0.3, 0, 0], [1, 0, 0])
     for method, remedy in (
-        (swarm.Verlet(1e-3, 1e5), "use Impact"), (swarm.Impact(contact_step=1e-3), "leave contact_step out"),
+        (swarm.Verlet(1e-3, 1e5), "use Impact"), (swarm.Trapezoidal(1e-3, 1e5), "use Impact"),
     ):  # fmt: skip
         with pytest.raises(SceneError, match=rf"surfaces\[1\] must not be Spheres with .*; {remedy}"):
             swarm.simulate(scene, start, method, until=0.1)

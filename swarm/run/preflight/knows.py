@@ -455,7 +455,6 @@ CAPABILITIES = (
         (SOFT_BODIES, PAPER_BODIES): _of_one_room("bodies and soft walls", "use Impact(dt=...)"),
         (BALLS,): _of_one_room("particles that have a radius and Impact", f"{_TO_POINTS}, and Impact()"),
         (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
-        (CHORDS,): _of_one_room("a contact_step", _NO_STEP),
         (HEAVY,): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
     }),
     Capability("union with walls between its rooms", _rooms_that_touch, {
@@ -483,7 +482,6 @@ CAPABILITIES = (
     Capability("field", _fields, {
         (SOFT_BODIES, PAPER_BODIES): _listed("bodies and soft walls", "use Impact(dt=...)"),
         (PAPER, BASELINE, OTHER_POINTS): _listed("{method}", _TO_EXACT),
-        (CHORDS,): _listed("a contact_step", _NO_STEP),
     }),
     Capability("dt of Impact", _argument("dt", None), {
         (*_RIGID_POINTS, *_RIGID_BALLS): Refusal(

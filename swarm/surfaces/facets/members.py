@@ -51,6 +51,10 @@ class Facets(Members, Patched):
     def may_meet(self, k, here):
         return may_pass(self.grid, k, here)
 
+    def keeps(self, number, r):
+        is_other = (number < 0.0) | (number >= self.count())
+        return is_other or self.is_there(number, r, 0.0) or self.wall_after(number, r, 0.0) >= 0.0
+
     def is_there(self, number, r, near):
         return self.wall(number).is_there(r, near)
 

@@ -14,6 +14,8 @@ from .members import Members, member
 
 # By so many times round-off is a flight inside of another cavity where it goes on.
 _INSIDE = 4.0
+# So many parts of a flight are looked at before it is said to be free so far.
+_MOST_PARTS = 1000
 
 
 class Foam(Members, Patched):
@@ -21,6 +23,10 @@ class Foam(Members, Patched):
 
     def field_hit(self, gravity, r, v):
         return _leaving(self, gravity, r, v)
+
+    def other_hit(self, number, r, v, until):
+        # A chord of a cavity is inside of it.
+        return flights.NEVER if number >= 0.0 else _end(self, r, v, until)
 
     def is_in_another(self, number, r):
         return _nearest(self, r)[1] > 0.0
@@ -71,6 +77,18 @@ def _is_in_other(foam, number, r, near):
         if float(m) != number and member(foam, index(m)).distance(r) < -near:
             return True
     return False
+
+
+@outlined
+def _end(foam, r, v, until):
+    """The `Hit` where a straight flight that lasts so long leaves the foam; the wall is -1 where it is free so far."""
+    t = 0.0
+    for _part in range(_MOST_PARTS):
+        hit = _leaving(foam, None, r + t * v, v)
+        t += hit.time
+        if hit.wall >= 0.0 or not t < until:
+            return flights.Hit(t, hit.wall)
+    return flights.Hit(t, -1.0)
 
 
 @outlined

@@ -22,6 +22,8 @@ from ..shapes.sphere import SphereCavity, SphereNumbers, ball, cavity
 from ..time_of_impact import flights
 from ..time_of_impact.course import rise_time
 
+# So many cells a step is followed through at most.
+_MOST_CELLS = 4000
 # The rows of a rotation that turns nothing.
 _UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
 # What has fields of its own in a table, beside vectors and balls.
@@ -119,6 +121,14 @@ class Members(Record):
     def field_hit(self, gravity, r, v):
         """The first `Hit` of a free flight, or how far it is surely free."""
         return _first_hit(self, gravity, r, v)
+
+    def other_hit(self, number, r, v, until):
+        """The first `Hit` of a straight flight that lasts so long with any but this one; -1: with any of them."""
+        return _other_hit(self, number, r, v, until)
+
+    def keeps(self, number, r):
+        """Whether a step along one of them that ends at a place on it ends where that is; of any other it says so."""
+        return True
 
     # --- Of a field that moves: see safe.py ---
 
@@ -317,6 +327,24 @@ def _first_hit(members, gravity, r, v):
         if time < found.time:
             found = flights.Hit(time, select(hits, float(m), -1.0))
     return found
+
+
+@outlined
+def _other_hit(members, number, r, v, until):
+    grid, t, place = members.grid, 0.0, r
+    for _cell in range(_MOST_CELLS):
+        cell = cell_of(grid, place)
+        found = flights.Hit(t + members.until_out(cell, None, place, v), -1.0)
+        first, stop = entries_of(grid, cell.number)
+        for k in range(first, stop):
+            m = float(grid.entries[k])
+            time, _hits = member(members, index(grid.entries[k])).first_hit(r, v)
+            if time < found.time and m != number:
+                found = flights.Hit(time, m)
+        if found.wall >= 0.0 or not found.time < until:
+            return found
+        t, place = found.time, r + found.time * v
+    return flights.Hit(t, -1.0)
 
 
 # --- Which is near ---------------------------------------------------------------------------------------

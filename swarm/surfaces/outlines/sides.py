@@ -181,6 +181,10 @@ class Sides(Members, Patched):
         d = side.along_plane(r - side.body.center)
         return select(norm(d) < norm(d - side.end), side.joined_before, side.joined_after)
 
+    def keeps(self, number, r):
+        is_other = (number < 0.0) | (number >= self.count())
+        return is_other or self.is_there(number, r, 0.0)
+
     def goes_on(self, number, other):
         """Whether a side joins this one smoothly: what slides on this one does not meet it, but goes on on it."""
         side = self.wall(number)

@@ -4,8 +4,8 @@ import math
 from typing import Any, NamedTuple
 
 from ...kernel.gravity import as_vector
-from ...kernel.jit import select
-from ..presence.rooms import leaving
+from ...kernel.jit import outlined, select
+from ..presence.rooms import is_of_room, leaving
 from ..walls import Field
 from .course import Fall, Quartic
 from .polynomial import PolynomialFlight
@@ -21,6 +21,8 @@ class Hit(NamedTuple):
     wall: float
 
 
+# Rooms of a union, or cells of a field, that a step is followed through at most.
+_MOST_ROOMS = 1000
 # No hit, ever.
 NEVER = Hit(math.inf, 0.0)
 
@@ -173,15 +175,57 @@ def hit_of(walls, gravity, wall, r, v):
     return first, found
 
 
-def other_hit(walls, wall, r, v):
-    """The first hit of a straight flight with any wall but this one, which is one of these."""
+def other_hit(walls, wall, r, v, until=math.inf):
+    """The first hit of a straight flight that lasts so long with any wall but this one; -1: with any wall.
+
+    In a union that is with the walls of the same room: what goes over into another one is met here.
+    """
     first = NEVER
+    for rooms in reversed(walls.joined()):
+        is_in_union = False
+        for room in reversed(rooms):
+            is_in_room = is_of_room(room, wall)
+            is_in_union = is_in_room | is_in_union
+            for number, other, _gentle in reversed(room):
+                time, _found = other.first_hit(r, v)
+                first = _unless(first, (wall == number) | (not is_in_room), Hit(time, number))
+        first = _unless(first, is_in_union, union_end(walls, rooms, r, v, until))
     # The only wall has no other: else the compiler would compute its hit and throw it away at run time.
-    for k, other in reversed(tuple(enumerate(walls.each if len(walls.each) > 1 else ()))):
-        time, _found = other.first_hit(r, v)
-        use = (first.time < time) | (wall == k)
-        first = Hit(select(use, first.time, time), select(use, first.wall, float(k)))
+    several = len(walls.each) > 1 or len(walls.fields()) > 0
+    for number, other in reversed(walls.shared() if several else ()):
+        if isinstance(other, Field):
+            first = soonest(other.members.other_hit(wall - number, r, v, until), number, first)
+        else:
+            time, _found = other.first_hit(r, v)
+            first = _unless(first, wall == number, Hit(time, number))
     return first
+
+
+def _unless(first, skip, hit):
+    """The sooner one of two hits, the `first` one if the other is to be skipped."""
+    use = (first.time < hit.time) | skip
+    return Hit(select(use, first.time, hit.time), select(use, first.wall, hit.wall))
+
+
+@outlined
+def union_end(walls, rooms, r, v, until):
+    """The `Hit` where a straight flight that lasts so long leaves a union; the wall is -1 where it is free so far."""
+    t = 0.0
+    for _room in range(_MOST_ROOMS):
+        place = r + t * v
+        hits = tuple(tuple(wall.first_hit(place, v) for _number, wall, _gentle in room) for room in rooms)
+        hit = union_hit(walls, rooms, hits, None, (place, v))
+        t += hit.time
+        if hit.wall >= 0.0 or not t < until:
+            return Hit(t, hit.wall)
+    return Hit(t, -1.0)
+
+
+def is_free(walls, r, v, until):
+    """Whether a straight flight meets no wall for so long."""
+    if len(walls.fields()) > 0 or len(walls.unions) > 0:
+        return other_hit(walls, -1.0, r, v, until).time > until
+    return first_hit(walls, None, r, v).time > until
 
 
 # --- Free time, with and without gravity -----------------------------------------------------------------
