@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import pandas
 
 _VECTORS = ("position", "velocity_before", "velocity_after")
+_LASTED = ("duration", "largest_force", "friction_loss")
 _TEXTS = ("scene", "method", "kept", "start")
 _NEEDED = (
     "impacts/time", "frames/complete", "frames/time", "frames/rows", "walls/surface", "walls/member",
@@ -171,6 +172,7 @@ class ImpactLog(Stored):
         fields += [*((name, real, 3) for name in _VECTORS), ("impulse", real)]
         fields += [field for field in (("slip", real, 3), ("image", "i4", 3)) if field[0] in self._columns]
         fields += [("partner", "i4")] * ("partner" in self._columns)
+        fields += [(name, real) for name in _LASTED if name in self._columns]
         fields += [("counter", "i4"), ("sense", "i4")] * (self._counters > 0)
         return np.dtype(fields)
 
@@ -204,6 +206,13 @@ class ImpactLog(Stored):
 
             Of particles with a radius a collision of two is a row too, of the one with the smaller number: `partner` is
             the other one, -1 at a wall, `impulse` what each gives the other, and both `surface` and `member` are -1.
+
+            A contact of two grains, or of a grain with a wall, lasts, and has its row where it ends, as laws of walls
+            act there: `time` is the end of the step, `velocity_before` is that at the start of the contact, `impulse`
+            the sum of its normal impulses, and further columns are `duration` [s], `largest_force` [N] along the normal
+            and `friction_loss` [J], what friction and the resistance to rolling have taken. At a face of a mesh or an
+            outline `member` is that of the end. A contact has no row that lasts at the end of the run, or that the wall
+            leaves, by an opening or as it is `present` no more.
 
             In a run with counters a crossing is a row too, with an impulse of 0 and the velocity at the crossing twice:
             `counter` is the place of the counter in `counters` and `sense` 0 out of its admissible side, 1 back, and

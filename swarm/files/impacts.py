@@ -1,9 +1,9 @@
 """Writing logs of impacts: rows are appended, and the number of frames that are complete is written last.
 
 impacts/{time,particle,wall,position,velocity_before,velocity_after,impulse}, one entry an impact, with friction also
-impacts/slip, impacts/image where the scene repeats, and impacts/partner of balls; frames/complete (2,), how many frames
-are, and for these frames/{time,rows}, their times and how many rows there are at the end of each: what comes after them
-is of no use yet.
+impacts/slip, impacts/image where the scene repeats, impacts/partner of balls, and impacts/{duration,largest_force,
+friction_loss} of contacts of grains; frames/complete (2,), how many frames are, and for these frames/{time,rows}, their
+times and how many rows there are at the end of each: what comes after them is of no use yet.
 walls/{surface,member} are what each number in impacts/wall stands for. parameters/{scene,method,kept} as TOML text,
 parameters/particles, their number, parameters/start, a digest of them at the start, and parameters/seed.
 """

@@ -95,8 +95,9 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             first = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
             begin_solve(rows, c, first, half * place[i, LIGHTNESS] * square(way.along))
             set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
-            if law.friction is not None:
+            if near.wall_drag is not None:
                 rows[c, LISTED] = k
+            if law.friction is not None:
                 set_vector(rows, c, DRAG, vector_at(near.wall_drag, index(k), 0) * lasting(rows[c, GAP]))
             if law.rolling is not None:
                 set_vector(rows, c, ROLL, vector_at(near.wall_drag, index(k), KEPT_ROLL) * lasting(rows[c, GAP]))

@@ -202,8 +202,9 @@ def gather_pairs(matter, grains, near, touches):
                 first = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
                 begin_solve(rows, c, first, half * ease)
                 set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
-                if matter.pairs.friction is not None:
+                if near.drag is not None:
                     rows[c, LISTED] = k
+                if matter.pairs.friction is not None:
                     set_vector(rows, c, DRAG, vector_at(near.drag, index(k), 0) * lasting(rows[c, GAP]))
                 if matter.pairs.rolling is not None:
                     set_vector(rows, c, ROLL, vector_at(near.drag, index(k), KEPT_ROLL) * lasting(rows[c, GAP]))

@@ -1,4 +1,4 @@
-"""The impulses of friction and of rolling of the last step, carried over when lists are made anew."""
+"""What is kept of contacts from step to step, such as their friction, carried over when lists are made anew."""
 
 from typing import Any, NamedTuple
 
@@ -7,15 +7,17 @@ from numpy.typing import NDArray
 
 from .grain_arrays import FACE
 
+# Columns that are the other way round for the other particle: the impulses of friction and of rolling.
+_TURNS = 6
 # More than a field has.
 _FACES = 1 << 31
 
 
 class Drags(NamedTuple):
-    """The impulses that are not 0, by their pairs of particles, in ascending order; and those at walls."""
+    """What is not 0, by their pairs of particles, in ascending order; and those at walls."""
 
     pair: NDArray[np.int64]
-    drag: NDArray[np.float64]  # (pairs, 3 or 6) on the particle with the smaller number
+    drag: NDArray[np.float64]  # (pairs, columns) on the particle with the smaller number
     at_wall: NDArray[np.int64]
     wall_drag: NDArray[np.float64]
 
@@ -41,12 +43,17 @@ def _at_walls(world: Any) -> NDArray[np.int64]:
 
 
 def kept_drags(world: Any) -> Drags | None:
-    """The impulses of friction that lists hold, None where there is no friction."""
+    """What lists keep of contacts, None where they keep nothing."""
     near = world.near
     if near.drag is None:
         return None
     key, sign = _pairs(world)
-    return Drags(*_sorted(key, near.drag[: key.size] * sign[:, None]), *_sorted(_at_walls(world), near.wall_drag))
+    return Drags(*_sorted(key, _turned(near.drag[: key.size], sign)), *_sorted(_at_walls(world), near.wall_drag))
+
+
+def _turned(drag: NDArray[np.float64], sign: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What is kept of pairs, of the other particle where the sign is -1."""
+    return np.concatenate([drag[:, :_TURNS] * sign[:, None], drag[:, _TURNS:]], axis=1)
 
 
 def _sorted(key: NDArray[np.int64], drag: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -62,7 +69,7 @@ def set_drags(world: Any, kept: Drags | None) -> None:
         return
     near = world.near
     key, sign = _pairs(world)
-    near.drag[: key.size] = _found(key, kept.pair, kept.drag) * sign[:, None]
+    near.drag[: key.size] = _turned(_found(key, kept.pair, kept.drag), sign)
     at = _at_walls(world)
     near.wall_drag[: at.size] = _found(at, kept.at_wall, kept.wall_drag)
 

@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import norm
+from ..lanes.watching.log import Struck
+from ..surfaces.periodic.period import into
 from ..surfaces.presence.openings import is_open
 from .contacts import apart
-from .grain_arrays import RADIUS, X, vector_at
+from .grain_arrays import AFTER, RADIUS, X, vector_at
 from .overlaps import move_of
-from .vessel import met
+from .vessel import met, met_member
 
 
 @outlined
@@ -34,9 +36,13 @@ def open_wall(matter, wall, numbers, grains, near):
 
 
 @outlined
-def let_out(matter, wall, grains, near, books, given):
-    """Let balls escape that reach into an open wall at the end of the step, at a time [s]; how many do."""
-    place, found, (number, time) = grains.place, 0, given
+def let_out(matter, wall, world, given):
+    """Let balls escape that reach into an open wall at the end of the step; how many do.
+
+    `given` is the number of the wall, and that time [s].
+    """
+    grains, near, books, noting, (number, time) = world.grains, world.near, world.books, world.noting, given
+    place, found = grains.place, 0
     for k in range(near.wall_first[number], near.wall_first[number + 1]):
         c = index(k)
         if near.wall_is_open[c]:
@@ -44,9 +50,17 @@ def let_out(matter, wall, grains, near, books, given):
             one, r = index(grains.number[i]), vector_at(place, i, X)
             own = met(wall, near.listed, near.spans, c, place[i, RADIUS])
             books.dissipated[one] += matter.law.stored_energy(own.gap_of(own.inner(r)))
-            reaches = own.level_of(own.end_inner(r + move_of(matter, grains, i))) > 0.0
+            end = r + move_of(matter, grains, i)
+            reaches = own.level_of(own.end_inner(end)) > 0.0
             if reaches and math.isnan(books.escape_time[one]):
                 books.escape_time[one] = time
+                if noting is not None:
+                    member = noting.places[number][
+                        index(met_member(wall, near.listed, near.spans, c, place[i, RADIUS], end))
+                    ]
+                    back, v = into(noting.period, end), vector_at(grains.speed, i, AFTER)
+                    struck = Struck(grains.number[i], float(member), time, back.r, v, v, 0.0)
+                    noting.log.ended(noting.image, struck, back.images)
                 found += 1
     return found
 

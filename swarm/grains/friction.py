@@ -30,6 +30,7 @@ from .grain_arrays import (
     LISTED,
     PUSH,
     RADIUS,
+    RUBBED,
     SIZE,
     START,
     set_vector,
@@ -131,7 +132,7 @@ def _facing(own, way, radius, r0, move):
     return n, _carried(own, r0 - radius * n, r0 + move - radius * n)
 
 
-def _faced(wall, grains, touches, c, i, move):
+def faced(wall, grains, touches, c, i, move):
     """`_facing` of a ball that moves so."""
     rows = touches.wall_rows
     radius, r0 = grains.place[i, RADIUS], vector_at(rows, c, START)
@@ -171,7 +172,7 @@ def twist_wall(matter, wall, grains, touches, number):
         c = index(k)
         i = index(touches.wall_ends[c])
         move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
-        n, _velocities = _faced(wall, grains, touches, c, i, move)
+        n, _velocities = faced(wall, grains, touches, c, i, move)
         turned = cross(n, vector_at(rows, c, DRAG)) * (ROUNDNESS * rows[c, EASE] / grains.place[i, RADIUS])
         set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - turned)
 
@@ -187,10 +188,11 @@ def book_rubbing(matter, wall, grains, near, touches, books, number):
         one, drag = index(grains.number[i]), vector_at(rows, c, DRAG)
         set_vector(near.wall_drag, index(int(rows[c, LISTED])), 0, drag)
         move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
-        n, (both, _last) = _faced(wall, grains, touches, c, i, move)
+        n, (both, _last) = faced(wall, grains, touches, c, i, move)
         turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
         gained = dot(drag, move) / matter.h - 0.5 * grains.place[i, RADIUS] * dot(cross(n, drag), turned)
         given = 0.5 * dot(drag, both)
+        rows[c, RUBBED] = given - gained
         books.dissipated[one] += given - gained
         if moves(wall):
             books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given
@@ -209,5 +211,6 @@ def book_rubbing_pairs(matter, grains, near, touches, books):
         drag = vector_at(rows, c, DRAG)
         set_vector(near.drag, index(int(rows[c, LISTED])), 0, drag)
         gained = dot(drag, move) / matter.h - 0.5 * dot(twist, turned)
+        rows[c, RUBBED] = -gained
         books.dissipated[index(grains.number[i])] -= 0.5 * gained
         books.dissipated[index(grains.number[j])] -= 0.5 * gained

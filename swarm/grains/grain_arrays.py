@@ -18,8 +18,8 @@ BEFORE, AFTER = 0, 3
 # Columns of `Touches.rows`: s0, from one centre to the other at the start of a step, or the centre; |s0|, or the inner
 # function of the wall; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
 # inverse of the mass that moves; the damping; the gain of a Newton step; and where there is friction its
-# impulse, the place in the lists, and the angular impulse of the resistance to rolling.
-START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED, ROLL = (
+# impulse, the place in the lists, the angular impulse of the resistance to rolling, and what both take.
+START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED, ROLL, RUBBED = (
     0,
     3,
     4,
@@ -33,10 +33,14 @@ START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED
     16,
     19,
     20,
+    23,
 )
 COLUMNS, COLUMNS_OF_FRICTION = 16, 24
-# Columns of `Neighbours.drag`: where the angular impulse of the resistance to rolling is kept.
+# Columns of `Neighbours.drag`: where the angular impulse of the resistance to rolling is kept; and in a run with a log
+# of contacts when each has begun, the sum of its normal impulses, the largest force, what friction has taken, and the
+# velocity, of a pair that of the particle with the smaller number, and the slip at its start.
 KEPT_ROLL = 3
+BEGAN, PRESSED, FORCE, TAKEN_OFF, ARRIVED, SLIP, KEPT = 6, 7, 8, 9, 10, 13, 16
 # Columns of `Neighbours.spans`: where those of a field begin in `listed` and end, and of which face they are.
 BEGIN, END, FACE = 0, 1, 2
 # Of a clock: the steps of the frame that are done, those since pairs were listed, and those since the run was halted
@@ -64,7 +68,7 @@ class Neighbours(NamedTuple):
     slot: Array  # (room of walls,) int32
     wall_is_on: Array
     drag: (
-        Any  # (room, 3) the impulse of friction of each pair in the last step, (room, 6) with that of rolling, or None
+        Any  # (room, 3) the impulse of friction of each pair in the last step, with that of rolling (room, 6), or None
     )
     wall_drag: Any
     # Of a scene with fields, else None
@@ -121,7 +125,7 @@ def near_of(
 ) -> Neighbours:  # fmt: skip
     """Room for so many pairs, for so many balls at walls, and so many members of fields, where there are any.
 
-    Of each contact so many numbers of friction are kept from step to step.
+    Of each contact so many numbers are kept from step to step.
     """
     drags = (np.zeros((pairs, kept)), np.zeros((touching, kept))) if kept else (None, None)
     made = Neighbours(
@@ -136,9 +140,9 @@ def near_of(
     return made._replace(spans=spans, listed=listed, used=np.zeros(1, np.int64))
 
 
-def touches_of(walls: int, pairs: int, touching: int, has_friction: bool = False, listed: Any = None) -> Touches:
+def touches_of(walls: int, pairs: int, touching: int, is_kept: bool = False, listed: Any = None) -> Touches:
     """Room for the contacts of so many pairs and of so many balls at walls; `Neighbours` has the members of fields."""
-    columns = COLUMNS_OF_FRICTION if has_friction else COLUMNS
+    columns = COLUMNS_OF_FRICTION if is_kept else COLUMNS
     return Touches(
         np.zeros((pairs, columns)), np.zeros((pairs, 2), np.int32), np.zeros((touching, columns)),
         np.zeros(touching, np.int32), np.zeros((2, walls), np.int64), np.zeros(1, np.int64),

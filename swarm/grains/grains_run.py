@@ -14,6 +14,7 @@ from ..compiled_scene import CompiledScene
 from ..contact.laws import NONE
 from ..contact.wall_impact import RandomSource
 from ..errors import RunError
+from ..lanes.watching.log import Log
 from ..lanes.watching.watchers import Followed
 from ..methods import Penalty
 from ..methods.base import Method
@@ -33,7 +34,8 @@ from .booking import ContactTotals, MemberCounts
 from .drags import Drags, kept_drags, set_drags
 from .exits import stored_with_others
 from .faces import Fields
-from .grain_arrays import BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X
+from .grain_arrays import BEFORE, DONE, KEPT, LOST, SINCE, SKIN, TAKEN, X
+from .logged import Noting
 from .matter import matter_of
 from .overlaps import COLUMNS
 from .passing import Passing
@@ -125,7 +127,7 @@ class GrainsRun(BaseRun):
             )  # fmt: skip
             self._world = self._world._replace(sender=sender)
         if counters is not None:
-            passing = Passing(state.mass, state.crossed, state.period)
+            passing = Passing(state.mass, state.crossed, state.period, self._pages())
             self._world = self._world._replace(followed=Followed(passing, None))
         self._clock = np.zeros(arrays.CLOCK)
         self._clock[SKIN] = _SKIN * radius.min()
@@ -261,9 +263,9 @@ class GrainsRun(BaseRun):
     def _room(self, n: int, pairs: int, touching: int, members: int | None) -> tuple[arrays.Neighbours, arrays.Touches]:
         """Arrays for n balls, so many pairs, balls at walls, and members of fields near them, None without fields."""
         walls, matter = len(self._owners), self._matter
-        rubs, kept = matter.rubs, (6 if matter.rolls else 3) if matter.rubs else 0
+        kept = KEPT if self._impacts is not None else (6 if matter.rolls else 3) if matter.rubs else 0
         near = arrays.near_of(n, walls, pairs, touching, kept, members, matter.openings is not None)
-        return near, arrays.touches_of(walls, pairs, touching, rubs, near.listed)
+        return near, arrays.touches_of(walls, pairs, touching, kept > 0, near.listed)
 
     def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Neighbours:
         """Make room for so many pairs, balls at walls, and members of fields, and some more."""
@@ -320,6 +322,10 @@ class GrainsRun(BaseRun):
     def _clock_time(self, moment: float) -> float:
         return super()._clock_time(moment) if self._instants is None else moment
 
+    def _pages(self) -> Any:
+        """In which cells the lists were made, as the log of contacts has it."""
+        return None if self._impacts is None or self.state.image is None else self._image
+
     # --- A frame -------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
@@ -349,27 +355,34 @@ class GrainsRun(BaseRun):
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
         status, stop, steps = Status.LEASE_ENDED.value, -1.0, self._steps_in(span)
-        while status == Status.LEASE_ENDED or (status == Status.DONE and stop < steps):
+        page = self._open_page(moment)
+        while status in (Status.LEASE_ENDED, Status.LOG_FULL) or (status == Status.DONE and stop < steps):
             self._feed_in(span, moment)
             rule = MarchRule(steps, stop := self._stop(span, moment), self._watch.passes, moment)
-            world = self._watched_world()
+            world = self._watched_world(None if page is None else page.log)
             status = self._call(march, self._matter, self._walls, world, self._clock, rule, latest=latest)
             if status == Status.LEASE_ENDED:
                 self._list_again()
+            elif page is not None and status == Status.LOG_FULL:
+                page.turn()
+        if page is not None:
+            page.close()
         if status == Status.DONE:
             # Those at the end of the frame.
             self._feed_in(span, moment)
         return status, 0
 
-    def _watched_world(self) -> World:
-        """The world with the counts of members, of which another is of a run that goes on."""
-        world = self._world
+    def _watched_world(self, log: Log | None) -> World:
+        """The world with the counts of members, of which another is of a run that goes on, and a log of contacts."""
+        world, places = self._world, self._fields.places
         if world.sender is not None:
             # Members are others where the skin has become wider than the images of a cell.
-            world = world._replace(sender=world.sender._replace(places=self._fields.places()))
+            world = world._replace(sender=world.sender._replace(places=places()))
+        if log is not None:
+            world = world._replace(noting=Noting(log, places(), self.state.period, self._pages()))
         if self._tally is None:
             return world
-        return world._replace(members=MemberCounts(self._tally.counts(), self._fields.places()))
+        return world._replace(members=MemberCounts(self._tally.counts(), places()))
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         # Of the step.
@@ -386,10 +399,8 @@ class GrainsRun(BaseRun):
         cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
         yield lists.list_pairs, (matter.period, world.grains, world.near, cells, 0.0)
         yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0, 0.0)
-        yield (
-            march,
-            (matter, self._walls, self._watched_world(), self._clock, MarchRule(0.0, 0.0, self._watch.passes, 0.0)),
-        )
+        watched = self._watched_world(None if self._impacts is None else self._impacts.example)
+        yield march, (matter, self._walls, watched, self._clock, MarchRule(0.0, 0.0, self._watch.passes, 0.0))
         yield energy.stored, (matter, self._walls, world.grains, world.near)
         if self._instants is not None or matter.openings is not None:
             into = self.state.dissipated

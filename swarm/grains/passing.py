@@ -16,20 +16,30 @@ class Passing(NamedTuple):
     mass: Array  # (N,) [kg]
     crossed: Any  # `Crossed`
     period: Any  # `Period` of the cell, or None
+    image: Any = None  # (3, N) where the cells are in which the lists were made, or None
 
 
 @outlined
 def count_moves(matter, grains, followed):
-    """Count what all centres cross in the step; `followed` is a `Followed` of `Passing`."""
-    period = followed.state.period
+    """Count what all centres cross in the step; `followed` is a `Followed` of `Passing`, its log ends with the step."""
+    period, log, first = followed.state.period, followed.log, 0
     for k in range(grains.place.shape[0]):
         i = index(k)
         p, move = index(grains.number[i]), move_of(matter, grains, i)
         # Between two lists a centre may be a little outside the cell.
-        r = into(period, vector_at(grains.place, i, X)).r
+        here = into(period, vector_at(grains.place, i, X))
+        r = here.r
         before = ParticleMoment(r, vector_at(grains.speed, i, BEFORE), matter.h)
         after = ParticleMoment(r + move, vector_at(grains.speed, i, AFTER), 0.0)
+        if log is not None:
+            first = index(log.filled[0])
         matter.counters.count_step(followed, p, before, after)
+        if log is not None:
+            log.shift(first, here.images)
         if has_left(period, after.r):
-            back = after._replace(r=into(period, after.r).r)
-            matter.counters.come_back(followed, p, before, after.r, back)
+            again = into(period, after.r)
+            if log is not None:
+                first = index(log.filled[0])
+            matter.counters.come_back(followed, p, before, after.r, after._replace(r=again.r))
+            if log is not None:
+                log.shift(first, here.images + again.images)

@@ -24,6 +24,7 @@ from .grain_arrays import (
     PUSH,
     RADIUS,
     ROLL,
+    RUBBED,
     set_vector,
     vector_at,
 )
@@ -93,6 +94,7 @@ def book_rolling_pairs(grains, near, touches, books):
         turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
         turned = turned - (vector_at(spin, j, BEFORE) + vector_at(spin, j, AFTER))
         lost = -0.25 * dot(roll, turned)
+        rows[c, RUBBED] += 2.0 * lost
         books.dissipated[index(grains.number[i])] += lost
         books.dissipated[index(grains.number[j])] += lost
 
@@ -142,6 +144,7 @@ def book_rolling(wall, grains, near, touches, books, number):
         set_vector(near.wall_drag, index(int(rows[c, LISTED])), KEPT_ROLL, roll)
         gained = 0.5 * dot(roll, vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER))
         given = dot(roll, _spin_of(wall, grains, touches, c, i))
+        rows[c, RUBBED] += given - gained
         books.dissipated[one] += given - gained
         if moves(wall):
             books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given

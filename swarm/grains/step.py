@@ -13,12 +13,14 @@ from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
+from ..lanes.watching.log import is_full
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall, count_members
 from .contacts import gather_pairs, push_pairs, sweep_pairs, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
 from .grain_arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
+from .logged import log_pairs, log_wall, note_pairs, note_wall
 from .overlaps import look_at_pairs, look_at_wall
 from .passing import count_moves
 from .rolling import book_rolling, book_rolling_pairs, roll_pairs, roll_wall, turn_pairs, turn_wall
@@ -56,6 +58,7 @@ class World(NamedTuple):
     followed: Any = None  # `Followed` of `Passing`, where there are counters
     members: Any = None  # `MemberCounts`, or None
     sender: Any = None  # `Sender`, or None where no wall sends balls off
+    noting: Any = None  # `Noting`, or None in a run without a log of contacts
 
 
 # --- Of one step -----------------------------------------------------------------------------------------
@@ -226,6 +229,22 @@ def _arrive(matter, grains):
             set_vector(grains.spin, i, BEFORE, vector_at(grains.spin, i, AFTER))
 
 
+def _note(matter, walls, world, time):
+    """Add the step, which ends at a time [s], to what is noted of contacts."""
+    grains, near, touches = world.grains, world.near, world.touches
+    note_pairs(matter, grains, near, touches, time)
+    for k, wall in enumerate(walls.each):
+        note_wall(matter, matter.walls[k], wall, grains, near, touches, world.noting, (k, time))
+
+
+def _log(matter, walls, world, time):
+    """The rows of the contacts that have ended in the step, which is done, at a time [s]."""
+    grains, near, touches = world.grains, world.near, world.touches
+    log_pairs(matter, grains, near, touches, world.noting, time)
+    for k, wall in enumerate(walls.each):
+        log_wall(matter, wall, grains, near, touches, world.noting, (k, time))
+
+
 def _book(matter, walls, world):
     """Book what the contacts of the step did; the largest overlap [m]."""
     grains, near, touches, books = world.grains, world.near, world.touches, world.books
@@ -266,7 +285,7 @@ def _let_out(matter, walls, world, time):
     """Let balls escape in a step that ends at a time; how many do."""
     found = 0
     for k, wall in enumerate(walls.each):
-        found += let_out(matter, wall, world.grains, world.near, world.books, (k, time))
+        found += let_out(matter, wall, world, (k, time))
     return found
 
 
@@ -278,6 +297,13 @@ def _send_off(matter, walls, world, time):
             one = send_off(matter, wall, world, (k, time))
             status = status if one == Status.DONE else one
     return status
+
+
+def _followed_until(world, time):
+    """What counters write to in a step that ends at a time [s]."""
+    if world.noting is None:
+        return world.followed
+    return world.followed._replace(log=world.noting.log._replace(end=time))
 
 
 def _swept(matter, walls, listed, grains, skin):
@@ -328,12 +354,15 @@ def _step(matter, walls, listed, world, skin):
 def march(matter, walls, world, clock, rule):
     """Take step after step until the end of the frame, or the stop before it: the `Status`.
 
-    LEASE_ENDED where lists are to be made anew, also where balls have escaped: then call this again. INTERRUPTED after
-    so many steps as the rule says; it goes on with the same bits.
+    LEASE_ENDED where lists are to be made anew, also where balls have escaped, and LOG_FULL where the log of contacts
+    needs an empty part: then call this again. INTERRUPTED after so many steps as the rule says; it goes on with the
+    same bits.
     """
     while clock[DONE] < rule.stop:
         if clock[TAKEN] >= rule.halt[0]:
             return Status.INTERRUPTED.value
+        if world.noting is not None and is_full(world.noting.log):
+            return Status.LOG_FULL.value
         left = (rule.span - clock[DONE]) * matter.h
         now = walls.during(left, left - matter.h)
         listed = walls.at(left + clock[SINCE] * matter.h)
@@ -341,11 +370,15 @@ def march(matter, walls, world, clock, rule):
         if status != Status.DONE.value:
             return status
         time = rule.moment - (left - matter.h)
+        if world.noting is not None:
+            _note(matter, now, world, time)
         escaped = 0 if matter.openings is None else _let_out(matter, now, world, time)
         if matter.counters is not None:
-            count_moves(matter, world.grains, world.followed)
+            count_moves(matter, world.grains, _followed_until(world, time))
         _arrive(matter, world.grains)
         sent = Status.DONE.value if world.sender is None else _send_off(matter, now, world, time)
+        if world.noting is not None:
+            _log(matter, now, world, time)
         clock[DONE] += 1.0
         clock[TAKEN] += 1.0
         clock[SINCE] += 1.0

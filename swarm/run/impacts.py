@@ -65,10 +65,13 @@ class Impacts:
         in_order_of_time = meet or compiled.scene.reacts()
         # Contacts with several walls may end in one step.
         most = min(LANES * len(compiled.numbering.surfaces_of_rows), _ROWS // 2) if lasts else LANES
-        self._room = _ROWS // 2 if counts else 1 if in_order_of_time else most
+        self._lasts = meet and lasts
+        # In a step of many grains many contacts may end.
+        rows = max(_ROWS, n) if self._lasts else _ROWS
+        self._room = rows // 2 if counts or self._lasts else 1 if in_order_of_time else most
         self._spare: queue.SimpleQueue[Log] = queue.SimpleQueue()
         for _ in range(2 * threads + _MORE):
-            self._spare.put(self._made(_ROWS))
+            self._spare.put(self._made(rows))
         # Of the types that kernels are called with.
         self.example = self._made(0)
         self.begin, self.total, self.ends = 0.0, 0, dict[int, int]()
@@ -81,11 +84,13 @@ class Impacts:
 
     def _made(self, rows: int) -> Log:
         real = self._real
+        lasted = [np.empty(rows, real) if self._lasts else None for _column in range(3)]
         return Log(
             np.empty(rows), np.empty(rows, np.int32), np.empty(rows, np.int32), np.empty((rows, 3), real),
             np.empty((rows, 3), real), np.empty((rows, 3), real), np.empty(rows, real),
             np.empty((rows, 3), real) if self._slips else None,
             np.empty((rows, 3), np.int32) if self._repeats else None, np.empty(rows, np.int32) if self._meet else None,
+            lasted[0], lasted[1], lasted[2],
             np.zeros(2, np.int64), np.zeros(GOING, np.int64),
             np.zeros(STRIDE, np.int64), self._chosen, 0.0, 0.0, self._room,
         )  # fmt: skip
@@ -155,11 +160,15 @@ def log_of(task: Task) -> Impacts | None:
 
 
 class ThreadLog:
-    """The log that one thread fills."""
+    """The log that one thread fills.
+
+    Attributes:
+        log: the one that is filled now.
+    """
 
     def __init__(self, impacts: Impacts, end: float) -> None:
         self._impacts, self._end = impacts, end
-        self._log = impacts.empty(end)
+        self.log = impacts.empty(end)
 
     def call(self, kernel: Any, *arguments: Any) -> tuple[int, int, int]:
         """The result of a kernel; each time the log is full, it goes on with an empty one."""
@@ -167,30 +176,31 @@ class ThreadLog:
             status, particle, drawn = kernel(*(self._with_log(one) for one in arguments))
             if status != Status.LOG_FULL:
                 return status, particle, drawn
-            going = self._log.going.copy()
+            going = self.log.going.copy()
             self.turn()
-            self._log.going[:] = going
+            self.log.going[:] = going
 
     def _with_log(self, one: Any) -> Any:
         return one._replace(watchers=self.watched_by(one.watchers)) if isinstance(one, Share) else one
 
     def watched_by(self, watchers: Watchers) -> Watchers:
         """These watchers, with the log that is filled now."""
-        return watchers._replace(log=self._log)
+        return watchers._replace(log=self.log)
 
     def turn(self) -> None:
         """Hand over what there is, and go on with an empty log."""
         self.close()
-        self._log = self._impacts.empty(self._end)
+        self.log = self._impacts.empty(self._end)
 
     def close(self) -> None:
         """Hand over what there is."""
-        if self._log.filled[1]:
+        if self.log.filled[1]:
             raise RunError(
-                f"the frame at {self._end:g} s has flights that cross counters more often than the log of impacts "
-                "has room for; use more frames (every), which cut flights, or leave impacts out"
+                f"the frame at {self._end:g} s has flights that cross counters more often, or steps in which more "
+                "contacts end, than the log of impacts has room for; use more frames (every), which cut flights, fewer "
+                "particles in the log (impact_particles), or leave impacts out"
             )
-        self._impacts.hand_over(self._log)
+        self._impacts.hand_over(self.log)
 
 
 def chosen(particles: Any, n: int) -> NDArray[np.bool_] | None:

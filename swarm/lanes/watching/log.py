@@ -31,6 +31,14 @@ class BeforeContact(LaneView):
 ROWS = _named.count
 
 
+class Lasted(Record):
+    """What is known of a contact that takes time."""
+
+    duration: float  # [s]
+    largest_force: float  # along the normal [N]
+    friction_loss: float  # by friction, and by the resistance to rolling [J]
+
+
 class Struck(Record):
     """An impact of a particle on a wall or on another particle, or its way through an opening."""
 
@@ -43,6 +51,7 @@ class Struck(Record):
     impulse: float  # along the normal [N s]
     slip: Vec = ZERO  # relative to the wall, before
     partner: Any = -1
+    lasted: Any = None  # `Lasted`, of a contact that takes time
 
 
 class Log(NamedTuple):
@@ -58,6 +67,9 @@ class Log(NamedTuple):
     slip: Any  # (rows, 3) [m/s] tangential velocity relative to the wall, before; None without friction
     image: Any  # (rows, 3) int32, how many cells away that is; None where the scene does not repeat
     partner: Any  # (rows,) int32, the particle that it meets, -1 at a wall; None where particles do not meet
+    duration: Any  # (rows,) of the contacts of grains, as in `Lasted`; None of impacts
+    largest_force: Any
+    friction_loss: Any
     filled: Array  # (2,) int64, and how many rows had no room
     going: Array  # (GOING,) int64
     order: Array  # int64, the lanes of a pass that have a row
@@ -99,6 +111,16 @@ class Log(NamedTuple):
         if self.has(struck.particle) or (struck.partner >= 0 and self.has(struck.partner)):
             self._add(image, struck)
 
+    @outlined
+    def ended(self, image, struck, images):
+        """A row for a contact that has ended in a step, as `hit`, so many cells farther away, where there is room."""
+        if self.filled[0] >= self.time.size:
+            self.filled[1] += 1
+            return
+        first = self.filled[0]
+        self.hit(image, struck)
+        self.shift(first, images)
+
     def add_crossing(self, state, particle, there, number, images):
         """A row for a particle, a `Moment`, that crosses a counter: 2 counter + sense, so many cells away."""
         if not self.has(particle):
@@ -110,9 +132,14 @@ class Log(NamedTuple):
         k = index(self.filled[0])
         time = self.end - there.remaining
         self._add(state.image, Struck(particle, -1.0 - number, time, there.r, there.v, there.v, 0.0))
+        self.shift(k, images)
+
+    def shift(self, first, images):
+        """Rows from one on are so many cells farther away."""
         if self.image is not None:
-            for axis, images_along in enumerate(images):
-                self.image[k, axis] += np.int32(images_along)
+            for k in range(first, self.filled[0]):
+                for axis, images_along in enumerate(images):
+                    self.image[index(k), axis] += np.int32(images_along)
 
     def has(self, particle):
         """Whether a particle has rows."""
@@ -142,6 +169,11 @@ class Log(NamedTuple):
                 self.image[k, axis] = np.int32(image[axis, p])
         if self.partner is not None:
             self.partner[k] = np.int32(struck.partner)
+        if self.duration is not None:
+            self.duration[k] = self.largest_force[k] = self.friction_loss[k] = 0.0
+            if struck.lasted is not None:
+                self.duration[k], self.largest_force[k] = struck.lasted.duration, struck.lasted.largest_force
+                self.friction_loss[k] = struck.lasted.friction_loss
 
 
 def _put(rows, k, vector):

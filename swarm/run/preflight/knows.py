@@ -440,7 +440,7 @@ CAPABILITIES = (
         _EVERY_BODY: Refusal(
             "impacts must be None with bodies, got {got}: several points of a body meet a wall at once", "use particles"
         ),
-        (BASELINE, GRAINS, OTHER_POINTS): Refusal(
+        (BASELINE, OTHER_POINTS): Refusal(
             "impacts must be None with {method}, got {got}: its contacts last for a time", "use Impact"
         ),
     }),

@@ -1,0 +1,141 @@
+"""The log of contacts: of each one a row where it ends, with what its steps have added up.
+
+A contact begins with the first step at whose end two balls, or a ball and a wall, overlap, and ends with the first one
+at whose end they do not: in all other steps its impulse is 0. What is noted of it meanwhile is kept beside its
+friction, by its pair, or its ball and the face of the wall, also where lists are made anew.
+"""
+
+from typing import Any, NamedTuple
+
+from ..kernel.arrays import index
+from ..kernel.jit import outlined
+from ..kernel.vector import ZERO, norm
+from ..lanes.watching.log import Lasted, Log, Struck
+from ..surfaces.periodic.period import into
+from .at_walls import rising
+from .contacts import closing
+from .friction import across, faced
+from .grain_arrays import (
+    AFTER,
+    ARRIVED,
+    BEFORE,
+    BEGAN,
+    COAST,
+    FORCE,
+    GAP,
+    IMPULSE,
+    LISTED,
+    PRESSED,
+    RADIUS,
+    RUBBED,
+    SIZE,
+    SLIP,
+    START,
+    TAKEN_OFF,
+    X,
+    set_vector,
+    vector_at,
+)
+from .vessel import met, met_member
+
+
+class Noting(NamedTuple):
+    """What the log of contacts takes besides them."""
+
+    log: Log
+    places: Any  # of each wall, of each member its number in the scene, (members,) int64
+    period: Any  # `Period` of the cell, or None
+    image: Any  # (3, N) where the cells are in which the lists were made, or None
+
+
+def _note(matter, rubs, rows, c, kept, time):
+    """Add a step that ends at a time [s] to what is noted of a contact; whether that begins in it."""
+    gap, k = rows[c, GAP], index(int(rows[c, LISTED]))
+    # The second one at the start of the run.
+    begins = (gap <= 0.0) | (kept[k, PRESSED] == 0.0)
+    if begins:
+        kept[k, BEGAN] = time - matter.h
+        kept[k, PRESSED] = kept[k, FORCE] = kept[k, TAKEN_OFF] = 0.0
+    impulse = norm(vector_at(rows, c, IMPULSE))
+    kept[k, PRESSED] += impulse
+    kept[k, FORCE] = max(kept[k, FORCE], impulse / matter.h)
+    if rubs:
+        kept[k, TAKEN_OFF] += rows[c, RUBBED]
+    return begins
+
+
+@outlined
+def note_pairs(matter, grains, near, touches, time):
+    """Add a step that ends at a time [s] to what is noted of the contacts of pairs."""
+    rows, speed = touches.rows, grains.speed
+    for k in range(touches.used[0]):
+        c = index(k)
+        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
+        if _note(matter, matter.pairs.friction is not None, rows, c, near.drag, time):
+            first = i if grains.number[i] < grains.number[j] else j
+            set_vector(near.drag, index(int(rows[c, LISTED])), ARRIVED, vector_at(speed, first, BEFORE))
+
+
+@outlined
+def note_wall(matter, law, wall, grains, near, touches, noting, given):
+    """The same of the contacts with a wall; `given` is its number, and the time."""
+    rows, speed, half, (number, time) = touches.wall_rows, grains.speed, 0.5 * matter.h, given
+    begin = touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        i = index(touches.wall_ends[c])
+        if _note(matter, law.friction is not None, rows, c, near.wall_drag, time):
+            place, v = index(int(rows[c, LISTED])), vector_at(speed, i, BEFORE)
+            set_vector(near.wall_drag, place, ARRIVED, v)
+            if noting.log.slip is not None:
+                move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
+                n, (both, _last) = faced(wall, grains, touches, c, i, move)
+                set_vector(near.wall_drag, place, SLIP, across(v - 0.5 * both, n))
+
+
+def _row(noting, at, kept, k, time, slip):
+    """A row of a contact with what is noted in row k; `at` is a `Struck` without it, in no cell."""
+    lasted = Lasted(time - kept[k, BEGAN], kept[k, FORCE], kept[k, TAKEN_OFF])
+    back = into(noting.period, at.r)
+    struck = at._replace(
+        r=back.r, before=vector_at(kept, k, ARRIVED), impulse=kept[k, PRESSED], slip=slip, lasted=lasted
+    )
+    noting.log.ended(noting.image, struck, back.images)
+
+
+@outlined
+def log_pairs(matter, grains, near, touches, noting, time):
+    """The rows of the contacts of pairs that have ended in the step, which is done, at a time [s]."""
+    rows, speed, half = touches.rows, grains.speed, 0.5 * matter.h
+    for k in range(touches.used[0]):
+        c = index(k)
+        if rows[c, GAP] > 0.0:
+            i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
+            move = vector_at(rows, c, COAST) + half * (vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
+            if rows[c, GAP] + closing(vector_at(rows, c, START), rows[c, SIZE], move).change <= 0.0:
+                if grains.number[i] > grains.number[j]:
+                    i, j = j, i
+                r, v = vector_at(grains.place, i, X), vector_at(speed, i, BEFORE)
+                at = Struck(grains.number[i], -1.0, time, r, v, v, 0.0, partner=grains.number[j])
+                _row(noting, at, near.drag, index(int(rows[c, LISTED])), time, ZERO)
+
+
+@outlined
+def log_wall(matter, wall, grains, near, touches, noting, given):
+    """The same of the contacts with a wall; `given` is its number, and the time."""
+    rows, speed, half, (number, time) = touches.wall_rows, grains.speed, 0.5 * matter.h, given
+    begin = touches.wall_spans[0, number]
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        if rows[c, GAP] > 0.0:
+            i = index(touches.wall_ends[c])
+            radius = grains.place[i, RADIUS]
+            move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
+            own = met(wall, touches.listed, touches.spans, c, radius)
+            if rows[c, GAP] + rising(own, vector_at(rows, c, START), rows[c, SIZE], move).change <= 0.0:
+                r, v = vector_at(grains.place, i, X), vector_at(speed, i, BEFORE)
+                member = noting.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
+                place = index(int(rows[c, LISTED]))
+                slip = ZERO if noting.log.slip is None else vector_at(near.wall_drag, place, SLIP)
+                at = Struck(grains.number[i], float(member), time, r, v, v, 0.0)
+                _row(noting, at, near.wall_drag, place, time, slip)
