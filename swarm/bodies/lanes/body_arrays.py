@@ -215,23 +215,20 @@ class HeldContacts(NamedTuple):
     """The contacts of each lane that last, at most C of them; of walls that are springs all."""
 
     name: Counts  # (B, C, 2) point and wall
-    frame: Floats  # (B, C, 3, 3) normal and two tangents
-    press: Floats  # (B, 3 C) force along each [N]
+    frame: Floats  # (B, 2 C, 3, 3) normal and two tangents; behind them those with which every trial of a step begins
+    press: Floats  # (B, 6 C) force along each [N], and likewise; more arrays make a step 1.4 times as long
     before: Floats  # (B, 3 C) and in the step before, NaN if that step had other contacts
     impulse: Floats  # (B, C) of the step [N s]
     work: Floats  # (B, C) of its wall in the step [J]
     stages: Counts  # (B, C) in how many stages of the step it pushes
     lost: Floats  # (B,) to friction in the step [J]
     multiplier: Floats  # (B, C) lambda of walls that are springs
-    guess: Floats  # (B, 3 C) the forces with which every trial of the step begins
-    guess_frame: Floats  # (B, C, 3, 3) and their directions
 
 
 def arrays_of_held(lanes, most):
     """The shape and the type of each array of `HeldContacts`."""
     whole, real, some = np.int64, np.float64, (lanes, most)
     return (
-        ((lanes, most, 2), whole), ((lanes, most, 3, 3), real), ((lanes, 3 * most), real), ((lanes, 3 * most), real),
-        (some, real), (some, real), (some, whole), (lanes, real), (some, real), ((lanes, 3 * most), real),
-        ((lanes, most, 3, 3), real),
+        ((lanes, most, 2), whole), ((lanes, 2 * most, 3, 3), real), ((lanes, 6 * most), real),
+        ((lanes, 3 * most), real), (some, real), (some, real), (some, whole), (lanes, real), (some, real),
     )  # fmt: skip

@@ -33,14 +33,14 @@ class HardContacts(BodyContacts):
     @outlined
     def begin(self: Any, i):
         # In a step they press as in the step before where they are the same.
-        pace, active = self.pace, self.active
+        pace, active, most = self.pace, self.active, self.rule.most
         if not (pace.fresh[i] or not pace.solved[i]):
             # All trials of a step begin alike. Friction is solved to `_CREEP`, not to round-off: from the forces of the
             # trial before, one that ended inside ends outside when it is made again, and no time would be the impact's.
             for a in range(pace.active[i]):
                 for d in range(3):
-                    active.press[i, 3 * a + d] = active.guess[i, 3 * a + d]
-                    put_direction(active.frame[i], a, d, direction(active.guess_frame[i], a, d))
+                    active.press[i, 3 * a + d] = active.press[i, 3 * (most + a) + d]
+                    put_direction(active.frame[i], a, d, direction(active.frame[i], most + a, d))
             return
         name, frame, before, found = active.name[i], active.frame[i], pace.active[i], 0
         fresh = scratch((MOST_CONTACTS, 2), np.int64)
@@ -65,8 +65,8 @@ class HardContacts(BodyContacts):
                     put_direction(frame, a, d, direction(turned, a, d))
         for a in range(found):
             for d in range(3):
-                active.guess[i, 3 * a + d] = active.press[i, 3 * a + d]
-                put_direction(active.guess_frame[i], a, d, direction(frame, a, d))
+                active.press[i, 3 * (most + a) + d] = active.press[i, 3 * a + d]
+                put_direction(active.frame[i], most + a, d, direction(frame, a, d))
 
     @outlined
     def turn(self: Any, i, r1):
