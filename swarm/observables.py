@@ -25,7 +25,7 @@ CHUNK = 256
 _COLUMNS = 64
 
 # Rows of what has crossed a counter, in both senses: how many, and the sums.
-_COUNTED = 2 * (1 + CROSSED)
+COUNTED = 2 * (1 + CROSSED)
 
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
 
@@ -262,7 +262,7 @@ def summed(
     totals = np.add.reduce(np.ascontiguousarray(sums), axis=1)
     kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
     lost, lasted = totals[_ENERGY_ERROR : _ENERGY_ERROR + 2].tolist()
-    last = len(totals) - _COUNTED * counters
+    last = len(totals) - COUNTED * counters
     walls, crossed = totals[_ENERGY_ERROR + 2 : last], totals[last:]
     pushed, heat = walls[:booked], walls[booked:]
     # The work of walls that move is booked behind their impulses.
@@ -281,11 +281,11 @@ def summed(
         "wall_heat": np.bincount(owners, weights=heat) if has_heat else np.zeros_like(impulse),
         **moves,
         **_of_parts(parts, pushed[: len(owners)], heat if has_heat else None),
-        **_of_counters(crossed, counters),
+        **of_counters(crossed, counters),
     }
 
 
-def _of_counters(crossed: Floats, counters: int) -> dict[str, NDArray[Any]]:
+def of_counters(crossed: Floats, counters: int) -> dict[str, NDArray[Any]]:
     """What has crossed each counter in each sense, from the rows of `Crossed`."""
     if not counters:
         return {}

@@ -424,9 +424,6 @@ def test_methods_without_counters_are_refused():
     sentence = "a contact_step of 0.001, got 1; leave contact_step out"
     with pytest.raises(swarm.SceneError, match=rf"counters must be left out with {sentence}"):
         swarm.simulate(SPHERE, start, swarm.Impact(contact_step=1e-3), until=1.0, counters=[swarm.Sphere(0.1)])
-    bodies = swarm.place(SPHERE, swarm.dumbbell(length=0.1, mass=1.0), 2, seed=1)
-    with pytest.raises(swarm.SceneError, match=r"counters must be left out with bodies, got 1; use particles"):
-        swarm.simulate(SPHERE, bodies, swarm.Impact(dt=1e-2), until=1.0, counters=[swarm.Sphere(0.1)])
     fast = one([0.5, 0.4, 0.3], [1e9, 0.0, 0.0])
     with pytest.raises(
         swarm.SceneError, match=r"period\[0\] must be so long that particles come through at most 1e\+07"

@@ -383,10 +383,10 @@ def test_bad_input(tmp_path, monkeypatch, keywords, message):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_bodies_have_no_log(tmp_path):
+def test_bodies_at_soft_walls_have_no_log(tmp_path):
     body = swarm.place(SPHERE, swarm.dumbbell(0.1, 1.0), 2)
-    with pytest.raises(swarm.SceneError, match=r"impacts must be None with bodies, .*; use particles"):
-        swarm.simulate(SPHERE, body, swarm.Impact(dt=1e-2), until=1.0, impacts=tmp_path / "i.h5")
+    with pytest.raises(swarm.SceneError, match=r"impacts must be None with Penalty, .*; use Impact"):
+        swarm.simulate(SPHERE, body, swarm.Penalty(dt=1e-2, penalty=1e3), until=1.0, impacts=tmp_path / "i.h5")
 
 
 def test_impact_particles_without_a_log():

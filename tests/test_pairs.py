@@ -107,7 +107,7 @@ def test_a_sentence_that_changes_is_seen_and_the_folder_of_a_log_is_not():
     (engines, one), *_ = known.refused.items()
     changed = known._replace(refused={engines: one._replace(remedy="run it here")})
     assert pairs.digest_of(changed.sentence(engines[0])) != pairs.DECLARED[engines[0]][known.name]
-    refusal = "impacts must be None with bodies, got {}impacts.h5: several points"
+    refusal = "impacts must be None with a cluster, got {}impacts.h5: its shards"
     assert pairs.digest_of(refusal.format("/tmp/tmpa1/")) == pairs.digest_of(refusal.format(""))
 
 

@@ -11,7 +11,9 @@ from ..methods.base import Method, check_surfaces
 from ..methods.fixed_step import check_solids
 from ..motion.given import require_angles
 from ..particles import Particles
+from ..run.impacts import require_logged
 from ..run.options import RunOptions, Task
+from ..run.preflight.counting import require_compiled, require_counters
 from ..run.preflight.starts import require_inside
 from ..scene import Scene
 from ..surfaces.shapes.slab import Slab
@@ -46,13 +48,13 @@ def task_of(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -
     warn_of_passing(scene, bodies.body)
     _warn_of_turns(bodies, method.dt)  # type: ignore[attr-defined]
     check_surfaces(method, scene)
-    if options.compile != "never":
-        for surface in scene.surfaces:
-            surface.require_compiled()
+    require_compiled(scene, options)
     if len(bodies.body.contacts):
         touching = bodies.contact_points().reshape(3, -1)
         require_inside(scene, Particles(touching, touching))
     points = bodies.particles()
+    require_logged(len(bodies), options)
+    require_counters(scene, points, options)
     if options.keeps_float32():
         require_near(scene, points)
     return Task(compiled, points, method, options, bodies)

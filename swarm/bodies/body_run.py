@@ -16,8 +16,10 @@ from ..methods.base import Method
 from ..motion import pose
 from ..observables import CHUNK
 from ..particles import Particles
-from ..run.base import Arrays, BaseRun
+from ..run.base import Arrays, BaseRun, named
 from ..run.doors import comers
+from ..run.impacts import ThreadLog
+from ..run.preflight.counting import counters_of, crossed_of
 from ..run.starting_state import UNSEEDED, Seeding
 from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
@@ -64,6 +66,10 @@ class BodyRun(BaseRun):
             len(compiled.numbering.surfaces_of_rows) + len(own),
         )
         self._bodies = _state_of(bodies, particles, rows, walls, self._walls[2] is not None, scene.moves())
+        self._counters = counters_of(scene, watched.counters, logs=True)
+        if self._counters is not None:
+            crossed = crossed_of(self._counters, watched.counters, scene, bodies.centers())
+            self._bodies = self._bodies._replace(crossed=crossed)
         none = np.zeros(0)
         # What files take of a run.
         self.state = State(
@@ -110,11 +116,12 @@ class BodyRun(BaseRun):
     def calls(self) -> list[tuple[Any, tuple[Any, ...]]]:
         return [(advance_bodies, self._arguments(0, np.zeros(1, np.int64)))]
 
-    def _arguments(self, thread: int, ticket: Any) -> tuple[Any, ...]:
-        """Arguments of `advance_bodies`, with the counts of a thread."""
-        both, bodies = (self._ties, self._touching), self._bodies
-        if self._tally is not None:
-            bodies = bodies._replace(counts=self._tally.of_thread(thread).impacts)
+    def _arguments(self, thread: int, ticket: Any, page: ThreadLog | None = None) -> tuple[Any, ...]:
+        """Arguments of `advance_bodies`, with the counts of a thread, and its page of the log."""
+        counts = None if self._tally is None else self._tally.of_thread(thread)
+        watchers = self._watchers(self._counters)._replace(counts=counts)
+        watchers = watchers if page is None else page.watched_by(watchers)
+        both, bodies = (self._ties, self._touching), self._bodies._replace(watchers=watchers)
         return both, self._walls, self._rule, bodies, ticket, self._size, self._watch.passes
 
     def _prepare(self, span: float, moment: float) -> None:
@@ -155,9 +162,14 @@ class BodyRun(BaseRun):
         return depths
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
-        threads, ticket = 1 if self._tier.is_plain else self._threads, np.zeros(1, np.int64)
-        calls = [self._arguments(thread, ticket) for thread in range(threads)]
-        status, body = max(self._called(advance_bodies, calls, latest))
+        threads, status, body = 1 if self._tier.is_plain else self._threads, int(Status.LOG_FULL), 0
+        pages = [self._open_page(moment) for _thread in range(threads)]
+        while status == Status.LOG_FULL:
+            ticket = np.zeros(1, np.int64)
+            calls = [self._arguments(thread, ticket, page) for thread, page in enumerate(pages)]
+            status, body = max(self._called(advance_bodies, calls, latest))
+            for page in (one for one in pages if one is not None):
+                page.turn() if status == Status.LOG_FULL else page.close()
         return status, body
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
@@ -222,7 +234,7 @@ class BodyRun(BaseRun):
         sums, errors, depths = zip(*(self._sums_of(*block, moment) for block in self._blocks()), strict=True)
         self._sums = np.ascontiguousarray(np.array(sums).T)
         self._seen = {
-            **summed(self._sums, self._owners, surfaces, len(self._own), len(self._body.cavities)),
+            **summed(self._sums, self._owners, surfaces, len(self._own), len(self._body.cavities), self._counted()),
             "energy_error": max(errors),
             "max_penetration": float(max([*depths, *(out.max() for out in self._out_of_own())])),
             "impacts": int(bodies.impacts.sum()),
@@ -233,6 +245,10 @@ class BodyRun(BaseRun):
         }
         if self._rule.loop:
             self._seen["sweeps"] = int(bodies.sweeps.sum())
+
+    def _counted(self) -> int:
+        """The number of counters."""
+        return 0 if self._counters is None else len(self._counters.each)
 
     def _sums_of(self, some: slice, r: Floats, v: Floats, moment: float) -> tuple[list[float], float, float]:
         """Of one chunk: what is summed, as `summed` takes it, the largest error of the energy, how far it is out."""
@@ -251,6 +267,10 @@ class BodyRun(BaseRun):
             pushed = np.concatenate([pushed, worked.sum(axis=1)])
             # The rest is that of anchors.
             work = work - worked.sum(axis=0) if len(bodies.path) else np.zeros_like(work)
+        if bodies.crossed is not None:
+            parts = (bodies.crossed.number, bodies.crossed.sums)
+            passed = [np.ascontiguousarray(part[:, some]).sum(axis=1) for part in parts]
+            pushed = np.concatenate([pushed, *passed])
         numbers = (kinetic, fall, elastic, total, lost, bodies.sliding[some], work)
         depth = self._depths(some, r, moment).max(initial=0.0) if len(self._body.contacts) else 0.0
         return (
@@ -278,7 +298,9 @@ class BodyRun(BaseRun):
             )
 
     def _arrays(self) -> Arrays:
-        return {name: array for name, array in self._bodies._asdict().items() if array is not None}
+        crossed = {} if self._bodies.crossed is None else named("crossed", self._bodies.crossed)
+        kept = self._bodies._replace(watchers=None, mass=None, crossed=None)._asdict()
+        return crossed | {name: array for name, array in kept.items() if array is not None}
 
 
 def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
@@ -328,4 +350,5 @@ def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, opens
         free=np.zeros((len(body.contacts), n), np.int8) if opens else None,
         escape_time=np.full(n, math.nan) if opens else None,
         wall_work=np.zeros((walls, n)) if moves else None,
+        mass=np.full(n, body.mass_matrix.sum()),
     )

@@ -92,6 +92,11 @@ class Bodies(TiedParticles):
         """(3, K, n) the points that can touch walls."""
         return np.asarray(np.einsum("kp,xpn->xkn", self.body.contacts, self.position))
 
+    def centers(self) -> Floats:
+        """(3, n) the centres of mass."""
+        weight = self.body.mass_matrix.sum(axis=0)
+        return np.asarray(np.tensordot(self.position, weight / weight.sum(), axes=(1, 0)))
+
     def bonds(self) -> Pairs:
         """(B n, 2) the pairs of points that are tied, of all copies, as numbers of `particles`."""
         n = len(self)

@@ -8,6 +8,7 @@ import numpy as np
 from ..compiled_scene import CompiledScene
 from ..contact.energy import contact_energy
 from ..kernel.vector import column
+from ..observables import COUNTED, of_counters
 from ..state import Floats
 from .body import Body
 from .lanes.body_arrays import Ties
@@ -85,14 +86,18 @@ class BodyEnergies:
         return np.tensordot(self._body.contacts, r, axes=(1, 1)).transpose(1, 0, 2)
 
 
-def summed(sums: Floats, owners: list[int], surfaces: int, own: int, cavities: int) -> dict[str, Any]:
+def summed(
+    sums: Floats, owners: list[int], surfaces: int, own: int, cavities: int, counters: int = 0
+) -> dict[str, Any]:  # fmt: skip
     """The observables that are sums over bodies, from those of all chunks (quantities, chunks).
 
     `owners` says which surface each wall belongs to. Rows of impulse are of these, then of the `own` surfaces of the
-    body, of which the last `cavities` are cavities; behind them the work of the walls, where some move.
+    body, of which the last `cavities` are cavities; behind them the work of the walls, where some move, and what has
+    crossed so many counters.
     """
     kinetic, fall, elastic, total, lost, sliding, work, *vectors = (totals := sums.sum(axis=1))[:13].tolist()
-    pushed, worked = np.split(totals[13:], [len(owners) + own])
+    last = len(totals) - COUNTED * counters
+    pushed, worked = np.split(totals[13:last], [len(owners) + own])
     return {
         "kinetic_energy": kinetic,
         "potential_energy": fall,
@@ -107,4 +112,5 @@ def summed(sums: Floats, owners: list[int], surfaces: int, own: int, cavities: i
         "work": work,
         **({"wall_work": np.bincount(owners, weights=worked, minlength=surfaces)} if len(worked) else {}),
         **({"cavity_impulse": pushed[len(pushed) - cavities :]} if cavities else {}),
+        **of_counters(totals[last:], counters),
     }

@@ -97,8 +97,9 @@ def _added(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
         added = observables.summed(sums, owners, rows, has_heat, of_parts, len(task.options.counters))
     else:
         added = energies.summed(
-            sums, owners, len(task.scene.surfaces), len(own_surfaces(task.bodies.body)), len(task.bodies.body.cavities)
-        )
+            sums, owners, len(task.scene.surfaces), len(own_surfaces(task.bodies.body)),
+            len(task.bodies.body.cavities), len(task.options.counters),
+        )  # fmt: skip
     added |= brought
     seen: dict[str, Any] = {}
     # In the order of a run on one machine.

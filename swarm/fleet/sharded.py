@@ -62,7 +62,7 @@ class Sharded(Session):
         """The folder of the shards and their bounds, those of the session before or so many new ones."""
         folder = shards.folder_of(self._trajectory)
         if self._bounds is None:
-            self._bounds = shards.bounds_of(len(task.particles if task.bodies is None else task.bodies), count)
+            self._bounds = shards.bounds_of(task.count, count)
             shards.clear(folder)
             self._trajectory.unlink(missing_ok=True)
             self.keep(0, 0.0)

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
-from ..errors import RunError
+from ..errors import RunError, SceneError
 from ..lanes.share import Share
 from ..lanes.table import LANES, STRIDE
 from ..lanes.watching.log import GOING, Log
 from ..lanes.watching.watchers import Watchers
-from .options import Task
+from .options import RunOptions, Task
 
 # Rows of one log, and how many logs there are besides the two of each thread: one is written while others are filled.
 # They bound the memory: 6 MB each. With a quarter of the rows a row takes the writer twice as long.
@@ -153,7 +153,7 @@ def log_of(task: Task) -> Impacts | None:
         return None
     threads = options.thread_count()
     return Impacts(
-        task.compiled, len(task.particles), options.impact_particles, options.precision, threads,
+        task.compiled, task.count, options.impact_particles, options.precision, threads,
         bool(options.counters), task.particles.radius is not None,
         task.method.law() is not None,
     )  # fmt: skip
@@ -201,6 +201,13 @@ class ThreadLog:
                 "particles in the log (impact_particles), or leave impacts out"
             )
         self._impacts.hand_over(self.log)
+
+
+def require_logged(n: int, options: RunOptions) -> None:
+    """Raise a `SceneError` where impacts are asked for of particles, or bodies, that are not there."""
+    numbers = options.impact_particles
+    if isinstance(numbers, tuple) and numbers[-1] >= n:
+        raise SceneError(f"impact_particles must be numbers of particles, from 0 to {n - 1}, got {numbers[-1]}")
 
 
 def chosen(particles: Any, n: int) -> NDArray[np.bool_] | None:

@@ -178,6 +178,11 @@ class Task:
         return self.compiled.scene
 
     @property
+    def count(self) -> int:
+        """The number of particles, or of bodies."""
+        return len(self.particles if self.bodies is None else self.bodies)
+
+    @property
     def is_coupled(self) -> bool:
         """Whether particles depend on one another: they meet, or move a wall. Such a run is one shard."""
         return self.particles.radius is not None or self.scene.reacts()

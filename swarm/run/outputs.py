@@ -62,7 +62,7 @@ def _impacts(task: Task, session: Session, log: Impacts | None) -> "Writer | Non
         return None
     from ..files.impacts import ImpactWriter, about
 
-    texts = about(task.compiled, task.method, log.kept, {"particles": len(task.particles), **session.identity})
+    texts = about(task.compiled, task.method, log.kept, {"particles": task.count, **session.identity})
     start = (session.first, log.total) if session.first > 0 else None
     writer = ImpactWriter(task.options.impacts, log.columns(), log.ends, texts, start)
     log.write, log.sums = writer.add, writer.sums

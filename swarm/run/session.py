@@ -92,7 +92,7 @@ class Session:
         elif self._trajectory.exists() and not overwrite:
             self._refuse_to_restart(until)
         if log is not None:
-            self._find_log(task.options.impacts, overwrite)
+            self._find_log(task, overwrite)
 
     def _hold(self, task: Task, log: Impacts | None) -> None:
         """Lock the files of the run, and describe it."""
@@ -132,15 +132,16 @@ class Session:
         else:
             marks.check_target(path, overwrite, what)
 
-    def _find_log(self, path: Path, overwrite: bool) -> None:
+    def _find_log(self, task: Task, overwrite: bool) -> None:
         """Raise a SceneError if the run cannot go on with its log of impacts, or begin it anew."""
+        path: Path = task.options.impacts
         if self.first == 0 and (overwrite or not path.exists()):
             return
         from ..files.impact_log import load_impacts
 
         with load_impacts(path) as before:
             there = dataclasses.replace(self._job, **before.identity)
-            there.require_same(self._job, path)
+            there.require_same(dataclasses.replace(self._job, particles=task.count), path)
             if self.first == 0:
                 return  # a kill came before the first frame of the trajectory
             before.require_holds(self._job.frame + 1, self._job.rows, self._job.sums, self._path)

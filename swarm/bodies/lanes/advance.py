@@ -8,7 +8,8 @@ from ...common.status import Status
 from ...kernel.arrays import next_of, scratch
 from ...kernel.jit import long_kernel, select
 from ...kernel.vector import column
-from . import impact, impact_time, prescribed
+from ...lanes.watching.log import is_full
+from . import following, impact, impact_time, prescribed
 from .body_arrays import PACES, BodyLanes, HeldContacts, LaneNumbers, arrays_of_held, shapes_of_lanes
 from .newton import BRIEF, solve
 from .passages import Passages, look_back
@@ -47,8 +48,9 @@ def advance_bodies(body, walls, rule, state, ticket, size, halt):
         pace.body[i] = -1
     begin, end, passes = 0, 0, 0
     while True:
-        halted = passes >= halt[0]
-        if halted:
+        halted = Status.INTERRUPTED if passes >= halt[0] else Status.DONE
+        halted = Status.LOG_FULL if is_full(state.watchers.log) else halted
+        if halted != Status.DONE:
             begin, end = -1, -1
             _stop(contacts, state)
         live = 0
@@ -65,7 +67,7 @@ def advance_bodies(body, walls, rule, state, ticket, size, halt):
                 begin += 1
             live += pace.body[i] >= 0
         if live == 0:
-            return (Status.INTERRUPTED if halted else Status.DONE), 0
+            return halted, 0
         passes += 1
         _try(contacts, state)
         _look(contacts, walls[0], c)
@@ -83,7 +85,7 @@ def advance_bodies(body, walls, rule, state, ticket, size, halt):
             for i in range(count):
                 if pace.body[i] >= 0 and (pace.action[i] == impact_time.COMMIT or pace.action[i] == impact_time.STRIKE):
                     contacts.come_back(i)
-        _commit(contacts)
+        _commit(contacts, state)
         for i in range(count):
             if pace.action[i] != impact_time.AGAIN:
                 _finish(contacts, state, i)
@@ -276,8 +278,10 @@ def _look(contacts, scene, c):
             pace.out[i] = pace.out[i] | (contacts.walls_then(i).distance(wall, touching.place(r1, k, i)) > 0.0)
 
 
-def _commit(contacts):
+def _commit(contacts, state):
     """Take the trial as the step where it is one."""
+    if state.watchers.counters is not None:
+        following.count_steps(contacts, state)
     lanes, pace, count = contacts.lanes, contacts.pace, contacts.pace.out.size
     for i in range(count):
         pace.done[i] = (pace.action[i] == impact_time.COMMIT) | (pace.action[i] == impact_time.STRIKE)

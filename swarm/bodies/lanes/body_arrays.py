@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel.vector import ZERO, column
+from ...lanes.watching.watchers import Watchers
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -126,13 +127,17 @@ class BodyState(NamedTuple):
     free: Any = None  # (K, n) int8, whether a contact point has passed an opening; None without openings
     escape_time: Any = None  # (n,) when the last one of a body has [s], NaN of bodies that are inside
     wall_work: Any = None  # (walls, n) of each wall [J], a part of `work`; None where none moves
-    counts: Any = None  # (walls,) int64, impacts on each that one thread has computed, where they are counted
+    # What is told of impacts and of steps, and what counters write to:
+    watchers: Any = Watchers()  # of the thread
+    mass: Any = None  # (n,) of each body [kg]
+    crossed: Any = None  # `Crossed`, where there are counters
+    image: Any = None  # (3, n) how many cells away each body is, where the scene repeats
 
     def count_impact(self, number, wall):
-        """Count an impact of a body on a wall."""
+        """Count an impact of a body on a wall that is a spring."""
         self.impacts[number] += 1
-        if self.counts is not None:
-            self.counts[wall] += 1
+        if self.watchers.counts is not None:
+            self.watchers.counts.add(wall, 1)
 
 
 class BodyLanes(NamedTuple):

@@ -10,6 +10,7 @@ from ...kernel.jit import Array, outlined
 from ...kernel.limits import ENERGY_OF_IMPACT, EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import column, dot, put, square
+from ...lanes.watching.log import Struck
 from .contacts import MOST_CONTACTS, direction, missing, sweep
 
 # Blows at one instant; sweeps over the contacts of one, and the change of their impulses that ends them.
@@ -113,25 +114,31 @@ def _blow(bodies, state, name, frame, found, i):
     if max(p) == 0.0:
         return False
     is_led = max(ties.led) >= 0
-    before = kinetic_of(ties, v, i) if is_led else 0.0
+    moved = kinetic_of(ties, v, i) if is_led else 0.0
     against = scratch(m, np.float64)
     if not elastic:
         # Links of lengths that change give their energy away in the next short step, which takes a change back.
         lost += blow.strain(scratch(m, np.float64), against, i)
     work = blow.work(state, p, i)
+    before = scratch((3, found), np.float64)
+    if state.watchers.log is not None:
+        for a in range(found):
+            put(before, 0, a, touching.place(v, name[a, 0], i))
     blow.give(p, against, i)
     for a in range(found):
-        w = name[a, 1]
-        state.impulse[bodies.walls.row(float(w)), number] += p[wide * a]
+        state.impulse[bodies.walls.row(float(name[a, 1])), number] += p[wide * a]
         if p[wide * a] > 0.0:
-            state.count_impact(number, w)
+            state.impacts[number] += 1
+            # Of a cavity that a point carries no impact is told.
+            if name[a, 1] < touching.walls:
+                state.watchers.hit(state.image, blow.struck(a, column(before, 0, a), p[wide * a], i))
     if not elastic:
         # p times the mean of the rates before and after
         for a in range(rows):
             lost += 0.5 * p[a] * (rate[a] + missing(blow.schur, a, rate[a], p))
     state.dissipated[number] += lost
     if is_led:
-        work = (kinetic_of(ties, v, i) - before) + lost
+        work = (kinetic_of(ties, v, i) - moved) + lost
     state.work[number] += work
     return True
 
@@ -172,6 +179,16 @@ class BodyImpact(Record):
                 state.wall_work[bodies.walls.row(wall), number] += work
                 total += work
         return total
+
+    def struck(self, a, before, impulse, i):
+        """The `Struck` of contact a, which had a velocity before."""
+        bodies, (k, wall) = self.bodies, (self.name[a, 0], self.name[a, 1])
+        c, u = bodies.touching.place(bodies.lanes.r, k, i), bodies.touching.place(bodies.lanes.v, k, i)
+        n, slip = self.direction(self.wide * a), bodies.slip(bodies.walls_now(i), wall, c, before)
+        time = bodies.rule.end - bodies.pace.remaining[i]
+        return Struck(
+            bodies.pace.body[i], float(wall), time, c, before, u, impulse, slip - dot(slip, n) * n
+        )  # fmt: skip
 
     def coupling(self, row):
         """The row of a link or guide among all couplings."""

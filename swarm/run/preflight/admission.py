@@ -14,9 +14,10 @@ from ...sources.births import with_births
 from ...surfaces.instant import gaps_of, gradient_of
 from ...surfaces.plane import require_start
 from .. import engines
+from ..impacts import require_logged
 from ..options import RunOptions, Task
 from . import workload
-from .counting import require_counters
+from .counting import require_compiled, require_counters
 from .knows import Asked, require_known
 from .starts import require_inside
 
@@ -56,18 +57,14 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
     balls = _balls(scene, start, method, options)
     radius = None if balls is None else balls.radius
     compiled = scene.compiled(None if radius is None else float(radius.max()), method.apart())
-    if options.compile != "never":
-        counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
-        walls = [*scene.surfaces, *scene.pieces.open_volumes()]
-        for surface in [*walls, *counters]:
-            surface.require_compiled()
+    require_compiled(scene, options)
     _require_motions(scene, times.until)
     if balls is None:
         particles = with_births(scene, start, options.sources, options.seed, times.until, method.birth_times)
     else:
         particles = balls
         place_unborn(scene, balls, options.seed)
-    _require_logged(particles, options)
+    require_logged(len(particles), options)
     if options.keeps_float32():
         require_near(scene, particles)
     method.check(scene, particles)
@@ -148,15 +145,6 @@ def _require_countable(scene: Scene, particles: Particles, until: float) -> None
                 f"particles that may be {reach / length + before:.3g} cells away at {until:g} s; give a longer period, "
                 "or a shorter run"
             )
-
-
-def _require_logged(particles: Particles, options: RunOptions) -> None:
-    """Raise a `SceneError` where impacts are asked for of particles that are not there."""
-    numbers = options.impact_particles
-    if isinstance(numbers, tuple) and numbers[-1] >= len(particles):
-        raise SceneError(
-            f"impact_particles must be numbers of particles, from 0 to {len(particles) - 1}, got {numbers[-1]}"
-        )
 
 
 def _require_normals(scene: Scene, particles: Particles) -> None:

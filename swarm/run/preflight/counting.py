@@ -43,6 +43,14 @@ def require_counters(scene: Scene, particles: Particles, options: RunOptions) ->
         _require_few_cells(scene, particles, options)
 
 
+def require_compiled(scene: Scene, options: RunOptions) -> None:
+    """Raise a `SceneError` where a surface of a run, or of a counter, cannot be compiled."""
+    if options.compile != "never":
+        counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
+        for surface in [*scene.surfaces, *scene.pieces.open_volumes(), *counters]:
+            surface.require_compiled()
+
+
 def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) -> None:
     """Raise a `SceneError` where a flight may cross counters in more cells than can be looked at in a while."""
     every = options.times.every

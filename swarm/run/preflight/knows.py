@@ -437,15 +437,11 @@ CAPABILITIES = (
         ),
     }),
     Capability("log of impacts", _option("impacts"), {
-        _EVERY_BODY: Refusal(
-            "impacts must be None with bodies, got {got}: several points of a body meet a wall at once", "use particles"
-        ),
-        (BASELINE, OTHER_POINTS): Refusal(
+        (SOFT_BODIES, PAPER_BODIES, BASELINE, OTHER_POINTS): Refusal(
             "impacts must be None with {method}, got {got}: its contacts last for a time", "use Impact"
         ),
     }),
     Capability("counter", _option("counters"), {
-        _EVERY_BODY: Refusal("counters must be left out with bodies, got {count}", "use particles"),
         (OTHER_POINTS,): Refusal(
             "counters must be left out with {method}, got {count}: a counter follows flights, not steps", "use Impact()"
         ),
