@@ -100,7 +100,7 @@ def test_a_pendulum_is_counted_by_its_steps():
     scene = vessel((0.0, 0.0, -9.81))
     start = swarm.Bodies(rod, rod.points.T[:, :, None], np.zeros((3, 2, 1)))
     run = swarm.simulate(
-        scene, start, swarm.Impact(dt=5e-3), until=1.8, every=0.6, counters=planes, **PLAIN
+        scene, start, swarm.Impact(dt=5e-3), until=1.8, every=0.6, counters=[swarm.Plane((1.0, 0.0, 0.0), 0.0)], **PLAIN
     )  # fmt: skip
     # A quarter of a period is 1.854 sqrt(l/g) = 0.265 s, and then it passes the lowest place every 0.53 s.
     assert run.observables["crossings"][:, 0].sum(axis=1).tolist() == [0, 1, 2, 3]
