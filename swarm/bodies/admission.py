@@ -19,6 +19,7 @@ from ..scene import Scene
 from ..surfaces.shapes.slab import Slab
 from ..surfaces.surface import Surface
 from . import covering
+from .births import with_born
 from .body import Body
 from .copies import Bodies
 
@@ -52,6 +53,7 @@ def task_of(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -
     if len(bodies.body.contacts):
         touching = bodies.contact_points().reshape(3, -1)
         require_inside(scene, Particles(touching, touching))
+    bodies = with_born(scene, bodies, options.sources, options.seed, options.times.until)
     points = bodies.particles()
     require_logged(len(bodies), options)
     require_counters(scene, points, options)

@@ -165,6 +165,11 @@ class Body:
         springs = np.array([spring[:2] for spring in self.springs], dtype=np.int64).reshape(-1, 2)
         return np.concatenate([self.links, springs, self.strained()])
 
+    def center_of(self, position: Floats) -> Floats:
+        """(3, n) the centres of mass of copies (3, P, n), or with velocities those of the centres."""
+        weight = self.mass_matrix.sum(axis=0)
+        return np.asarray(np.tensordot(position, weight / weight.sum(), axes=(1, 0)))
+
     def inverse_mass(self) -> Floats:
         """(P, P) the inverse of the masses of the points that can move; 0 at anchored ones."""
         free = np.setdiff1d(np.arange(len(self)), list(self.anchors))

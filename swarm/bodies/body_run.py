@@ -25,6 +25,7 @@ from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
 from ..scene import Scene
 from ..state import Floats, State
+from .births import BodyFeed
 from .copies import Bodies
 from .energies import BodyEnergies, summed
 from .lanes.advance import advance_bodies
@@ -66,6 +67,7 @@ class BodyRun(BaseRun):
             len(compiled.numbering.surfaces_of_rows) + len(own),
         )
         self._bodies = _state_of(bodies, particles, rows, walls, self._walls[2] is not None, scene.moves())
+        self._counted_by = watched.counters
         self._counters = counters_of(scene, watched.counters, logs=True)
         if self._counters is not None:
             crossed = crossed_of(self._counters, watched.counters, scene, bodies.centers())
@@ -102,14 +104,15 @@ class BodyRun(BaseRun):
         self._rule = StepRule(dt, stages, gravity, 0.0, room, noise, lanes, soft, contacts, looped, strict)
         # Frames of fixed steps are counted in steps.
         self._unit = 1.0 if soft is None or soft.is_cut else dt
-        pull = math.hypot(*gravity) * self._ties.mass.sum()
-        self._led_start, self._energy_start, self._scale = np.zeros((3, n))
+        self._pull = math.hypot(*gravity) * self._ties.mass.sum() * size
+        self._led_start, self._scale = np.zeros((2, n))
+        self._energy_start = self._bodies.energy
+        if bodies.births is not None:
+            self._feed = BodyFeed(scene, bodies, seeding.seed, self._energy_of)
+            self.state = self.state._replace(born_time=np.tile(self._feed.born_time, points))
         for some, r, v in self._blocks():
-            kinetic = self._energies.kinetic(v)
             self._led_start[some] = self._energies.led(r, v)
-            self._energy_start[some] = start = kinetic + self._energies.fall(r) + self._energies.stored(r)
-            self._scale[some] = np.maximum(np.abs(start), kinetic) + pull * size
-        self._bodies.energy[:] = self._energy_start
+            self._begin_books(some, r, v)
         self._seen: dict[str, Any] = {}
         self._sums = np.zeros((0, 0))
 
@@ -136,7 +139,32 @@ class BodyRun(BaseRun):
             self._bodies.remaining.fill(span * self._unit)
             if self._bodies.escape_time is not None:
                 self._bodies.remaining[~np.isnan(self._bodies.escape_time)] = 0.0
+            self._feed_in(moment)
         self._rule = self._rule._replace(end=moment)
+
+    def _energy_of(self, r: Floats, v: Floats) -> Floats:
+        """The energy of copies."""
+        return self._energies.kinetic(v) + self._energies.fall(r) + self._energies.stored(r)
+
+    def _begin_books(self, some: Any, r: Floats, v: Floats) -> None:
+        """Begin the books of the energy of copies that are there now."""
+        self._energy_start[some] = start = self._energy_of(r, v)
+        self._scale[some] = np.maximum(np.abs(start), self._energies.kinetic(v)) + self._pull
+
+    def _feed_in(self, moment: float) -> None:
+        """Let those come that are due up to a moment [s]; what is left of the frame is theirs."""
+        feed, bodies = self._feed, self._bodies
+        if not isinstance(feed, BodyFeed):
+            return
+        bodies.remaining[np.isnan(feed.born_time)] = 0.0
+        for time, some, r, v in feed.until(moment):
+            bodies.position[..., some], bodies.velocity[..., some] = r, v
+            bodies.remaining[some] = moment - time
+            self._begin_books(some, r, v)
+            if self._counters is not None:
+                centers = self._body.center_of(r)
+                sides = crossed_of(self._counters, self._counted_by, self._scene, centers).side
+                bodies.crossed.side[:, some] = sides
 
     def _reach(self, moment: float) -> None:
         """The walls of the frame, or its piece, that ends at a moment [s]: alone, with those of the body, and open."""
@@ -146,6 +174,8 @@ class BodyRun(BaseRun):
     def _switch(self, instant: float) -> None:
         for surface in np.flatnonzero(comers(self._scene, instant)):
             depth = self._depths(slice(None), self._bodies.position, instant)[surface]
+            if self._feed is not None:
+                depth[np.tile(np.isnan(self._feed.born_time), len(self._body.contacts))] = -math.inf
             if not depth.max(initial=-math.inf) <= self._deepest:
                 body = self._first + int(np.argmax(depth)) % len(self._bodies.remaining)
                 raise RunError(
@@ -195,14 +225,16 @@ class BodyRun(BaseRun):
 
     # --- What is observed --------------------------------------------------------------------------------
 
-    def _blocks(self) -> Iterator[tuple[slice, Floats, Floats]]:
+    def _blocks(self) -> Iterator[tuple[Any, Floats, Floats]]:
         """The bodies by chunks: which they are, their positions and velocities.
 
         BLAS rounds a column by how many there are, and NumPy a sum by where its numbers lie: with arrays of its own a
         chunk has the same bits in every run that it is a part of.
         """
         for begin in range(0, len(self._bodies.remaining), CHUNK):
-            some = slice(begin, begin + CHUNK)
+            some: Any = slice(begin, begin + CHUNK)
+            if self._feed is not None:
+                some = begin + np.flatnonzero(~np.isnan(self._feed.born_time[some]))
             both = self._bodies.position[..., some], self._bodies.velocity[..., some]
             yield some, np.ascontiguousarray(both[0]), np.ascontiguousarray(both[1])
 
@@ -224,6 +256,7 @@ class BodyRun(BaseRun):
             yield cavity.scene.distances_outside(r[:, point] - r[:, carrier])
 
     def observe(self) -> None:
+        self._feed_in(0.0)
         self._observe(0.0)
 
     def _observe(self, moment: float) -> None:
@@ -243,6 +276,9 @@ class BodyRun(BaseRun):
             "escaped": 0 if bodies.escape_time is None else int(np.count_nonzero(~np.isnan(bodies.escape_time))),
             "link_error": self._link_error(),
         }
+        if self._feed is not None:
+            self._seen |= self._feed.observed()
+            self.state.born_time[:] = np.tile(self._feed.born_time, len(self._body))  # type: ignore[index]
         if self._rule.loop:
             self._seen["sweeps"] = int(bodies.sweeps.sum())
 
@@ -250,7 +286,7 @@ class BodyRun(BaseRun):
         """The number of counters."""
         return 0 if self._counters is None else len(self._counters.each)
 
-    def _sums_of(self, some: slice, r: Floats, v: Floats, moment: float) -> tuple[list[float], float, float]:
+    def _sums_of(self, some: Any, r: Floats, v: Floats, moment: float) -> tuple[list[float], float, float]:
         """Of one chunk: what is summed, as `summed` takes it, the largest error of the energy, how far it is out."""
         energies, bodies = self._energies, self._bodies
         kinetic, fall, elastic = energies.kinetic(v), energies.fall(r), energies.stored(r)
@@ -275,7 +311,7 @@ class BodyRun(BaseRun):
         depth = self._depths(some, r, moment).max(initial=0.0) if len(self._body.contacts) else 0.0
         return (
             [*(one.sum() for one in numbers), *np.concatenate([*energies.momenta(r, v), pushed])],
-            scaled.max().item(),
+            scaled.max(initial=0.0).item(),
             float(depth),
         )
 
@@ -300,6 +336,7 @@ class BodyRun(BaseRun):
     def _arrays(self) -> Arrays:
         crossed = {} if self._bodies.crossed is None else named("crossed", self._bodies.crossed)
         kept = self._bodies._replace(watchers=None, mass=None, crossed=None)._asdict()
+        kept |= {} if self._feed is None else {"scale": self._scale}
         return crossed | {name: array for name, array in kept.items() if array is not None}
 
 

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from ..common import checks
 from ..errors import SceneError
 from ..motion import led
-from ..particles import Particles, TiedParticles
+from ..particles import Births, Particles, TiedParticles
 from ..state import Floats
 from . import checked, holding
 from .body import Body
@@ -54,6 +54,8 @@ class Bodies(TiedParticles):
     body: Body
     position: Floats
     velocity: Floats
+    # Of all copies, in a run with sources.
+    births: Births | None = None
     # Whether a run left them: its steps keep lengths, and velocities along ties but to the order of the step.
     _is_of_run = False
 
@@ -94,8 +96,7 @@ class Bodies(TiedParticles):
 
     def centers(self) -> Floats:
         """(3, n) the centres of mass."""
-        weight = self.body.mass_matrix.sum(axis=0)
-        return np.asarray(np.tensordot(self.position, weight / weight.sum(), axes=(1, 0)))
+        return self.body.center_of(self.position)
 
     def bonds(self) -> Pairs:
         """(B n, 2) the pairs of points that are tied, of all copies, as numbers of `particles`."""
@@ -130,7 +131,11 @@ class Bodies(TiedParticles):
         matrix = self.body.mass_matrix
         mass = np.diagonal(matrix) * (matrix.sum() / np.trace(matrix))
         flat = self.position.reshape(3, -1), self.velocity.reshape(3, -1)
-        return Particles(*flat, np.repeat(mass, len(self)))
+        made = Particles(*flat, np.repeat(mass, len(self)))
+        if (births := self.births) is not None:
+            points = len(self.body)
+            made.births = births._replace(time=np.tile(births.time, points), source=np.tile(births.source, points))
+        return made
 
 
 def _rows(name: str, value: ArrayLike, count: int) -> Floats:

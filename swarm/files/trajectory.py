@@ -221,7 +221,7 @@ class Trajectory(Stored):
             return held
 
     def bodies(self, k: int) -> "Bodies":
-        """The bodies at frame k; negative k count from the end.
+        """The bodies at frame k that are born by then; negative k count from the end.
 
         Raises:
             SceneError: the file holds particles, or keeps too few digits: the links of bodies have exact lengths.
@@ -238,7 +238,10 @@ class Trajectory(Stored):
                 'points, or run again with precision = "float64"'
             )
         with self._reading(f"frame {k}"):
-            position, velocity = points.position.reshape(shape), points.velocity.reshape(shape)
+            there = self.born(k).reshape(shape[1:])[0]
+            position, velocity = (
+                rows.reshape(shape)[..., there] for rows in (points.position, points.velocity)
+            )  # fmt: skip
             bodies: Bodies = view("bodies").bodies_of_run(body, position, velocity)
         return bodies
 

@@ -134,19 +134,26 @@ class Feed:
         """A free place for a birth, with a velocity; None where none of a few is free."""
         mass, radius = self._particles.mass[number], self._particles.radius
         assert radius is not None
-        centres = np.concatenate([there.position, *(r[:, None] for _n, r, _v in made)], axis=1)
-        reach = _APART * (np.append(there.radius, radius[[n for n, _r, _v in made]]) + radius[number])
+        there = self._beside(there, made)
+        reach = _APART * (there.radius + radius[number])
         scale = 1.0 if self._births.balls[k].temperature is None else 1.0 / math.sqrt(mass)
         for _try in range(_TRIES):
             position, velocity = self._places[k].at(int(self._tried[k]))
             self._tried[k] += 1
-            away = centres - position[:, None]
+            away = there.position - position[:, None]
             for axis, length in enumerate(self._scene.period or ()):
                 if length is not None:
                     away[axis] -= length * np.rint(away[axis] / length)
             if ((away * away).sum(axis=0) >= reach * reach).all() and self._is_within(position, radius[number], now):
                 return position, scale * velocity
         return None
+
+    def _beside(self, there: There, made: list[tuple[int, Floats, Floats]]) -> There:
+        """What is there with those that were `made` at this instant; their velocities are not asked for."""
+        radius = self._particles.radius
+        assert radius is not None
+        position = np.concatenate([there.position, *(r[:, None] for _n, r, _v in made)], axis=1)
+        return there._replace(position=position, radius=np.append(there.radius, radius[[n for n, _r, _v in made]]))
 
     def _is_within(self, position: Floats, radius: float, now: float) -> bool:
         """Whether a ball is within the walls that move, or come and go."""

@@ -58,6 +58,7 @@ def with_births(
                 f"sources[{k}].radius {must} where the other particles of the run {got}, got {one.radius}: balls and "
                 "points do not meet"
             )
+        one.require_points(f"sources[{k}]")
     drawn = [_drawn(scene, one, f"sources[{k}]", k, seed, until, times_taken) for k, one in enumerate(sources)]
     times = np.concatenate([time for time, _r, _v in drawn])
     if not len(times) + given:

@@ -85,10 +85,13 @@ class Source(Validated):
             neither balls nor walls, each at up to 16 random places. On a wall balls touch it with their surface, on
             another surface and in a volume their centres are there, everywhere as far as the largest one fits.
         density: of balls [kg/m^3], in a plane [kg/m^2], in place of a mass.
-        spin: of balls: the angular speed about random axes, or three numbers, the angular velocity [rad/s].
-        blocked: of balls, what becomes of a birth that finds no free place: "wait", it and those after it come when it
-            finds one, tried again in the time that a ball needs for its radius; "report", it never comes. Both count in
-            the observable `blocked`.
+        spin: of balls and bodies: the angular speed about random axes, or three numbers, the angular velocity [rad/s].
+        blocked: of balls and bodies, what becomes of a birth that finds no free place: "wait", it and those after it
+            come when it finds one, tried again in the time that a ball needs for its radius; "report", it never comes.
+            Both count in the observable `blocked`.
+
+    In a run of bodies those that come are further copies of the body, turned at random; a birth has room where the ball
+    around the body has, about its centre of mass. Its mass is that of the body.
 
     Raises:
         SceneError: an argument is out of its range, or they do not go together. What does not go with the scene (a
@@ -189,14 +192,21 @@ class Source(Validated):
 
     def _check_balls(self) -> None:
         if self.radius is None:
-            given = {"density": self.density is None, "spin": self.spin == 0.0, "blocked": self.blocked == "wait"}
-            if wrong := [name for name, is_left_out in given.items() if not is_left_out]:
+            if self.density is not None:
                 raise SceneError(
-                    f"{wrong[0]} must be left out without a radius, got {getattr(self, wrong[0])}: the particles are "
-                    "points; give radius="
+                    f"density must be left out without a radius, got {self.density:g}: give radius=, or the mass"
                 )
         elif self.density is not None and self.mass != 1.0:
             raise SceneError(f"a source needs one of mass and density, got {self.mass:g} kg and {self.density:g}")
+
+    def require_points(self, name: str) -> None:
+        """Raise a `SceneError` where it asks for what points do not have."""
+        given = {"spin": self.spin == 0.0, "blocked": self.blocked == "wait"}
+        if self.radius is None and (wrong := [key for key, is_left_out in given.items() if not is_left_out]):
+            raise SceneError(
+                f"{name}.{wrong[0]} must be left out without a radius, got {getattr(self, wrong[0])}: the particles "
+                "are points; give radius="
+            )
 
     def largest(self) -> float:
         """The largest radius of its balls [m]; 0 of points."""

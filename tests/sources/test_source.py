@@ -201,8 +201,13 @@ def test_runs_that_support_no_sources():
     with pytest.raises(swarm.SceneError, match=r"sources must be left out with .*; use Impact\(\) with"):
         run(SPHERE, source, start, swarm.Impact(contact_step=1e-3))
     bodies = swarm.place(SPHERE, swarm.dumbbell(0.1, 1.0), 2, speed=1.0)
-    with pytest.raises(swarm.SceneError, match="sources must be left out with bodies, got 1; use particles"):
-        run(SPHERE, source, bodies, swarm.Impact(dt=1e-2))
+    with pytest.raises(swarm.SceneError, match=r"sources must be left out with bodies and Penalty, got 1: a body is"):
+        run(SPHERE, source, bodies, swarm.Penalty(dt=1e-2, penalty=1e3))
+    for given in ({"spin": 1.0}, {"blocked": "report"}):
+        with pytest.raises(
+            swarm.SceneError, match=rf"sources\[0\].{next(iter(given))} must be left out without a radius"
+        ):
+            run(SPHERE, swarm.Source(0, **GIVEN, **given), start)
 
 
 def test_a_formula_has_a_volume_to_be_born_in():

@@ -430,7 +430,10 @@ CAPABILITIES = (
     }, True),
     Capability("no step", _no_step, {(BODIES,): _NO_METHOD}, True),
     Capability("source", _option("sources"), {
-        _EVERY_BODY: Refusal("sources must be left out with bodies, got {count}", "use particles"),
+        (SOFT_BODIES, PAPER_BODIES): Refusal(
+            "sources must be left out with bodies and {method}, got {count}: a body is born at any time, not at the "
+            "end of a step", "use Impact(dt=...)",
+        ),
         (CHORDS, OTHER_POINTS): Refusal(
             "sources must be left out with {whole!r:.200}, got {count}: particles are born at any time, not at the end "
             "of a step", _TO_EXACT,
@@ -740,6 +743,12 @@ CAPABILITIES = (
     Capability("cluster and log of impacts", _on_cluster(_option("impacts")), {
         ENGINES: Refusal(
             "impacts must be None with a cluster, got {got}: its shards keep no common log", "run without a cluster"
+        ),
+    }),
+    Capability("cluster and sources of bodies", _on_cluster(_option("sources")), {
+        _EVERY_BODY: Refusal(
+            "sources must be left out with bodies on a cluster, got {count}: its shards have the bodies of the start",
+            "run without a cluster",
         ),
     }),
     Capability("cluster and observables of some particles", _on_cluster(_measured_in_part), {

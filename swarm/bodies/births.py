@@ -1,0 +1,127 @@
+"""Births of bodies while a run lasts: a birth has room where the ball around the body, about its centre, has room.
+
+Each is turned at random, uniform among all orientations, by its number alone: the same bits for any threads.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..particles import Particles
+from ..run.feeding import Feed, There
+from ..scene import Scene
+from ..sources.ball_places import place_unborn
+from ..sources.births import stream, with_births
+from ..sources.source import Source
+from ..state import Floats
+from .body import Body
+from .copies import Bodies
+
+# Stream of the orientations of a source.
+_TURNS = 5
+# Where no bodies are: they do not meet one another.
+_NONE = There(np.zeros((3, 0)), np.zeros((3, 0)), np.zeros(0))
+
+
+def reach_of(body: Body) -> float:
+    """How far its points are from its centre of mass at most [m]."""
+    return float(np.sqrt((_arms(body) ** 2).sum(axis=0)).max())
+
+
+def _arms(body: Body) -> Floats:
+    """(3, P) from the centre of mass to each point."""
+    points = body.points.T[:, :, None]
+    return np.asarray((points - body.center_of(points)[:, None])[:, :, 0])
+
+
+def with_born(scene: Scene, bodies: Bodies, sources: tuple[Source, ...], seed: int, until: float) -> Bodies:
+    """The bodies of a run with sources, behind those of the start those that come.
+
+    Raises:
+        SceneError: a source does not fit the bodies or the scene.
+    """
+    if not sources:
+        return bodies
+    body = bodies.body
+    if body.anchors or body.guides:
+        raise SceneError(
+            f"sources must be left out with a body that has anchors or guides, got {len(sources)}: its place is given; "
+            "give all copies at the start"
+        )
+    mass = float(body.mass_matrix.sum())
+    for k, one in enumerate(sources):
+        if one.radius is not None:
+            raise SceneError(f"sources[{k}].radius must be left out with bodies, got {one.radius}: the body has a size")
+        if one.mass not in (1.0, mass):
+            raise SceneError(f"sources[{k}].mass must be that of the body, {mass:g} kg, or left out, got {one.mass:g}")
+    around = tuple(replace(one, radius=reach_of(body), mass=mass) for one in sources)
+    centers = _centers(bodies)
+    made = with_births(scene, centers, around, seed, until)
+    assert made.births is not None
+    try:
+        place_unborn(scene, made, seed)
+    except SceneError as error:
+        raise SceneError(str(error).replace("radius must leave a place", "where must leave a place")) from None
+    number = np.arange(len(bodies), len(made))
+    spin = np.zeros_like(made.position) if made.spin is None else made.spin
+    place, velocity, turning = (rows[:, None, number] for rows in (made.position, made.velocity, spin))
+    turns = np.array([_turn(seed, int(made.births.source[i]), int(i)) for i in number]).reshape(-1, 3, 3)
+    arms = np.einsum("nxy,yp->xpn", turns, _arms(body))
+    position = np.concatenate([bodies.position, place + arms], axis=2)
+    velocity = np.concatenate([bodies.velocity, velocity + np.cross(turning, arms, axis=0)], axis=2)
+    all_of_them = Bodies.unchecked(body, position, velocity)
+    all_of_them.births = made.births
+    return all_of_them
+
+
+def _centers(bodies: Bodies) -> Particles:
+    """The balls around bodies."""
+    body = bodies.body
+    return Particles(
+        bodies.centers(), body.center_of(bodies.velocity), body.mass_matrix.sum(), radius=reach_of(body)
+    )  # fmt: skip
+
+
+def _turn(seed: int, k: int, number: int) -> Floats:
+    """A rotation (3, 3), uniform among all, of the birth with a number."""
+    w, *v = (q := stream(seed, k, _TURNS, number).standard_normal(4)) / np.sqrt(q @ q)
+    x, y, z = v
+    cross = np.array([(0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)])
+    return np.asarray(np.eye(3) + 2.0 * (w * cross + cross @ cross))
+
+
+class BodyFeed(Feed):
+    """The births of the bodies of a run.
+
+    Args:
+        scene: the vessel.
+        bodies: all copies, with their births.
+        seed: of the run.
+        energy: of copies by their positions and velocities (3, P, n), (n,) [J].
+    """
+
+    def __init__(self, scene: Scene, bodies: Bodies, seed: int, energy: Any) -> None:
+        balls = _centers(bodies)
+        balls.births = bodies.births
+        super().__init__(scene, balls, seed)
+        # Of each copy how its points are, and move, about its centre.
+        self._arms = bodies.position - balls.position[:, None]
+        self._slips = bodies.velocity - balls.velocity[:, None]
+        self._energy_of = energy
+
+    def until(self, moment: float) -> list[tuple[float, NDArray[np.int64], Floats, Floats]]:
+        """The births up to a moment [s]: the time, the numbers of copies, their positions and velocities (3, P, n)."""
+        made = []
+        while (due := self.next()) <= moment:
+            born = self.come(due, _NONE)
+            position = born.position[:, None] + self._arms[:, :, born.number]
+            velocity = born.velocity[:, None] + self._slips[:, :, born.number]
+            self._energy[born.number] = self._energy_of(position, velocity)
+            made.append((due, born.number, position, velocity))
+        return made
+
+    def _beside(self, there: There, _made: list[tuple[int, Floats, Floats]]) -> There:
+        return there
