@@ -19,8 +19,10 @@ from ...kernel.vector import Vec, absolute, dot, square, total
 from ..fields.grid import enter_bodies
 
 # Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
-# ones more are crossed. For each facet there are at most so many cells, which take 5 bytes each.
-_AREA, _CELLS_EACH, _MOST_CELLS = 6.0, 32.0, 100_000_000
+# ones more are crossed. It doubles with ten times as many facets, from the first number of facets to the second: what
+# the processor's cache holds is crossed sooner. For each facet there are at most so many cells, of 5 bytes each.
+_AREA, _DOUBLES, _FEW, _MANY = 1.5, math.log10(2.0), 1e3, 1e5
+_CELLS_EACH, _MOST_CELLS = 32.0, 100_000_000
 # Cells of few facets.
 _LEAST_CELLS = 64
 # A plane in a cell is known by four whole numbers up to this one, and so to these parts of the cell's diagonal and of a
@@ -68,7 +70,8 @@ def _cells(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, 
     # A flat mesh has room before and behind it.
     extent = np.maximum(extent, 1e-3 * extent.max())
     most = min(max(_CELLS_EACH * len(corners), _LEAST_CELLS), _MOST_CELLS)
-    side = max(math.sqrt(_AREA * area), (extent.prod() / most) ** (1.0 / 3.0))
+    wide = _AREA * (min(max(len(corners), _FEW), _MANY) / _FEW) ** _DOUBLES
+    side = max(math.sqrt(wide * area), (extent.prod() / most) ** (1.0 / 3.0))
     shape = np.maximum(np.ceil(extent / side), 1.0)
     room = 4.0 * MARGIN * extent
     middle = 0.5 * (low + high)
