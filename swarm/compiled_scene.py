@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 MOST_WALLS = 24
 # Of a scene in which impacts move a wall, what takes each wall by itself.
 REACTING = "walls that react"
+# Of a method with steps from one wall, what takes fields by their members, and all other walls by themselves.
+CUT = "steps that are cut at impacts"
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
 
@@ -121,7 +123,7 @@ class CompiledScene:
         in_steps = largest is None and is_in_steps(apart)
         reach = scene.reach_of_steps() if in_steps else largest
         self.pieces = scene.pieces if reach is None else scene.pieces_of_balls(reach)
-        if in_steps:
+        if in_steps and apart != CUT:
             self.pieces = self.pieces.as_walls()
         self.order = order_of(self.pieces.each, apart is None, self.pieces.rooms(), largest is not None)
         walls = len(self._spans)

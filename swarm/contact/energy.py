@@ -7,6 +7,7 @@ from ..kernel.gravity import potential, weight
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot, norm, square, total
+from ..surfaces.walls import Field
 
 # The force needs these of every wall.
 NEEDS = ("inner", "gap_of", "gap_slope", "discrete_gradient")
@@ -38,7 +39,8 @@ def contact_energy(law, walls, over_mass, r):
         return 0.0
     stored = 0.0
     for wall in reversed(walls.each):
-        stored = law.stored_energy(wall.gap_of(wall.inner(r))) + stored
+        gap = wall.members.deepest_in_cell(r) if isinstance(wall, Field) else wall.gap_of(wall.inner(r))
+        stored = law.stored_energy(gap) + stored
     return stored * over_mass
 
 

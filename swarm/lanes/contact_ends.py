@@ -51,13 +51,31 @@ def end_hard_contacts(method, walls, gravity, share, lanes, i, before, kept):
     if method.laws_at_ends is None:
         return
     for s in range(walls.length()):
-        end_contacts(method, walls, gravity, share, lanes, i, before, (float(s), lanes.impulse[s, i] - kept[s]))
+        pushed = _wall_of_row(walls, s, lanes.lane(i).r), lanes.impulse[s, i] - kept[s]
+        end_contacts(method, walls, gravity, share, lanes, i, before, pushed)
+
+
+def _wall_of_row(walls, row, r):
+    """The wall of a row: of a field the member that a point is deepest in, or nearest to."""
+    if len(walls.fields()) == 0:
+        return float(row)
+    return _deepest_of_row(walls, row, r)
+
+
+@outlined
+def _deepest_of_row(walls, row, r):
+    number, found, most = walls.numbers_near(r), -1.0, -math.inf
+    for k in range(number.size):
+        depth = walls.distance(number[k], r)
+        if walls.row(number[k]) == row and depth > most:
+            found, most = number[k], depth
+    return found
 
 
 @outlined
 def _end(method, walls, gravity, share, lanes, i, step):
     before, wall, impulse = step
-    flier, p, row = lanes.lane(i), index(lanes.particle[i]), index(int(wall))
+    flier, p, row = lanes.lane(i), index(lanes.particle[i]), index(walls.row(wall))
     state = share.state
     state.pressed[row, p] += impulse
     now, v = method.at_start(lanes.faced(walls, i), flier.remaining), flier.v
@@ -131,9 +149,10 @@ def _send(method, walls, now, gravity, share, lanes, i, at):
     flier.twice += change
     if not method.dissipates:
         state.energy[p] += 0.5 * change
-    lanes.impulse[index(int(wall)), i] += bounce.impulse - 2.0 * b
+    row = index(now.row(wall))
+    lanes.impulse[row, i] += bounce.impulse - 2.0 * b
     add_work(walls, lanes.impulse, i, wall, 0.5 * (bounce.work - turned))
-    heat = book_energy(state, (index(int(wall)), p, p), mass, bounce)
+    heat = book_energy(state, (row, p, p), mass, bounce)
     if share.counts is not None:
         share.counts.give(wall, heat, bounce.wait)
     if state.absorbed is not None and bounce.wait > 0.0:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.validated import Count, Flag, Positive, choice
+from ..compiled_scene import CUT
 from ..contact import uzawa
 from ..contact.discrete_gradient import form_of, reaction_needs
 from ..contact.reflection import CHORD_NEEDS
@@ -65,7 +66,8 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
         adaptive: cut each step at the instant of impact (the paper's recommendation); flights are then exact over any
             time, and contact steps are dt long. A step with another wall in its way is replaced by the exact
-            reflection. Without gravity only.
+            reflection, and so is one that ends beyond the body, the face or the side that it is with, of fields, meshes
+            and outlines: these need it. Without gravity only.
         acceleration: "none" is the paper's loop; "secant" replaces (8) by a secant; "reflection" starts the secant from
             the multiplier of the converged step. All have the same fixed point; where it does not exist, all use (8).
         on_unconverged: what happens if a loop ends above the tolerance. "raise" ends the run and names step,
@@ -147,8 +149,11 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
             _POLICIES[self.on_unconverged],
             scene.reach_of_steps() if self.adaptive else fixed_step.longest_step(scene, self.dt),
             fixed_step.moves(scene),
-            fixed_step.laws_at_ends(scene),
+            fixed_step.laws_at_ends(scene, self.apart()),
         )
+
+    def apart(self) -> str:
+        return CUT if self.adaptive else type(self).__name__
 
     def time_of_impact(self) -> float | None:
         # A centred step is a part of the flights before and after it.

@@ -108,9 +108,9 @@ def moves(scene: Scene) -> Moves | None:
     return Moves(0.0) if scene.moves() else None
 
 
-def laws_at_ends(scene: Scene) -> Laws | None:
+def laws_at_ends(scene: Scene, apart: str = "fixed steps") -> Laws | None:
     """The laws of walls as kernels take them, where a wall has any besides its motion."""
-    laws = scene.compiled(apart="fixed steps").laws
+    laws = scene.compiled(apart=apart).laws
     return laws if laws is not None and (laws.loses or laws.send_off) else None
 
 

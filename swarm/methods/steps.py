@@ -20,7 +20,7 @@ from ..kernel.arrays import kept, scratch
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import outlined, select
 from ..kernel.vector import square
-from ..surfaces.lowered import lowered
+from ..surfaces.lowered import as_met, lowered
 from ..surfaces.time_of_impact import flights
 from . import base, contract, penalty
 
@@ -60,12 +60,18 @@ class StepNumbers(penalty.GradientSteps):
         """Whether a contact step starts with an impact."""
         raise NotImplementedError
 
-    def is_alone(self, walls, wall, start, r1, kappa):
-        """Whether no other wall, of those at the end of the step, has a part in it: then one lane can do it alone."""
+    def is_alone(self, met, after, start, r1, kappa):
+        """Whether no other wall than the one that is `met` (walls, number) has a part in the step from `start` to r1.
+
+        `after` are those at its end, as it takes them. Then one lane can do the step alone.
+        """
         raise NotImplementedError
 
-    def is_blocked(self, walls, wall, start, h):
-        """Whether the chord on a wall meets another one later in the step, or passes a solid by."""
+    def is_blocked(self, met, held, start, h):
+        """Whether the chord on the wall that is `met` meets another one later in the step, or passes a solid by.
+
+        `held` are the walls and its number as the step takes them.
+        """
         return False
 
     def start(self, lane):
@@ -73,8 +79,8 @@ class StepNumbers(penalty.GradientSteps):
         return lane
 
     def held(self, walls, start, wall):
-        """The walls as taken by the step that has this lane at its start."""
-        return walls
+        """The walls, and the number of one, as taken by the step that has this lane at its start."""
+        return walls, wall
 
     def ended(self, lane, contact):
         """The contact, with what remains of the frame of the lane."""
@@ -88,12 +94,13 @@ class StepNumbers(penalty.GradientSteps):
 
     def guess(self, walls, gravity, lane, wall):
         start = self.start(lane)
-        return penalty.GradientSteps.guess(self, self.held(walls, start, wall), gravity, start, wall)
+        walls, wall = self.held(walls, start, wall)
+        return penalty.GradientSteps.guess(self, walls, gravity, start, wall)
 
     def improve(self, walls, gravity, lane, wall, solution, multiplier):
         start = self.start(lane)
-        held = self.held(walls, start, wall)
-        return penalty.GradientSteps.improve(self, held, gravity, start, wall, solution, multiplier)
+        walls, wall = self.held(walls, start, wall)
+        return penalty.GradientSteps.improve(self, walls, gravity, start, wall, solution, multiplier)
 
     def free(self, gravity, lane, h):
         return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass * h * h)
@@ -109,7 +116,7 @@ class StepNumbers(penalty.GradientSteps):
 
     def first_multiplier(self, walls, gravity, lane, wall, kappa):
         lane = self.start(lane)
-        walls = self.held(walls, lane, wall)
+        walls, wall = self.held(walls, lane, wall)
         cut, over = self.cut(lane.remaining), self.over(walls, lane.remaining)
         better, multiplier = uzawa.reflection(over, wall, cut.law, self.free(gravity, lane, cut.h))
         use = (self.acceleration == uzawa.REFLECTION) & (multiplier > 0.0)
@@ -124,15 +131,15 @@ class StepNumbers(penalty.GradientSteps):
     # --- Contact ---
 
     def contact(self, walls, gravity, lane, wall, solution):
-        start = self.start(lane)
-        return self.ended(lane, self._step(self.held(walls, start, wall), gravity, start, wall, solution))
+        return self.ended(lane, self._step(walls, gravity, self.start(lane), wall, solution))
 
     def _step(self, walls, gravity, lane, wall, solution):
         """The `Contact` of a lane at the start of its step."""
         cut, kappa = self.cut(lane.remaining), solution.kappa
-        end = self.pushed(walls, gravity, lane, wall, cut.h, kappa)
-        alone = self.is_alone(end.after, wall, lane, end.r, kappa)
-        solved = alone & (not solution.unsolved) & end.over.pushes(wall, kappa)
+        held, number = self.held(walls, lane, wall)
+        end = self.pushed(held, gravity, lane, number, cut.h, kappa)
+        alone = self.is_alone((walls, wall), end.after, lane, end.r, kappa)
+        solved = alone & (not solution.unsolved) & end.over.pushes(number, kappa)
         touching = wall >= 0.0
         step = (lane.remaining > 0.0) & touching & solved
         new = step & self.is_new(end.over, lane.r)
@@ -154,10 +161,10 @@ class StepNumbers(penalty.GradientSteps):
     @outlined
     def hard_pass(self, walls, gravity, lane, wall, lanes, i):
         start = self.start(lane)
-        held = self.held(walls, start, wall)
+        held, number = self.held(walls, start, wall)
         cut, record = self.cut(start.remaining), lanes.record
         h, over = cut.h, self.over(held, start.remaining)
-        if self.is_blocked(held, wall, start, h):
+        if self.is_blocked((walls, wall), (held, number), start, h):
             record[uzawa.SWEEPS, i] = 0.0
             return self.as_impacts(walls, lane, cut, wall, lanes, i)
         free = self.free(gravity, start, h)
@@ -197,8 +204,8 @@ class FixedSteps(StepNumbers):
     def is_new(self, walls, r):
         return not walls.outside(-1.0, r)
 
-    def is_alone(self, walls, wall, start, r1, kappa):
-        return not walls.outside(wall, r1)
+    def is_alone(self, met, after, start, r1, kappa):
+        return not after.outside(met[1], r1)
 
     @outlined
     def as_impacts(self, walls, lane, cut, wall, lanes, i):
@@ -225,6 +232,8 @@ class FixedSteps(StepNumbers):
 class CutSteps(StepNumbers):
     """The method with steps that begin at the impact, without gravity."""
 
+    looks_around = True
+
     def seconds(self, remaining):
         return remaining
 
@@ -238,21 +247,29 @@ class CutSteps(StepNumbers):
     def is_new(self, walls, r):
         return True
 
-    def is_alone(self, walls, wall, start, r1, kappa):
+    def held(self, walls, start, wall):
+        # Of a field the member that is met: its row is the number of that.
+        if len(walls.fields()) == 0:
+            return walls, wall
+        return as_met(walls, wall), select(wall < 0.0, wall, 1.0 * walls.row(wall))
+
+    def is_alone(self, met, after, start, r1, kappa):
         # Fixed steps look at their ends only; these follow the chord. A solid that it passes by (kappa = 0, the free
         # flight ends outside it again) was hit all the same.
+        walls, wall = met
         free = (flights.other_hit(walls, wall, start.r, r1 - start.r, 1.0).time > 1.0) & (kappa != 0.0)
-        return free & (not self.is_too_fast(r1 - start.r))
+        return free & walls.keeps(wall, r1) & (not self.is_too_fast(r1 - start.r))
 
-    def is_blocked(self, walls, wall, start, h):
+    def is_blocked(self, met, held, start, h):
+        (walls, wall), (taken, number) = met, held
         r, p = start.r, h * start.v
-        kappa = chord(walls, wall, r, p)
-        r1 = walls.push(wall, r, p, kappa)
+        kappa = chord(taken, number, r, p)
+        r1 = taken.push(number, r, p, kappa)
         other = flights.other_hit(walls, wall, r, r1 - r, 1.0)
         # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
-        later = other.time <= 1.0 and not walls.of(other.wall, False, uzawa.has_limit, self.law, r)
-        later = later or uzawa.meets_later(walls, wall, self.law, r, p)
-        return not walls.pushes(wall, kappa) or kappa == 0.0 or later
+        later = other.time <= 1.0 and not _is_held_by(walls, other.wall, self.law, r)
+        later = later or not walls.keeps(wall, r1) or uzawa.meets_later(taken, number, self.law, r, p)
+        return not taken.pushes(number, kappa) or kappa == 0.0 or later
 
     @outlined
     def as_impacts(self, walls, lane, cut, wall, lanes, i):
@@ -291,7 +308,8 @@ class CentredSteps(CutSteps):
         return lane._replace(r=lane.r - half * lane.v, remaining=2.0 * half)
 
     def held(self, walls, start, wall):
-        return lowered(walls, wall, start.r)
+        walls, wall = CutSteps.held(self, walls, start, wall)
+        return lowered(walls, wall, start.r), wall
 
     def ended(self, lane, contact):
         half = self.half(lane)
@@ -307,16 +325,17 @@ class CentredSteps(CutSteps):
         there = touching & (self.half(lane) > 0.0)
         return select(there, kappa, 0.0), there
 
-    def is_alone(self, walls, wall, start, r1, kappa):
-        free = (start.remaining > 0.0) & _is_free(walls, start, r1) & (kappa != 0.0)
+    def is_alone(self, met, after, start, r1, kappa):
+        free = (start.remaining > 0.0) & _is_free(met[0], start, r1) & (kappa != 0.0)
         return free & (not self.is_too_fast(r1 - start.r))
 
-    def is_blocked(self, walls, wall, start, h):
+    def is_blocked(self, met, held, start, h):
         if not h > 0.0:
             return True
+        walls, wall = held
         p = h * start.v
         kappa = chord(walls, wall, start.r, p)
-        free = _is_free(walls, start, walls.push(wall, start.r, p, kappa))
+        free = _is_free(met[0], start, walls.push(wall, start.r, p, kappa))
         later = uzawa.meets_later(walls, wall, self.law, start.r, p)
         return not walls.pushes(wall, kappa) or kappa == 0.0 or not free or later
 
@@ -324,4 +343,9 @@ class CentredSteps(CutSteps):
 def _is_free(walls, start, r1):
     """Whether no wall is between the impact, the middle of the step that starts there, and its end r1."""
     middle = start.r + 0.5 * start.remaining * start.v
-    return flights.first_hit(walls, None, middle, r1 - middle).time > 1.0
+    return flights.is_free(walls, middle, r1 - middle, 1.0)
+
+
+def _is_held_by(walls, wall, law, r):
+    """Whether a wall takes part in the loop of a step from r: a particle is on it, and it is no member of a field."""
+    return wall >= walls.count_in_fields() and walls.of(wall, False, uzawa.has_limit, law, r)

@@ -1,6 +1,6 @@
-"""Walls as a centred contact step takes them: the gap of the wall that is met is 0 where the step begins.
+"""Walls as a contact step takes them: of a field the member that is met, and lowered for a step centred about it.
 
-The step then begins in State I, on the level surface of phi through its start, and ends on it.
+A centred step begins in State I, on the level surface of phi through its start, and ends on it: there the gap is 0.
 """
 
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 from ..kernel.jit import select
 from .contract import Smooth
 from .frames import Unturned
+from .walls import Field
 
 
 class Lowered(Unturned):
@@ -24,6 +25,35 @@ class Lowered(Unturned):
 
     def level_of(self, q):
         return self.gap_of(q)
+
+
+class Met(Unturned):
+    """The member of a field that a step is a contact with, if it is `here`; else a wall that nothing reaches."""
+
+    body: Any
+    here: Any
+
+    def gap_of(self, q):
+        return select(self.here, self.body.gap_of(q), -1.0)
+
+    def level_of(self, q):
+        return select(self.here, self.body.level_of(q), -1.0)
+
+    def gap_slope(self, q0, q1):
+        slope, bend = self.body.gap_slope(q0, q1)
+        return select(self.here, slope, 0.0), select(self.here, bend, 0.0)
+
+
+def as_met(walls, number):
+    """The walls with one member of each field in its place, that with this number, which others do not reach."""
+    each: Any = ()
+    for first, wall in walls.numbered():
+        if isinstance(wall, Field):
+            here = (number >= first) & (number < first + wall.count())
+            each = (*each, Met(wall.members.wall(number - first), here))
+        else:
+            each = (*each, wall)
+    return walls._replace(each=each)
 
 
 def lowered(walls, number, r):

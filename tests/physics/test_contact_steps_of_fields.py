@@ -164,9 +164,27 @@ def scenes():
     }  # fmt: skip
 
 
+def loop_of_multipliers(start):
+    return swarm.AugmentedLagrangian(
+        STEP, 1e4, adaptive=True, acceleration="reflection", tolerance=1e-28, max_sweeps=200, contact_start=start
+    )
+
+
+METHODS = {
+    "Impact": lambda start: swarm.Impact(contact_step=STEP, contact_start=start),
+    "AugmentedLagrangian": loop_of_multipliers,
+}
+
+
+# It has no rooms.
+REFUSED = [("foam", "AugmentedLagrangian"), ("union", "AugmentedLagrangian")]
+
+
 @pytest.mark.parametrize("start", ["impact", "centred"])
-@pytest.mark.parametrize("name", scenes())
-def test_steps_are_those_of_a_loop_over_balls_and_planes(name, start):
+@pytest.mark.parametrize(
+    ("name", "method"), [(one, kind) for one in scenes() for kind in METHODS if (one, kind) not in REFUSED]
+)
+def test_steps_are_those_of_a_loop_over_balls_and_planes(name, method, start):
     """Each is a step on the body, the face or the room that is met, or the mirror where that ends or another is met."""
     surfaces, solids, rooms = scenes()[name]
     places = np.array([(0.1, -0.15, 0.1), (-0.2, 0.1, -0.1), (0.2, 0.1, 0.15), (-0.1, -0.2, 0.0)]).T
@@ -178,8 +196,7 @@ def test_steps_are_those_of_a_loop_over_balls_and_planes(name, start):
     elif name == "field":
         places = places * 0.5 - 0.3 * np.array([0.0, 1.0, 1.0])[:, None]
     scene, particles = swarm.Scene(surfaces), swarm.Particles(places, speeds)
-    method = swarm.Impact(contact_step=STEP, contact_start=start)
-    result = swarm.simulate(scene, particles, method, until=UNTIL, compile="never")
+    result = swarm.simulate(scene, particles, METHODS[method](start), until=UNTIL, compile="never")
     assert result.observables["energy_error"].max() <= 1e-12
     assert places_outside(scene, result) <= 1.5
     taken = []

@@ -203,6 +203,10 @@ def _fields(asked: Asked) -> Found:
     yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().fields())
 
 
+def _fields_in_fixed_steps(asked: Asked) -> Found:
+    yield from _fields(asked) if not getattr(asked.method, "adaptive", True) else ()
+
+
 def _sheets(asked: Asked) -> Found:
     yield from ({"i": i, "got": one} for i, one in _walls(asked) if getattr(one, "open", False))
 
@@ -480,8 +484,14 @@ CAPABILITIES = (
     }, within="union"),
     Capability("field", _fields, {
         (SOFT_BODIES, PAPER_BODIES): _listed("bodies and soft walls", "use Impact(dt=...)"),
-        (PAPER, BASELINE, OTHER_POINTS): _listed("{method}", _TO_EXACT),
+        (BASELINE, OTHER_POINTS): _listed("{method}", _TO_EXACT),
     }),
+    Capability("field in fixed steps of multipliers", _fields_in_fixed_steps, {
+        (PAPER,): Refusal(
+            "surfaces[{i}] must not be {kind} with adaptive = False, got {got!r:.200}: a step of fixed length has no "
+            "face or body to begin at", "give adaptive=True, or use Penalty or Impact",
+        ),
+    }, True, within="field"),
     Capability("dt of Impact", _argument("dt", None), {
         (*_RIGID_POINTS, *_RIGID_BALLS): Refusal(
             "dt of Impact must be left out with particles, got {got}: it is the step of bodies", "leave it out"
