@@ -12,7 +12,7 @@ from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import dot, square
 from ..surfaces.shapes.slab import AXES
-from ..surfaces.wall_law import leave_of, may_end, mirrored
+from ..surfaces.wall_law import leave_of, lets_wait, may_end, mirrored
 
 # A squared speed into the wall counts as 0 up to this fraction of the squared speeds before and after the law.
 _ROUND_OFF = 1e-30
@@ -64,6 +64,11 @@ class Laws(Record):
     def may_end(self):
         """Whether one of the `laws` of surfaces may absorb a particle, or let it wait."""
         return any(may_end(law) for one in self.own or () for some in one.each for law in some.laws)
+
+    @property
+    def may_wait(self):
+        """Whether a law of a wall lets particles wait in a trial."""
+        return any(lets_wait(law) for one in self.own or () for some in one.each for law in some.laws)
 
     def in_plane(self, across):
         """These laws in a scene with a plane across the axis of this number, None where it has none."""

@@ -76,6 +76,8 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
         is_in = (own.level_of(q0) > 0.0) | (own.level_of(own.end_inner(r0 + move)) > 0.0)
         if near.wall_is_open is not None:
             is_in = is_in & (not near.wall_is_open[index(k)])
+        if matter.holds is not None:
+            is_in = is_in & (place[i, LIGHTNESS] > 0.0)
         if is_in & (not near.wall_is_on[index(k)]):
             near.wall_is_on[index(k)] = True
             c = index(start + count)

@@ -65,6 +65,7 @@ class Matter(Record):
     limits: Any  # `Limits` of overlaps.py
     openings: Any  # of all walls, or None
     counters: Any = None  # `counters.Counters`, or None
+    holds: Any = None  # True where walls hold balls, else None
 
     @property
     def rubs(self):
@@ -187,6 +188,8 @@ def gather_pairs(matter, grains, near, touches):
             move = half * (here - (vector_at(speed, j, BEFORE) + vector_at(speed, j, AFTER)))
             reach, q0 = radius + place[j, RADIUS], square(s0)
             is_in = (min(q0, square(s0 + move)) < reach * reach) & (not near.is_on[index(k)])
+            if matter.holds is not None:
+                is_in = is_in & (place[i, LIGHTNESS] + place[j, LIGHTNESS] > 0.0)
             if is_in:
                 near.is_on[index(k)] = True
                 c, size = index(count), math.sqrt(q0)

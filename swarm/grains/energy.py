@@ -2,9 +2,10 @@
 
 from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
-from ..kernel.vector import norm
+from ..kernel.vector import norm, put
 from .contacts import apart
 from .grain_arrays import BEFORE, RADIUS, X, vector_at
+from .held import is_held, velocity_of
 from .vessel import met
 
 
@@ -52,13 +53,14 @@ def stored(matter, walls, grains, near):
 
 
 @long_kernel
-def show(grains, state):
-    """Copy where balls are, and how fast, into the state, in the order of the particles."""
+def show(grains, state, held):
+    """Copy where balls are, and how fast, into the state, in the order of the particles; `held` is a `Held` or None."""
     for k in range(grains.number.size):
         i = index(k)
-        one = index(grains.number[i])
+        one, v = index(grains.number[i]), velocity_of(held, grains, i)
+        put(state.velocity, 0, one, v)
         for axis in range(3):
             state.position[axis, one] = grains.place[i, X + axis]
-            state.velocity[axis, one] = grains.speed[i, BEFORE + axis]
             if grains.spin is not None:
-                state.balls.spin[axis, one] = grains.spin[i, BEFORE + axis]
+                turned = held.spin[axis, one] if is_held(held, one) else grains.spin[i, BEFORE + axis]
+                state.balls.spin[axis, one] = turned

@@ -35,6 +35,7 @@ from .drags import Drags, kept_drags, set_drags
 from .exits import stored_with_others
 from .faces import Fields
 from .grain_arrays import BEFORE, DONE, KEPT, LOST, SINCE, SKIN, TAKEN, X
+from .held import held_of
 from .logged import Noting
 from .matter import matter_of
 from .overlaps import COLUMNS
@@ -63,14 +64,15 @@ class GrainsRun(BaseRun):
         radius = particles.radius
         assert radius is not None
         counters = counters_of(scene, watched.counters, logs=True)
-        self._matter = matter_of(compiled, method, radius)._replace(counters=counters)
+        laws = compiled.laws or NONE
+        holds = True if laws.may_wait else None
+        self._matter = matter_of(compiled, method, radius)._replace(counters=counters, holds=holds)
         rubs, spin = self._matter.rubs, particles.spin
         if spin is None and rubs:
             spin = np.zeros((3, n))
         feed = None if particles.births is None else Feed(scene, particles, seeding.seed)
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
         loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
-        laws = compiled.laws or NONE
         ends = laws.may_end
         loses = loses or laws.may_dissipate or ends
         # What contacts store with a wall that goes is lost.
@@ -126,6 +128,8 @@ class GrainsRun(BaseRun):
                 self._fields.places(),
             )  # fmt: skip
             self._world = self._world._replace(sender=sender)
+        if holds is not None:
+            self._world = self._world._replace(held=held_of(state.mass, rubs))
         if counters is not None:
             passing = Passing(state.mass, state.crossed, state.period, self._pages())
             self._world = self._world._replace(followed=Followed(passing, None))
@@ -224,7 +228,7 @@ class GrainsRun(BaseRun):
         lost += stored_with_others(self._matter, world, gone)
         self.state.dissipated[world.grains.number] += lost
         # There it stays.
-        self._tier.kernel(energy.show)(world.grains, self.state)
+        self._tier.kernel(energy.show)(world.grains, self.state, world.held)
         stay = {name: rows[~gone] for name, rows in world.grains._asdict().items() if rows is not None}
         rest, near = world.grains._replace(**stay), world.near
         members = None if near.listed is None else near.listed.size
@@ -405,11 +409,11 @@ class GrainsRun(BaseRun):
         if self._instants is not None or matter.openings is not None:
             into = self.state.dissipated
             yield energy.store_at_walls, (matter, self._walls, 0.0, world.grains, world.near, into)
-        yield energy.show, (world.grains, self.state)
+        yield energy.show, (world.grains, self.state, world.held)
         yield observables.observe, self._observing()
 
     def _show(self, moment: float) -> None:
-        self._tier.kernel(energy.show)(self._world.grains, self.state)
+        self._tier.kernel(energy.show)(self._world.grains, self.state, self._world.held)
         image, position = self.state.image, self.state.position
         for axis, length in enumerate(self._scene.period or ()):
             if length is not None and image is not None:
@@ -451,6 +455,8 @@ class GrainsRun(BaseRun):
         kept = {"clock": self._clock, "image": self._image}
         for name in ("grains", "near", "books"):
             kept |= named(name, getattr(self._world, name))
+        if self._world.held is not None:
+            kept |= named("held", self._world.held._replace(mass=None))
         if self.state.escape_time is not None or self.state.absorbed_time is not None:
             # Where those are that are gone, and how fast.
             kept |= {"position": self.state.position, "velocity": self.state.velocity}

@@ -36,6 +36,7 @@ from .grain_arrays import (
     set_vector,
     vector_at,
 )
+from .held import velocity_of
 from .vessel import met, met_member
 
 
@@ -104,8 +105,9 @@ def _row(noting, at, kept, k, time, slip):
 
 
 @outlined
-def log_pairs(matter, grains, near, touches, noting, time):
+def log_pairs(matter, world, time):
     """The rows of the contacts of pairs that have ended in the step, which is done, at a time [s]."""
+    grains, near, touches, noting = world.grains, world.near, world.touches, world.noting
     rows, speed, half = touches.rows, grains.speed, 0.5 * matter.h
     for k in range(touches.used[0]):
         c = index(k)
@@ -115,14 +117,15 @@ def log_pairs(matter, grains, near, touches, noting, time):
             if rows[c, GAP] + closing(vector_at(rows, c, START), rows[c, SIZE], move).change <= 0.0:
                 if grains.number[i] > grains.number[j]:
                     i, j = j, i
-                r, v = vector_at(grains.place, i, X), vector_at(speed, i, BEFORE)
+                r, v = vector_at(grains.place, i, X), velocity_of(world.held, grains, i)
                 at = Struck(grains.number[i], -1.0, time, r, v, v, 0.0, partner=grains.number[j])
                 _row(noting, at, near.drag, index(int(rows[c, LISTED])), time, ZERO)
 
 
 @outlined
-def log_wall(matter, wall, grains, near, touches, noting, given):
+def log_wall(matter, wall, world, given):
     """The same of the contacts with a wall; `given` is its number, and the time."""
+    grains, near, touches, noting = world.grains, world.near, world.touches, world.noting
     rows, speed, half, (number, time) = touches.wall_rows, grains.speed, 0.5 * matter.h, given
     begin = touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
@@ -133,7 +136,7 @@ def log_wall(matter, wall, grains, near, touches, noting, given):
             move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
             own = met(wall, touches.listed, touches.spans, c, radius)
             if rows[c, GAP] + rising(own, vector_at(rows, c, START), rows[c, SIZE], move).change <= 0.0:
-                r, v = vector_at(grains.place, i, X), vector_at(speed, i, BEFORE)
+                r, v = vector_at(grains.place, i, X), velocity_of(world.held, grains, i)
                 member = noting.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
                 place = index(int(rows[c, LISTED]))
                 slip = ZERO if noting.log.slip is None else vector_at(near.wall_drag, place, SLIP)

@@ -20,6 +20,7 @@ from ..kernel.vector import ZERO, Vec, dot, square
 from ..surfaces.in_motion.posed import Posed
 from .at_walls import rising
 from .grain_arrays import AFTER, BEFORE, COAST, GAP, LIGHTNESS, RADIUS, SIZE, START, X, set_vector, vector_at
+from .held import hold
 from .overlaps import BALL, WALL
 from .vessel import met, met_member, moves
 
@@ -105,4 +106,6 @@ def _act(wall, own, world, at, time):
     if books.absorbed_time is not None and bounce.wait == math.inf:
         books.absorbed_time[one], books.absorbed_wall[one] = time, np.int32(member)
         return Status.LEASE_ENDED.value
+    if world.held is not None and bounce.wait > 0.0:
+        hold(world.held, grains, i, time + bounce.wait)
     return Status.DONE.value

@@ -19,7 +19,8 @@ from .booking import book_pairs, book_wall, count_members
 from .contacts import gather_pairs, push_pairs, sweep_pairs, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
-from .grain_arrays import AFTER, BEFORE, DONE, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
+from .grain_arrays import AFTER, BEFORE, DONE, LIGHTNESS, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
+from .held import let_go
 from .logged import log_pairs, log_wall, note_pairs, note_wall
 from .overlaps import look_at_pairs, look_at_wall
 from .passing import count_moves
@@ -58,6 +59,7 @@ class World(NamedTuple):
     followed: Any = None  # `Followed` of `Passing`, where there are counters
     members: Any = None  # `MemberCounts`, or None
     sender: Any = None  # `Sender`, or None where no wall sends balls off
+    held: Any = None  # `Held`, or None where no wall holds balls
     noting: Any = None  # `Noting`, or None in a run without a log of contacts
 
 
@@ -84,7 +86,10 @@ def _fly(matter, grains):
         i = index(k)
         if spin is not None:
             set_vector(spin, i, AFTER, vector_at(spin, i, BEFORE))
-        set_vector(speed, i, AFTER, accelerated(matter.pull, vector_at(speed, i, BEFORE), matter.h))
+        v = vector_at(speed, i, BEFORE)
+        if matter.holds is None or grains.place[i, LIGHTNESS] > 0.0:
+            v = accelerated(matter.pull, v, matter.h)
+        set_vector(speed, i, AFTER, v)
 
 
 def _gather(matter, walls, world):
@@ -239,10 +244,9 @@ def _note(matter, walls, world, time):
 
 def _log(matter, walls, world, time):
     """The rows of the contacts that have ended in the step, which is done, at a time [s]."""
-    grains, near, touches = world.grains, world.near, world.touches
-    log_pairs(matter, grains, near, touches, world.noting, time)
+    log_pairs(matter, world, time)
     for k, wall in enumerate(walls.each):
-        log_wall(matter, wall, grains, near, touches, world.noting, (k, time))
+        log_wall(matter, wall, world, (k, time))
 
 
 def _book(matter, walls, world):
@@ -273,6 +277,12 @@ def _look(matter, walls, world):
         if status == Status.DONE.value:
             status = look_at_wall(matter, wall, grains, near, books.failed, k)
     return status
+
+
+def _let_go(matter, world, now):
+    """Let the balls go that have waited until a step that begins now [s]."""
+    if world.held is not None:
+        let_go(world.held, world.grains, now, matter.h)
 
 
 def _open(matter, walls, world):
@@ -364,6 +374,7 @@ def march(matter, walls, world, clock, rule):
         if world.noting is not None and is_full(world.noting.log):
             return Status.LOG_FULL.value
         left = (rule.span - clock[DONE]) * matter.h
+        _let_go(matter, world, rule.moment - left)
         now = walls.during(left, left - matter.h)
         listed = walls.at(left + clock[SINCE] * matter.h)
         status = _step(matter, now, listed, world, clock[SKIN])

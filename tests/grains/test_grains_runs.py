@@ -109,7 +109,10 @@ def test_a_cell_is_as_good_as_its_images():
     [
         (swarm.Scene([swarm.Sphere(9.0, restitution=0.0)]), "restitution must be 0.01 or more"),
         (swarm.Scene(ROOM.surfaces, pairs=swarm.Pairs(restitution=0.001)), "pairs.restitution must be 0.01"),
-        (swarm.Scene([swarm.Sphere(9.0, laws=[swarm.Sticky(0.1)])]), "must not let particles with a radius wait"),
+        (
+            swarm.Scene([swarm.Sphere(9.0, laws=[swarm.Sticky(0.1)], motion=swarm.Oscillation((0.1, 0.0, 0.0), 1.0))]),
+            "must not let particles wait where a wall moves",
+        ),
         (swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 5.0, mass=1.0)]), "mass"),
     ],
 )

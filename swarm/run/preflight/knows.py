@@ -632,9 +632,9 @@ CAPABILITIES = (
         ),
     }, within="law of a wall"),
     Capability("wait", _sticky, {
-        _EVERY_BALL: Refusal(
+        _RIGID_BALLS: Refusal(
             "surfaces[{i}].laws[{k}] must not let particles with a radius wait, got {got!r:.200}",
-            "use a law without a wait, such as Lambert, or leave the radius out",
+            "use a law without a wait, such as Lambert, Penalty, or leave the radius out",
         ),
     }, within="law of a wall"),
     Capability("mass of a wall", _masses, {

@@ -13,7 +13,8 @@ class Sticky(WallLaw):
     With another law it leaves by that: `laws=[Lambert(), Sticky(1e-3)]`. Files and observables have a particle that
     waits where it is on the wall, with the velocity with which it will leave, so its energy and momentum are those
     after the impact, and the log of impacts has the time of the impact. It costs nothing in frames in which it waits.
-    The scene must have no motion, and the wall no mass.
+    With `Penalty` it leaves at the start of a step; a grain that waits is a fixed sphere for others. The scene must
+    have no motion, and the wall no mass.
 
     Raises:
         SceneError: by the surface: a time below 0; by the run: a wall moves.

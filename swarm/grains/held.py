@@ -1,0 +1,73 @@
+"""Balls that wait at a wall: a law of it holds them for a while where a contact has ended.
+
+A ball that is held neither moves nor turns, as if its mass had no bound: what presses on it meets a fixed sphere, and
+no work is done on it. Its velocity and spin are those with which it leaves, also in files and sums meanwhile, so that
+its energy is there all the time. It leaves at the start of the first step that begins when its wait is over, or later.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..kernel.arrays import index
+from ..kernel.jit import Array, outlined
+from ..kernel.vector import ZERO, Vec
+from .grain_arrays import BEFORE, LIGHTNESS, set_vector, vector_at
+
+# A step that begins so little of a step earlier begins then.
+_WHOLE = 1e-6
+
+
+class Held(NamedTuple):
+    """Which balls are held, by the numbers of particles."""
+
+    until: Array  # (N,) when each leaves [s], NaN where it is not held
+    velocity: Array  # (3, N) with which it leaves [m/s]
+    spin: Any  # (3, N) [rad/s], None where there is no friction
+    mass: Array  # (N,) [kg]
+
+
+def held_of(mass: Any, rubs: bool) -> Held:
+    """No ball is held."""
+    n = len(mass)
+    return Held(np.full(n, math.nan), np.zeros((3, n)), np.zeros((3, n)) if rubs else None, mass)
+
+
+def is_held(held, one):
+    """Whether a particle is held."""
+    return False if held is None else held.until[one] == held.until[one]
+
+
+def velocity_of(held, grains, i):
+    """The velocity of a ball, or that with which it leaves."""
+    one = index(grains.number[i])
+    if is_held(held, one):
+        return Vec(held.velocity[0, one], held.velocity[1, one], held.velocity[2, one])
+    return vector_at(grains.speed, i, BEFORE)
+
+
+def hold(held, grains, i, until):
+    """Hold a ball from now on until a time [s]."""
+    one, v = index(grains.number[i]), vector_at(grains.speed, i, BEFORE)
+    held.until[one], grains.place[i, LIGHTNESS] = until, 0.0
+    held.velocity[0, one], held.velocity[1, one], held.velocity[2, one] = v.x, v.y, v.z
+    set_vector(grains.speed, i, BEFORE, ZERO)
+    if held.spin is not None:
+        for axis in range(3):
+            held.spin[axis, one] = grains.spin[i, BEFORE + axis]
+        set_vector(grains.spin, i, BEFORE, ZERO)
+
+
+@outlined
+def let_go(held, grains, now, h):
+    """Let the balls go that leave before a step of a length [s] that begins now [s]."""
+    for k in range(grains.number.size):
+        i = index(k)
+        one = index(grains.number[i])
+        if held.until[one] <= now + _WHOLE * h:
+            set_vector(grains.speed, i, BEFORE, velocity_of(held, grains, i))
+            if held.spin is not None:
+                for axis in range(3):
+                    grains.spin[i, BEFORE + axis] = held.spin[axis, one]
+            held.until[one], grains.place[i, LIGHTNESS] = math.nan, 1.0 / held.mass[one]
