@@ -195,7 +195,7 @@ def _miscounted(done: Ran) -> str:
     escaped = int(np.isfinite(result.escape_time).sum()) // points
     if int(seen["escaped"][-1]) < escaped:
         return f"escaped is {seen['escaped'][-1]}, and {escaped} have a time of it"
-    if "absorbed" in seen and int(seen["absorbed"][-1].sum()) != int(np.isfinite(result.absorbed_time).sum()):
+    if "absorbed" in seen and int(seen["absorbed"][-1].sum()) != int(np.isfinite(result.absorbed_time).sum()) // points:
         return f"absorbed is {seen['absorbed'][-1].sum()}, and another number of particles have a time of it"
     sources = done.given.options.get("sources", ())
     if sources and int(seen["born"][-1].sum()) != sum(len(one.times) for one in sources):

@@ -4,12 +4,13 @@ import math
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
+from ..contact.laws import Laws
 from ..errors import RunError
 from ..kernel.limits import SOLVED_PLACE
 from ..methods.base import Method
@@ -20,6 +21,7 @@ from ..run.base import Arrays, BaseRun, named
 from ..run.doors import comers
 from ..run.impacts import ThreadLog
 from ..run.preflight.counting import counters_of, crossed_of
+from ..run.observed import gone_of
 from ..run.starting_state import UNSEEDED, Seeding
 from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
@@ -57,7 +59,7 @@ class BodyRun(BaseRun):
         n, points, own = len(bodies), len(bodies.body), own_surfaces(bodies.body)
         self._body = bodies.body
         self._ties = ties_of(bodies.body, law.alpha if looped else None)
-        self._touching = touching_of(bodies.body, self._ties, compiled)
+        self._touching = touching_of(bodies.body, self._ties, compiled, seeding)
         self._carried = [Scene([surface]).compiled() for surface, _carrier, _point in bodies.body.cavities]
         self._compiled, self._own, self._changes = compiled, own, scene.moves() or scene.has_doors()
         self._reach(0.0)
@@ -66,7 +68,8 @@ class BodyRun(BaseRun):
             len(self._ties.ends) + len(bodies.body.guides),
             len(compiled.numbering.surfaces_of_rows) + len(own),
         )
-        self._bodies = _state_of(bodies, particles, rows, walls, self._walls[2] is not None, scene.moves())
+        books = _books_of(self._walls[2] is not None, scene.moves(), self._touching.laws)
+        self._bodies = _state_of(bodies, particles, rows, walls, books)
         self._counted_by = watched.counters
         self._counters = counters_of(scene, watched.counters, logs=True)
         if self._counters is not None:
@@ -78,6 +81,8 @@ class BodyRun(BaseRun):
             particles.position, particles.velocity, particles.mass, none, none, np.zeros(points * n, np.int64),
             np.zeros((walls, 0)), none, None,
             escape_time=None if self._walls[2] is None else np.full(points * n, math.nan),
+            absorbed_time=np.full(points * n, math.nan) if books.absorb else None,
+            absorbed_wall=np.full(points * n, -1, np.int32) if books.absorb else None,
         )  # fmt: skip
         contacts = most_contacts_of(self._touching, soft)
         per_lane = 8 * (24 * points + 10 * rows + rows * rows + 20 * contacts)
@@ -137,8 +142,9 @@ class BodyRun(BaseRun):
             self._rule = self._rule._replace(room=room, noise=room / self._least)
         if not self._cut_short:
             self._bodies.remaining.fill(span * self._unit)
-            if self._bodies.escape_time is not None:
-                self._bodies.remaining[~np.isnan(self._bodies.escape_time)] = 0.0
+            for time in (self._bodies.escape_time, self._bodies.absorbed_time):
+                if time is not None:
+                    self._bodies.remaining[~np.isnan(time)] = 0.0
             self._feed_in(moment)
         self._rule = self._rule._replace(end=moment)
 
@@ -189,6 +195,9 @@ class BodyRun(BaseRun):
         depths = self._scene.distances_outside(points, moment)
         if self._bodies.free is not None:
             depths[:, self._bodies.free[:, some].reshape(-1) > 0] = -math.inf
+        if self._bodies.absorbed_time is not None:
+            absorbed = ~np.isnan(self._bodies.absorbed_time[some])
+            depths[:, np.tile(absorbed, len(self._body.contacts))] = -math.inf
         return depths
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
@@ -264,10 +273,16 @@ class BodyRun(BaseRun):
         self.state.impacts[:] = np.tile(bodies.impacts, len(self._body))
         if self.state.escape_time is not None:
             self.state.escape_time[:] = np.tile(bodies.escape_time, len(self._body))
+        if self.state.absorbed_time is not None:
+            self.state.absorbed_time[:] = np.tile(bodies.absorbed_time, len(self._body))
+            # A body counts once.
+            self.state.absorbed_wall[: len(bodies.absorbed_wall)] = bodies.absorbed_wall  # type: ignore[index]
         sums, errors, depths = zip(*(self._sums_of(*block, moment) for block in self._blocks()), strict=True)
         self._sums = np.ascontiguousarray(np.array(sums).T)
+        own, cavities = len(self._own), len(self._body.cavities)
         self._seen = {
-            **summed(self._sums, self._owners, surfaces, len(self._own), len(self._body.cavities), self._counted()),
+            **gone_of(self.state._replace(escape_time=None), 0, self._surfaces_of_walls, surfaces),
+            **summed(self._sums, self._owners, surfaces, (own, cavities, bodies.heat is not None), self._counted()),
             "energy_error": max(errors),
             "max_penetration": float(max([*depths, *(out.max() for out in self._out_of_own())])),
             "impacts": int(bodies.impacts.sum()),
@@ -293,16 +308,17 @@ class BodyRun(BaseRun):
         total, lost = kinetic + fall + elastic, bodies.dissipated[some]
         work = bodies.work[some] + energies.led(r, v) - self._led_start[some]
         error, scale = np.abs(total + lost - work - self._energy_start[some]), self._scale[some]
-        if self._scene.moves():
+        if self._scene.moves() or bodies.heat is not None:
             # What walls have given is a scale too: a body may start at rest.
             scale = np.maximum(scale, kinetic)
         scaled = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0.0)
         pushed = np.ascontiguousarray(bodies.impulse[:, some]).sum(axis=1)
-        if bodies.wall_work is not None:
-            worked = np.ascontiguousarray(bodies.wall_work[: len(self._owners), some])
-            pushed = np.concatenate([pushed, worked.sum(axis=1)])
-            # The rest is that of anchors.
-            work = work - worked.sum(axis=0) if len(bodies.path) else np.zeros_like(work)
+        for books in (bodies.wall_work, bodies.heat):
+            if books is not None:
+                given = np.ascontiguousarray(books[: len(self._owners), some])
+                pushed = np.concatenate([pushed, given.sum(axis=1)])
+                # The rest is that of anchors.
+                work = work - given.sum(axis=0) if len(bodies.path) else np.zeros_like(work)
         if bodies.crossed is not None:
             parts = (bodies.crossed.number, bodies.crossed.sums)
             passed = [np.ascontiguousarray(part[:, some]).sum(axis=1) for part in parts]
@@ -357,8 +373,21 @@ def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
     return pool
 
 
-def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, opens: bool, moves: bool) -> BodyState:
-    """All copies at the start, with so many rows of multipliers and of walls, and whether walls open, and move."""
+class _Books(NamedTuple):
+    """What is booked of walls, by what they do."""
+
+    open: bool
+    move: bool
+    heat: bool
+    absorb: bool
+
+
+def _books_of(opens: bool, moves: bool, laws: Laws | None) -> _Books:
+    return _Books(opens, moves, laws is not None and laws.give_heat, laws is not None and laws.may_end)
+
+
+def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, books: _Books) -> BodyState:
+    """All copies at the start, with so many rows of multipliers and of walls."""
     n, body = len(bodies), bodies.body
     anchors = [(q, body.anchors[q]) for q in led_points(body)]
     paths = [[motion.harmonic(start) for start in bodies.position[:, q].T] for q, motion in anchors]  # type: ignore[union-attr]
@@ -384,8 +413,11 @@ def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, opens
         sweeps=whole[3],
         unconverged=whole[4],
         energy=np.zeros(n),
-        free=np.zeros((len(body.contacts), n), np.int8) if opens else None,
-        escape_time=np.full(n, math.nan) if opens else None,
-        wall_work=np.zeros((walls, n)) if moves else None,
+        free=np.zeros((len(body.contacts), n), np.int8) if books.open else None,
+        escape_time=np.full(n, math.nan) if books.open else None,
+        wall_work=np.zeros((walls, n)) if books.move else None,
+        heat=np.zeros((walls, n)) if books.heat else None,
+        absorbed_time=np.full(n, math.nan) if books.absorb else None,
+        absorbed_wall=np.full(n, -1, np.int32) if books.absorb else None,
         mass=np.full(n, body.mass_matrix.sum()),
     )

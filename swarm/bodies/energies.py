@@ -87,17 +87,19 @@ class BodyEnergies:
 
 
 def summed(
-    sums: Floats, owners: list[int], surfaces: int, own: int, cavities: int, counters: int = 0
-) -> dict[str, Any]:  # fmt: skip
+    sums: Floats, owners: list[int], surfaces: int, booked: tuple[int, int, bool], counters: int = 0
+) -> dict[str, Any]:
     """The observables that are sums over bodies, from those of all chunks (quantities, chunks).
 
     `owners` says which surface each wall belongs to. Rows of impulse are of these, then of the `own` surfaces of the
-    body, of which the last `cavities` are cavities; behind them the work of the walls, where some move, and what has
-    crossed so many counters.
+    body, of which the last `cavities` are cavities; behind them the work of the walls, where some move, their heat,
+    where they give any, and what has crossed so many counters; `booked` is (own, cavities, whether they give heat).
     """
+    own, cavities, heats = booked
     kinetic, fall, elastic, total, lost, sliding, work, *vectors = (totals := sums.sum(axis=1))[:13].tolist()
     last = len(totals) - COUNTED * counters
-    pushed, worked = np.split(totals[13:last], [len(owners) + own])
+    pushed, given = np.split(totals[13:last], [len(owners) + own])
+    worked, heat = given[: len(given) - heats * len(owners)], given[len(given) - heats * len(owners) :]
     return {
         "kinetic_energy": kinetic,
         "potential_energy": fall,
@@ -108,7 +110,7 @@ def summed(
         "angular_momentum": np.array(vectors[3:]),
         "impulse": np.bincount(owners, weights=pushed[: len(owners)], minlength=surfaces),
         "sliding_time": sliding,
-        "wall_heat": np.zeros(surfaces),
+        "wall_heat": np.bincount(owners, weights=heat, minlength=surfaces) if heats else np.zeros(surfaces),
         "work": work,
         **({"wall_work": np.bincount(owners, weights=worked, minlength=surfaces)} if len(worked) else {}),
         **({"cavity_impulse": pushed[len(pushed) - cavities :]} if cavities else {}),

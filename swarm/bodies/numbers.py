@@ -5,8 +5,10 @@ import math
 import numpy as np
 
 from ..compiled_scene import CompiledScene
+from ..contact.wall_impact import RandomSource
 from ..methods import AugmentedLagrangian
 from ..methods.base import Method
+from ..run.starting_state import UNSEEDED, Seeding
 from ..state import Floats
 from ..surfaces.surface import Surface
 from .body import Body
@@ -95,7 +97,7 @@ def own_surfaces(body: Body) -> list[Surface]:
     return [surface for _point, surface in body.guides] + [surface for surface, _carrier, _point in body.cavities]
 
 
-def touching_of(body: Body, ties: Ties, compiled: CompiledScene) -> Touching:
+def touching_of(body: Body, ties: Ties, compiled: CompiledScene, seeding: Seeding = UNSEEDED) -> Touching:
     """Its points that may touch the walls of a scene, or those of its own guides and cavities."""
     b = _combinations(body)
     single = ((b != 0.0).sum(axis=1) == 1) & (b.max(axis=1, initial=0.0) == 1.0)
@@ -104,7 +106,9 @@ def touching_of(body: Body, ties: Ties, compiled: CompiledScene) -> Touching:
     surfaces = of_walls + own_surfaces(body)
     restitution = np.array([surface.restitution for surface in surfaces])
     friction = np.array([surface.friction for surface in surfaces])
+    laws = compiled.laws if compiled.laws is not None and compiled.laws.send_off else None
+    random = None if laws is None else RandomSource(seeding.signed(), seeding.first)
     return Touching(
         b, plain, b @ ties.inverse_mass, len(body.contacts), len(of_walls), len(body.guides),
-        restitution, friction, bool(((restitution < 1.0) | (friction > 0.0)).any()),
+        restitution, friction, laws is not None or bool(((restitution < 1.0) | (friction > 0.0)).any()), laws, random,
     )  # fmt: skip

@@ -91,7 +91,9 @@ class WallLaw(Record):
                 takes k and k + 1, and `random.exponential(k)`, for k = 0, 1, ...; the same for any threads and any
                 resume. 2 k and 2 k + 1 together cost as much as one. `random.diffuse(n, u, k)` is a unit vector of the
                 cosine law, `random.across` the axis across the plane of the scene, or None.
-            mass: of the particle [kg].
+            mass: of the particle [kg]. Of a body it is what its contact point has along the normal, 1/(n K n), with
+                the inverse mass K of the body there; v is such across the normal that mass |v - u|^2/2 is the energy
+                that an impulse at this point can change.
         """
         raise NotImplementedError
 

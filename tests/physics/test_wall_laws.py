@@ -310,7 +310,7 @@ def test_what_knows_no_laws_says_so():
     scene = swarm.Scene([wall])
     bodies = swarm.place(scene, swarm.dumbbell(0.1, 1.0), 2, speed=1.0, seed=1)
     with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws must be left out with bodies"):
-        swarm.simulate(scene, bodies, swarm.Impact(dt=1e-3), until=1.0)
+        swarm.simulate(scene, bodies, swarm.Penalty(dt=1e-3, penalty=1e4), until=1.0)
 
 
 def test_a_file_has_the_name_of_a_law(tmp_path):

@@ -52,6 +52,8 @@ class Touching(NamedTuple):
     restitution: Any  # (walls + G + C,)
     friction: Any  # (walls + G + C,)
     is_dissipative: bool  # whether any wall is
+    laws: Any = None  # `Laws` of the walls of the scene where one sends bodies off
+    random: Any = None  # and `RandomSource` of these
 
     def place(self, r, k, i):
         """The place of contact point k of a lane, or with velocities its velocity."""
@@ -127,6 +129,9 @@ class BodyState(NamedTuple):
     free: Any = None  # (K, n) int8, whether a contact point has passed an opening; None without openings
     escape_time: Any = None  # (n,) when the last one of a body has [s], NaN of bodies that are inside
     wall_work: Any = None  # (walls, n) of each wall [J], a part of `work`; None where none moves
+    heat: Any = None  # (walls, n) that each wall gave by its laws [J], a part of `work`; None where none gives any
+    absorbed_time: Any = None  # (n,) when a wall absorbed each body [s], NaN of the others; None where none does
+    absorbed_wall: Any = None  # (n,) int32, the number of that wall, -1 of the others
     # What is told of impacts and of steps, and what counters write to:
     watchers: Any = Watchers()  # of the thread
     mass: Any = None  # (n,) of each body [kg]

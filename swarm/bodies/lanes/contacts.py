@@ -60,6 +60,10 @@ class BodyContacts(Constrained):
         """An impact at this instant; contacts may last from there."""
         raise NotImplementedError
 
+    def send_off(self, state, name, frame, found, i):
+        """Send a body off by a law of a wall at one of these contacts, which approach; whether one acts."""
+        return False
+
     # --- In a stage
 
     def push(self, i):

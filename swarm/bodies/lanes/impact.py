@@ -23,7 +23,14 @@ SHORT = 1.0 / 16.0
 
 def chatters(touching, state, number):
     """Whether bounces follow one another ever faster: then they end."""
-    return state.short[number] > _CHATTER and min(touching.restitution) < 1.0
+    laws = touching.laws
+    loses = laws is not None and (laws.may_dissipate or laws.thermal is not None)
+    return state.short[number] > _CHATTER and (loses or min(touching.restitution) < 1.0)
+
+
+def is_absorbed(state, number):
+    """Whether a wall has absorbed a body."""
+    return state.absorbed_wall is not None and state.absorbed_wall[number] >= 0
 
 
 @outlined
@@ -82,7 +89,9 @@ def strike(bodies, state, i):
     frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
     for turn in range(_BLOWS):
         found = bodies.near(i, name, frame, True)
-        if found == 0 or not _blow(bodies, state, name, frame, found, i):
+        if found == 0 or is_absorbed(state, bodies.pace.body[i]):
+            return turn
+        if not bodies.send_off(state, name, frame, found, i) and not _blow(bodies, state, name, frame, found, i):
             return turn
     return _BLOWS
 

@@ -13,7 +13,7 @@ import numpy as np
 from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.vector import dot, norm
-from . import impact, impact_time, sticking
+from . import impact, impact_time, sent_off, sticking
 from .contacts import MOST_CONTACTS, NEAR, ROOM, BodyContacts, direction, put_direction, put_frame, sweep
 
 # From this correction of a stage on the equations may be worse by the factor, in units of round-off: where more
@@ -157,8 +157,13 @@ class HardContacts(BodyContacts):
         short = at_once or pace.step[i] < impact.SHORT * self.rule.dt
         state.short[number] = state.short[number] + 1 if short else 0
         blows = impact.strike(self, state, i)
+        if self.touching.laws is not None and at_once and blows == 0:
+            blows = sent_off.leave_rest(self, state, i)
         # The energy of a strain takes as many products as the square of its edges.
         if blows > 0 and max(ties.led) < 0 and ties.compliance.shape[0] == 0:
             impact.restore(self, state, i)
         stays = impact.chatters(self.touching, state, number) or pace.stuck[i] > _LASTS
         pace.lasts[i] = pace.lasts[i] or stays or (at_once and blows == 0)
+
+    def send_off(self, state, name, frame, found, i):
+        return self.touching.laws is not None and sent_off.send_off(self, state, name, frame, found, i)

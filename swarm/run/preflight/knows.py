@@ -603,19 +603,16 @@ CAPABILITIES = (
         _RIGID_BALLS: _without_rolling("pairs.rolling", _AT_AN_INSTANT),
     }, within="law of pairs"),
     Capability("temperature", _of_walls("temperature", None), {
-        _EVERY_BODY: _with_bodies("temperature", "None"),
+        (SOFT_BODIES, PAPER_BODIES): _with_bodies("temperature", "None", "use Impact(dt=...)"),
         (BASELINE,): _with_method("temperature", "None"),
         (CHORDS,): _LOSES,
     }),
     Capability("law of a wall", _of_walls("laws", ()), {
-        _EVERY_BODY: _with_bodies("laws", "left out"),
+        (SOFT_BODIES, PAPER_BODIES): _with_bodies("laws", "left out", "use Impact(dt=...)"),
         (BASELINE,): _with_method("laws", "left out"),
         (CHORDS,): _LOSES,
     }),
     Capability("laws of groups of a mesh", _groups, {
-        _EVERY_BODY: Refusal(
-            "surfaces[{i}].groups must be None with bodies, got laws of {got}", "give the whole mesh one law"
-        ),
         (SOFT,): Refusal("surfaces[{i}].groups must be None with {method}, got laws of {got}", _ONE_LAW),
     }, within="law of a wall"),
     Capability("losses of groups of a mesh", _lossy_groups, {
@@ -635,6 +632,11 @@ CAPABILITIES = (
         _RIGID_BALLS: Refusal(
             "surfaces[{i}].laws[{k}] must not let particles with a radius wait, got {got!r:.200}",
             "use a law without a wait, such as Lambert, Penalty, or leave the radius out",
+        ),
+        (BODIES,): Refusal(
+            "surfaces[{i}].laws[{k}] must not let bodies wait, got {got!r:.200}: a wall holds one point of a body, and "
+            "the rest would go on",
+            "use a law without a wait, such as Lambert, or particles",
         ),
     }, within="law of a wall"),
     Capability("mass of a wall", _masses, {
