@@ -431,6 +431,8 @@ def _alone(draft: Draft) -> None:
     """The cell repeats around a solid; around a cavity it has no meaning."""
     # A capsule is so thin that particles come back later.
     draft.until = 1.4 if draft.cell.wall == "capsule" else 1.2
+    if draft.cell.engine.startswith("bodies"):
+        draft.until = 2.4
     if draft.cell.wall not in _ENDLESS and "outside" in WALLS[draft.cell.wall].sides:
         draft.side, draft.start, draft.vessel = "outside", "around", False
 

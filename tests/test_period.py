@@ -169,11 +169,11 @@ def test_images_are_whole_numbers(image):
         swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], image=image)
 
 
-def test_bodies_are_refused():
+def test_bodies_at_soft_walls_are_refused():
     scene = swarm.Scene([FLOOR, CEILING], period=(1.0, 1.0, None))
     bodies = swarm.place(scene, swarm.dumbbell(0.05, 1.0), 2)
-    with pytest.raises(swarm.SceneError, match="period must be None with bodies"):
-        swarm.simulate(scene, bodies, swarm.Impact(dt=1e-2), until=1.0)
+    with pytest.raises(swarm.SceneError, match="period must be None with bodies and Penalty"):
+        swarm.simulate(scene, bodies, swarm.Penalty(dt=1e-2, penalty=1e3), until=1.0)
 
 
 # --- Positions -------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from ..errors import SceneError
 from ..files.origin import require_near
 from ..methods import Impact, Penalty
 from ..methods.base import Method, check_surfaces
@@ -47,13 +48,18 @@ def task_of(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -
         require_angles(f"anchors[{point}]", motion, options.times.until)
     assert method.dt is not None  # type: ignore[attr-defined]
     warn_of_passing(scene, bodies.body)
+    if scene.period is not None and (bodies.body.anchors or bodies.body.guides):
+        raise SceneError(
+            f"period must be None with a body that has anchors or guides, got {scene.period}: they do not repeat; "
+            "leave the period out"
+        )
     _warn_of_turns(bodies, method.dt)  # type: ignore[attr-defined]
     check_surfaces(method, scene)
     require_compiled(scene, options)
     if len(bodies.body.contacts):
         touching = bodies.contact_points().reshape(3, -1)
         require_inside(scene, Particles(touching, touching))
-    bodies = with_born(scene, bodies, options.sources, options.seed, options.times.until)
+    bodies = with_born(scene, bodies.in_cell(scene), options.sources, options.seed, options.times.until)
     points = bodies.particles()
     require_logged(len(bodies), options)
     require_counters(scene, points, options)

@@ -73,7 +73,7 @@ def with_born(scene: Scene, bodies: Bodies, sources: tuple[Source, ...], seed: i
     position = np.concatenate([bodies.position, place + arms], axis=2)
     velocity = np.concatenate([bodies.velocity, velocity + np.cross(turning, arms, axis=0)], axis=2)
     all_of_them = Bodies.unchecked(body, position, velocity)
-    all_of_them.births = made.births
+    all_of_them.births, all_of_them.image = made.births, made.image
     return all_of_them
 
 
@@ -81,7 +81,7 @@ def _centers(bodies: Bodies) -> Particles:
     """The balls around bodies."""
     body = bodies.body
     return Particles(
-        bodies.centers(), body.center_of(bodies.velocity), body.mass_matrix.sum(), radius=reach_of(body)
+        bodies.centers(), body.center_of(bodies.velocity), body.mass_matrix.sum(), bodies.image, reach_of(body)
     )  # fmt: skip
 
 

@@ -70,8 +70,7 @@ class BodyRun(BaseRun):
         )
         books = _books_of(self._walls[2] is not None, scene.moves(), self._touching.laws)
         self._bodies = _state_of(bodies, particles, rows, walls, books)
-        self._counted_by = watched.counters
-        self._counters = counters_of(scene, watched.counters, logs=True)
+        self._counted_by, self._counters = watched.counters, counters_of(scene, watched.counters, logs=True)
         if self._counters is not None:
             crossed = crossed_of(self._counters, watched.counters, scene, bodies.centers())
             self._bodies = self._bodies._replace(crossed=crossed)
@@ -83,6 +82,7 @@ class BodyRun(BaseRun):
             escape_time=None if self._walls[2] is None else np.full(points * n, math.nan),
             absorbed_time=np.full(points * n, math.nan) if books.absorb else None,
             absorbed_wall=np.full(points * n, -1, np.int32) if books.absorb else None,
+            image=particles.image,
         )  # fmt: skip
         contacts = most_contacts_of(self._touching, soft)
         per_lane = 8 * (24 * points + 10 * rows + rows * rows + 20 * contacts)
@@ -102,14 +102,18 @@ class BodyRun(BaseRun):
         room = SOLVED_PLACE * max(size, scene.extent())
         self._least, self._room = math.sqrt(min([*(self._link_lengths() ** 2), size * size])), room
         noise = room / self._least
-        strict = getattr(method, "on_unconverged", "") == "raise"
         dt, stages = method.dt, np.array(STAGES[getattr(method, "order", 2)])  # type: ignore[attr-defined]
         # More gain in a compiled kernel alone.
         lanes = 1 if tier.is_plain else lanes
-        self._rule = StepRule(dt, stages, gravity, 0.0, room, noise, lanes, soft, contacts, looped, strict)
+        self._rule = StepRule(
+            dt, stages, gravity, 0.0, room, noise, lanes, soft, contacts, looped,
+            getattr(method, "on_unconverged", "") == "raise", compiled.cell(),
+        )  # fmt: skip
         # Frames of fixed steps are counted in steps.
         self._unit = 1.0 if soft is None or soft.is_cut else dt
-        self._pull = math.hypot(*gravity) * self._ties.mass.sum() * size
+        self._mass = float(self._ties.mass.sum())
+        self._falls = -gravity * [length or 0.0 for length in scene.period or (None,) * 3]
+        self._pull = math.hypot(*gravity) * self._mass * size
         self._led_start, self._scale = np.zeros((2, n))
         self._energy_start = self._bodies.energy
         if bodies.births is not None:
@@ -277,6 +281,8 @@ class BodyRun(BaseRun):
             self.state.absorbed_time[:] = np.tile(bodies.absorbed_time, len(self._body))
             # A body counts once.
             self.state.absorbed_wall[: len(bodies.absorbed_wall)] = bodies.absorbed_wall  # type: ignore[index]
+        if self.state.image is not None:
+            self.state.image[:] = np.tile(bodies.image, len(self._body))
         sums, errors, depths = zip(*(self._sums_of(*block, moment) for block in self._blocks()), strict=True)
         self._sums = np.ascontiguousarray(np.array(sums).T)
         own, cavities = len(self._own), len(self._body.cavities)
@@ -323,6 +329,10 @@ class BodyRun(BaseRun):
             parts = (bodies.crossed.number, bodies.crossed.sums)
             passed = [np.ascontiguousarray(part[:, some]).sum(axis=1) for part in parts]
             pushed = np.concatenate([pushed, *passed])
+        if bodies.image is not None:
+            # The books are of places in the cell.
+            whole = self._mass * self._falls @ bodies.image[:, some]
+            fall, total = fall + whole, total + whole
         numbers = (kinetic, fall, elastic, total, lost, bodies.sliding[some], work)
         depth = self._depths(some, r, moment).max(initial=0.0) if len(self._body.contacts) else 0.0
         return (
@@ -420,4 +430,5 @@ def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, books
         absorbed_time=np.full(n, math.nan) if books.absorb else None,
         absorbed_wall=np.full(n, -1, np.int32) if books.absorb else None,
         mass=np.full(n, body.mass_matrix.sum()),
+        image=bodies.image,
     )

@@ -1,12 +1,13 @@
 """Many copies of one body, each with its own place and velocity."""
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..common import checks
 from ..errors import SceneError
 from ..motion import led
 from ..particles import Births, Particles, TiedParticles
+from ..scene import Scene
 from ..state import Floats
 from . import checked, holding
 from .body import Body
@@ -56,6 +57,8 @@ class Bodies(TiedParticles):
     velocity: Floats
     # Of all copies, in a run with sources.
     births: Births | None = None
+    # (3, n) how many cells away each is, in a run of a scene that repeats.
+    image: NDArray[np.int64] | None = None
     # Whether a run left them: its steps keep lengths, and velocities along ties but to the order of the step.
     _is_of_run = False
 
@@ -98,6 +101,16 @@ class Bodies(TiedParticles):
         """(3, n) the centres of mass."""
         return self.body.center_of(self.position)
 
+    def in_cell(self, scene: Scene) -> "Bodies":
+        """The same bodies with their centres of mass in the cell, where a scene repeats."""
+        if scene.period is None:
+            return self
+        center = self.centers()
+        inside, away = scene.wrapped(center)
+        made = Bodies.unchecked(self.body, self.position + (inside - center)[:, None], self.velocity)
+        made.births, made.image = self.births, away
+        return made
+
     def bonds(self) -> Pairs:
         """(B n, 2) the pairs of points that are tied, of all copies, as numbers of `particles`."""
         n = len(self)
@@ -131,7 +144,8 @@ class Bodies(TiedParticles):
         matrix = self.body.mass_matrix
         mass = np.diagonal(matrix) * (matrix.sum() / np.trace(matrix))
         flat = self.position.reshape(3, -1), self.velocity.reshape(3, -1)
-        made = Particles(*flat, np.repeat(mass, len(self)))
+        image = None if self.image is None else np.tile(self.image, len(self.body))
+        made = Particles(*flat, np.repeat(mass, len(self)), image)
         if (births := self.births) is not None:
             points = len(self.body)
             made.births = births._replace(time=np.tile(births.time, points), source=np.tile(births.source, points))

@@ -173,6 +173,8 @@ def task_of(folder: Path, k: int) -> Task:
         shape = 3, len(whole.body), -1
         position, velocity = (np.array(arrays[name].reshape(shape)[..., first:last], order="C") for name in _ARRAYS[:2])
         bodies = Bodies.unchecked(whole.body, position, velocity)
+        if "image" in arrays:
+            bodies.image = np.array(arrays["image"].reshape(shape)[:, 0, first:last], order="C")
         particles = bodies.particles()
     options = dataclasses.replace(whole.options, trajectory=file_of(folder, k))
     of_all = whole.start, whole.scales

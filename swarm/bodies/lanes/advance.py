@@ -132,6 +132,8 @@ def _finish(contacts, state, i):
             lanes.older[a, i] = math.nan
     if contacts.passages is not None:
         look_back(contacts, i)
+    if contacts.rule.period is not None:
+        following.come_into_cell(contacts, state, i)
     _begin_step(pace, i)
 
 
@@ -265,7 +267,8 @@ def _look(contacts, scene, c):
                         for i in range(count):
                             c[x, i] += b * r1[3 * q + x, i]
         for i in range(count):
-            out = scene.at(pace.remaining[i] - pace.step[i]).outside(-1.0, column(c, 0, i))
+            spot = contacts.in_cell(k, column(c, 0, i), column(c, 0, i))
+            out = scene.at(pace.remaining[i] - pace.step[i]).outside(-1.0, spot)
             pace.out[i] = pace.out[i] | (out & (not contacts.is_free(k, i)))
         if have_ends(contacts.walls):
             for i in range(count):

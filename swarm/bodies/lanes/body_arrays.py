@@ -105,6 +105,7 @@ class StepRule(NamedTuple):
     most: int  # contacts of a body at once
     loop: bool  # whether multipliers are found by Uzawa's loop
     strict: bool  # whether one that does not converge ends the run
+    period: Any = None  # `Period` of the cell, where the scene repeats
 
 
 class BodyState(NamedTuple):

@@ -8,6 +8,7 @@ import math
 from ...kernel.jit import outlined
 from ...kernel.limits import EPSILON
 from ...kernel.vector import Vec, column, cross, dot, norm, put
+from ...surfaces.periodic.period import moved_into
 from .constraints import Constrained
 from .passages import BEHIND, OUT
 from .through import WayThrough, have_ends, is_of_ends, passed
@@ -64,6 +65,21 @@ class BodyContacts(Constrained):
         """Send a body off by a law of a wall at one of these contacts, which approach; whether one acts."""
         return False
 
+    # --- In a cell that repeats
+
+    def in_cell(self, k, c, by):
+        """A place of contact point k, moved as `by` is into the cell: its walls are those of a place in the cell."""
+        if self.rule.period is None:
+            return c
+        return c if k >= self.touching.points else moved_into(self.rule.period, c, by)
+
+    def spot(self, r, k, i):
+        """The place of contact point k of a lane among the walls: it is moved as at the start of the step."""
+        c = self.touching.place(r, k, i)
+        if self.rule.period is None:
+            return c
+        return self.in_cell(k, c, self.touching.place(self.lanes.r, k, i))
+
     # --- In a stage
 
     def push(self, i):
@@ -94,7 +110,7 @@ class BodyContacts(Constrained):
             k, wall, d = name[a // wide, 0], name[a // wide, 1], direction(frame, a // wide, a % wide)
             e = d
             if a % wide == 0:
-                e = self.gap_gradient(float(wall), self.touching.place(lanes.r1, k, i), i)
+                e = self.gap_gradient(float(wall), self.spot(lanes.r1, k, i), i)
             for row in range(m):
                 c = half * ties.couplings[count + k, self.coupling(row)]
                 along[a, row] = c * dot(e, column(lanes.d, 3 * row, i))
@@ -116,7 +132,7 @@ class BodyContacts(Constrained):
             k, press, frame = active.name[i, a, 0], active.press[i, 3 * a], active.frame[i]
             active.stages[i, a] += 1 if press > 0.0 else 0
             active.impulse[i, a] += self.pace.h[i] * press * norm(direction(frame, a, 0))
-            y0, y1 = touching.place(lanes.ra, k, i), touching.place(lanes.r1, k, i)
+            y0, y1 = self.spot(lanes.ra, k, i), self.spot(lanes.r1, k, i)
             away = y1 - y0
             if self.walls_move():
                 carried, moved = self.carried(active.name[i, a, 1], y0, y1, i)
@@ -186,7 +202,7 @@ class BodyContacts(Constrained):
         """Whether a free point is inside of all walls again, or at one that is not open there."""
         walls, room = self.walls_now(i), self.rule.room
         back = self.passages.free[k, self.pace.body[i]] != BEHIND
-        c, met = self.touching.place(self.lanes.r, k, i), self.touching.span(k)
+        c, met = self.spot(self.lanes.r, k, i), self.touching.span(k)
         for j in range(count_at(walls, met, c)):
             w = float(wall_at(walls, met, j, c))
             gap = walls.distance(w, c)
@@ -201,14 +217,23 @@ class BodyContacts(Constrained):
         if not have_ends(self.walls) or k >= self.touching.points:
             return WayThrough(math.inf, -1.0, -math.inf)
         start, limits = self.touching.place(self.lanes.r, k, i), (_AT * self.rule.room, room, 0.0)
-        return passed(self.walls_now(i), self.walls_then(i), start, c, limits)
+        if self.rule.period is None:
+            return passed(self.walls_now(i), self.walls_then(i), start, c, limits)
+        # What lies on the way over a face is known in the cell of its start, or in that of its end.
+        found = WayThrough(math.inf, -1.0, -math.inf)
+        for by in (start, c):
+            ends = self.in_cell(k, start, by), self.in_cell(k, c, by)
+            way = passed(self.walls_now(i), self.walls_then(i), *ends, limits)
+            if way.time < found.time:
+                found = way
+        return found
 
     def come_back(self, i):
         """Note which points that are behind walls that end come back through one of these in this step of a lane."""
         at, free, number = _AT * self.rule.room, self.passages.free, self.pace.body[i]
         for k in range(self.touching.points):
             if free[k, number] == BEHIND:
-                start, end = self.touching.place(self.lanes.r, k, i), self.touching.place(self.lanes.r1, k, i)
+                start, end = self.spot(self.lanes.r, k, i), self.spot(self.lanes.r1, k, i)
                 # A way back from there: what starts at a wall and leaves it inwards comes back through it.
                 way = passed(self.walls_then(i), self.walls_now(i), end, start, (at, at, 2.0 * at))
                 free[k, number] = OUT if way.wall >= 0.0 else BEHIND
@@ -224,7 +249,7 @@ class BodyContacts(Constrained):
         for k in range(touching.plain.size):
             if self.is_free(k, i):
                 continue
-            c, u = touching.place(self.lanes.r, k, i), touching.place(self.lanes.v, k, i)
+            c, u = self.spot(self.lanes.r, k, i), touching.place(self.lanes.v, k, i)
             met = touching.span(k)
             for j in range(count_at(walls, met, c)):
                 w = wall_at(walls, met, j, c)

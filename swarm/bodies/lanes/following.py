@@ -1,9 +1,12 @@
 """Counters of bodies: they get the way of each centre of mass in a step, and change no bit of it."""
 
+import numpy as np
+
 from ...kernel.jit import outlined
-from ...kernel.vector import ZERO, column
+from ...kernel.vector import ZERO, column, dot, put
 from ...lanes.watching.crossings import Flown, ParticleMoment
 from ...lanes.watching.watchers import Followed
+from ...surfaces.periodic.period import has_left, into, moved_into
 from .impact_time import COMMIT, STRIKE
 
 
@@ -40,11 +43,32 @@ def count_steps(contacts, state):
 def _count_step(contacts, state, i):
     ties, lanes, pace, counters = contacts.ties, contacts.lanes, contacts.pace, state.watchers.counters
     number, step, remaining = pace.body[i], pace.step[i], pace.remaining[i]
-    followed = Followed(state, state.watchers.log)
-    r, v = centre(ties, lanes.r, i), centre(ties, lanes.v, i)
-    end = centre(ties, lanes.r1, i)
-    if is_free(contacts, i):
-        counters.look_at(counters.gravity, followed, number, Flown(r, v, step, remaining, end, ZERO))
-    else:
+    followed, period = Followed(state, state.watchers.log), contacts.rule.period
+    r, v, end = centre(ties, lanes.r, i), centre(ties, lanes.v, i), centre(ties, lanes.r1, i)
+    flown = Flown(r, v, step, remaining, end, ZERO)
+    if not is_free(contacts, i):
+        before = ParticleMoment(r, v, remaining)
         after = ParticleMoment(end, centre(ties, lanes.v1, i), remaining - step)
-        counters.count_step(followed, number, ParticleMoment(r, v, remaining), after)
+        counters.count_step(followed, number, before, after)
+        if has_left(period, end):
+            counters.come_back(followed, number, before, end, after._replace(r=into(period, end).r))
+    elif period is None:
+        counters.look_at(counters.gravity, followed, number, flown)
+    else:
+        counters.look_at_cells(period, counters.gravity, followed, number, flown)
+
+
+@outlined
+def come_into_cell(contacts, state, i):
+    """Bring a lane with a centre of mass that has left the cell back into it; its energy is that of the place there."""
+    ties, lanes, period, number = contacts.ties, contacts.lanes, contacts.rule.period, contacts.pace.body[i]
+    there = centre(ties, lanes.r, i)
+    if not has_left(period, there):
+        return
+    n = into(period, there).images
+    for p in range(lanes.r.shape[0] // 3):
+        put(lanes.r, 3 * p, i, moved_into(period, column(lanes.r, 3 * p, i), there))
+    for axis, images in enumerate(n):
+        state.image[axis, number] += np.int64(images)
+    if period.fall is not None:
+        state.energy[number] -= state.mass[number] * dot(n, period.fall)

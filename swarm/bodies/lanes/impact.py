@@ -11,6 +11,7 @@ from ...kernel.limits import ENERGY_OF_IMPACT, EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import column, dot, put, square
 from ...lanes.watching.log import Struck
+from ...surfaces.periodic.period import into
 from .contacts import MOST_CONTACTS, direction, missing, sweep
 
 # Blows at one instant; sweeps over the contacts of one, and the change of their impulses that ends them.
@@ -173,7 +174,7 @@ class BodyImpact(Record):
         k, wall, bodies = self.name[a // self.wide, 0], self.name[a // self.wide, 1], self.bodies
         u = bodies.touching.place(bodies.lanes.v, k, i)
         if bodies.walls_move():
-            u = bodies.slip(bodies.walls_now(i), wall, bodies.touching.place(bodies.lanes.r, k, i), u)
+            u = bodies.slip(bodies.walls_now(i), wall, bodies.spot(bodies.lanes.r, k, i), u)
         return dot(self.direction(a), u)
 
     def work(self, state, p, i):
@@ -183,7 +184,7 @@ class BodyImpact(Record):
             walls, number = bodies.walls_now(i), bodies.pace.body[i]
             for a in range(p.size):
                 k, wall = self.name[a // self.wide, 0], float(self.name[a // self.wide, 1])
-                u = walls.velocity(wall, bodies.touching.place(bodies.lanes.r, k, i))
+                u = walls.velocity(wall, bodies.spot(bodies.lanes.r, k, i))
                 work = -p[a] * dot(self.direction(a), u)
                 state.wall_work[bodies.walls.row(wall), number] += work
                 total += work
@@ -192,11 +193,12 @@ class BodyImpact(Record):
     def struck(self, a, before, impulse, i):
         """The `Struck` of contact a, which had a velocity before."""
         bodies, (k, wall) = self.bodies, (self.name[a, 0], self.name[a, 1])
-        c, u = bodies.touching.place(bodies.lanes.r, k, i), bodies.touching.place(bodies.lanes.v, k, i)
+        c, u = bodies.spot(bodies.lanes.r, k, i), bodies.touching.place(bodies.lanes.v, k, i)
+        images = into(bodies.rule.period, bodies.touching.place(bodies.lanes.r, k, i)).images
         n, slip = self.direction(self.wide * a), bodies.slip(bodies.walls_now(i), wall, c, before)
         time = bodies.rule.end - bodies.pace.remaining[i]
         return Struck(
-            bodies.pace.body[i], float(wall), time, c, before, u, impulse, slip - dot(slip, n) * n
+            bodies.pace.body[i], float(wall), time, c, before, u, impulse, slip - dot(slip, n) * n, -1, images
         )  # fmt: skip
 
     def coupling(self, row):

@@ -41,8 +41,9 @@ def look(bodies, i, larger):
     for k in range(touching.plain.size):
         if bodies.is_free(k, i):
             continue
-        c, met = touching.place(lanes.r1, k, i), touching.span(k)
-        near, ahead = count_at(walls, met, c), bodies.passed(k, c, room, i)
+        end, met = touching.place(lanes.r1, k, i), touching.span(k)
+        c = bodies.in_cell(k, end, end)
+        near, ahead = count_at(walls, met, c), bodies.passed(k, end, room, i)
         for j in range(near + int(ahead.wall >= 0.0)):
             w = wall_at(walls, met, j, c) if j < near else int(ahead.wall)
             gap = walls.distance(float(w), c) if j < near else ahead.gap
@@ -62,7 +63,7 @@ def look(bodies, i, larger):
         return STRIKE_NOW if low == 0.0 else AGAIN
     if low == 0.0 and tau <= _SHORTEST * rule.dt:
         # It is at the wall, and does not leave it.
-        start = bodies.walls_now(i).distance(float(wall), touching.place(lanes.r, point, i))
+        start = bodies.walls_now(i).distance(float(wall), _start(bodies, point, i))
         if start >= -NEAR * rule.room:
             return STRIKE_NOW
     closer = pace.high[i] < math.inf and worst < _CLOSER * pace.outside[i]
@@ -95,8 +96,13 @@ def _stays(bodies, k, wall, gap, i):
     """Whether a contact of a lasting step is as far outside as it was, since short steps do not bring it back."""
     if bodies.pace.active[i] == 0 or not bodies.touching.dissipates(wall):
         return False
-    start = bodies.walls_now(i).distance(float(wall), bodies.touching.place(bodies.lanes.r, k, i))
+    start = bodies.walls_now(i).distance(float(wall), _start(bodies, k, i))
     return gap - start <= bodies.rule.room
+
+
+def _start(bodies, k, i):
+    """The place of a contact point at the start of the step, among the walls at its end."""
+    return bodies.in_cell(k, bodies.touching.place(bodies.lanes.r, k, i), bodies.touching.place(bodies.lanes.r1, k, i))
 
 
 def _inside(rule, pace, i, gap):

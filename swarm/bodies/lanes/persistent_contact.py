@@ -73,7 +73,7 @@ class HardContacts(BodyContacts):
         touching, active, frame = self.touching, self.active, self.active.frame[i]
         for a in range(self.pace.active[i]):
             k, wall = active.name[i, a, 0], active.name[i, a, 1]
-            y0, y1 = touching.place(self.lanes.ra, k, i), touching.place(r1, k, i)
+            y0, y1 = self.spot(self.lanes.ra, k, i), self.spot(r1, k, i)
             n = self.walls_between(i).step_normal(float(wall), y0, y1)
             if touching.friction[wall] > 0.0:
                 t = direction(frame, a, 1)
@@ -93,7 +93,7 @@ class HardContacts(BodyContacts):
         error, eased = pace.residue[i], sticking.is_short(self, i) and touching.dissipate(active.name[i], found)
         for a in range(found):
             k, wall = active.name[i, a, 0], active.name[i, a, 1]
-            y0, y1 = touching.place(lanes.ra, k, i), touching.place(lanes.r1, k, i)
+            y0, y1 = self.spot(lanes.ra, k, i), self.spot(lanes.r1, k, i)
             way = away = y1 - y0
             if self.walls_move():
                 carried, moved = self.carried(wall, y0, y1, i)

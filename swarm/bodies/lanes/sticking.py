@@ -28,7 +28,7 @@ def is_short(bodies, i):
 @outlined
 def leave_out(bodies, i):
     """Leave out the forces of a short step that keeps lengths and gaps to round-off without them; whether it is one."""
-    ties, touching, rule, lanes, pace = bodies.ties, bodies.touching, bodies.rule, bodies.lanes, bodies.pace
+    ties, rule, lanes, pace = bodies.ties, bodies.rule, bodies.lanes, bodies.pace
     if not is_short(bodies, i):
         return False
     for a in range(ties.links):
@@ -39,8 +39,8 @@ def leave_out(bodies, i):
     active = bodies.active
     for a in range(pace.active[i]):
         k, wall = active.name[i, a, 0], float(active.name[i, a, 1])
-        before = bodies.walls_between(i).distance(wall, touching.place(lanes.ra, k, i))
-        if not bodies.walls_after(i).distance(wall, touching.place(lanes.p, k, i)) - before <= rule.room:
+        before = bodies.walls_between(i).distance(wall, bodies.spot(lanes.ra, k, i))
+        if not bodies.walls_after(i).distance(wall, bodies.spot(lanes.p, k, i)) - before <= rule.room:
             return False
     for a in range(ties.links):
         lanes.multiplier[a, i] = 0.0
@@ -71,7 +71,7 @@ def stop(bodies, state, i):
     for a in range(found):
         k, wall, press = active.name[i, a, 0], active.name[i, a, 1], active.press[i, 3 * a]
         name[a, 0], name[a, 1] = k, wall
-        n = bodies.walls_now(i).unit_normal(float(wall), touching.place(lanes.r, k, i))
+        n = bodies.walls_now(i).unit_normal(float(wall), bodies.spot(lanes.r, k, i))
         put_direction(frame, a, 0, n)
         if wide > 1:
             t = direction(active.frame[i], a, 1)

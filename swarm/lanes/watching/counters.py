@@ -133,7 +133,7 @@ class Counters(Record):
         if lanes.period is None:
             self.look_at(gravity, share, p, flown)
         else:
-            self._look_at_cells(lanes.period, gravity, share, p, flown)
+            self.look_at_cells(lanes.period, gravity, share, p, flown)
         for c, one in enumerate(self.each):
             if not self.is_in_lanes(one):
                 lanes.began[row_of_counter(c), i] = sign_of_side(share.state, c, p)
@@ -144,7 +144,7 @@ class Counters(Record):
             if not self.is_in_lanes(one):
                 look_at_one(one, c, gravity, share, p, flown)
 
-    def _look_at_cells(self, period, gravity, share, p, flown):
+    def look_at_cells(self, period, gravity, share, p, flown):
         """The same of a flight over faces, cell by cell: walls and counters are known in one."""
         back, (gx, gy, gz) = into(period, flown.end), pulls(gravity)
         r, v, left, remaining, images = flown.r, flown.v, flown.time, flown.remaining, ZERO

@@ -52,6 +52,7 @@ class Struck(Record):
     slip: Vec = ZERO  # relative to the wall, before
     partner: Any = -1
     lasted: Any = None  # `Lasted`, of a contact that takes time
+    images: Vec = ZERO  # of the cell, from that where the particle is booked
 
 
 class Log(NamedTuple):
@@ -129,17 +130,9 @@ class Log(NamedTuple):
         if self.filled[0] + LANES >= self.time.size:
             self.filled[1] += 1
             return
-        k = index(self.filled[0])
         time = self.end - there.remaining
-        self._add(state.image, Struck(particle, -1.0 - number, time, there.r, there.v, there.v, 0.0))
-        self.shift(k, images)
-
-    def shift(self, first, images):
-        """Rows from one on are so many cells farther away."""
-        if self.image is not None:
-            for k in range(first, self.filled[0]):
-                for axis, images_along in enumerate(images):
-                    self.image[index(k), axis] += np.int32(images_along)
+        crossing = Struck(particle, -1.0 - number, time, there.r, there.v, there.v, 0.0, images=images)
+        self._add(state.image, crossing)
 
     def has(self, particle):
         """Whether a particle has rows."""
@@ -165,8 +158,8 @@ class Log(NamedTuple):
         if self.slip is not None:
             _put(self.slip, k, struck.slip)
         if self.image is not None:
-            for axis in range(3):
-                self.image[k, axis] = np.int32(image[axis, p])
+            for axis, images_along in enumerate(struck.images):
+                self.image[k, axis] = np.int32(image[axis, p] + images_along)
         if self.partner is not None:
             self.partner[k] = np.int32(struck.partner)
         if self.duration is not None:

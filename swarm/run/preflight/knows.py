@@ -236,8 +236,8 @@ def _lossy_groups(asked: Asked) -> Found:
 
 
 def _period(asked: Asked) -> Found:
-    is_known = not isinstance(asked.particles, TiedParticles) and asked.method.knows_period()
-    if asked.scene.period is not None and not is_known:
+    is_soft = isinstance(asked.particles, TiedParticles) and not isinstance(asked.method, Impact)
+    if asked.scene.period is not None and (is_soft or not asked.method.knows_period()):
         yield {"got": asked.scene.period}
 
 
@@ -538,9 +538,9 @@ CAPABILITIES = (
             "period must be None with {whole}, got {got}: its steps do not end where a particle leaves the cell",
             _TO_EXACT,
         ),
-        _EVERY_BODY: Refusal(
-            "period must be None with bodies, got {got}: a body may lie across a face of the cell",
-            "use particles, or a vessel without a period",
+        (SOFT_BODIES, PAPER_BODIES): Refusal(
+            "period must be None with bodies and {method}, got {got}: a body may lie across a face of the cell",
+            "use Impact(dt=...), or a vessel without a period",
         ),
         (MASSIVE, HEAVY): Refusal(f"surfaces[{{i}}].{MASS_AND_PERIOD}", WITHOUT_PERIOD),
     }),

@@ -34,6 +34,7 @@ from .axes import (
     is_free,
     is_out,
     least,
+    length_of,
     most,
     pulls,
     room_along,
@@ -78,6 +79,12 @@ def into(period, r):
         return Return(r, ZERO)
     n = Vec(image_of(period.x, r.x), image_of(period.y, r.y), image_of(period.z, r.z))
     return Return(Vec(inside(period.x, r.x, n.x), inside(period.y, r.y, n.y), inside(period.z, r.z, n.z)), n)
+
+
+def moved_into(period, r, other):
+    """A position, moved by as many images as another one is into the cell."""
+    n = into(period, other).images
+    return r - Vec(n.x * length_of(period.x), n.y * length_of(period.y), n.z * length_of(period.z))
 
 
 def has_left(period, r):
