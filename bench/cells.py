@@ -295,8 +295,16 @@ def _balls(draft: Draft) -> swarm.Particles:
     return made
 
 
+def _triangle(across: int) -> swarm.Body:
+    """A body in a plane."""
+    points, turns = np.zeros((3, 3)), 2.0 * np.pi / 3.0 * np.arange(3)
+    points[:, np.arange(3) != across] = 0.046 * np.array([np.cos(turns), np.sin(turns)]).T
+    return swarm.Body(points, MASS / 3.0, links=[(0, 1), (1, 2), (2, 0)])
+
+
 def _bodies(draft: Draft) -> swarm.Bodies:
-    body = swarm.tetrahedron(edge=0.08, mass=MASS)
+    is_flat = draft.scene.get("plane") is not None
+    body = _triangle(draft.across()) if is_flat else swarm.tetrahedron(edge=0.08, mass=MASS)
     places, speeds = _arrays(draft)
     middle = body.points.mean(axis=0)
     arms = (body.points - middle).T[:, :, None]

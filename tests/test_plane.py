@@ -203,7 +203,16 @@ OUT = {
             swarm.Impact(dt=0.1),
             until=1.0,
         ),
-        ["plane must be None with bodies"],
+        ["must be in the plane z = 0", "all points of a body must lie, and move, in it"],
+    ),
+    "bodies at soft walls": (
+        lambda: swarm.simulate(
+            swarm.Scene([CIRCLE], plane="z"),
+            swarm.place(swarm.Scene([CIRCLE]), swarm.dumbbell(0.1, 1.0), 1),
+            swarm.Penalty(dt=0.1, penalty=1e3),
+            until=1.0,
+        ),
+        ["plane must be None with bodies and Penalty"],
     ),
 }
 

@@ -17,6 +17,7 @@ from ..run.options import RunOptions, Task
 from ..run.preflight.counting import require_compiled, require_counters
 from ..run.preflight.starts import require_inside
 from ..scene import Scene
+from ..surfaces.plane import require_start
 from ..surfaces.shapes.slab import Slab
 from ..surfaces.surface import Surface
 from . import covering
@@ -61,6 +62,7 @@ def task_of(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -
         require_inside(scene, Particles(touching, touching))
     bodies = with_born(scene, bodies.in_cell(scene), options.sources, options.seed, options.times.until)
     points = bodies.particles()
+    _require_in_plane(scene, bodies.body, points)
     require_logged(len(bodies), options)
     require_counters(scene, points, options)
     if options.keeps_float32():
@@ -79,6 +81,22 @@ def _require_steps(scene: Scene, bodies: Bodies, method: Method, options: RunOpt
     method.span("until", options.times.until)
     assert options.times.every is not None
     method.span("every", options.times.every)
+
+
+def _require_in_plane(scene: Scene, body: Body, points: Particles) -> None:
+    """Raise a `SceneError` where a body does not stay in the plane of a scene by itself."""
+    if scene.plane is None:
+        return
+    led = any(motion is not None for motion in body.anchors.values())
+    if led or body.guides or body.cavities:
+        raise SceneError(
+            f'plane must be None with a body that has guides, cavities or anchors that are led, got "{scene.plane}"; '
+            "leave it out"
+        )
+    try:
+        require_start(scene, points)
+    except SceneError as error:
+        raise SceneError(f"{str(error).partition(';')[0]}; all points of a body must lie, and move, in it") from None
 
 
 def _warn_of_turns(bodies: Bodies, dt: float) -> None:

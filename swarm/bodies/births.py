@@ -17,6 +17,7 @@ from ..sources.ball_places import place_unborn
 from ..sources.births import stream, with_births
 from ..sources.source import Source
 from ..state import Floats
+from ..surfaces.plane import along
 from .body import Body
 from .copies import Bodies
 
@@ -68,7 +69,8 @@ def with_born(scene: Scene, bodies: Bodies, sources: tuple[Source, ...], seed: i
     number = np.arange(len(bodies), len(made))
     spin = np.zeros_like(made.position) if made.spin is None else made.spin
     place, velocity, turning = (rows[:, None, number] for rows in (made.position, made.velocity, spin))
-    turns = np.array([_turn(seed, int(made.births.source[i]), int(i)) for i in number]).reshape(-1, 3, 3)
+    of, across = made.births.source, scene.across()
+    turns = np.array([_turn(seed, int(of[i]), int(i), across) for i in number]).reshape(-1, 3, 3)
     arms = np.einsum("nxy,yp->xpn", turns, _arms(body))
     position = np.concatenate([bodies.position, place + arms], axis=2)
     velocity = np.concatenate([bodies.velocity, velocity + np.cross(turning, arms, axis=0)], axis=2)
@@ -85,10 +87,12 @@ def _centers(bodies: Bodies) -> Particles:
     )  # fmt: skip
 
 
-def _turn(seed: int, k: int, number: int) -> Floats:
-    """A rotation (3, 3), uniform among all, of the birth with a number."""
-    w, *v = (q := stream(seed, k, _TURNS, number).standard_normal(4)) / np.sqrt(q @ q)
-    x, y, z = v
+def _turn(seed: int, k: int, number: int, across: int | None) -> Floats:
+    """A rotation (3, 3), uniform among all, in a plane about its normal, of the birth with a number."""
+    q = stream(seed, k, _TURNS, number).standard_normal(4)
+    if across is not None:
+        q[[1 + axis for axis in along(across)]] = 0.0
+    w, x, y, z = q / np.sqrt(q @ q)
     cross = np.array([(0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)])
     return np.asarray(np.eye(3) + 2.0 * (w * cross + cross @ cross))
 

@@ -573,8 +573,8 @@ CAPABILITIES = (
         ),
     }),
     Capability("plane", _of_scene("plane"), {
-        _EVERY_BODY: Refusal(
-            'plane must be None with bodies, got "{got}": bodies turn in space', "use particles, or leave it out"
+        (SOFT_BODIES, PAPER_BODIES): Refusal(
+            'plane must be None with bodies and {method}, got "{got}"', "use Impact(dt=...), or leave it out"
         ),
     }),
     Capability("restitution", _of_walls("restitution", 1.0), {
