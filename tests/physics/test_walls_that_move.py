@@ -188,6 +188,51 @@ def test_the_first_hit_is_found(name, motion, pull):
     assert found >= 2
 
 
+def in_a_sphere_that_swings(radius, swing, r, v, until):
+    """(its place and velocity then, the number of its impacts) of a particle, in thirty digits."""
+    amplitude, rate, phase = mpmath.matrix(swing.amplitude), 2 * mpmath.pi * swing.frequency, swing.phase
+    r, v, now, impacts = mpmath.matrix(r), mpmath.matrix(v), mpmath.mpf(0), 0
+
+    def off(t):
+        return r + v * (t - now) - amplitude * (mpmath.sin(rate * t + phase) - mpmath.sin(phase))
+
+    def gap(t):
+        return mpmath.norm(off(t)) - radius
+
+    def gaps(t):
+        wave = np.sin(float(rate) * t + phase) - math.sin(phase)
+        at = [float(r[k]) + float(v[k]) * (t - float(now)) - float(amplitude[k]) * wave for k in range(3)]
+        return np.sqrt(sum(x * x for x in at)) - radius
+
+    while True:
+        moments = np.linspace(float(now), until, 4001)[1:]
+        outside = np.flatnonzero(gaps(moments) > 0.0)
+        if not outside.size:
+            return r + v * (until - now), v, impacts
+        last = moments[outside[0]]
+        hit = mpmath.findroot(gap, (last - (moments[1] - moments[0]), last), solver="anderson", tol=1e-50)
+        normal = off(hit) / radius
+        approach = mpmath.fdot(v - amplitude * rate * mpmath.cos(rate * hit + phase), normal)
+        r, v, now, impacts = r + v * (hit - now), v - 2 * approach * normal, hit, impacts + 1
+
+
+@pytest.mark.parametrize("amplitude", [0.02, 0.15, 0.7])
+def test_impacts_in_a_sphere_that_swings(amplitude):
+    """Also where it leaves no place that it never comes to."""
+    swing = swarm.Oscillation((amplitude, 0.3 * amplitude, 0.5 * amplitude), frequency=0.7, phase=0.4)
+    scene = swarm.Scene([swarm.Sphere(0.5, motion=swing)])
+    start, until = swarm.fill(scene, 4, speed=1.0, seed=6), 2.5
+    result = run(scene, start, until)
+    with mpmath.workdps(30):
+        for k in range(4):
+            r, v = start.position[:, k].tolist(), start.velocity[:, k].tolist()
+            r, v, impacts = in_a_sphere_that_swings(0.5, swing, r, v, until)
+            assert result.impacts_per_particle[k] == impacts >= 2
+            assert np.abs(result.particles.position[:, k] - np.array(r.tolist(), float)[:, 0]).max() <= 1e-12
+            assert np.abs(result.particles.velocity[:, k] - np.array(v.tolist(), float)[:, 0]).max() <= 1e-11
+    assert result.observables["max_penetration"].max() <= 4.0 * np.finfo(float).eps
+
+
 def test_a_hit_of_a_wall_that_comes_and_goes():
     """A floor that swings just up to a particle which stands still, or just not."""
     amplitude, rest = 0.25, Vec(0.0, 0.0, 0.0)

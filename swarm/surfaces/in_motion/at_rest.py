@@ -71,6 +71,10 @@ class AtRest(Record):
 
     # --- Overridden by a shape: safe steps in the frame of a wall that moves other than uniformly; see rising.py ---
 
+    def core(self, depth):
+        """What lies so deep that walls displaced by less never reach it, as the cavity that it is; None if unknown."""
+        return
+
     def level_along(self, seen):
         """The level along a flight with a bound of its third derivative: a `Level`, or `Between` of rising.py."""
         raise NotImplementedError

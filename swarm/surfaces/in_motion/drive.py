@@ -13,7 +13,7 @@ from ... import motion as motions
 from ...kernel.angle import sine_and_versine
 from ...kernel.jit import Array, select
 from ...kernel.record import Record
-from ...kernel.vector import ZERO, Vec, cross, dot, vec
+from ...kernel.vector import ZERO, Vec, cross, dot, square, vec
 from ..surface import Surface
 
 # A motion changes little in this part of a radian, or of a piece of a path.
@@ -181,6 +181,23 @@ class Drive(Record):
         for swing in self.swings:
             swings = swings + swing.mean_velocity(middle, h)
         return self.velocity + swings + (ZERO if self.track is None else self.track.mean_velocity(middle, h))
+
+    def swing_amplitude(self):
+        """How far swings take the wall at most from where it would be without them; None if it moves in other ways."""
+        if self.turn is not None or self.track is not None:
+            return None
+        amplitude = 0.0
+        for swing in self.swings:
+            # |C cos a + S sin a| <= |(C, S)|
+            amplitude += math.sqrt(square(swing.cosine) + square(swing.sine))
+        return amplitude
+
+    def swing_center(self, t):
+        """Its displacement without swings at a time since the end of the frame, if it moves in no other ways."""
+        middle = self.shift + t * self.velocity
+        for swing in self.swings:
+            middle = middle - swing.cosine
+        return middle
 
     def angular_speed(self):
         """The angular speed of the surface [rad/s]."""

@@ -7,6 +7,7 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
+from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import norm
 from ...motion import Guide
@@ -46,6 +47,16 @@ class Moving(Record):
         """A particle as safe steps to the wall see it after a time of its flight: None where none are needed."""
         remaining = flight.remaining - t
         return flight.seen(t, self.during(remaining, remaining), flight.pull)
+
+    def leaves_core(self, r, v, remaining, t):
+        """When a straight flight that is there after a time leaves what the wall never reaches; that time elsewhere."""
+        within, drive = self.drive.swing_amplitude(), self.drive
+        core = None if within is None else self.body.core(within)
+        if core is None:
+            return t
+        r, v = r - drive.swing_center(-remaining), v - drive.velocity
+        leaves, _is_met = core.first_hit(r, v)
+        return select(core.level_of(core.inner(r + t * v)) < 0.0, leaves, t)
 
 
 class TurningWall(Moving):

@@ -17,6 +17,8 @@ from .common import Distance, ExactChord
 
 # Trials of a time for which the fall is bounded.
 _TRIALS = 3
+# Of a core, of the radius: what is computed to be in it is in it.
+_ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, repr=False)
@@ -197,7 +199,11 @@ class SphereNumbers(Distance, ExactChord):
     def level_along(self, seen):
         d, side = seen.r - self.center, self.side
         q, bend = square(d), square(seen.v) + dot(d, seen.a)
-        return Level(side * (q - self.radius2), side * dot(d, seen.v), side * bend, 2.0 * math.sqrt(q), 1.0)
+        return Level(side * (q - self.radius2), side * dot(d, seen.v), side * bend, self._steepness(q), 1.0)
+
+    def _steepness(self, q):
+        """|grad q|, or a number above it that is nearly it at the wall."""
+        return 2.0 * math.sqrt(q)
 
     def bounds_along(self, seen, within):
         # In a frame that its centre carries along: it does not turn.
@@ -217,6 +223,15 @@ class SphereCavity(SphereNumbers):
         # |d + v t|^2 - R^2 = c + 2 b t + |v|^2 t^2
         d = r - self.center
         return rise_time_inside(square(d) - self.radius2, dot(d, v), square(v)), True
+
+    def _steepness(self, q):
+        # 2 R |d| <= R^2 + |d|^2: no square root
+        return (self.radius2 + q) * self.curvature
+
+    def core(self, depth):
+        width = (1.0 - _ROUND_OFF) * self.radius - depth
+        width = select(width > 0.0, width, 0.0)
+        return self._replace(radius=width, radius2=width * width)
 
     may_be_far = False
     leaves_once = True

@@ -85,9 +85,9 @@ class InWallFrame(Record):
         return tuple(MostPull(min(a + more, most), min(more - a, most)) for a in self.a)
 
 
-def flight_of(r, v, pull, remaining):
-    """The flight of a particle."""
-    return Flight(r, v, pull, remaining, norm(v), norm(pull))
+def flight_of(r, v, pull, remaining, speed=None):
+    """The flight of a particle, and its speed where that is known."""
+    return Flight(r, v, pull, remaining, norm(v) if speed is None else speed, norm(pull))
 
 
 # --- Levels with a known second derivative: below c + 2 b t + a t^2 + k t^3, with a bound k of f'''/6 -------

@@ -10,15 +10,16 @@ import math
 from ...kernel.gravity import accelerated
 from ...kernel.jit import select
 from ...kernel.limits import EPSILON
-from ...kernel.vector import ZERO
+from ...kernel.vector import ZERO, norm
 from ..in_motion.moving import Moving
+from ..walls import Following
 from .flights import Hit
 from .rising import ThirdDerivativeBound, flight_of
 from .safe import closed_hit, seen_by_walls
 
 # What a lane knows of its way: the time of the flight so far, the wall that it has met or -1, and the first hit with
-# the walls that have a closed form.
-_TIME, _MET, _CLOSED, _OTHER = 0, 1, 2, 3
+# the walls that have a closed form; the speed at its start.
+_TIME, _MET, _CLOSED, _OTHER, _SPEED = 0, 1, 2, 3, 4
 # The bounds of a stride hold for at most so many times the pace of a wall: beyond, a power series says little.
 _AHEAD = 32.0
 
@@ -27,14 +28,14 @@ def start(walls, gravity, course, lane, r, v, remaining):
     """The way of a flight with so much of the frame left [s] into a lane of the course."""
     found = closed_hit(walls.at(remaining), gravity, r, v)
     course[_TIME, lane], course[_MET, lane] = 0.0, -1.0
-    course[_CLOSED, lane], course[_OTHER, lane] = found.time, found.wall
+    course[_CLOSED, lane], course[_OTHER, lane], course[_SPEED, lane] = found.time, found.wall, norm(v)
 
 
 def stride(walls, gravity, course, lane, r, v, remaining, is_first):
     """One stride of a lane that has not met a wall."""
     t, met, closed = course[_TIME, lane], course[_MET, lane], course[_CLOSED, lane]
     longest = select(closed < remaining, closed, remaining) - t
-    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining)
+    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining, course[_SPEED, lane])
     known = tuple(
         (number, ThirdDerivativeBound(wall.body, seen, wall.body.level_along(seen)))
         for wall, number, seen in seen_by_walls(walls, flight, t)
@@ -43,10 +44,24 @@ def stride(walls, gravity, course, lane, r, v, remaining, is_first):
     ahead = select(ahead < longest, ahead, longest)
     within = select(within < ahead, within, ahead)
     time, wall, meets = _first_stride(known, within, is_first)
-    step = select(time < within, time, within)
+    after = t + select(time < within, time, within)
+    if is_first and gravity is None:
+        after = _through_cores(walls, r, v, remaining, after, t + longest)
     under_way = (met < 0.0) & (longest > 0.0)
-    course[_TIME, lane] = select(under_way, t + step, t)
+    course[_TIME, lane] = select(under_way, after, t)
     course[_MET, lane] = select(under_way & meets & (time <= within), wall, met)
+
+
+def _through_cores(walls, r, v, remaining, t, longest):
+    """A time up to the longest until which a straight flight, free until t, surely stays where no wall ever comes."""
+    first = longest
+    for wall in reversed(walls.each):
+        if isinstance(wall, Following):
+            return t
+        if wall.accelerates:
+            leaves = wall.leaves_core(r, v, remaining, t)
+            first = select(leaves < first, leaves, first)
+    return select(t < first, first, t)
 
 
 def met(course, lane):
