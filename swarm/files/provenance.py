@@ -1,6 +1,7 @@
 """How a trajectory came to be: its end, its threads and its pace, and the versions of what made it."""
 
 import datetime
+import functools
 import os
 import platform
 from collections.abc import Callable
@@ -34,17 +35,24 @@ def makers() -> dict[str, str]:
         "version": VERSION,
         "python": platform.python_version(),
         "numpy": numpy.__version__,
-        "numba": version("numba"),
+        "numba": _numba(),
         "hdf5": h5py.version.hdf5_version,
-        "machine": f"{_processor()}, {os.cpu_count()} logical cores, {platform.system()}",
+        "machine": f"{_processor(_CPUS)}, {os.cpu_count()} logical cores, {platform.system()}",
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
     }
 
 
-def _processor() -> str:
-    """The name of the processor, or of its kind."""
+@functools.cache
+def _numba() -> str:
+    """The version of Numba, without its import."""
+    return version("numba")
+
+
+@functools.cache
+def _processor(file: Path) -> str:
+    """The name of the processor in a file of the system, or of its kind."""
     try:
-        models = [line.partition(":")[2].strip() for line in _CPUS.read_text().splitlines() if "model name" in line]
+        models = [line.partition(":")[2].strip() for line in file.read_text().splitlines() if "model name" in line]
     except OSError:
         models = []
     return models[0] if models else platform.machine()

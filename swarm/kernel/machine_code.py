@@ -21,6 +21,7 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
+from numba._dispatcher import compute_fingerprint
 from numba.core import event, sigutils
 from numba.core.caching import FunctionCache
 from numba.extending import typeof_impl
@@ -41,6 +42,8 @@ _CONFIG: Any = numba.config
 _LOCK = ".lock"
 _DIGESTS = "digests"
 _kernels: list[Any] = []
+# Kernels that are compiled, each with the fingerprint of its arguments.
+_found: set[tuple[Any, tuple[bytes, ...]]] = set()
 _compiling = threading.local()
 
 _HERE = Path(__file__).parent
@@ -278,7 +281,14 @@ def kind_of(function: Any, arguments: tuple[Any, ...]) -> str:
 
 def is_found(kernel: Any, arguments: tuple[Any, ...]) -> bool:
     """Whether a kernel is compiled for such arguments, in this process or on disk."""
-    return _is_found(getattr(kernel, "compiled", kernel), tuple(map(numba.typeof, arguments)))
+    try:
+        # What the dispatcher itself compares of arguments; their types take a hundred times as long.
+        known = kernel, tuple(map(compute_fingerprint, arguments))
+    except NotImplementedError:
+        return _is_found(getattr(kernel, "compiled", kernel), tuple(map(numba.typeof, arguments)))
+    if known not in _found and _is_found(getattr(kernel, "compiled", kernel), tuple(map(numba.typeof, arguments))):
+        _found.add(known)
+    return known in _found
 
 
 loaded(sys.modules[__name__])
