@@ -20,8 +20,8 @@ from ..particles import Particles
 from ..run.base import Arrays, BaseRun, named
 from ..run.doors import comers
 from ..run.impacts import ThreadLog
-from ..run.preflight.counting import counters_of, crossed_of
 from ..run.observed import gone_of
+from ..run.preflight.counting import counters_of, crossed_of
 from ..run.starting_state import UNSEEDED, Seeding
 from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
@@ -71,9 +71,7 @@ class BodyRun(BaseRun):
         books = _books_of(self._walls[2] is not None, scene.moves(), self._touching.laws)
         self._bodies = _state_of(bodies, particles, rows, walls, books)
         self._counted_by, self._counters = watched.counters, counters_of(scene, watched.counters, logs=True)
-        if self._counters is not None:
-            crossed = crossed_of(self._counters, watched.counters, scene, bodies.centers())
-            self._bodies = self._bodies._replace(crossed=crossed)
+        self._bodies = self._with_counters(self._bodies, scene, bodies)
         none = np.zeros(0)
         # What files take of a run.
         self.state = State(
@@ -151,6 +149,12 @@ class BodyRun(BaseRun):
                     self._bodies.remaining[~np.isnan(time)] = 0.0
             self._feed_in(moment)
         self._rule = self._rule._replace(end=moment)
+
+    def _with_counters(self, state: BodyState, scene: Scene, bodies: Bodies) -> BodyState:
+        """The state with what has crossed the counters, where there are any."""
+        if self._counters is None:
+            return state
+        return state._replace(crossed=crossed_of(self._counters, self._counted_by, scene, bodies.centers()))
 
     def _energy_of(self, r: Floats, v: Floats) -> Floats:
         """The energy of copies."""

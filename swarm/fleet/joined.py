@@ -90,16 +90,15 @@ def _added(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
     brought = {}
     if task.particles.births is not None:
         sums, brought = sums[:-1], total_of(sums)
+    laws = task.compiled.laws
+    has_heat = laws is not None and laws.give_heat
     if task.bodies is None:
-        laws = task.compiled.laws
-        has_heat = laws is not None and laws.give_heat
         rows, of_parts = booked(task.compiled.walls()), task.compiled.numbering.parts_of_rows
         added = observables.summed(sums, owners, rows, has_heat, of_parts, len(task.options.counters))
     else:
-        added = energies.summed(
-            sums, owners, len(task.scene.surfaces), len(own_surfaces(task.bodies.body)),
-            len(task.bodies.body.cavities), len(task.options.counters),
-        )  # fmt: skip
+        body = task.bodies.body
+        booked_of_bodies = len(own_surfaces(body)), len(body.cavities), has_heat and laws is not None and laws.send_off
+        added = energies.summed(sums, owners, len(task.scene.surfaces), booked_of_bodies, len(task.options.counters))
     added |= brought
     seen: dict[str, Any] = {}
     # In the order of a run on one machine.

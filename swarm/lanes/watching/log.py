@@ -134,6 +134,13 @@ class Log(NamedTuple):
         crossing = Struck(particle, -1.0 - number, time, there.r, there.v, there.v, 0.0, images=images)
         self._add(state.image, crossing)
 
+    def shift(self, first, images):
+        """Rows from one on are so many cells farther away."""
+        if self.image is not None:
+            for k in range(first, self.filled[0]):
+                for axis, images_along in enumerate(images):
+                    self.image[index(k), axis] += np.int32(images_along)
+
     def has(self, particle):
         """Whether a particle has rows."""
         return True if self.chosen is None else self.chosen[index(particle)]
