@@ -198,7 +198,7 @@ class BodyImpact(Record):
         n, slip = self.direction(self.wide * a), bodies.slip(bodies.walls_now(i), wall, c, before)
         time = bodies.rule.end - bodies.pace.remaining[i]
         return Struck(
-            bodies.pace.body[i], float(wall), time, c, before, u, impulse, slip - dot(slip, n) * n, -1, images
+            bodies.pace.body[i], float(wall), time, c, before, u, impulse, slip - dot(slip, n) * n, images=images
         )  # fmt: skip
 
     def coupling(self, row):
