@@ -257,11 +257,11 @@ class Scene:
 
     @cached_property
     def _pieces_of_vaults(self) -> Pieces:
-        """The pieces that balls meet: a union of several rooms is one of them."""
-        if not any(len(image.rooms) > 1 for images in self.pieces.images for image in images):
+        """The pieces that balls meet: a union of several rooms, or a foam, is one of them."""
+        images = [image for images in self.pieces.images for image in images]
+        if not any(len(one.rooms) > 1 or one.is_foam() for one in images):
             return self.pieces
-        images = (image for images in self.pieces.images for image in images)
-        return pieces_of([vault_of(one) if len(one.rooms) > 1 else one for one in images], None)
+        return pieces_of([vault_of(one) if len(one.rooms) > 1 or one.is_foam() else one for one in images], None)
 
     def pieces_of_balls(self, largest: float) -> Pieces:
         """The pieces that balls in the cell meet, with radii up to the largest one [m]."""

@@ -305,6 +305,10 @@ class Surface(Validated):
         """
         raise NotImplementedError
 
+    def rooms_of_balls(self) -> "tuple[Any, ...]":
+        """Its rooms as balls know them, each of the surfaces around it."""
+        return self.rooms
+
     def is_foam(self) -> bool:
         """Whether particles live in any of many bodies, not outside of all."""
         return False

@@ -101,6 +101,33 @@ def test_losses_at_the_rim_take_energy():
     assert result.observables["energy_error"].max() < 1e-12
 
 
+def test_grains_in_a_foam_are_those_in_the_union_of_its_bubbles():
+    """Also beyond the edge between two of them, with losses, and by the bits."""
+    laws = {"friction": 0.2, "restitution": 0.9}
+    foam = swarm.Spheres([one.center for one in SPHERES.parts], [0.1, 0.08], side="inside", **laws)
+    places, speeds = np.array([(0.02, 0.04), (0.05, 0.0), (0.0, 0.0)]), np.array([(0.1, -1.0), (0.6, 0.1), (0.0, 0.2)])
+    grains = swarm.Particles(places, speeds, mass=1e-4, radius=0.008)
+    ends = []
+    for surface in (foam, swarm.Union(SPHERES.parts, **laws)):
+        scene = swarm.Scene([surface], gravity=(0.0, 0.0, -9.81))
+        method = swarm.Penalty(dt=5e-4, penalty=500.0)
+        ends.append(swarm.simulate(scene, grains, method, until=0.2, every=0.1, progress=False, compile="never"))
+    assert ends[0].observables["impacts"][-1] > 3
+    assert np.array_equal(ends[0].particles.position, ends[1].particles.position)
+    assert ends[0].observables["energy_error"].max() < 1e-12
+    assert foam.phi(ends[0].particles.position).max() < 0.0
+
+
+def test_foams_that_no_grain_may_meet_are_refused_in_a_sentence():
+    corner = [(0.03 * math.cos(a), 0.03 * math.sin(a), 0.0) for a in (0.0, 2.1, 4.2)]
+    row = [(0.04 * k, 0.0, 0.0) for k in range(70)]
+    for places, words in ((corner, "three meet at a point"), (row, "of 70 rooms, and balls meet at most 64")):
+        foam = swarm.Spheres(places, 0.05, side="inside")
+        grain = swarm.Particles((0.0, 0.0, 0.03), (0.0, 0.0, 0.0), mass=1e-4, radius=2e-3)
+        with pytest.raises(swarm.SceneError, match=words):
+            swarm.simulate(swarm.Scene([foam]), grain, swarm.Penalty(1e-4, 2e3), until=0.1, every=0.1, progress=False)
+
+
 @pytest.mark.parametrize(
     ("union", "words"),
     [

@@ -187,10 +187,6 @@ def _unions_beside_own(asked: Asked) -> Found:
         yield from _unions(asked)
 
 
-def _foams(asked: Asked) -> Found:
-    yield from (one for one in _rooms(asked) if one["got"].is_foam())
-
-
 def _repeated_rooms(asked: Asked) -> Found:
     yield from _rooms(asked) if asked.scene.period is not None else ()
 
@@ -472,9 +468,6 @@ CAPABILITIES = (
             "surfaces[{i}] must not be a {kind} of several rooms with a body that has guides or cavities, got "
             "{got!r:.200}", "use a body without them",
         ),
-    }, within="union"),
-    Capability("foam", _foams, {
-        (GRAINS,): _of_one_room(_WITH_PENALTY, f"use a Union of its cavities, or {_TO_POINTS}"),
     }, within="union"),
     Capability("union in a cell that repeats", _repeated_rooms, {
         (GRAINS,): _of_one_room(f"{_WITH_PENALTY} and a period", "leave the period out, or use one room"),

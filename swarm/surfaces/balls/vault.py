@@ -1,4 +1,4 @@
-"""A union of several rooms as balls meet it: a surface of which each wall is of faces that join at edges."""
+"""A union of several rooms, or a foam, as balls meet it: a surface of walls, each of faces that join at edges."""
 
 import itertools
 import math
@@ -23,8 +23,8 @@ from .vaulted import RoomEdge, RoomFace, Vaulted, crossing, is_seen
 
 # Of the extent: what is round-off of a place, and what is farther than anything.
 _SLACK, _FAR = 1e-11, 1e6
-# Places from which edges are looked for.
-_PLACES = 24
+# Places from which edges are looked for, and most rooms.
+_PLACES, _MOST = 24, 64
 # What all parts of a union that balls meet have in common.
 _LAWS = "restitution", "friction", "temperature", "accommodation", "laws"
 _AT_REST = "motion", "present"
@@ -69,15 +69,20 @@ class Vault(Surface):
 
 
 def vault_of(union: Any) -> Vault:
-    """A union of several rooms as balls meet it."""
-    one = union.surfaces()[0]
-    return Vault(rooms_of=union.rooms, **{name: getattr(one, name) for name in _LAWS})
+    """A union of several rooms, or a foam, as balls meet it."""
+    rooms = union.rooms_of_balls()
+    one = rooms[0][0]
+    return Vault(rooms_of=rooms, **{name: getattr(one, name) for name in _LAWS})
 
 
 def no_balls_in(union: Any) -> str | None:
-    """None where balls may meet a union of several rooms, else half a sentence that says why they may not."""
-    begin = f"of {len(union.rooms)} rooms, of which "
-    for surface in union.surfaces():
+    """None where balls may meet a union of several rooms, or a foam, else half a sentence that says why not."""
+    rooms = union.rooms_of_balls()
+    surfaces = [surface for room in rooms for surface in room]
+    begin = f"of {len(rooms)} rooms, of which "
+    if len(rooms) > _MOST:
+        return f"of {len(rooms)} rooms, and balls meet at most {_MOST}, for each is compiled into the kernels"
+    for surface in surfaces:
         name = type(surface).__name__
         if surface.is_solid() or not isinstance(surface, _KINDS):
             known = ", ".join(kind.__name__ for kind in _KINDS)
@@ -87,9 +92,9 @@ def no_balls_in(union: Any) -> str | None:
         if changes:
             return f"{begin}a {name} has {changes[0]}, while edges of rooms that balls meet stay as they are"
     for what in _LAWS:
-        if len({repr(getattr(surface, what)) for surface in union.surfaces()}) > 1:
+        if len({repr(getattr(surface, what)) for surface in surfaces}) > 1:
             return f"{begin}the parts differ in {what}, while an edge belongs to both"
-    if len(union.rooms) > 2 and _any_corner(vault_of(union)):
+    if len(rooms) > 2 and _any_corner(vault_of(union)):
         return f"{begin}three meet at a point, where balls would turn about a tip; they turn about edges of two"
     return None
 

@@ -1,6 +1,6 @@
 """The fields of bodies by their kind: each body at its place, with its size and its rotation or axis."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -61,6 +61,16 @@ class Spheres(Many):
 
     def corners(self) -> tuple[Floats, Floats]:
         return self.centers.T - self.radii, self.centers.T + self.radii
+
+    def rooms_of_balls(self) -> tuple[Any, ...]:
+        if not self.is_foam():
+            return self.rooms
+        laws = {one.name: getattr(self, one.name) for one in fields(self) if one.kw_only}
+        rows = zip(self.centers.tolist(), self.radii.tolist(), strict=True)
+        return tuple((Sphere(radius, center, "inside", **laws),) for center, radius in rows)
+
+    def largest_ball(self) -> float:
+        return float(self.radii.min()) if self.is_foam() else super().largest_ball()
 
     @cached_property
     def members(self) -> Members:

@@ -15,6 +15,7 @@ from ...kernel.grid import Floats, one_cell
 from ...motion.wall import product
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region
+from ..balls.vault import no_balls_in
 from ..presence.patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
@@ -186,7 +187,7 @@ class Many(Surface):
 
     def holds_balls(self) -> str | None:
         if self.is_foam():
-            return "with cavities that have edges where they meet, at which balls would turn"
+            return no_balls_in(self)
         return self.solids()[0].holds_balls()
 
     def contain(self, points: Floats) -> NDArray[np.bool_]:
