@@ -204,6 +204,10 @@ class ImpactLog(Stored):
 
             A particle that passes an opening of a surface has its last row there, with an impulse of 0.
 
+            Of bodies `particle` is the number of the copy, and an impact of several contact points has a row for each:
+            place, velocities and impulse are those of the contact point. Impacts in cavities that a point of the body
+            carries, and ways through openings, have no rows. A crossing is that of the centre of mass.
+
             Of particles with a radius a collision of two is a row too, of the one with the smaller number: `partner` is
             the other one, -1 at a wall, `impulse` what each gives the other, and both `surface` and `member` are -1.
 

@@ -68,6 +68,8 @@ class Raster:
 
     def triangles(self, seen: Floats, triangles: Indices, colour: Floats) -> None:
         """Paint triangles with corners (V, 3), as they are seen, in colours of the corners (V, 3)."""
+        # Bodies that are not yet born have no place.
+        triangles = triangles[np.isfinite(seen[triangles]).all(axis=(1, 2))]
         corners = seen[triangles]
         xy = (corners[..., :2] - self.low) * self.scale - 0.5
         first = np.ceil(xy[..., 1].min(axis=1)).astype(np.int64)

@@ -86,7 +86,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             get all particles, also on a cluster, where the client calls them when the shards have ended.
         counters: surfaces that count the particles that cross them and do not stop any, each a surface at rest or a
             `Counter`, not with a contact_step. The motion has the same bits without them. With fixed steps a particle
-            crosses what is between the two ends of its step. See `Result.observables`.
+            crosses what is between the two ends of its step. A body crosses with its centre of mass. See
+            `Result.observables`.
         record_particles: the most particles recorded, evenly chosen.
         record_color: what their colour shows, "speed" or "energy-error".
         record_megabytes: largest size of the recording, above 0; of too many frames every k-th is recorded.

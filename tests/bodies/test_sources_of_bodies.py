@@ -81,6 +81,9 @@ def test_a_body_comes_only_where_a_wall_that_moves_leaves_room_for_it():
         first = 3 + int(np.ceil((reach - 0.01) / 0.1))
         assert seen["born"][:first, 0].tolist() == [0] * first
         assert seen["born"][-1, 0] == (2 if blocked == "wait" else 0)
+    # A picture shows those that are there.
+    assert np.isnan(run.bodies.position[..., 1:]).all()
+    run.plot()
 
 
 def test_a_run_in_many_sessions_has_the_same_births(tmp_path, monkeypatch):
