@@ -374,12 +374,12 @@ def test_balls_that_are_too_large_for_a_shape(surfaces, plane, words):
     ("surfaces", "words"),
     [
         (
-            [swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.5, (0.6, 0.0, 0.0))])],
-            r"must not be a Union of several rooms with particles that have a radius and Impact, got Union.*; use part",
+            [swarm.Spheres([(0.0, 0.0, 0.0), (0.6, 0.0, 0.0)], [0.5, 0.5], side="inside")],
+            r"must not be a Spheres of several rooms with particles that have a radius and Impact, got Sph.*; use a Un",
         ),
         ([swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)))], "Quadric, which has a tip at"),
     ],
-    ids=["union", "tip"],
+    ids=["foam", "tip"],
 )
 def test_what_no_ball_may_meet_is_refused_in_a_sentence(surfaces, words):
     scene = swarm.Scene(surfaces)

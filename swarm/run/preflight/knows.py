@@ -356,6 +356,7 @@ _TO_POINTS = "use particles without a radius"
 _TO_EXACT = "use Impact() with contact_step = 0"
 _NO_STEP = "leave contact_step out"
 _WITH_PENALTY = "particles that have a radius and Penalty"
+_WITH_IMPACT = "particles that have a radius and Impact"
 _AT_AN_INSTANT = "Impact: balls that meet at an instant do not roll on one another"
 _ONE_LAW = "give the whole mesh one law, or use Impact"
 _NO_METHOD = Refusal(
@@ -452,7 +453,6 @@ CAPABILITIES = (
     }),
     Capability("union", _rooms, {
         (SOFT_BODIES, PAPER_BODIES): _of_one_room("bodies and soft walls", "use Impact(dt=...)"),
-        (BALLS,): _of_one_room("particles that have a radius and Impact", f"{_TO_POINTS}, and Impact()"),
         (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
         (HEAVY,): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
     }),
@@ -471,6 +471,7 @@ CAPABILITIES = (
     }, within="union"),
     Capability("union in a cell that repeats", _repeated_rooms, {
         (GRAINS,): _of_one_room(f"{_WITH_PENALTY} and a period", "leave the period out, or use one room"),
+        (BALLS,): _of_one_room(f"{_WITH_IMPACT} and a period", "leave the period out, or use one room"),
     }, within="union"),
     Capability("union in a plane", _rooms_of_a_plane, {
         (GRAINS,): _of_one_room(f"{_WITH_PENALTY} and a plane", "leave the plane out, or use one room"),

@@ -23,8 +23,9 @@ from .vaulted import RoomEdge, RoomFace, Vaulted, crossing, is_seen
 
 # Of the extent: what is round-off of a place, and what is farther than anything.
 _SLACK, _FAR = 1e-11, 1e6
-# Places from which edges are looked for, and most rooms.
-_PLACES, _MOST = 24, 64
+# Places from which edges are looked for, and most rooms; of the smallest radius of curvature at these places, what is
+# taken for certain.
+_PLACES, _MOST, _ROUND = 24, 64, 0.5
 # What all parts of a union that balls meet have in common.
 _LAWS = "restitution", "friction", "temperature", "accommodation", "laws"
 _AT_REST = "motion", "present"
@@ -119,7 +120,9 @@ def _made(vault: Vault) -> list[Vaulted]:
     first = np.cumsum([0, *map(len, rooms)]).tolist()
     group, edges = list(range(len(faces))), []
     for edge, (k, a), (m, b) in _edges_of(rooms):
-        if any(_is_on(edge, place, slack) and is_seen(edge, place, slack) for place in _crossings(edge, places)):
+        on_it = [place for place in _crossings(edge, places) if _is_on(edge, place, slack)]
+        if any(is_seen(edge, place, slack) for place in on_it):
+            edge = edge._replace(bend=_ROUND * min(map(edge.bend_at, on_it)))
             one, other = group[first[k] + a], group[first[m] + b]
             group = [one if g == other else g for g in group]
             edges.append((first[k] + a, edge))

@@ -3,15 +3,23 @@
 A wall of a room is seen where it is in no other room; where walls of two rooms cross is an edge, about which balls
 turn. The nearest place of a wall is its foot, that of an edge is found by Newton's method: it is the one on the line in
 both planes that touch the walls, next to the ball.
+
+A flight of a hard ball is looked at. Where the foot on a face is seen, the flight is free until it meets the parallel
+surface; of an edge for as long as its bend says. A face or an edge that is hidden is not met before its foot may be
+seen, or is as near as a radius.
 """
 
+import math
 from typing import Any
 
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.record import Record
-from ...kernel.vector import dot, either, norm
-from ..contract import Smooth
+from ...kernel.vector import ZERO, absolute, cross, dot, either, norm, square, total
+from ..contract import Bent, Smooth
+from ..shapes.plane import PlaneNumbers
+from ..shapes.slab import SlabNumbers
+from ..time_of_impact import march
 
 # Newton's steps to an edge; one that is so many roundings of a place is the last.
 _SWEEPS, _STILL = 60, 4.0 * EPSILON
@@ -19,6 +27,8 @@ _SWEEPS, _STILL = 60, 4.0 * EPSILON
 _FAR = 4.0
 # Walls are parallel where the square of the sine is below this.
 _PARALLEL = 1e-18
+# Flat walls are parallel where the square of the cosine is above this.
+_FLAT, _ALIGNED = (PlaneNumbers, SlabNumbers), 1.0 - 1e-14
 
 
 class RoomFace(Record):
@@ -36,6 +46,37 @@ class RoomEdge(Record):
     other: Any
     own: Any
     others: Any
+    bend: float = math.inf  # the smallest radius of curvature [m]
+
+    def bend_at(self, x):
+        """The radius of curvature at a place, in Python: by what both walls bend along the edge."""
+        n, m = outward(self.one, x), outward(self.other, x)
+        along = cross(n, m)
+        sine2 = square(along)
+        along = along * (1.0 / math.sqrt(sine2))
+        a, b = (wall.outward_acceleration(x, along, ZERO) for wall in (self.one, self.other))
+        bend2 = (a * a + b * b - 2.0 * dot(n, m) * a * b) / sine2
+        return 1.0 / math.sqrt(bend2) if bend2 > 0.0 else math.inf
+
+
+class Rim(Record):
+    """An edge as a ball at a place sees it: the foot, how far it is, and the radius of the ball."""
+
+    bend: float
+    foot: Any
+    away: float
+    radius: float
+
+    side = 1.0
+
+    def bent(self, r):
+        away, room = self.away, self.bend - self.away
+        reach = 0.5 * min(max(room, 0.0), away)
+        left, short = room - reach, away - reach
+        most = select(left > 0.0, 0.5 / select(left > 0.0, left, 1.0), 0.0)
+        clear = away - self.radius
+        n = (self.foot - r) * (1.0 / select(away > 0.0, away, 1.0))
+        return Bent(n, -clear, most, max(most, 0.5 / select(short > 0.0, short, 1.0)), reach, max(clear, 0.0))
 
 
 class Vaulted(Smooth):
@@ -68,6 +109,13 @@ class Vaulted(Smooth):
     def clearance(self, r):
         return -self.phi(r)
 
+    def project(self, r):
+        away, place = nearest(self, r)
+        return r + ((away - self.radius) / select(away > 0.0, away, 1.0)) * (place - r)
+
+    def look(self, r, v, pull, t, is_first):
+        return _look(self, r, v, pull, t, is_first)
+
 
 @outlined
 def nearest(wall, r):
@@ -92,18 +140,30 @@ def outward(wall, r):
     return wall.side * wall.gradient(r)
 
 
-@outlined
 def is_seen(part, place, slack):
     """Whether a place of a face or an edge is in its own rooms, and not inside of others."""
-    seen = True
+    return hidden(part, place, ZERO) <= slack
+
+
+@outlined
+def hidden(part, place, n):
+    """How far a place of a face or an edge is from where it would be seen, at least; 0 or less where it is seen.
+
+    A flat face has the normal n: what is behind a wall along it stays so.
+    """
+    depth = part.own[0].distance(place)
     for wall in part.own:
-        seen = seen & (wall.distance(place) <= slack)
+        depth = max(depth, wall.distance(place))
     for room in part.others:
-        gap = room[0].distance(place)
+        gap = -math.inf
         for wall in room:
-            gap = max(gap, wall.distance(place))
-        seen = seen & (gap >= -slack)
-    return seen
+            away = wall.distance(place)
+            if isinstance(wall, _FLAT):
+                turn = dot(n, outward(wall, place))
+                away = select((away < 0.0) & (turn * turn > _ALIGNED), -math.inf, away)
+            gap = max(gap, away)
+        depth = max(depth, -gap)
+    return depth
 
 
 @outlined
@@ -124,3 +184,63 @@ def crossing(one, other, y, far):
             if way <= _STILL * (norm(x) + norm(y)):
                 break
     return x
+
+
+# --- Flights of hard balls -------------------------------------------------------------------------------
+
+# A foot moves by at most so many times what its ball does, which is no larger than a part of what its wall is round by.
+_FASTER = 2.0
+# Of a radius, how far a ball goes where the edge next to it is not found.
+_UNFOUND = 0.05
+
+
+@outlined
+def _look(wall, r, v, pull, t, is_first):
+    """The `SafeStep` of a flight at a time."""
+    p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
+    away, place = nearest(wall, p)
+    room = 2.0 * EPSILON * total(absolute(p))
+    if not is_first and away < wall.radius and dot(place - p, w) > 0.0:
+        return march.SafeStep(t, 0.0, -1.0, 0.0)
+    step = math.inf
+    for face in wall.faces:
+        step = min(step, _to_face(wall, face, p, w, pull))
+    for edge in wall.edges:
+        step = min(step, _to_edge(wall, edge, p, w, pull))
+    arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= room
+    return march.SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
+
+
+@outlined
+def _to_face(wall, face, p, w, pull):
+    """A time during which a flight surely does not meet a face."""
+    away = face.wall.distance(p)
+    n = outward(face.wall, p)
+    depth = hidden(face, p - away * n, n if isinstance(face.wall, _FLAT) else ZERO)
+    step = 0.0
+    if depth <= wall.slack or away <= -wall.radius:
+        grown = face.wall.grown(wall.radius)
+        if pull.x == 0.0 and pull.y == 0.0 and pull.z == 0.0:
+            step, _meets = grown.first_hit(p, w)
+        else:
+            step, _meets = grown.falling_hit(p, w, pull)
+    return step if depth <= wall.slack else max(step, _unseen(wall, abs(away), depth, w, pull))
+
+
+@outlined
+def _to_edge(wall, edge, p, w, pull):
+    """The same of an edge."""
+    least = max(abs(edge.one.distance(p)), abs(edge.other.distance(p)))
+    foot = crossing(edge.one, edge.other, p, _FAR * wall.radius)
+    if max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) > wall.slack:
+        return _unseen(wall, least, 2.0 * _FASTER * _UNFOUND * wall.radius, w, pull)
+    away, depth = norm(foot - p), hidden(edge, foot, ZERO)
+    if depth > wall.slack:
+        return _unseen(wall, away, depth, w, pull)
+    return march.safe_step(Rim(edge.bend, foot, away, wall.radius), p, w, pull, 0.0)[2]
+
+
+def _unseen(wall, away, depth, w, pull):
+    """How long a face or an edge stays hidden, or is farther than a radius, by the way of its foot to where it ends."""
+    way = max(away - wall.radius, min(depth / _FASTER, wall.radius))
+    return march.time_to_travel(norm(w), norm(pull), way)

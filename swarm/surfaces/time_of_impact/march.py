@@ -105,20 +105,20 @@ def march(surface, r, v, pull):
 
 def safe_time_by_steps(surface, r, v, pull):
     """A time during which the flight surely stays admissible."""
-    level, _half, step, _way, _steepness = _safe_step(surface, r, v, pull, 0.0)
+    level, _half, step, _way, _steepness = safe_step(surface, r, v, pull, 0.0)
     return select(level > 0.0, 0.0, step)
 
 
 def look(surface, r, v, pull, t, is_first):
     """The `SafeStep` at a wall."""
     p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
-    level, half, step, way, steepness = _safe_step(surface, p, w, pull, 0.0)
+    level, half, step, way, steepness = safe_step(surface, p, w, pull, 0.0)
     # By round-off, or because the surface bends more than its file says.
     is_past = level > 0.0 and half > 0.0 and not is_first
     room = 2.0 * EPSILON * total(absolute(p))
     slack = room * steepness
     if not is_past and lets_go(level, half, step, slack):
-        _level, _half, step, _way, _steepness = _safe_step(surface, p, w, pull, slack)
+        _level, _half, step, _way, _steepness = safe_step(surface, p, w, pull, slack)
         return SafeStep(t, step, -1.0, -1.0)
     straight = pull.x == 0.0 and pull.y == 0.0 and pull.z == 0.0
     if not is_past and straight and surface.passed(p, w):
@@ -139,7 +139,7 @@ def lets_go(level, half, step, slack):
 
 
 @outlined
-def _safe_step(surface, r, v, pull, slack):
+def safe_step(surface, r, v, pull, slack):
     """(level, half its derivative, a time during which the flight stays admissible, how far it goes at most, |grad q|).
 
     With a slack the level counts as so much below 0.
@@ -158,15 +158,15 @@ def _safe_step(surface, r, v, pull, slack):
         most = max(most, 0.0)
         m0 = most * speed2 + 0.5 * side * dot(n, pull)
         m1 = (2.0 * most + magnitude) * g
-    step = _step_within(level, half, m0 + select(m1 > 0.0, m1 * reach, 0.0), _time_to_travel(speed, g, reach))
+    step = _step_within(level, half, m0 + select(m1 > 0.0, m1 * reach, 0.0), time_to_travel(speed, g, reach))
     if m1 > 0.0 and (step > 0.0 or m0 < 0.0):
         # Again with the M of a shorter way: of twice that step, or as far as a fall off the wall surely bends away.
-        shorter = min(reach, max(2.0 * _travelled(speed, g, step), -0.5 * m0 / m1))
-        within = _step_within(level, half, m0 + select(m1 > 0.0, m1 * shorter, 0.0), _time_to_travel(speed, g, shorter))
+        shorter = min(reach, max(2.0 * travelled(speed, g, step), -0.5 * m0 / m1))
+        within = _step_within(level, half, m0 + select(m1 > 0.0, m1 * shorter, 0.0), time_to_travel(speed, g, shorter))
         step = max(step, within)
     if clear > 0.0:
-        step = max(step, _time_to_travel(speed, g, clear))
-    return level, half, step, _travelled(speed, g, step), norm(n)
+        step = max(step, time_to_travel(speed, g, clear))
+    return level, half, step, travelled(speed, g, step), norm(n)
 
 
 def _step_within(level, half, bound, longest):
@@ -174,11 +174,12 @@ def _step_within(level, half, bound, longest):
     return min(rise_time(level, half, bound), longest)
 
 
-def _time_to_travel(speed, g, way):
+def time_to_travel(speed, g, way):
     """The time t with speed t + g t^2/2 = way."""
     twice = speed + (speed if g == 0.0 else math.sqrt(speed * speed + 2.0 * g * way))
     return 2.0 * way / twice if twice > 0.0 else math.inf
 
 
-def _travelled(speed, g, t):
+def travelled(speed, g, t):
+    """How far a flight goes in a time at most."""
     return (speed + 0.5 * g * t) * t

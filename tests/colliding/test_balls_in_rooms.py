@@ -1,0 +1,85 @@
+"""Hard balls in a union of several rooms, whose edges they turn about."""
+
+import math
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.kernel.vector import Vec
+
+BOXES = swarm.Union([swarm.Box((0.5, 0.5, 0.5)), swarm.Box((0.6, 0.2, 0.25), (0.9, 0.1, 0.05))])
+SPHERES = swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.4, (0.6, 0.1, 0.0))])
+PIPE = swarm.Union([swarm.Sphere(0.5), swarm.Cylinder(0.2, length=2.0, axis=(1.0, 0.0, 0.0), center=(0.9, 0.0, 0.0))])
+UNIONS = {"boxes": BOXES, "spheres": SPHERES, "pipe": PIPE}
+FLIGHTS = 6
+
+
+def met(union, radius, place, velocity, pull):
+    """When a flight meets the walls."""
+    walls = swarm.Scene([union]).compiled().of_balls(radius).walls(0.0).grown(radius).each
+    r, v = Vec(*np.array(place)), Vec(*np.array(velocity))
+    with np.errstate(all="ignore"):
+        if pull is None:
+            return min(wall.first_hit(r, v) for wall in walls)
+        return min(wall.falling_hit(r, v, Vec(*pull)) for wall in walls)
+
+
+@pytest.mark.parametrize("pull", [None, (0.5, 1.0, -3.0)], ids=["straight", "fall"])
+@pytest.mark.parametrize("name", list(UNIONS))
+def test_a_flight_ends_where_points_all_over_the_ball_leave_the_union(name, pull):
+    # phi of points of a sphere says whether the ball is in the union, with no use of edges or feet.
+    rng, union, radius = np.random.default_rng(5), UNIONS[name], 0.07
+    around = rng.normal(size=(3, 3000))
+    around *= radius / np.sqrt((around**2).sum(axis=0))
+    for _flight in range(FLIGHTS):
+        place, velocity = rng.uniform(-0.2, 0.2, 3), rng.normal(size=3)
+        time, meets = met(union, radius, place, velocity, pull)
+        assert meets
+
+        def outside(t, grown, place=place, velocity=velocity):
+            center = place + t * velocity + (0.0 if pull is None else 0.5 * t * t * np.array(pull))
+            return union.phi(center[:, None] + grown * around).max()
+
+        assert max(outside(t, 1.0 - 1e-9) for t in np.linspace(0.0, time, 40)) <= 1e-9
+        assert outside(time, 1.03) > 0.0
+
+
+@pytest.mark.parametrize("height", [0.0, 0.02, 0.05, 0.069])
+def test_a_ball_meets_the_edge_of_a_doorway_at_a_distance_of_its_radius(height):
+    # The lower edge of the doorway is the line x = 0.5, z = -0.2, which the ball comes to within the plane y = 0.1.
+    radius, speed, edge = 0.07, 1.0, (0.5, -0.2)
+    start = (0.1, 0.1, edge[1] + height)
+    exact = (edge[0] - math.sqrt(radius**2 - height**2) - start[0]) / speed
+    time, meets = met(BOXES, radius, start, (speed, 0.0, 0.0), None)
+    assert meets
+    assert time == pytest.approx(exact, abs=1e-14)
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.5, -2.0)], ids=["straight", "fall"])
+@pytest.mark.parametrize("name", list(UNIONS))
+def test_balls_in_rooms_keep_their_energy_and_stay_inside(name, gravity):
+    rng = np.random.default_rng(1)
+    position = np.array([(x, y, 0.0) for x in (-0.15, 0.15) for y in (-0.15, 0.15)]).T
+    scene = swarm.Scene([UNIONS[name]], gravity=gravity)
+    balls = swarm.Particles(position, 2.0 * rng.normal(size=position.shape), radius=0.06)
+    done = swarm.simulate(scene, balls, swarm.Impact(), until=0.4, every=0.2, compile="never", progress=False)
+    energy = np.array(done.observables["kinetic_energy"])
+    if gravity is not None:
+        energy = energy + done.observables["potential_energy"]
+    assert np.abs(energy / energy[0] - 1.0).max() < 1e-14
+    assert done.observables["impacts"][-1] > 2
+    gaps = scene.distances_outside(done.particles.position, 0.0, done.particles.radius)
+    assert gaps.max() <= 4.0 * np.finfo(float).eps * 1.5
+
+
+def test_rooms_that_touch_at_a_face_are_as_one_box():
+    halves = swarm.Union([swarm.Box((0.35, 0.4, 0.45), (x, 0.0, 0.0)) for x in (-0.35, 0.35)])
+    ends = []
+    for vessel in (halves, swarm.Box((0.7, 0.4, 0.45))):
+        balls = swarm.Particles((0.1, 0.05, -0.1), (2.0, 1.1, -0.7), radius=0.05)
+        done = swarm.simulate(
+            swarm.Scene([vessel]), balls, swarm.Impact(), until=3.0, every=3.0, compile="never", progress=False
+        )
+        ends.append(done.particles.position)
+    np.testing.assert_allclose(*ends, atol=1e-13)
