@@ -207,3 +207,59 @@ def test_steps_are_those_of_a_loop_over_balls_and_planes(name, method, start):
         taken += steps
     assert len(taken) == result.observables["impacts"][-1] >= 8
     assert sum(taken) > 0.5 * len(taken)
+
+
+# --- Soft faces ----------------------------------------------------------------------------------------------
+
+STIFFNESS, SHORT, SPAN = 4e3, 4e-3, 0.24
+
+
+def spring(faces, r, v):
+    """Place and velocity of a particle of 1 kg after steps against one face at a time, and how many touched one."""
+    touched, sign = 0, -1.0 if faces.solid else 1.0
+    for _step in range(round(SPAN / SHORT)):
+        ends = [sign * (faces.normals @ place - faces.offsets) for place in (r, r + SHORT * v)]
+        if faces.solid:
+            # The depth in it is that behind the nearest face.
+            met = [int(np.argmin(max(ends, key=lambda gaps: gaps.min())))] if max(e.min() for e in ends) > 0.0 else []
+        else:
+            met = np.flatnonzero(np.maximum(*ends) > 0.0)
+        assert len(met) <= 1
+        impulse = 0.0
+        if len(met):
+            touched += 1
+            g, u = ends[0][met[0]], sign * faces.normals[met[0]] @ v
+            low, high = 0.0, 4.0 * (abs(u) + STIFFNESS * SHORT * (abs(g) + SHORT * abs(u)))
+            for _halving in range(80):
+                # What it takes of u is h (V1 - V0)/(g1 - g0), for g1 at the mean of both velocities.
+                impulse = 0.5 * (low + high)
+                g1 = g + SHORT * (u - 0.5 * impulse)
+                stored = 0.5 * STIFFNESS * (max(g1, 0.0) ** 2 - max(g, 0.0) ** 2)
+                low, high = (impulse, high) if impulse < SHORT * stored / (g1 - g) else (low, impulse)
+            v0, v = v, v - impulse * sign * faces.normals[met[0]]
+            r = r + 0.5 * SHORT * (v0 + v)
+        else:
+            r = r + SHORT * v
+    return r, v, touched
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_soft_faces_of_a_mesh_are_springs_of_a_loop(side):
+    """Each step against one face of a mesh takes the energy of its spring, and gives it back.
+
+    The first particle is on its face, to round-off, where a step begins.
+    """
+    faces = Polyhedron(*_prism_faces(0.7), side == "outside")
+    places = np.array([(0.1, 0.0, 0.67), (-0.62, 0.045, 0.1)]).T
+    speeds = np.array([(0.05, 0.1, 0.3), (-0.3, 0.05, 0.02)]).T
+    if side == "outside":
+        places = np.array([(0.1, 0.0, 0.73), (-0.68, 0.05, 0.1)]).T
+        speeds = speeds * np.array([(1.0, 1.0, -1.0), (-1.0, 1.0, 1.0)]).T
+    scene, particles = swarm.Scene([_mesh(0.7, side)]), swarm.Particles(places, speeds)
+    result = swarm.simulate(scene, particles, swarm.Penalty(SHORT, STIFFNESS), until=SPAN, compile="never")
+    assert result.observables["energy_error"].max() <= 1e-12
+    for i in range(len(particles)):
+        r, v, touched = spring(faces, places[:, i], speeds[:, i])
+        assert touched > 10
+        assert result.particles.position[:, i] == pytest.approx(r, abs=1e-9)
+        assert result.particles.velocity[:, i] == pytest.approx(v, abs=1e-9)

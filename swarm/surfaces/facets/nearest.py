@@ -43,7 +43,9 @@ def foot_on(facets, mesh, r):
     normal, height = _row(facets.table, int(near.which)), near.height(r)
     away = norm(r - near.foot)
     sign = 1.0 if height > 0.0 else -1.0
-    return SignedDistance(sign * away, (r - near.foot) * (sign / away) if away > 0.0 and height != 0.0 else normal)
+    # On a facet the way from the foot is round-off, and leads anywhere.
+    is_off = away > facets.like.room.value and height != 0.0
+    return SignedDistance(sign * away, (r - near.foot) * (sign / away) if is_off else normal)
 
 
 @kernel
