@@ -180,7 +180,14 @@ class CompiledScene:
 
     def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
         """The openings of every wall in the frame that ends at a moment [s], or None."""
-        return openings_in(self._spans, (self.pieces.volumes, self.pieces.doorways), moment) or None
+        return self.openings_of(self._spans, moment)
+
+    def openings_of(self, spans: list[tuple[int, int]], moment: float) -> tuple[Opened, ...] | None:
+        """The openings of some walls in a row, given as (piece, walls), or None."""
+        volumes, doorways = self.pieces.volumes, self.pieces.doorways
+        # Balls meet no rooms that a door could be between.
+        given = (volumes, doorways if self.largest is None else ((),) * len(volumes))
+        return openings_in(spans, given, moment) or None
 
     def walls(self, moment: float = 0.0) -> Walls:
         """The walls by their kinds, in the frame, or its piece, that ends at a moment [s]."""

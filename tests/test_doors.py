@@ -505,3 +505,21 @@ def test_what_rests_is_not_woken_for_nothing(monkeypatch):
     monkeypatch.setattr(DoorRun, "_switch", watched)
     run(scene, thrown([(0, 0, -1)], [(0, 0, 0)]), until=1.0, frames=1)
     assert seen[-1] == (0.5, [ARRIVED])
+
+
+@pytest.mark.parametrize("kind", ["balls", "heavy", "grains"])
+def test_a_door_between_rooms_is_none_for_balls_in_one_room(kind):
+    method = swarm.Penalty(dt=1e-3, penalty=1e5) if kind == "grains" else swarm.Impact()
+    ends = []
+    for between in (True, False):
+        door = swarm.Opening(swarm.Plane((-1.0, 0.0, 0.0), 0.0), between=between)
+        vessel = swarm.Sphere(0.5, openings=[door], mass=5.0 if kind == "heavy" else None)
+        ball = swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.2, 0.0), radius=0.05)
+        done = swarm.simulate(
+            swarm.Scene([vessel]), ball, method, until=1.0, every=1.0, compile="never", progress=False
+        )
+        ends.append(done.particles.position[0, 0])
+        if between:
+            assert done.observables["impacts"][-1] > 0
+    # It comes back from the wall, where an opening has let it out.
+    assert ends[0] < 0.3 < 0.4 < ends[1]

@@ -14,7 +14,6 @@ from ...run.observed import Observed
 from ...scene import Scene
 from ...surfaces.fields.members import Members
 from ...surfaces.presence.doors import walls_then
-from ...surfaces.presence.openings import openings_in
 from ...surfaces.surface import Surface
 from ...surfaces.walls import Field, Walls
 from .freedoms import WIDTH, Freedoms, Shifted
@@ -55,7 +54,7 @@ def _reacting(compiled: CompiledScene, moment: float) -> tuple[Reacting, ...]:
         freedom = _freedom(surface, heavy.index(pieces.owners[p]), scene.gravity or (0.0, 0.0, 0.0))
         laws, mine = _laws_of(piece, scene), np.flatnonzero(numbers == p).tolist()
         absorbs = 1.0 if laws is not None and laws.may_end else None
-        openings = openings_in([(p, len(mine))], (pieces.volumes, pieces.doorways), moment) or None
+        openings = compiled.openings_of([(p, len(mine))], moment)
         made += [
             Reacting(wall, freedom, mine[k], int(rows[mine[k]]), piece.restitution, laws, float(k), absorbs, openings)
             for k, wall in enumerate(walls)
