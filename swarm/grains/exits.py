@@ -31,7 +31,10 @@ def open_wall(matter, wall, numbers, grains, near):
         c = index(k)
         i = index(near.slot[c])
         r, radius = vector_at(place, i, X), place[i, RADIUS]
-        foot = r + radius * met(wall, near.listed, near.spans, c, radius).unit_normal(r)
+        own = met(wall, near.listed, near.spans, c, radius)
+        # Its length is 1 on the wall alone.
+        n = own.unit_normal(r)
+        foot = r + ((radius - own.distance(r)) / norm(n)) * n
         near.wall_is_open[c] = is_open(matter.openings, first, foot, 0.0)
 
 

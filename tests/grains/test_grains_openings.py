@@ -1,6 +1,7 @@
 """Soft balls at openings: the foot of a ball decides, and a ball has escaped when it reaches into the wall there."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ from test_grains_doors import balanced
 
 import swarm
 from swarm.files import checkpoint
+from swarm.grains import exits, grain_arrays
 from swarm.grains.grains_run import GrainsRun
+from swarm.kernel.vector import Vec
 from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched
 
@@ -149,3 +152,22 @@ def test_a_run_that_is_restored_goes_on_with_the_same_bits(tmp_path):
             assert run.advance(75.0, 0.6)
         assert bits(whole) == bits(first) == bits(second)
         assert whole.seen()["escaped"] > 2
+
+
+@pytest.mark.parametrize("place", [(0.3, 0.0, 0.0), (0.2, 0.3, 0.1), (0.0, -0.42, 0.0), (0.0, 0.0, 0.44)])
+@pytest.mark.parametrize("surface", [swarm.Sphere(0.5), swarm.Box((0.5, 0.5, 0.5)), swarm.Ellipsoid((0.5, 0.5, 0.55))])
+def test_the_foot_that_an_opening_is_asked_about_is_on_the_wall(monkeypatch, surface, place):
+    # The ball is before the wall, or in it, where the normal of a sphere has another length than 1.
+    radius, feet = 0.08, []
+    monkeypatch.setattr(exits, "is_open", lambda _openings, _wall, foot, _near: feet.append(foot) or False)
+    rows = np.zeros((1, 8))
+    rows[0, :3], rows[0, grain_arrays.RADIUS] = place, radius
+    near = SimpleNamespace(
+        wall_first=np.array([0, 1]), slot=np.zeros(1, int), wall_is_open=np.zeros(1, bool), listed=None, spans=None
+    )
+    for wall in swarm.Scene([surface]).compiled().of_balls(radius).walls(0.0).each:
+        exits.open_wall(SimpleNamespace(openings=()), wall, (0, 0.0), SimpleNamespace(place=rows), near)
+        foot = np.array(feet.pop())
+        bare = wall.grown(0.0)
+        assert abs(float(bare.distance(Vec(*foot)))) < 1e-12
+        assert np.linalg.norm(np.cross(foot - place, np.array(bare.unit_normal(Vec(*foot))))) < 1e-9
