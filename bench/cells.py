@@ -503,6 +503,12 @@ def _lossy(draft: Draft) -> None:
     draft.scene["pairs"] = swarm.Pairs(restitution=0.6)
 
 
+def _lasting(draft: Draft) -> None:
+    # From one room to the end of the next one the way is longer.
+    duration = 0.9 if draft.cell.wall == "union" else 0.5
+    draft.scene["pairs"] = swarm.Pairs(restitution=0.6, contact_duration=duration)
+
+
 def _spin(draft: Draft) -> None:
     draft.particles["spin"] = (3.0, -5.0, 4.0)
 
@@ -567,7 +573,7 @@ CAPABILITIES: dict[str, Capability] = {
     "contact start": Capability(_method(contact_start="centred"), lambda d: _centred(d)),
     "pair restitution": Capability(_pairs(restitution=0.6), _meet, "collisions"),
     "pair friction": Capability(_pairs(friction=0.3), _meet, "collisions"),
-    "contact duration": Capability(_pairs(restitution=0.6, contact_duration=0.5), _lossy, "collisions"),
+    "contact duration": Capability(_lasting, _lossy, "collisions"),
     "spin": Capability(_spin, _rough),
     "motion beside": Capability(_beside, shown="wall_work"),
     "cluster": Capability(lambda draft: draft.options.update(_of_cluster(draft.cell)), shown="impacts"),
