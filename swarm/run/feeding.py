@@ -124,7 +124,9 @@ class Feed:
                 self._blocked[k] += self._counted[k] < number
                 self._counted[k] = number
                 if waits:
-                    self._earliest[k] = max(now + self._pause(k, number, there), np.nextafter(now, np.inf))
+                    again = now + self._pause(k, number, there)
+                    again = self._next_due(now) if math.isinf(again) else again
+                    self._earliest[k] = max(again, np.nextafter(now, np.inf))
                     return
             self._over[k] += 1
 
@@ -177,6 +179,11 @@ class Feed:
         rms = math.sqrt(float((there.velocity * there.velocity).sum()) / n) if n else 0.0
         pace = max(pace, fall, rms)
         return radius / pace if pace > 0.0 else math.inf
+
+    def _next_due(self, now: float) -> float:
+        """When the next birth of any source is due [s]: where nothing moves, another place may be found then."""
+        times = self._births.time[self._births.source >= 0]
+        return float(times[times > now].min(initial=math.inf))
 
     def _bear(self, number: int, position: Floats, velocity: Floats, now: float) -> None:
         """Note a birth."""

@@ -79,18 +79,22 @@ def test_no_birth_overlaps_and_the_books_balance(name, blocked, tmp_path):
 
 
 def test_a_full_vessel_is_full(tmp_path):
-    """Balls at rest without gravity: nothing makes room, so that nothing is tried again."""
+    """Balls at rest without gravity: nothing makes room; other places are tried when the next birth is due."""
+    found = []
     scene = swarm.Scene([swarm.Box((0.03, 0.03, 0.03))])
     for blocked in ("wait", "report"):
         source = swarm.Source(scene.surfaces[0], volume=True, speed=0.0, radius=0.012, blocked=blocked, **EVEN)
         result = swarm.simulate(scene, None, swarm.Impact(), until=0.5, sources=source, compile="never", seed=3)
         born, most = int(result.observables["born"][-1, 0]), 51
         counted = int(result.observables["blocked"][-1, 0])
-        assert 1 <= born <= 8
-        assert counted == (1 if blocked == "wait" else most - born)
+        assert 4 <= born <= 8
+        # What waits is counted once, and as many places are tried as where it does not wait.
+        assert counted <= born + 1 if blocked == "wait" else counted == most - born
+        found.append(born)
         rest = result.particles.born().position
         near = min(math.dist(a, b) for a, b in itertools.combinations(rest.T, 2)) if born > 1 else 1.0
         assert near >= 0.024
+    assert found[0] == found[1]
 
 
 @pytest.mark.parametrize("name", ["a box", "a valve"])
