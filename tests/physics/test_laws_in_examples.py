@@ -50,7 +50,7 @@ def test_neutrons_stay_in_a_bottle_by_their_energy():
     assert np.abs(whole[late] - stays * curve.left[late]).max() < 0.02
 
 
-def test_a_pump_takes_what_a_source_gives():
+def test_a_pump_takes_what_a_source_gives(optimized):
     """Its throughput is the speed times the pressure; what enters the tube and does not come back is pumped.
 
     Gauges show a pressure that is even in the chamber and falls in the tube.
