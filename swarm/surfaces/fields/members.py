@@ -202,22 +202,31 @@ def member(members, m):
 
 def gathered(like, table, m, k):
     """Numbers of one kind with `like`, from row m of a table, from column k on."""
+    numbers, _after = _taken(like, table, m, k)
+    return numbers
+
+
+def _taken(like, table, m, k):
+    """What `gathered` gives, and the column after its last one."""
     # Numbers first: plain Python asks in this order.
     if not isinstance(like, tuple):
-        return None if like is None else table[m, k]
+        return (None, k) if like is None else (table[m, k], k + 1)
     if isinstance(like, GrownLike):
-        return gathered(like.body, table, m, k).grown(like.radius)
+        body, k = _taken(like.body, table, m, k)
+        return body.grown(like.radius), k
     if isinstance(like, SphereNumbers):
         # Four numbers of it are half a line of the cache; the others follow from them.
         made = cavity if isinstance(like, SphereCavity) else ball
-        return made(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3])
-    if isinstance(like, (*AXES, Shared)):
-        return like if isinstance(like, Shared) else type(like)(1.0)  # type: ignore[arg-type]
+        return made(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3]), k + 4
+    if isinstance(like, Shared):
+        return like, k
+    if isinstance(like, AXES):
+        return type(like)(1.0), k + 1  # type: ignore[arg-type]
     parts: tuple[Any, ...] = ()
     for part in like:
-        parts = (*parts, gathered(part, table, m, k))
-        k += width(part)
-    return parts if type(like) is tuple else type(like)(*parts)
+        one, k = _taken(part, table, m, k)
+        parts = (*parts, one)
+    return parts if type(like) is tuple else type(like)(*parts), k
 
 
 def width(like):
