@@ -11,7 +11,8 @@ from swarm.kernel.vector import Vec
 BOXES = swarm.Union([swarm.Box((0.5, 0.5, 0.5)), swarm.Box((0.6, 0.2, 0.25), (0.9, 0.1, 0.05))])
 SPHERES = swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.4, (0.6, 0.1, 0.0))])
 PIPE = swarm.Union([swarm.Sphere(0.5), swarm.Cylinder(0.2, length=2.0, axis=(1.0, 0.0, 0.0), center=(0.9, 0.0, 0.0))])
-UNIONS = {"boxes": BOXES, "spheres": SPHERES, "pipe": PIPE}
+FOAM = swarm.Spheres([(0.0, 0.0, 0.0), (0.6, 0.1, 0.0)], [0.5, 0.4], side="inside")
+UNIONS = {"boxes": BOXES, "spheres": SPHERES, "pipe": PIPE, "foam": FOAM}
 FLIGHTS = 6
 
 
@@ -71,6 +72,18 @@ def test_balls_in_rooms_keep_their_energy_and_stay_inside(name, gravity):
     assert done.observables["impacts"][-1] > 2
     gaps = scene.distances_outside(done.particles.position, 0.0, done.particles.radius)
     assert gaps.max() <= 4.0 * np.finfo(float).eps * 1.5
+
+
+def test_a_foam_is_the_union_of_its_bubbles():
+    ends = []
+    for vessel in (FOAM, SPHERES):
+        balls = swarm.Particles((0.1, 0.05, -0.1), (2.0, 1.1, -0.7), radius=0.05)
+        done = swarm.simulate(
+            swarm.Scene([vessel]), balls, swarm.Impact(), until=2.0, every=2.0, compile="never", progress=False
+        )
+        assert done.observables["impacts"][-1] > 3
+        ends.append(done.particles.position)
+    np.testing.assert_array_equal(*ends)
 
 
 def test_rooms_that_touch_at_a_face_are_as_one_box():

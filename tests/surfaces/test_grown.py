@@ -370,19 +370,8 @@ def test_balls_that_are_too_large_for_a_shape(surfaces, plane, words):
         swarm.simulate(scene, ball, swarm.Impact(), until=1.0, every=1.0, progress=False)
 
 
-@pytest.mark.parametrize(
-    ("surfaces", "words"),
-    [
-        (
-            [swarm.Spheres([(0.0, 0.0, 0.0), (0.6, 0.0, 0.0)], [0.5, 0.5], side="inside")],
-            r"must not be a Spheres of several rooms with particles that have a radius and Impact, got Sph.*; use a Un",
-        ),
-        ([swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)))], "Quadric, which has a tip at"),
-    ],
-    ids=["foam", "tip"],
-)
-def test_what_no_ball_may_meet_is_refused_in_a_sentence(surfaces, words):
-    scene = swarm.Scene(surfaces)
+def test_a_surface_with_a_tip_is_refused_in_a_sentence():
+    scene = swarm.Scene([swarm.Quadric(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)))])
     ball = swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), radius=0.1)
-    with pytest.raises(swarm.SceneError, match=words):
+    with pytest.raises(swarm.SceneError, match="Quadric, which has a tip at"):
         swarm.simulate(scene, ball, swarm.Impact(), until=1.0, every=1.0, progress=False)
