@@ -97,8 +97,8 @@ def _added(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
         added = observables.summed(sums, owners, rows, has_heat, of_parts, len(task.options.counters))
     else:
         body = task.bodies.body
-        booked_of_bodies = len(own_surfaces(body)), len(body.cavities), has_heat and laws is not None and laws.send_off
-        added = energies.summed(sums, owners, len(task.scene.surfaces), booked_of_bodies, len(task.options.counters))
+        own = len(own_surfaces(body)), len(body.cavities), has_heat
+        added = energies.summed(sums, owners, len(task.scene.surfaces), own, len(task.options.counters))
     added |= brought
     seen: dict[str, Any] = {}
     # In the order of a run on one machine.

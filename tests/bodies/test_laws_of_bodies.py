@@ -143,3 +143,24 @@ def test_a_body_that_rests_on_a_hot_floor_is_sent_off():
 def test_no_body_waits_at_a_wall():
     with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws\[0\] must not let bodies wait"):
         run(laws=[swarm.Sticky(1.0)])
+
+
+def test_groups_of_a_mesh_have_laws_of_their_own():
+    """The floor, z = -0.3, keeps its own energy; all other faces stop the contact point."""
+    corners = 0.3 * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    faces = [
+        (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4),
+        (1, 5, 7), (1, 7, 3),
+    ]  # fmt: skip
+    group = [1 if all(corners[k][2] < 0.0 for k in face) else 0 for face in faces]
+    mesh = swarm.Mesh(corners, faces, group=group, names=("rest", "floor"), groups={"floor": {"temperature": 0.0}})
+    for down, hot in ((-1.0, True), (1.0, False)):
+        r, v = BRICK.points.T + np.array([0.0, 0.0, 0.28 * down])[:, None], np.zeros((3, len(BRICK.points)))
+        v[2] = down
+        seen = swarm.simulate(
+            swarm.Scene([mesh]), swarm.Bodies(BRICK, r[..., None], v[..., None]), swarm.Impact(dt=2e-3), until=0.01,
+            compile="never", threads=1, progress=False,
+        ).observables  # fmt: skip
+        assert seen["impacts"][-1] > 0
+        assert (seen["wall_heat"][-1].sum() < -0.1 * seen["total_energy"][0]) == hot
+        assert seen["energy_error"].max() < 1e-12
