@@ -78,6 +78,22 @@ def test_the_momentum_is_that_of_the_logged_impulses(tmp_path, laws):
     assert seen["energy_error"].max() < 1e-12
 
 
+def test_what_a_law_sends_off_has_a_row_too(tmp_path):
+    scene = vessel(temperature=0.5)
+    run = swarm.simulate(
+        scene, tumbling(scene, n=1), swarm.Impact(dt=0.02), until=0.8, impacts=tmp_path / "i.h5", **PLAIN
+    )  # fmt: skip
+    with swarm.load_impacts(tmp_path / "i.h5") as log:
+        table = log.table()
+    assert len(table) == run.observables["impacts"][-1] > 0
+    assert table["impulse"].sum() == pytest.approx(run.observables["impulse"][-1].sum(), rel=1e-13)
+    normals = normals_of(scene.surfaces[0], table["position"])
+    assert ((normals * table["velocity_after"]).sum(axis=1) < 0.0).all()
+    # The wall gives heat: no mirror.
+    speeds = [np.linalg.norm(table[name], axis=1) for name in ("velocity_before", "velocity_after")]
+    assert np.abs(speeds[1] - speeds[0]).min() > 1e-6
+
+
 def test_a_flight_up_and_down_through_a_counter_in_one_step_counts_twice(tmp_path):
     scene = vessel((0.0, 0.0, -2.0))
     rod = swarm.dumbbell(length=0.1, mass=2.0)

@@ -138,10 +138,7 @@ def _blow(bodies, state, name, frame, found, i):
     for a in range(found):
         state.impulse[bodies.walls.row(float(name[a, 1])), number] += p[wide * a]
         if p[wide * a] > 0.0:
-            state.impacts[number] += 1
-            # Of a cavity that a point carries no impact is told.
-            if name[a, 1] < touching.walls:
-                state.watchers.hit(state.image, blow.struck(a, column(before, 0, a), p[wide * a], i))
+            blow.tell(state, a, column(before, 0, a), p[wide * a], i)
     if not elastic:
         # p times the mean of the rates before and after
         for a in range(rows):
@@ -189,6 +186,13 @@ class BodyImpact(Record):
                 state.wall_work[bodies.walls.row(wall), number] += work
                 total += work
         return total
+
+    def tell(self, state, a, before, impulse, i):
+        """Count the impact at contact a, which had a velocity before, and tell the watchers of it."""
+        state.impacts[self.bodies.pace.body[i]] += 1
+        # Of a cavity that a point carries nothing is told.
+        if self.name[a, 1] < self.bodies.touching.walls:
+            state.watchers.hit(state.image, self.struck(a, before, impulse, i))
 
     def struck(self, a, before, impulse, i):
         """The `Struck` of contact a, which had a velocity before."""

@@ -113,8 +113,9 @@ def _by_law(bodies, state, name, frame, contact, i):
     if not happens:
         return False
     row = bodies.walls.row(float(w))
-    state.count_impact(number, w)
+    arrives = touching.place(bodies.lanes.v, name[a, 0], i)
     if sent.wait == math.inf:
+        blow.tell(state, 0, arrives, mass * rate[0], i)
         state.impulse[row, number] += mass * rate[0]
         state.absorbed_time[number], state.absorbed_wall[number] = bodies.rule.end - bodies.pace.remaining[i], w
         bodies.pace.remaining[i] = 0.0
@@ -130,6 +131,7 @@ def _by_law(bodies, state, name, frame, contact, i):
     before = kinetic_of(ties, bodies.lanes.v, i) if is_led else 0.0
     work = blow.work(state, p, i)
     blow.give(p, against, i)
+    blow.tell(state, 0, arrives, p[0], i)
     state.impulse[row, number] += p[0]
     if is_led:
         work = (kinetic_of(ties, bodies.lanes.v, i) - before) + lost
@@ -147,7 +149,7 @@ def _sent(blow, state, rate, p, at, random, i):
     root = across_of(schur, mass)
     first, second = root.of(rate[1] - mass * schur[0, 1] * rate[0], rate[2] - mass * schur[0, 2] * rate[0])
     n, s, t = blow.direction(0), blow.direction(1), blow.direction(2)
-    c, into = touching.place(bodies.lanes.r, blow.name[0, 0], i), _AT_REST if rests else rate[0]
+    c, into = bodies.spot(bodies.lanes.r, blow.name[0, 0], i), _AT_REST if rests else rate[0]
     carried = walls.velocity(w, c) if bodies.walls_move() else ZERO
     v = into * n + first * s + second * t + carried
     slow = math.inf if chatters(touching, state, bodies.pace.body[i]) else 0.0
