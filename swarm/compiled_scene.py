@@ -185,9 +185,11 @@ class CompiledScene:
     def openings_of(self, spans: list[tuple[int, int]], moment: float) -> tuple[Opened, ...] | None:
         """The openings of some walls in a row, given as (piece, walls), or None."""
         volumes, doorways = self.pieces.volumes, self.pieces.doorways
-        # Balls meet no rooms that a door could be between.
-        given = (volumes, doorways if self.largest is None else ((),) * len(volumes))
-        return openings_in(spans, given, moment) or None
+        if self.largest is None:
+            return openings_in(spans, (volumes, doorways), moment) or None
+        # Balls meet no rooms that a door could be between: it opens nothing, and files have the times of escapes.
+        made = openings_in(spans, (volumes, ((),) * len(volumes)), moment)
+        return made if made or any(doorways) else None
 
     def walls(self, moment: float = 0.0) -> Walls:
         """The walls by their kinds, in the frame, or its piece, that ends at a moment [s]."""

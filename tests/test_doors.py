@@ -508,7 +508,7 @@ def test_what_rests_is_not_woken_for_nothing(monkeypatch):
 
 
 @pytest.mark.parametrize("kind", ["balls", "heavy", "grains"])
-def test_a_door_between_rooms_is_none_for_balls_in_one_room(kind):
+def test_a_door_between_rooms_is_none_for_balls_in_one_room(kind, tmp_path):
     method = swarm.Penalty(dt=1e-3, penalty=1e5) if kind == "grains" else swarm.Impact()
     ends = []
     for between in (True, False):
@@ -516,8 +516,9 @@ def test_a_door_between_rooms_is_none_for_balls_in_one_room(kind):
         vessel = swarm.Sphere(0.5, openings=[door], mass=5.0 if kind == "heavy" else None)
         ball = swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.2, 0.0), radius=0.05)
         done = swarm.simulate(
-            swarm.Scene([vessel]), ball, method, until=1.0, every=1.0, compile="never", progress=False
-        )
+            swarm.Scene([vessel]), ball, method, until=1.0, every=1.0, compile="never", progress=False,
+            trajectory=tmp_path / f"{between}.h5",
+        )  # fmt: skip
         ends.append(done.particles.position[0, 0])
         if between:
             assert done.observables["impacts"][-1] > 0
