@@ -66,7 +66,7 @@ FACTS = {
         close((a["seen"]["born"][:, 0] - a["seen"]["escaped"])[5:].mean(), 230, 0.15)
     ),
     "A gas at 300 K, and its pressure": lambda a: close(a["pressure"], 4.14e-4, 0.02),
-    "Balls of a given density, and their pressure": lambda a: close(a["ratio"], 4.0, 0.1),
+    "Balls at a given packing, and their pressure": lambda a: close(a["ratio"], 4.0, 0.1),
     "Grains that rest on one another, or hard balls": lambda a: (
         a["energy"][-1] < 0.03 * a["energy"].max() and a["result"].particles.position[2].min() > -0.05
     ),
