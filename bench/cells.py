@@ -505,7 +505,7 @@ def _lossy(draft: Draft) -> None:
 
 def _lasting(draft: Draft) -> None:
     # From one room to the end of the next one the way is longer.
-    duration = 0.9 if draft.cell.wall == "union" else 0.5
+    duration = 1.2 if draft.cell.wall in ("union", "foam") else 0.5
     draft.scene["pairs"] = swarm.Pairs(restitution=0.6, contact_duration=duration)
 
 
