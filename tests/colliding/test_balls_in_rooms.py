@@ -12,7 +12,14 @@ BOXES = swarm.Union([swarm.Box((0.5, 0.5, 0.5)), swarm.Box((0.6, 0.2, 0.25), (0.
 SPHERES = swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.4, (0.6, 0.1, 0.0))])
 PIPE = swarm.Union([swarm.Sphere(0.5), swarm.Cylinder(0.2, length=2.0, axis=(1.0, 0.0, 0.0), center=(0.9, 0.0, 0.0))])
 FOAM = swarm.Spheres([(0.0, 0.0, 0.0), (0.6, 0.1, 0.0)], [0.5, 0.4], side="inside")
-UNIONS = {"boxes": BOXES, "spheres": SPHERES, "pipe": PIPE, "foam": FOAM}
+# A bin: the mouth of the cone is in the cylinder.
+BIN = swarm.Union(
+    [
+        swarm.Cylinder(0.4, length=1.0, axis=(0.0, 0.0, 1.0), center=(0.0, 0.0, 0.25)),
+        swarm.Intersection([swarm.Cone(0.6, center=(0.0, 0.0, -0.9)), swarm.Plane((0.0, 0.0, 1.0), 0.0)]),
+    ]
+)
+UNIONS = {"boxes": BOXES, "spheres": SPHERES, "pipe": PIPE, "foam": FOAM, "bin": BIN}
 FLIGHTS = 6
 
 

@@ -19,7 +19,8 @@ from ..shapes.slab import Slab
 from ..shapes.sphere import Sphere
 from ..surface import Box as Bounds
 from ..surface import Surface
-from .vaulted import RoomEdge, RoomFace, Vaulted, crossing, is_seen
+from .tip import TipPlane
+from .vaulted import FLAT, RoomEdge, RoomFace, Vaulted, crossing, is_seen
 
 # Of the extent: what is round-off of a place, and what is farther than anything.
 _SLACK, _FAR = 1e-11, 1e6
@@ -116,7 +117,10 @@ def _walls_of(vault: Vault) -> tuple[Any, ...]:
 def _made(vault: Vault) -> list[Vaulted]:
     rooms, extent = _rooms_of(vault), vault.extent()
     slack, places = _SLACK * extent, _places_in(vault)
-    faces = [RoomFace(wall, room, _without(rooms, k)) for k, room in enumerate(rooms) for wall in room]
+    faces = [
+        RoomFace(wall, rooms[k], _without(rooms, k), *_bend_of(one, wall))
+        for k, room in enumerate(vault.rooms_of) for one, wall in _each(room)
+    ]  # fmt: skip
     first = np.cumsum([0, *map(len, rooms)]).tolist()
     group, edges = list(range(len(faces))), []
     for edge, (k, a), (m, b) in _edges_of(rooms):
@@ -137,7 +141,23 @@ def _made(vault: Vault) -> list[Vaulted]:
 
 def _rooms_of(vault: Vault) -> list[tuple[Any, ...]]:
     """The walls of every room."""
-    return [tuple(wall.grown(0.0) for one in room for wall in one.walls_of_balls(0.0)) for room in vault.rooms_of]
+    return [tuple(wall for _surface, wall in _each(room)) for room in vault.rooms_of]
+
+
+def _each(room: Any) -> Iterator[tuple[Surface, Any]]:
+    """The surfaces of a room, each with one of its walls."""
+    for one in room:
+        for wall in one.walls_of_balls(0.0):
+            yield one, wall.grown(0.0)
+
+
+def _bend_of(surface: Surface, wall: Any) -> tuple[float | None, float]:
+    """The radius of curvature of a wall [m], None of a cone, and by how much it changes along the wall."""
+    if isinstance(surface, (Sphere, Cylinder)) and not isinstance(wall, FLAT):
+        return surface.radius, 0.0
+    if isinstance(surface, Cone) and not isinstance(wall, TipPlane):
+        return None, math.tan(surface.half_angle)
+    return math.inf, 0.0
 
 
 def _places_in(vault: Vault) -> list[Vec]:

@@ -15,7 +15,7 @@ from typing import Any
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.record import Record
-from ...kernel.vector import ZERO, absolute, cross, dot, either, norm, square, total
+from ...kernel.vector import ZERO, Vec, absolute, cross, dot, either, norm, square, total
 from ..contract import Bent, Smooth
 from ..shapes.plane import PlaneNumbers
 from ..shapes.slab import SlabNumbers
@@ -28,7 +28,7 @@ _FAR = 4.0
 # Walls are parallel where the square of the sine is below this.
 _PARALLEL = 1e-18
 # Flat walls are parallel where the square of the cosine is above this.
-_FLAT, _ALIGNED = (PlaneNumbers, SlabNumbers), 1.0 - 1e-14
+FLAT, _ALIGNED = (PlaneNumbers, SlabNumbers), 1.0 - 1e-14
 
 
 class RoomFace(Record):
@@ -37,6 +37,8 @@ class RoomFace(Record):
     wall: Any
     own: Any
     others: Any
+    round: Any = None  # the smallest radius of curvature [m], None where it is another one at each place
+    slope: float = 0.0  # by how much at most that becomes less, of the way along the wall
 
 
 class RoomEdge(Record):
@@ -158,7 +160,7 @@ def hidden(part, place, n):
         gap = -math.inf
         for wall in room:
             away = wall.distance(place)
-            if isinstance(wall, _FLAT):
+            if isinstance(wall, FLAT):
                 turn = dot(n, outward(wall, place))
                 away = select((away < 0.0) & (turn * turn > _ALIGNED), -math.inf, away)
             gap = max(gap, away)
@@ -188,10 +190,9 @@ def crossing(one, other, y, far):
 
 # --- Flights of hard balls -------------------------------------------------------------------------------
 
-# A foot moves by at most so many times what its ball does, which is no larger than a part of what its wall is round by.
-_FASTER = 2.0
-# Of a radius, how far a ball goes where the edge next to it is not found.
-_UNFOUND = 0.05
+# Of a radius, how far a ball goes where the edge next to it is not found. A ball that is hidden from an edge goes at
+# least this part of what its foot has to go: the radius of curvature of an edge is a lower bound from samples.
+_UNFOUND, _LEAST = 0.05, 0.125
 
 
 @outlined
@@ -216,7 +217,8 @@ def _to_face(wall, face, p, w, pull):
     """A time during which a flight surely does not meet a face."""
     away = face.wall.distance(p)
     n = outward(face.wall, p)
-    depth = hidden(face, p - away * n, n if isinstance(face.wall, _FLAT) else ZERO)
+    foot = p - away * n
+    depth = hidden(face, foot, n if isinstance(face.wall, FLAT) else ZERO)
     step = 0.0
     if depth <= wall.slack or away <= -wall.radius:
         grown = face.wall.grown(wall.radius)
@@ -224,7 +226,10 @@ def _to_face(wall, face, p, w, pull):
             step, _meets = grown.first_hit(p, w)
         else:
             step, _meets = grown.falling_hit(p, w, pull)
-    return step if depth <= wall.slack else max(step, _unseen(wall, abs(away), depth, w, pull))
+    if depth <= wall.slack:
+        return step
+    way = _way_of_foot(_round_at(face, foot, n), face.slope, abs(away), depth)
+    return max(step, _unseen(wall, abs(away), way, w, pull))
 
 
 @outlined
@@ -233,14 +238,37 @@ def _to_edge(wall, edge, p, w, pull):
     least = max(abs(edge.one.distance(p)), abs(edge.other.distance(p)))
     foot = crossing(edge.one, edge.other, p, _FAR * wall.radius)
     if max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) > wall.slack:
-        return _unseen(wall, least, 2.0 * _FASTER * _UNFOUND * wall.radius, w, pull)
+        return _unseen(wall, least, _UNFOUND * wall.radius, w, pull)
     away, depth = norm(foot - p), hidden(edge, foot, ZERO)
     if depth > wall.slack:
-        return _unseen(wall, away, depth, w, pull)
+        return _unseen(wall, away, max(_way_of_foot(edge.bend, 0.0, away, depth), _LEAST * depth), w, pull)
     return march.safe_step(Rim(edge.bend, foot, away, wall.radius), p, w, pull, 0.0)[2]
 
 
-def _unseen(wall, away, depth, w, pull):
-    """How long a face or an edge stays hidden, or is farther than a radius, by the way of its foot to where it ends."""
-    way = max(away - wall.radius, min(depth / _FASTER, wall.radius))
-    return march.time_to_travel(norm(w), norm(pull), way)
+def _round_at(face, foot, n):
+    """The smallest radius of curvature of a face at a place with the normal n [m]."""
+    if face.round is not None:
+        return face.round
+    along = select(abs(n.x) < 0.5, 1.0, 0.0)
+    one = cross(n, Vec(along, 1.0 - along, 0.0))
+    one = one * (1.0 / norm(one))
+    # One of the two curvatures of a cone is 0, so that the other one is their sum in any two directions.
+    bend = abs(face.wall.outward_acceleration(foot, one, ZERO))
+    bend = bend + abs(face.wall.outward_acceleration(foot, cross(n, one), ZERO))
+    return select(bend > 0.0, 1.0 / select(bend > 0.0, bend, 1.0), math.inf)
+
+
+def _way_of_foot(roundness, slope, away, depth):
+    """How far a ball goes at least before its foot on a wall, or edge, has gone a distance `depth`.
+
+    On a wall with the radius of curvature a a foot at the distance d goes a/(a - d) times as far as the ball: with the
+    way w of the ball w a <= depth (a - d - w), and a is less by the slope times w after that.
+    """
+    if not roundness < math.inf:
+        return depth
+    return depth * max(roundness - away, 0.0) / (roundness + (1.0 + slope) * depth)
+
+
+def _unseen(wall, away, way, w, pull):
+    """How long a face or an edge stays hidden, or is farther than a radius, with the way until its foot may be seen."""
+    return march.time_to_travel(norm(w), norm(pull), max(away - wall.radius, min(way, wall.radius)))
