@@ -373,3 +373,10 @@ def test_a_run_in_two_parts_is_the_run():
     half = swarm.simulate(SPHERE, particles, swarm.Impact(), until=2.0, threads=1).particles
     rest = swarm.simulate(SPHERE, half, swarm.Impact(), until=2.0, threads=1).particles
     assert rest.position == pytest.approx(whole.position, abs=1e-13)
+
+
+def test_the_method_is_impact_unless_one_is_given():
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    start = swarm.fill(scene, 3, speed=1.0, seed=1)
+    one, other = (swarm.simulate(scene, start, *method, until=2.0).particles for method in ((), (swarm.Impact(),)))
+    np.testing.assert_array_equal(one.position, other.position)

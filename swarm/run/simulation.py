@@ -8,6 +8,7 @@ import numpy as np
 
 from ..common.frames import Frame
 from ..methods.base import Method
+from ..methods.impact import Impact
 from ..particles import Particles
 from ..scene import Scene
 from ..sources.source import Source
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 def simulate(  # noqa: PLR0913  the keywords are the public interface
     scene: Scene,
     particles: "Particles | Bodies | None",
-    method: Method,
+    method: Method | None = None,
     *,
     until: float,
     every: float | None = None,
@@ -71,7 +72,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
     Args:
         scene: the walls and gravity.
         particles: the start, particles or bodies; it is not changed. None: `sources` give all.
-        method: how to advance; bodies by Impact with a dt, Penalty, or AugmentedLagrangian with adaptive=True.
+        method: how to advance; None: `Impact()`. Bodies need Impact with a dt, Penalty, or AugmentedLagrangian with
+            adaptive=True.
         until: end of the run [s], above 0.
         every: time between frames [s], at most `until`; None: only the first and the last.
         trajectory: HDF5 file to write; its folder must exist.
@@ -148,7 +150,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         frames=frames, precision=precision, compression=compression, checkpoint=checkpoint, resume=resume,
         walltime=walltime, compile=compile, seed=seed, cluster=cluster, shards=shards, sources=sources,
     )  # fmt: skip
-    return carry_out(scene, particles, method, options)
+    return carry_out(scene, particles, Impact() if method is None else method, options)
 
 
 def carry_out(
