@@ -59,7 +59,8 @@ def look(bodies, i, larger):
     again, low = pace.wall[i] >= 0, pace.low[i]
     pace.point[i], pace.wall[i] = point, wall
     if tau - low <= _NARROW * rule.dt:
-        pace.trial[i] = low
+        # The bracket ends here: the trial at its lower end, farther inside than round-off, is then the impact.
+        pace.high[i], pace.trial[i] = tau, low
         return STRIKE_NOW if low == 0.0 else AGAIN
     if low == 0.0 and tau <= _SHORTEST * rule.dt:
         # It is at the wall, and does not leave it.
