@@ -609,16 +609,26 @@ _WITHOUT_MEANING = {
 }
 
 
+def _without_steps(cell: Cell) -> str | None:
+    """None, or why a contact step of an engine says nothing."""
+    method = ENGINES[cell.engine].method
+    if method is swarm.Penalty:
+        return "Penalty has no such argument"
+    if method is swarm.AugmentedLagrangian and cell.capability == "contact step":
+        return "AugmentedLagrangian has no such argument"
+    if cell.engine in ("balls, Impact", "balls, heavy wall"):
+        return "hard balls meet one another at instants: a contact that took a time would have no place among these"
+    return None
+
+
 def meaning(cell: Cell) -> str | None:
     """None, or why a combination says nothing, and is no cell."""
     engine, wall = ENGINES[cell.engine], WALLS[cell.wall]
     name, engine_of_points = cell.capability, cell.engine in _OF_POINTS
     if name == "mass" and "mass" in engine.laws:
         return "the engine is that of walls with a mass"
-    if name in ("contact step", "contact start") and engine.method is swarm.Penalty:
-        return "Penalty has no such argument"
-    if name == "contact step" and engine.method is swarm.AugmentedLagrangian:
-        return "AugmentedLagrangian has no such argument"
+    if name in ("contact step", "contact start") and (why := _without_steps(cell)) is not None:
+        return why
     if name in ("oscillation", "turning", "path") and "mass" in engine.laws:
         return "impacts move the wall, so that its motion cannot be given"
     if name == "door" and cell.wall == "planes" and cell.engine == "balls, heavy wall":
