@@ -1,7 +1,7 @@
 """The log of contacts: of each one a row where it ends, with what its steps have added up.
 
-A contact begins with the first step at whose end two balls, or a ball and a wall, overlap, and ends with the first one
-at whose end they do not: in all other steps its impulse is 0. What is noted of it meanwhile is kept beside its
+A contact begins with the first step that ends with an overlap of two balls, or of a ball and a wall, and ends with the
+first one that ends without it: in all other steps its impulse is 0. What is noted of it meanwhile is kept beside its
 friction, by its pair, or its ball and the face of the wall, also where lists are made anew.
 """
 

@@ -27,7 +27,7 @@ class Lowered(Unturned):
         return self.gap_of(q)
 
 
-class Met(Unturned):
+class MetMember(Unturned):
     """The member of a field that a step is a contact with, if it is `here`; else a wall that nothing reaches."""
 
     body: Any
@@ -50,7 +50,7 @@ def as_met(walls, number):
     for first, wall in walls.numbered():
         if isinstance(wall, Field):
             here = (number >= first) & (number < first + wall.count())
-            each = (*each, Met(wall.members.wall(number - first), here))
+            each = (*each, MetMember(wall.members.wall(number - first), here))
         else:
             each = (*each, wall)
     return walls._replace(each=each)

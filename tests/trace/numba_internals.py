@@ -65,8 +65,9 @@ COMPILING = {
     "core.typed_passes": None,
     "core.untyped_passes": None,
 }
-# What is compiled, on disk: cache.py, entries.py
+# What is compiled, on disk and in this process: cache.py, entries.py, machine_code.py
 CACHE = {
+    "_dispatcher.compute_fingerprint": None,
     "core.caching.FunctionCache": None,
     "core.caching.FunctionCache._index_key": "self sig codegen",
     "core.caching.FunctionCache.save_overload": "self sig data",

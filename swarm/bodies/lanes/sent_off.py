@@ -22,7 +22,7 @@ from ...kernel.vector import ZERO, column, dot, square
 from .contacts import MOST_CONTACTS, direction, missing, put_direction
 from .impact import BodyImpact, chatters, kinetic_of
 
-# The smaller one of the two inverse masses across a normal is none where its part of the other is below this.
+# The smaller one of the two inverse masses across a normal counts as 0 where its part of the other is below this.
 _HELD = 1e-12
 # A squared speed into a wall is round-off up to this part of that of the fastest point.
 _ROUND_OFF = (16.0 * EPSILON) ** 2

@@ -259,7 +259,7 @@ def _round_at(face, foot, n):
 
 
 def _way_of_foot(roundness, slope, away, depth):
-    """How far a ball goes at least before its foot on a wall, or edge, has gone a distance `depth`.
+    """How far a ball goes at least before its foot on a wall, or edge, goes by a distance `depth`.
 
     On a wall with the radius of curvature a a foot at the distance d goes a/(a - d) times as far as the ball: with the
     way w of the ball w a <= depth (a - d - w), and a is less by the slope times w after that.
