@@ -180,7 +180,10 @@ class PointBatches:
                 raise SceneError(self._sentence(count, tried))
             if tried >= next_report and count < n:
                 next_report = 2 * tried
-                _LOG.warning("%s: %d of %d births have a place so far, after %d points", self._name, count, n, tried)
+                _LOG.warning(
+                    "%s: %d of %d births have a place so far, in a small part of what is searched, after %d points",
+                    self._name, count, n, tried,
+                )  # fmt: skip
         points, normals = np.concatenate(found, axis=1).reshape(2, 3, n)
         return points, normals
 

@@ -117,10 +117,14 @@ def _what_runs(content: Content) -> str:
     stated, frame = titles.of_particles(content), content.frames.get("start")
     if frame is None:
         return stated
-    masses = frame.mass * (1 if content.body is None else len(content.body))
-    speeds = np.sqrt((frame.velocity**2).sum(axis=0))
+    body, masses, velocity = content.body, frame.mass, frame.velocity
+    if body is not None:
+        # Those of bodies, not of their points
+        masses = np.array([body.mass_matrix.sum()])
+        velocity = body.center_of(np.ascontiguousarray(velocity).reshape(3, len(body), -1))
+    speeds = np.sqrt((velocity**2).sum(axis=0))
     for what, values, unit in (
-        (" of" if content.body is None else ", each of", masses, "kg"),
+        (" of" if body is None else ", each of", masses, "kg"),
         (", at the start with", speeds[~np.isnan(speeds)], "m/s"),
     ):
         if not len(values):

@@ -392,3 +392,13 @@ def test_work_of_anchors_is_no_drift(tmp_path):
         lines = {line.path: line for line in series.lines_of(BOX, METHOD, [], trajectory.body)}
     assert lines["/energy/work"].values(np.array([1.0]), {"work": np.array([0.25])}) == [0.25]
     assert "/link_error" not in lines
+
+
+def test_the_words_have_the_mass_of_a_body_and_the_speed_of_its_centre(tmp_path):
+    body = swarm.Body([(0.0, 0.0, 0.0), (0.2, 0.0, 0.0)], mass=[3.0, 1.0], links=[(0, 1)])
+    spins = np.array([[[0.0], [0.0]], [[-0.5], [1.5]], [[1.0], [1.0]]])
+    start = swarm.Bodies(body, np.array(body.points).T[:, :, None], spins)
+    scene = swarm.Scene([swarm.Sphere(2.0)])
+    swarm.simulate(scene, start, swarm.Impact(dt=1e-3), until=2e-3, trajectory=tmp_path / "run.h5", compile="never")
+    stated = summary.of_trajectory(tmp_path / "run.h5")["what runs"]
+    assert stated.endswith("of 4 kg, at the start with 1 m/s")

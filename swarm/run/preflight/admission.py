@@ -43,7 +43,8 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
     )
     for name, value, allowed in kinds:
         if not isinstance(value, allowed) and not (name == "particles" and value is None and options.sources):
-            raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}")
+            instead = "; None goes with sources=[...]" if value is None and name == "particles" else ""
+            raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}{instead}")
     require_known(Asked(scene, particles, method, options))
     if isinstance(particles, TiedParticles):
         _require_motions(scene, options.times.until)
