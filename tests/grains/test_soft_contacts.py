@@ -190,7 +190,7 @@ def test_soft_contacts_are_reported_before_the_run(caplog):
     assert f"at 20 m/s against particle 0, sinks up to {depth:.2g} m into it, {depth / RADIUS:.2g} radii" in pair
     (wall,) = warnings_of(caplog, swarm.Scene([ROOM]), thrown(5.0), SOFT)
     assert "with 5 m/s, sinks up to 0.016 m into a wall, 1.6 radii" in wall
-    assert "use a penalty of 6.2e+04 or more (1000 here)" in wall
+    assert "use a penalty of 6.3e+04 or more (1000 here)" in wall
     assert warnings_of(caplog, swarm.Scene([ROOM]), thrown(5.0), swarm.Penalty(1e-5, 6.3e4)) == []
 
 

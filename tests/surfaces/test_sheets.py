@@ -401,3 +401,19 @@ def test_grains_meet_a_sheet_from_both_sides():
     )
     assert end.particles.velocity[2] == pytest.approx([1.0, -1.0], abs=1e-12)
     assert end.particles.position[2, 0] == pytest.approx(-end.particles.position[2, 1], abs=1e-15)
+
+
+@pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(dt=2e-4, penalty=1e5)], ids=["Impact", "Penalty"])
+def test_a_ball_meets_a_flat_ring_of_many_triangles(method):
+    n, turns = 24, 2.0 * np.pi * np.arange(24) / 24
+    rings = [np.stack([size * np.cos(turns), size * np.sin(turns), 0.0 * turns], axis=1) for size in (0.1, 0.2)]
+    after = (np.arange(n) + 1) % n
+    faces = [triple for k, j in enumerate(after) for triple in ((k, n + k, n + j), (k, n + j, j))]
+    ring = swarm.Mesh(np.concatenate(rings), faces, open=True)
+    ball = swarm.Particles((0.15, 0.0, 0.1), (0.0, 0.0, -1.0), radius=0.02)
+    end = swarm.simulate(swarm.Scene([ring]), ball, method, until=0.2, compile="never")
+    assert end.observables["impacts"][-1] == 1
+    # A spring turns it round for the time of half a period.
+    lasts = 0.0 if isinstance(method, swarm.Impact) else np.pi * np.sqrt(1.0 / 1e5)
+    assert end.particles.position[2, 0] == pytest.approx(0.02 + 0.12 - lasts, abs=1e-3)
+    assert end.observables["energy_error"].max() < 1e-12

@@ -57,9 +57,12 @@ def _turned(z: float) -> float:
 
 
 def _penalty(method: Method, depth: float, allowed: float) -> float:
-    """The penalty with which a depth is what is allowed [m]."""
+    """The penalty with which a depth is what is allowed [m], to two digits."""
     a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
-    return float(alpha * math.pow(depth / allowed, a + 1.0))
+    enough = float(alpha * math.pow(depth / allowed, a + 1.0))
+    # Upwards: what a sentence names is enough.
+    unit = 10.0 ** (math.floor(math.log10(enough)) - 1)
+    return math.ceil(enough / unit) * unit
 
 
 # --- Speeds ----------------------------------------------------------------------------------------------

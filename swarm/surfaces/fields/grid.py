@@ -14,6 +14,8 @@ from .members import gathered
 
 # Cells for each body: a flight through more of them looks at fewer bodies in each.
 _CELLS_EACH = 1.0
+# The least extent along an axis, of the largest.
+_FLAT = 1e-3
 # So many bodies are entered in plain Python: to compile what does it takes a second.
 _SOME = 2000
 
@@ -29,6 +31,8 @@ def cells_of(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) 
         )
     endless = ~((first > -0.5 * ENDLESS) & (last < 0.5 * ENDLESS))
     extent = np.where(endless, 1.0, last - first)
+    # Flat bodies in one plane have room before and behind it.
+    extent = np.where(endless, 1.0, np.maximum(extent, _FLAT * np.where(endless, 0.0, extent).max()))
     each = extent[~endless].prod() / (_CELLS_EACH * max(1, bodies))
     side = each ** (1.0 / max(1, (~endless).sum()))
     if repeated is not None:
