@@ -1,6 +1,9 @@
 """The same job in other programs: one adapter each, left out with a sentence where the program is not installed."""
 
+import importlib
+from collections.abc import Iterable
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Protocol
 
 import numpy as np
@@ -35,3 +38,15 @@ class Peer(Protocol):
 
     def run(self, job: Job) -> tuple[Floats, float]:
         """Positions at the end, and the seconds of the steps alone, on one thread."""
+
+
+def loaded(names: Iterable[str]) -> tuple[dict[str, tuple[ModuleType, str]], list[str]]:
+    """The adapters with these names and the versions of their programs, and a sentence for each that is left out."""
+    found, missing = {}, []
+    for name in names:
+        peer = importlib.import_module(f"{__package__}.{name}")
+        try:
+            found[name] = peer, peer.version()
+        except (ImportError, OSError) as error:
+            missing.append(f"{name} is left out: {error}; {peer.INSTALL} installs it.")
+    return found, missing

@@ -1,6 +1,5 @@
 """Others on their own ground, each in turn with ours: grains, rays in a mesh, and the first seconds of a small run."""
 
-import importlib
 import math
 import os
 import resource
@@ -19,7 +18,7 @@ import swarm
 from ..grains import DIAMETER, MASS, hopper
 from ..meshes import ball, nanoseconds, scene_of, vessel
 from ..report import ROOT, Row, as_usual, in_turn, tier
-from . import Floats
+from . import Floats, loaded
 
 # A contact of two grains lasts so many steps of so long [s].
 _STEPS, _DT = 20, 1e-4
@@ -41,16 +40,9 @@ every = 1.0
 
 def rows(quick: bool) -> tuple[list[Row], list[str]]:
     """The rows, and a sentence for each program that cannot be loaded."""
-    found, missing = [], []
-    for name, measure in (("granular", grains), ("embree", meshes), ("mujoco", first_seconds)):
-        peer = importlib.import_module(f"{__package__}.{name}")
-        try:
-            version = peer.version()
-        except (ImportError, OSError) as error:
-            missing.append(f"{name} is left out: {error}; {peer.INSTALL} installs it.")
-            continue
-        found += measure(peer, version, quick)
-    return found, missing
+    measures = {"granular": grains, "embree": meshes, "mujoco": first_seconds}
+    peers, missing = loaded(measures)
+    return [row for name, peer in peers.items() for row in measures[name](*peer, quick)], missing
 
 
 # --- Grains ----------------------------------------------------------------------------------------------

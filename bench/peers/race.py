@@ -7,7 +7,6 @@ stiff one changes the energy in explicit steps: for each step dt, stiffnesses dt
 are tried, of ten to a hundred steps a contact, and dt is halved until one of them comes near enough.
 """
 
-import importlib
 import time
 from collections.abc import Callable
 
@@ -18,7 +17,7 @@ from swarm.methods.base import Method
 
 from .. import yardstick
 from ..report import Row, machine, show, write
-from . import Floats, Job, ground
+from . import Floats, Job, ground, loaded
 
 PEERS = ("lammps", "openmm", "warp")
 RADIUS, SPEED, UNTIL = 0.5, 0.5, 10.0
@@ -87,14 +86,8 @@ def solution(
 def solvers() -> tuple[dict[str, Solver], list[str]]:
     """Name -> run, and a sentence for each program that cannot be loaded."""
     found: dict[str, Solver] = {"swarm, Penalty": penalty, "plain Verlet in Numba": numba_verlet}
-    missing = []
-    for name in PEERS:
-        peer = importlib.import_module(f"{__package__}.{name}")
-        try:
-            version = peer.version()
-        except (ImportError, OSError) as error:
-            missing.append(f"{name} is left out: {error}; {peer.INSTALL} installs it.")
-            continue
+    peers, missing = loaded(PEERS)
+    for peer, version in peers.values():
         found[version] = peer.run
         print(f"{version}: {peer.settings()}")
     return found, missing

@@ -62,10 +62,7 @@ def with_born(scene: Scene, bodies: Bodies, sources: tuple[Source, ...], seed: i
     centers = _centers(bodies)
     made = with_births(scene, centers, around, seed, until)
     assert made.births is not None
-    try:
-        place_unborn(scene, made, seed)
-    except SceneError as error:
-        raise SceneError(str(error).replace("radius must leave a place", "where must leave a place")) from None
+    place_unborn(scene, made, seed, "where")
     number = np.arange(len(bodies), len(made))
     spin = np.zeros_like(made.position) if made.spin is None else made.spin
     place, velocity, turning = (rows[:, None, number] for rows in (made.position, made.velocity, spin))

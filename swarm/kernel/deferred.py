@@ -1,4 +1,4 @@
-"""What the compiler is told when it is first needed, and not before: a run of few particles needs no compiler.
+"""What the compiler registers when it is first needed, and not before: a run of few particles needs no compiler.
 
 To import Numba, LLVM and the trace, and to load a kernel, takes 0.6 s of processor time, more than such a run.
 """

@@ -16,6 +16,11 @@ from .source import Source
 _BLOCK, _MOST_ROUNDS = 1024, 256
 # A ball that is born at a wall is so much of its radius away from it.
 _CLEAR = 1e-9
+# What came, by the argument that can be changed: of balls, and of bodies, which are as large as they are.
+_LACKING = {
+    "radius": "got {:g} m, for which none of {} random places is; use smaller balls, or a larger source",
+    "where": "got none for the ball of {:g} m around a body, of {} random places; move it, or make it larger",
+}
 
 
 class BallPlaces:
@@ -26,14 +31,15 @@ class BallPlaces:
         source: of balls.
         k: the number of the source.
         seed: of the run.
+        sized: the argument of the source that a sentence asks to change.
 
     Raises:
         SceneError: there is no such place, or a beam does not lead into the vessel.
     """
 
-    def __init__(self, scene: Scene, source: Source, k: int, seed: int) -> None:
+    def __init__(self, scene: Scene, source: Source, k: int, seed: int, sized: str = "radius") -> None:
         self._scene, self._source, self._name = scene, source, (name := f"sources[{k}]")
-        self._key = seed, k
+        self._key, self._sized = (seed, k), sized
         require_in_plane(scene, source, name)
         self._place = place_of(scene, source, name)
         self._points = PointBatches(scene, self._place, name)
@@ -72,8 +78,8 @@ class BallPlaces:
                 break
         if not count:
             raise SceneError(
-                f"{self._name}.radius must leave a place within the walls, got {self._radius:g} m, for which none of "
-                f"{_MOST_ROUNDS * _BLOCK} random places is; use smaller balls, or a larger source"
+                f"{self._name}.{self._sized} must leave a place within the walls, "
+                + _LACKING[self._sized].format(self._radius, _MOST_ROUNDS * _BLOCK)
             )
         points, normals = np.resize(np.concatenate(found, axis=1).T, (_BLOCK, 6)).T.reshape(2, 3, _BLOCK)
         velocity = self._velocities(speeds, points, normals)
@@ -96,15 +102,19 @@ class BallPlaces:
         return from_surface(source, random, normals, self._across)
 
 
-def ball_places(scene: Scene, particles: Particles, seed: int) -> list[BallPlaces]:
+def ball_places(scene: Scene, particles: Particles, seed: int, sized: str = "radius") -> list[BallPlaces]:
     """The places of each source of balls of a run, with this seed."""
     given = () if particles.births is None else particles.births.balls
-    return [BallPlaces(scene, one, k, seed) for k, one in enumerate(given)]
+    return [BallPlaces(scene, one, k, seed, sized) for k, one in enumerate(given)]
 
 
-def place_unborn(scene: Scene, particles: Particles, seed: int) -> None:
-    """Give balls that are not yet born a place and a velocity of their source, until they are."""
-    for k, places in enumerate(ball_places(scene, particles, seed)):
+def place_unborn(scene: Scene, particles: Particles, seed: int, sized: str = "radius") -> None:
+    """Give balls that are not yet born a place and a velocity of their source, until they are.
+
+    Raises:
+        SceneError: a source has no place for its balls; `sized` is the argument of it that can be changed.
+    """
+    for k, places in enumerate(ball_places(scene, particles, seed, sized)):
         assert particles.births is not None
         own = np.flatnonzero(particles.births.source == k)
         position, velocity = places.block(0)

@@ -87,8 +87,8 @@ class Source(Validated):
         density: of balls [kg/m^3], in a plane [kg/m^2], in place of a mass.
         spin: of balls and bodies: the angular speed about random axes, or three numbers, the angular velocity [rad/s].
         blocked: of balls and bodies, what becomes of a birth that finds no free place: "wait", it and those after it
-            come when it finds one, tried again in the time that a ball needs for its radius; "report", it never comes.
-            Both count in the observable `blocked`.
+            come when it finds one, tried again in the time that a ball needs for its radius, or where nothing moves
+            when the next birth is due; "report", it never comes. Both count in the observable `blocked`.
 
     In a run of bodies those that come are further copies of the body, turned at random; a birth has room where the ball
     around the body has, about its centre of mass. Its mass is that of the body.

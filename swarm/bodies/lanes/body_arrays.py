@@ -133,7 +133,7 @@ class BodyState(NamedTuple):
     heat: Any = None  # (walls, n) that each wall gave by its laws [J], a part of `work`; None where none gives any
     absorbed_time: Any = None  # (n,) when a wall absorbed each body [s], NaN of the others; None where none does
     absorbed_wall: Any = None  # (n,) int32, the number of that wall, -1 of the others
-    # What is told of impacts and of steps, and what counters write to:
+    # What observes impacts and steps, and what counters write to:
     watchers: Any = Watchers()  # of the thread
     mass: Any = None  # (n,) of each body [kg]
     crossed: Any = None  # `Crossed`, where there are counters

@@ -190,7 +190,7 @@ class BodyImpact(Record):
     def tell(self, state, a, before, impulse, i):
         """Count the impact at contact a, which had a velocity before, and tell the watchers of it."""
         state.impacts[self.bodies.pace.body[i]] += 1
-        # Of a cavity that a point carries nothing is told.
+        # Watchers see no cavity that a point carries.
         if self.name[a, 1] < self.bodies.touching.walls:
             state.watchers.hit(state.image, self.struck(a, before, impulse, i))
 

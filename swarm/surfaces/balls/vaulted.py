@@ -261,8 +261,8 @@ def _round_at(face, foot, n):
 def _way_of_foot(roundness, slope, away, depth):
     """How far a ball goes at least before its foot on a wall, or edge, goes by a distance `depth`.
 
-    On a wall with the radius of curvature a a foot at the distance d goes a/(a - d) times as far as the ball: with the
-    way w of the ball w a <= depth (a - d - w), and a is less by the slope times w after that.
+    With the radius of curvature R of the wall, a ball at the distance d that goes the way w moves its foot by at most
+    w R/(R - d - w). On a cone R is then less by the slope times w.
     """
     if not roundness < math.inf:
         return depth
