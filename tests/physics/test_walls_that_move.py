@@ -16,6 +16,7 @@ from examples import fermi
 from swarm.kernel.vector import ZERO, Vec, vec
 from swarm.lanes import block
 from swarm.motion import pose
+from swarm.surfaces.in_motion.drive import drive_of
 from swarm.surfaces.time_of_impact import safe
 
 G = 9.81
@@ -67,6 +68,15 @@ def imbalance(result):
         seen["total_energy"] + seen["dissipated_energy"] - seen["wall_work"].sum(axis=1) - seen["wall_heat"].sum(axis=1)
     )
     return np.abs(kept - kept[0]).max() / np.abs(seen["total_energy"]).max()
+
+
+def test_the_bound_of_the_speed_of_a_path_is_near_its_largest_speed():
+    rng = np.random.default_rng(5)
+    for _case in range(30):
+        times = np.sort(rng.uniform(0.0, 3.0, 9))
+        drive = drive_of(swarm.Sphere(0.5, motion=swarm.Path(times, rng.normal(size=(9, 3)))), 0.0)
+        speeds = [math.hypot(*drive.track.at(t)[1]) for t in np.linspace(times[0], times[-1], 4000).tolist()]
+        assert max(speeds) <= (1.0 + 1e-12) * drive.fastest <= 1.25 * max(speeds)
 
 
 # --- Uniform motion: the trajectory at rest, transformed -------------------------------------------------

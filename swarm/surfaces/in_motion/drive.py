@@ -232,15 +232,18 @@ def drive_of(surface: Surface, moment: float) -> Drive:
         elif isinstance(one, motions.Path):
             cubics = one.cubics
             track = Track(np.array(one.times), cubics, _vector(one.displacement(moment)), moment)
-            # Within a piece the velocity is largest at an end or where the second derivative is 0.
             h = np.diff(one.times)
             time_scale = min(time_scale, _SLOW * float(h.min()))
-            ends = cubics[1], cubics[1] + h * (2.0 * cubics[2] + 3.0 * h * cubics[3])
+            # The velocity of each half of a piece lies within the triangle of the control points of its Bezier form.
+            first, last = cubics[1], cubics[1] + h * (2.0 * cubics[2] + 3.0 * h * cubics[3])
+            between = cubics[1] + h * cubics[2]
+            left, right = 0.5 * (first + between), 0.5 * (between + last)
+            controls = first, left, 0.5 * (left + right), right, last
             bends = 2.0 * cubics[2], 2.0 * cubics[2] + 6.0 * h * cubics[3]
             jerk += float(6.0 * np.sqrt((cubics[3] ** 2).sum(axis=0)).max())
             jerks += 6.0 * np.abs(cubics[3]).max(axis=1)
             hardest += float(max(np.sqrt((bend**2).sum(axis=0)).max() for bend in bends))
-            fastest += float(max(np.sqrt((end**2).sum(axis=0)).max() for end in ends)) + float(h.max()) * hardest
+            fastest += float(max(np.sqrt((control**2).sum(axis=0)).max() for control in controls))
         else:
             axis = motions.unit_axis(one)
             time_scale = min(time_scale, _SLOW / abs(one.rate)) if one.rate else time_scale
