@@ -93,10 +93,7 @@ def _require_in_plane(scene: Scene, body: Body, points: Particles) -> None:
             f'plane must be None with a body that has guides, cavities or anchors that are led, got "{scene.plane}"; '
             "leave it out"
         )
-    try:
-        require_start(scene, points)
-    except SceneError as error:
-        raise SceneError(f"{str(error).partition(';')[0]}; all points of a body must lie, and move, in it") from None
+    require_start(scene, points, "all points of a body must lie, and move, in it")
 
 
 def _warn_of_turns(bodies: Bodies, dt: float) -> None:

@@ -78,7 +78,7 @@ def _require_pull(plane: str, gravity: Sequence[float]) -> None:
         )
 
 
-def require_start(scene: Any, particles: Any) -> None:
+def require_start(scene: Any, particles: Any, mend: str = "") -> None:
     """Raise a `SceneError` where a particle starts out of the plane of a scene, or with what would lead out of it."""
     across = across_of(scene.plane)
     if across is None:
@@ -88,10 +88,11 @@ def require_start(scene: Any, particles: Any) -> None:
         if off.size:
             k = int(off[np.argmax(np.abs(rows[across, off]))])
             where = "out of it" if what == "start" else "with a velocity out of it"
+            row = f"particles.{'position' if what == 'start' else 'velocity'}[{across}]"
             raise SceneError(
                 f'particles must be in the plane {scene.plane} = 0 of a scene with plane = "{scene.plane}", got '
                 f"{off.size} of {rows.shape[1]} {where}; the farthest is particle {k}, by {rows[across, k]:g} {unit}; "
-                f"set particles.{'position' if what == 'start' else 'velocity'}[{across}] to 0, or use swarm.fill"
+                f"{mend or f'set {row} to 0, or use swarm.fill'}"
             )
     if particles.spin is None:
         return
