@@ -11,7 +11,7 @@ import numpy as np
 
 from .common.checks import closest, count, listed, particles_fit
 from .common.columns import read_columns, row_of
-from .common.validated import Count, Flag, Magnitude, NotNegativeCount, Part, Positive
+from .common.validated import Count, Flag, Magnitude, NotNegativeCount, Part, Positive, Validated
 from .errors import SceneError
 from .files import paths
 from .methods import Impact, Method
@@ -37,8 +37,8 @@ OUTPUTS = {"trajectory": "-o", "recording": "--record", "impacts": "--impacts"}
 
 
 @dataclass(frozen=True)
-class ParticlesTable:
-    """[particles]: their number, speed and mass, or the file that holds them; `fill` and `pack` check the values."""
+class ParticlesTable(Validated):
+    """[particles]: their number, speed and mass, or the file that holds them; `fill` and `pack` check what is left."""
 
     count: Count | None = None
     speed: Magnitude | None = None

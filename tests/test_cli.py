@@ -146,7 +146,7 @@ def test_results_do_not_depend_on_threads(folder):
         ),
         ("count = 10", f"count = {10**400}", [], "count"),
         ("count = 10", f"count = {'9' * 5000}", [], "cannot read the scene file scene.toml"),
-        ("speed = 0.5", "speed = 1e300", [], "[particles]: speed must be at most 1e+100, got 1e+300"),
+        ("speed = 0.5", "speed = 1e300", [], "particles.speed must be at most 1e+100, got 1e+300"),
         (
             "every = 0.5",
             "every = 1e-12",

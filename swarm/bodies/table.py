@@ -13,7 +13,7 @@ import numpy as np
 
 from ..common import checks
 from ..common.checks import Vector
-from ..common.validated import Count, Validated
+from ..common.validated import Count, Magnitude, NotNegativeCount, Validated
 from ..errors import SceneError
 from ..motion import Oscillation, Rotation, Translation
 from ..motion import table_of as motion_table
@@ -41,9 +41,14 @@ class Made(Validated):
     # The function that makes the body of the other keys.
     maker: ClassVar[Callable[..., Body]]
     count: Count | None = None
-    speed: float | None = None
-    spin: float | None = None
-    seed: int | None = None
+    speed: Magnitude | None = None
+    spin: Magnitude | None = None
+    seed: NotNegativeCount | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        # Its arguments are wrong or right as the file is read, not when the copies are placed.
+        self.body()
 
     def body(self) -> Body:
         """The body that is described."""

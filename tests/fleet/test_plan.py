@@ -111,6 +111,7 @@ def test_runs_that_differ_in_numbers_are_of_one_kind(plan_of):
         ('"surface.0.restitutoin" = [0.5]', ['sweep."surface.0.restitutoin" = 0.5', "did you mean 'restitution'"]),
         ("surface.0.restitutoin = [0.5]", ['sweep."surface.0.restitutoin" = 0.5', "did you mean 'restitution'"]),
         ('"partcles.seed" = [1]', ['sweep."partcles.seed" = 1', "did you mean 'particles'"]),
+        ('"particles.speed" = [1.0, -1.0]', ['sweep."particles.speed" = -1.0: particles.speed must be 0 or more']),
         ('"method.contact_stp" = [0.1]', ["did you mean 'contact_step'"]),
         ('"surface.3.restitution" = [0.5]', ['"surface.3.restitution"', "has one entry, number 0, got '3'"]),
         ('"gravity.x" = [0.5]', ['"gravity.x"', "entries 0 to 2, got 'x'"]),
