@@ -8,6 +8,8 @@ import typer
 from ..errors import SceneError
 from .shown import Picture, TrajectoryFile, written
 
+ReplacesPicture = Annotated[bool, typer.Option("--overwrite", help="Replace an existing picture.")]
+
 
 def record(
     file: TrajectoryFile,
@@ -47,6 +49,7 @@ def view(
             "--viewer/--no-viewer", help="By the Rerun viewer or by matplotlib [default: the viewer if it can]."
         ),
     ] = None,
+    overwrite: ReplacesPicture = False,
 ) -> None:
     """Draw a contact sheet of a recording; no screen and no GPU are needed."""
     from ..common.extras import needed_by
@@ -56,12 +59,12 @@ def view(
     with needed_by("a contact sheet", "plot"):
         from ..recording import sheet
 
-    target = _picture(output or file.with_suffix(".png"), file)
+    target = _picture(output or file.with_suffix(".png"), file, overwrite)
     by = sheet.draw_sheet(Playback(file), target, None if times is None else _numbers("--times", times), viewer)
     print(f"written to {target}; drawn by {by}")
 
 
-def plot(file: TrajectoryFile, output: Picture = None) -> None:
+def plot(file: TrajectoryFile, output: Picture = None, overwrite: ReplacesPicture = False) -> None:
     """Draw energy error, penetration, impacts, pressure, speeds and the particles or bodies of a trajectory."""
     from ..common.extras import needed_by
 
@@ -69,7 +72,7 @@ def plot(file: TrajectoryFile, output: Picture = None) -> None:
         from ..pictures import plots
     from ..files.trajectory import load
 
-    target = _picture(output or file.with_suffix(".png"), file)
+    target = _picture(output or file.with_suffix(".png"), file, overwrite)
     with load(file) as trajectory:
         plots.draw_plot(trajectory, target)
     print(f"written to {target}")
@@ -94,11 +97,8 @@ def animate(
     written(film)
 
 
-def _picture(output: Path, source: Path) -> Path:
-    """The file that a picture becomes; a SceneError if it cannot.
-
-    A picture of swarm is cheap to draw again, so it is replaced without an option.
-    """
+def _picture(output: Path, source: Path, overwrite: bool) -> Path:
+    """The file that a picture becomes; a SceneError if it cannot."""
     from ..files.marks import check_target
     from ..files.paths import check_distinct, target_of
 
@@ -106,7 +106,7 @@ def _picture(output: Path, source: Path) -> Path:
     if target.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise SceneError(f"picture: expected a file name that ends in .png, .pdf or .svg, got {target}")
     check_distinct({"picture": target}, {"file that it is drawn from": source})
-    check_target(target, overwrite=True, what="picture")
+    check_target(target, overwrite, what="picture")
     return target
 
 

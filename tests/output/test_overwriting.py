@@ -116,9 +116,17 @@ def test_a_picture_replaces_pictures_of_swarm_alone(tmp_path, suffix):
 
 def test_plot_keeps_a_picture_of_others(whole, tmp_path):
     (tmp_path / "photo.png").write_bytes(b"\x89PNG\r\n\x1a\n and a holiday")
-    code, output = command("plot", whole / "run.h5", "-o", tmp_path / "photo.png")
+    code, output = command("plot", whole / "run.h5", "-o", tmp_path / "photo.png", "--overwrite")
     assert (code, (tmp_path / "photo.png").read_bytes()) == (1, b"\x89PNG\r\n\x1a\n and a holiday")
     assert "photo.png is not a picture of swarm, and only such a file is overwritten" in output
+
+
+def test_plot_replaces_a_picture_only_if_asked(whole, tmp_path):
+    words = "plot", whole / "run.h5", "-o", tmp_path / "plot.png"
+    assert command(*words)[0] == 0
+    code, output = command(*words)
+    assert (code, "picture: " in output, "overwrite it (--overwrite" in output) == (1, True, True)
+    assert command(*words, "--overwrite")[0] == 0
 
 
 def test_record_keeps_a_file_of_others(whole, tmp_path):
