@@ -206,6 +206,8 @@ def text_of(path: Path) -> str:
     try:
         # Editors on Windows begin a file with a byte order mark.
         return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise SceneError(f"there is no file {path}; expected a scene file (.toml)") from None
     except (OSError, ValueError) as error:  # the second: not UTF-8
         raise SceneError(f"cannot read the scene file {path}: {error}") from error
 

@@ -31,6 +31,7 @@ from ..words import facts
 from ..words.amounts import listed, many
 from ..words.content import Content
 from ..words.statements import rows_of
+from .file_run import named_alone
 
 # Bytes of a row of a log of impacts, and of Python with NumPy, Numba and HDF5.
 _ROW, _PROGRAM = 112, 2.5e8
@@ -110,6 +111,7 @@ def outlook_of_file(
         job, about = scene_file.read(path, plugins), {}
         stored = path.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
         target = Path(output or stored)
+        named_alone(job, trajectory=output)
     options = replace(job.run, trajectory=target, threads=job.run.threads if threads is None else threads)
     return about | outlook(replace(job, run=options), target, makes_folder=bool(about))
 

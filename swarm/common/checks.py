@@ -25,6 +25,8 @@ PARTICLE, FEW = 146, 1_000_000
 _DOUBLE = 8
 # Characters of a value that are shown in a sentence.
 _SHOWN = 200
+# How a sentence about an argument, or about a key of a table of it, begins.
+_ARGUMENT = re.compile(r"[a-z_]\w*(\[\d+\])*(\.[a-z_]\w*(\[\d+\])*)*( must | has | is |: )")
 _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
@@ -299,6 +301,15 @@ def closest(value: Any, known: Iterable[str]) -> str:
     """A hint "; did you mean ...?" or nothing."""
     found = difflib.get_close_matches(value if isinstance(value, str) else shown(value), list(known), n=1, cutoff=0.5)
     return f"; did you mean {found[0]!r}?" if found else ""
+
+
+def located(where: str, error: object) -> str:
+    """The sentence about a part, behind the place of it: an argument or a key of it behind a dot.
+
+    >>> located("surface[0]", "radius must be above 0"), located("surface[0]", "cannot read the mesh part.stl")
+    ('surface[0].radius must be above 0', 'surface[0]: cannot read the mesh part.stl')
+    """
+    return f"{where}{'.' if _ARGUMENT.match(str(error)) else ': '}{error}"
 
 
 def listed(names: Iterable[str]) -> str:

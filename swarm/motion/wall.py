@@ -186,8 +186,8 @@ def parts_of_wall(where: str, value: Any, within: tuple[Any, ...] = ()) -> "Wall
         except SceneError as error:
             raise SceneError(f"{where}: {error}") from None
     raise SceneError(
-        f"{where} must be None, swarm.Translation, Oscillation, Rotation, Path, Guide or a sum of them, got "
-        f"{checks.shown(value)}{checks.brackets(value)}"
+        f"{where} must be None, swarm.Translation, Oscillation, Rotation, Path, Guide or a sum of them, or in a file "
+        f"a table with a kind, got {checks.shown(value)}{checks.brackets(value)}"
     )
 
 
@@ -209,7 +209,7 @@ def _of_table(table: Mapping[str, Any], where: str) -> "WallMotion":
     try:
         return KINDS[kind](**given)  # type: ignore[no-any-return]
     except SceneError as error:
-        raise SceneError(f"{where}.{error}") from None
+        raise SceneError(checks.located(where, error)) from None
 
 
 def _times(value: ArrayLike) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import tomli_w
 
-from ..common.checks import closest, listed
+from ..common.checks import closest, listed, located
 from ..errors import SceneError
 from ..scene import Scene
 from ..sources.source import Source
@@ -47,7 +47,7 @@ def _counter_of(table: Any, where: str) -> Counter:
     try:
         return Counter(**made)
     except SceneError as error:
-        raise SceneError(f"{where}.{error}") from None
+        raise SceneError(located(where, error)) from None
 
 
 def source_table(source: Source, scene: Scene) -> dict[str, Any]:

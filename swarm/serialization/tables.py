@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.checks import closest, listed, one_of
+from ..common.checks import closest, listed, located, one_of, shown
 from ..common.validated import bare, is_left_out
 from ..errors import SceneError
 from ..methods import ALL_METHODS, Method
@@ -29,6 +29,16 @@ from . import plugins
 T = TypeVar("T")
 # What in the table of a surface are tables of surfaces.
 NESTED = ("openings", "part")
+# Types of msgspec in the words of TOML.
+_WORDS = {
+    "float": "a number", "int": "a whole number", "str": "a text", "bool": "true or false", "array": "a list",
+    "object": "a table",
+}  # fmt: skip
+# Keys that stand elsewhere, and where.
+_ELSEWHERE = {
+    **{key: f"; {key} belongs at the top, before the first table" for key in ("gravity", "period", "plane")},
+    **dict.fromkeys(("position", "velocity"), '; places and velocities are in a file: from = "start.csv"'),
+}
 # An array of more numbers is not written as text: HDF5 loses texts of 100 MB, and a million balls take 10 s to write.
 _LONG, _ARRAY = 1000, "sha256:"
 
@@ -39,7 +49,8 @@ def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None,
     surfaces = [] if surfaces is None else surfaces
     if not isinstance(surfaces, list):
         raise SceneError(
-            "surface: expected at least one [[surface]] table, or none for balls in free space, got something else"
+            "surface: expected [[surface]] tables, one for each surface, got "
+            + ("a table [surface]; write it in double brackets" if isinstance(surfaces, Mapping) else shown(surfaces))
         )
     built = [surface_of(table, f"surface[{i}]") for i, table in enumerate(surfaces)]
     met = None if pairs is None else convert(pairs, Pairs, "pairs")
@@ -67,7 +78,7 @@ def opening_of(table: Any, where: str) -> Surface | Opening:
     try:
         return Opening(surface, **mine)
     except SceneError as error:
-        raise SceneError(f"{where}.{error}") from None
+        raise SceneError(located(where, error)) from None
 
 
 def method_of(table: Any) -> Method:
@@ -172,8 +183,7 @@ def convert(table: Any, cls: type[T], where: str) -> T:
     names = {field.metadata.get("key", field.name): field for field in kept_fields(cls)}
     for key in table:
         if key not in names:
-            at_top = key in ("gravity", "period", "plane")
-            hint = f"; {key} belongs at the top, before the first table" if at_top else closest(key, names)
+            hint = _ELSEWHERE.get(key) or closest(key, names)
             raise SceneError(f"{where}.{key}: unknown key, expected {listed(names)}{hint}")
     for key, field in names.items():
         if field.default is dataclasses.MISSING and key not in table:
@@ -221,12 +231,20 @@ def _sentence(message: str, where: str, table: Mapping[str, Any], keys: Mapping[
     reason, path = match.groups()
     if not path:
         # From our own checks, which begin with the argument's name.
-        return f"{where}.{reason}"
+        return located(where, reason)
     name = re.split(r"[.\[]", path)[0]
     key = keys.get(name, name)
     path = key + path.removeprefix(name)
     value = f" (in {key} = {table[key]!r})" if key in table else ""
-    return f"{where}.{path}: {reason[0].lower()}{reason[1:].replace('`', '')}{value}"
+    reason = re.sub(r"`([^`]*)`", lambda types: _in_words(types[1]), reason)
+    unit = isinstance(table.get(key), str) and reason.startswith("Expected a number, got a text")
+    hint = "; numbers have no unit: lengths are in m, times in s, masses in kg, energies in J" if unit else ""
+    return f"{where}.{path}: {reason[0].lower()}{reason[1:]}{value}{hint}"
+
+
+def _in_words(types: str) -> str:
+    """`float | array | null` is "a number or a list"; what is no name of a type stays."""
+    return " or ".join(_WORDS.get(one, one) for one in types.split(" | ") if one != "null") or "nothing"
 
 
 def with_laws(table: Any, where: str) -> Any:
@@ -244,7 +262,8 @@ def with_laws(table: Any, where: str) -> Any:
 def _law_of(table: Any, where: str) -> WallLaw | str:
     """A law of a wall from its table: of a kind, or of code that the caller allows."""
     if not isinstance(table, Mapping):
-        return table if isinstance(table, str) else _no_law(where, table)
+        # A trajectory has the text of an object of user-defined code.
+        return table if isinstance(table, str) and "(" in table else _no_law(where, table)
     if "law" in table and "kind" in table:
         raise SceneError(f"{where}: expected a kind or a law, got both; remove one of them")
     key = "law" if "law" in table else "kind"

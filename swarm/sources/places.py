@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.checks import located
 from ..errors import SceneError
 from ..kernel.limits import PUT_ON_SURFACE
 from ..scene import Scene
@@ -242,7 +243,7 @@ class PointBatches:
         try:
             samples = surface.area_samples(bounds, scene.across())
         except SceneError as error:
-            raise SceneError(f"{self._name}.{error}") from None
+            raise SceneError(located(self._name, error)) from None
         if not sum(one.area for one in samples) > 0.0:
             raise SceneError(self._sentence(0, 0))
         return samples

@@ -66,13 +66,13 @@ STRAIN = {"edges": [[0, 1]], "rest": [1.0], "stiffness": [[0, 1, 2.0]]}
         ({"anchors": [{"point": 0, "kind": "rotatoin"}]}, r"anchors\[0\]\.kind must be .*did you mean 'rotation'"),
         (
             {"anchors": [{"point": 0, "kind": "translation", "velocity": [0, 0, "a"]}]},
-            r"anchors\[0\]\.velocity\[2\]: expected float, got str",
+            r"anchors\[0\]\.velocity\[2\]: expected a number, got a text",
         ),
         ({"guides": [{"point": 0}]}, r"guides\[0\]\.surface: expected"),
         ({"guides": [{"point": 0, "surface": {**BALL, "radius": 0}}]}, r"guides\[0\]\.surface\.radius must be"),
         ({"cavities": [{"surface": BALL, "carrier": 0}]}, r"cavities\[0\]\.point: expected"),
-        ({"points": [[0.0, 0.0]]}, r"body\.points\[0\]: expected array of length 3"),
-        ({"links": [[0, 0.5]]}, r"body\.links\[0\]\[1\]: expected int"),
+        ({"points": [[0.0, 0.0]]}, r"body\.points\[0\]: expected a list of length 3"),
+        ({"links": [[0, 0.5]]}, r"body\.links\[0\]\[1\]: expected a whole number"),
         ({"likns": []}, r"body\.likns: unknown key.*did you mean 'links'"),
     ],
 )  # fmt: skip

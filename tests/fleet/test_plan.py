@@ -117,7 +117,7 @@ def test_runs_that_differ_in_numbers_are_of_one_kind(plan_of):
         ('"gravity.x" = [0.5]', ['"gravity.x"', "entries 0 to 2, got 'x'"]),
         ('"particles.speed.x" = [0.5]', ["particles.speed is 1.0, which has no 'x'"]),
         ('"surface.0.restitution" = [0.5, 1.5]', ['"surface.0.restitution" = 1.5', "from 0 to 1"]),
-        ('"surface.0.restitution" = [0.5, "x"]', ['"surface.0.restitution" = "x"', "expected float"]),
+        ('"surface.0.restitution" = [0.5, "x"]', ['"surface.0.restitution" = "x"', "expected a number"]),
         ('"run.until" = [-1.0]', ['"run.until" = -1.0', "must be above 0, got -1"]),
         ('"particles.temperature" = [1.0]\n"surface.0.radius" = [-1.0]', ['"surface.0.radius" = -1.0']),
         (

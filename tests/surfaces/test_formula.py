@@ -354,10 +354,10 @@ def test_its_table_and_back():
     ("table", "message"),
     [
         ({}, r"surface\[0\].phi: expected"),
-        ({"phi": 3}, r"surface\[0\].phi: expected str, got int \(in phi = 3\)"),
+        ({"phi": 3}, r"surface\[0\].phi: expected a text, got a whole number \(in phi = 3\)"),
         ({"phi": "x + q"}, r"surface\[0\].phi has an unknown name 'q'"),
         ({"formula": "x"}, r"surface\[0\].formula: unknown key"),
-        ({"phi": PILL, "size": "big"}, r"surface\[0\].size: expected float"),
+        ({"phi": PILL, "size": "big"}, r"surface\[0\].size: expected a number"),
         ({"phi": PILL, "bounds": [1, 2]}, r"surface\[0\].bounds"),
         ({"phi": "__import__('os').system('touch /tmp/owned')"}, r"surface\[0\].phi must call only"),
     ],

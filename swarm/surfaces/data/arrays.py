@@ -39,10 +39,10 @@ def _of_npy(path: Path) -> Floats:
     with path.open("rb") as file:
         begin = file.read(12)
     if not begin.startswith(_MAGIC):
-        raise SceneError(f"{path} must hold one array, as np.save writes it, got another kind of file")
+        raise SceneError(f"the file {path} must hold one array, as np.save writes it, got another kind of file")
     # NumPy allocates a header of the length that the file states.
     if int.from_bytes(begin[8 : 10 if begin[6:7] == b"\x01" else 12], "little") > size:
-        raise SceneError(f"{path} must be whole, got a header that is longer than the file")
+        raise SceneError(f"the file {path} must be whole, got a header that is longer than the file")
     try:
         # The map is refused where the file is shorter than its header says.
         found = np.load(path, mmap_mode="r", allow_pickle=False)
@@ -66,13 +66,13 @@ def _of_hdf5(path: Path) -> Floats:
         file.visititems(lambda _name, one: found.append(one) if getattr(one, "ndim", 0) == 3 else None)
         if len(found) != 1:
             named = checks.listed(one.name for one in found) or "none"
-            raise SceneError(f"{path} must hold one dataset with three axes, got {named}")
+            raise SceneError(f"the file {path} must hold one dataset with three axes, got {named}")
         (dataset,) = found
         size = _require(path, dataset.shape, dataset.dtype)
         active = path.stat().st_size * (_DENSEST if dataset.id.get_create_plist().get_nfilters() > 0 else 1)
         if size > active:
             raise SceneError(
-                f"{path} must hold all samples, got {dataset.name} of shape {dataset.shape}, which takes "
+                f"the file {path} must hold all samples, got {dataset.name} of shape {dataset.shape}, which takes "
                 f"{checks.in_bytes(size)}, in a file of {checks.in_bytes(path.stat().st_size)}; write all of them"
             )
         return np.asarray(dataset[()])
@@ -81,11 +81,11 @@ def _of_hdf5(path: Path) -> Floats:
 def _require(path: Path, shape: tuple[int, ...], kind: np.dtype[Any]) -> float:
     """The size of an array [bytes], if it is one of numbers that fits in memory."""
     if kind.kind not in "iuf":
-        raise SceneError(f"{path} must hold an array of numbers, got {kind}")
+        raise SceneError(f"the file {path} must hold an array of numbers, got {kind}")
     size = float(math.prod(shape)) * kind.itemsize
     if size > checks.memory():
         raise SceneError(
-            f"{path} must fit in memory, got an array of shape {shape}, which takes {checks.in_bytes(size)}; this "
-            f"machine has {checks.in_bytes(checks.memory())}"
+            f"the file {path} must fit in memory, got an array of shape {shape}, which takes "
+            f"{checks.in_bytes(size)}; this machine has {checks.in_bytes(checks.memory())}"
         )
     return size

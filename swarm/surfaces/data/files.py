@@ -4,7 +4,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from ...common.checks import closest, listed
+from ...common.checks import closest, listed, located
 from ...errors import SceneError
 from ..surface import Surface
 from .arrays import read_samples
@@ -53,7 +53,7 @@ def samples_of(table: Any, where: str, path: Path) -> Any:
             weld=table.get("weld"),
         )
     except SceneError as error:
-        raise SceneError(f"{where}.{error}") from None
+        raise SceneError(located(where, error)) from None
     samples = {name: getattr(made, name) for name in ("values", "spacing", "origin", "mesh_error", "mesh_weld")}
     return {
         **{key: value for key, value in given.items() if key not in ("scale", "weld")},

@@ -150,7 +150,7 @@ def test_a_mesh_in_a_scene_file(tmp_path):
     surface = read('file = "parts/part.stl"\nspacing = 0.1\nrestitution = 0.9')
     assert (surface.restitution, surface.mesh_error > 0.0, surface.spacing) == (0.9, True, (0.1, 0.1, 0.1))
     for more, message in {
-        'file = "part.stl"\nspacing = 0.1': r"surface\[0\].cannot read the mesh .*part.stl",
+        'file = "part.stl"\nspacing = 0.1': r"surface\[0\]: cannot read the mesh .*part.stl",
         "spacing = 0.1": r"surface\[0\].file: expected the name of a file, got nothing",
         'file = "parts/part.stl"\nspacing = "a"': r"surface\[0\].spacing must be",
         'file = "parts/part.stl"\nspacing = 0.1\norigin = [0, 0, 0]': r"surface\[0\].origin: unknown key of a mesh",

@@ -90,7 +90,7 @@ def test_a_scene_file_joins_corners(tmp_path):
     (tmp_path / "scene.toml").write_text(text)
     assert scene_file.read(tmp_path / "scene.toml").scene.surfaces[0].mesh_weld < 2e-3
     (tmp_path / "scene.toml").write_text(text.replace("2e-3", "2e-4"))
-    with pytest.raises(swarm.SceneError, match=r"surface\[0\].the mesh .* within weld = 0.0002 m"):
+    with pytest.raises(swarm.SceneError, match=r"surface\[0\]: the mesh .* within weld = 0.0002 m"):
         scene_file.read(tmp_path / "scene.toml")
 
 
