@@ -152,8 +152,9 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'swarm' has no attribute {name!r}")
     # No other public name is the name of a module: importing that module would hide it.
     value = getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
-    importlib.import_module(".common.signature", __name__).show_in_lines(value)
-    globals()[name] = value
+    signature = importlib.import_module(".common.signature", __name__)
+    signature.show_in_lines(value)
+    globals()[name] = value = signature.explain_calls(value)
     return value
 
 

@@ -1,4 +1,4 @@
-"""What `help` shows in lines of a terminal: signatures, a parameter each with the short names of types, and docstrings.
+"""What `help` shows in lines of a terminal, signatures and docstrings; and errors that name the arguments there are.
 
 Public names get them when they are first used, see `__getattr__` of the package.
 """
@@ -6,12 +6,14 @@ Public names get them when they are first used, see `__getattr__` of the package
 import functools
 import inspect
 import re
+import sys
 import textwrap
 from types import FunctionType
 from typing import Any
 
 from numpy.typing import ArrayLike
 
+from .checks import closest
 from .validated import bare
 
 # The columns of a terminal; the modules of a type, before its name.
@@ -24,6 +26,8 @@ _ENTRY = re.compile(r" {4}(?! )[*\w., \"-]+: ")
 _NOTE = re.compile(r"(Conserves|Order|Cost|Source|Reference): ")
 # What NumPy's name of all that becomes an array stands for: a line of 300 characters.
 _ARRAY = inspect.formatannotation(ArrayLike)
+# An error of Python about the arguments of a call: the function, and what Python 3.13 proposes.
+_CALLED, _PROPOSED = re.compile(r"^[\w.<>]+\(\)"), re.compile(r"\. Did you mean '\w+'\?$")
 _OF_NUMPY = re.compile(r"ndarray\[tuple\[Any, \.\.\.\], dtype\[(\w+)\]\]")
 
 
@@ -150,3 +154,46 @@ def _line(function: FunctionType, indent: int = 0) -> None:
         if len(inspect.Signature.__str__(signature)) > columns:
             signature.columns = columns
             function.__signature__ = signature  # type: ignore[attr-defined]
+
+
+def explain_calls(value: Any) -> Any:
+    """A function, or a class, of which a call with wrong arguments says which there are.
+
+    >>> def function(radius: float, *, side: str = "inside"): ...
+    >>> explain_calls(function)(1.0, sdie="outside")
+    Traceback (most recent call last):
+    TypeError: function() got an unexpected keyword argument 'sdie'; did you mean 'side'? Its arguments: radius, side
+    """
+    if isinstance(value, FunctionType):
+        explained = _explained(value, value)
+        # Pickles name a function by its module.
+        setattr(sys.modules[value.__module__], value.__name__, explained)
+        return explained
+    if isinstance(value, type):
+        maker = "__new__" if issubclass(value, tuple) else "__init__"
+        function = getattr(value, maker)
+        if isinstance(function, FunctionType):
+            setattr(value, maker, _explained(function, value))
+    return value
+
+
+def _explained(function: FunctionType, public: Any) -> Any:
+    @functools.wraps(function)
+    def call(*args: Any, **named: Any) -> Any:
+        try:
+            return function(*args, **named)
+        except TypeError as error:
+            if error.__traceback__ is not None and error.__traceback__.tb_next is None:  # of the call itself
+                raise TypeError(_with_arguments(str(error), public)) from None
+            raise
+
+    return call
+
+
+def _with_arguments(message: str, public: Any) -> str:
+    """An error of Python about the arguments of a call, with those that there are, and the nearest."""
+    parameters = inspect.signature(public).parameters.values()
+    known = [one.name for one in parameters if one.kind != one.VAR_KEYWORD and not one.name.startswith("_")]
+    message = _PROPOSED.sub("", _CALLED.sub(f"{public.__name__}()", message))
+    wrong = re.search(r"unexpected keyword argument '(\w+)'", message)
+    return f"{message}{(closest(wrong[1], known) if wrong else '') or '.'} Its arguments: {', '.join(known)}"

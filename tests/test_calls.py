@@ -1,0 +1,48 @@
+"""A call with wrong arguments says which there are, for every public name that is called."""
+
+import inspect
+import pickle
+
+import pytest
+
+import swarm
+from swarm.common.signature import explain_calls
+
+
+def arguments(name):
+    return list(inspect.signature(getattr(swarm, name)).parameters.values())
+
+
+# `swarm.run` is a package that is called and names its options itself; WallLaw has no fields; errors take one text.
+CALLED = [
+    name
+    for name in swarm.__all__
+    if callable(getattr(swarm, name)) and name not in ("run", "WallLaw") and not name.endswith("Error")
+]
+
+
+@pytest.mark.parametrize("name", CALLED)
+def test_a_misspelt_argument_names_the_nearest(name):
+    last = next(one for one in reversed(arguments(name)) if not one.name.startswith("_"))
+    if last.kind == last.VAR_KEYWORD:  # arguments of every surface: the class checks them
+        sentence = rf"{name}\(\) missing \d required positional argument.*\. Its arguments: "
+    else:
+        wrong = f"got an unexpected keyword argument '{last.name}x'; did you mean '{last.name}'"
+        sentence = rf"{name}\(\) {wrong}\? Its arguments: "
+    with pytest.raises(TypeError, match=f"^{sentence}"):
+        getattr(swarm, name)(**{f"{last.name}x": 1})
+
+
+def test_an_error_within_a_call_stays_as_it_is():
+    def inner(radius):
+        return radius
+
+    def outer(radius):
+        return inner(radios=radius)
+
+    with pytest.raises(TypeError, match=r"inner\(\) got an unexpected keyword argument 'radios'(\. Did you.*)?$"):
+        explain_calls(outer)(1.0)
+
+
+def test_a_public_function_is_pickled_by_its_name():
+    assert pickle.loads(pickle.dumps(swarm.simulate)) is swarm.simulate
