@@ -53,7 +53,9 @@ def grains(peer: ModuleType, version: str, quick: bool) -> list[Row]:
     stiffness, found = 0.5 * MASS * (math.pi / (_STEPS * _DT)) ** 2, []
     method, laws = swarm.Penalty(_DT, stiffness, 1.0), {"stiffness": stiffness, **_LAWS}
     rounds = 1 if quick else 3
-    for n, across, span, rest in ((27, 3, 20, 400),) if quick else ((1_000, 10, 1000, 20_000), (10_000, 18, 1000, 5000)):
+    for n, across, span, rest in (
+        ((27, 3, 20, 400),) if quick else ((1_000, 10, 1000, 20_000), (10_000, 18, 1000, 5000))
+    ):
         scene, start = hopper(n, across, _LAWS["friction"])
         half = float(scene.surfaces[0].half_widths[0])  # type: ignore[attr-defined]
         fall: dict[str, Callable[[], float]] = {
