@@ -126,7 +126,7 @@ def contact_history(
 def _require_one_wall(compiled: CompiledScene, method: Method) -> None:
     """Raise a `SceneError` where a surface is not taken as one wall."""
     for i, piece in compiled.pieces.owned():
-        if i in compiled.unions() or piece.is_foam() or (piece.is_one_wall and not isinstance(method, Penalty)):
+        if piece.is_one_wall and not isinstance(method, Penalty):
             raise SceneError(
                 f"surfaces[{i}] must be one wall for a single contact step with {type(method).__name__}, got "
                 f"{compiled.scene.surfaces[i]!r:.200}; use simulate"

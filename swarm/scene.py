@@ -439,7 +439,7 @@ class Scene:
             SceneError: it has too many walls.
         """
         order = self._of_points.order
-        in_steps = is_in_steps(apart) and (self.reach_of_steps() is not None or bool(order.fields))
+        in_steps = is_in_steps(apart) and (self.reach_of_steps() is not None or order.fields or order.unions)
         if largest is None and not in_steps and not (apart is not None and order.groups):
             return self._of_points
         return CompiledScene(self, largest, apart)

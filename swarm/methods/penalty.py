@@ -51,6 +51,8 @@ class Penalty(fixed_step.SoftWalls):
     the whole impulse of a contact. A contact that a weight makes last is rubbed each time that it swings back.
     Openings are asked for at the foot of a point on its wall at the start of a step, and doors are at whole steps; what
     a contact stores with a wall that opens, or goes, is in "dissipated_energy".
+    A `Union` of several rooms, or a foam, is one wall with the same laws for all of its parts: in a doorway nothing
+    pushes, and behind the edge of one the nearer room does.
     Particles with a radius press on one another and on walls by the same law, with the gap R_i + R_j - |r_i - r_j|:
     all impulses of a step are solved together, so that energy, momentum and angular momentum of the whole are conserved
     at any dt. There `restitution` (0.01 or more) and `friction` of `Pairs` and of surfaces count, walls may move in any

@@ -3,8 +3,10 @@
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ..errors import SceneError
+from .fields.one_vault import IN_COMMON
 from .periodic.images import Lengths, images_of
 from .presence.openings import reaches, volumes_of
 from .surface import Surface, volume_of
@@ -42,8 +44,18 @@ class Pieces:
         return zip(self.owners, self.each, strict=True)
 
     def as_walls(self) -> "Pieces":
-        """The same, where each field is one wall."""
-        return replace(self, each=tuple(piece.as_one_wall() for piece in self.each))
+        """The same, where each field, and each union of several rooms, is one wall."""
+        rows: list[tuple[Any, ...]] = []
+        first, each = 0, (self.each, self.owners, self.places, self.volumes, self.doorways)
+        for i, image in ((i, image) for i, some in enumerate(self.images) for image in some):
+            mine = slice(first, first + len(image.surfaces()))
+            first, volumes = mine.stop, itertools.chain(*self.volumes[mine])
+            if len(image.rooms) > 1:
+                rows.append((image.as_one_wall(), i, (), tuple(dict.fromkeys(volumes)), ()))
+            else:
+                rows += [(one.as_one_wall(), *rest) for one, *rest in zip(*(some[mine] for some in each), strict=True)]
+        images = tuple(tuple(one.as_one_wall() for one in some) for some in self.images)
+        return Pieces(images, *zip(*rows, strict=True))
 
     def rooms(self) -> list[tuple[tuple[int, ...], ...]]:
         """Of each union of several rooms the numbers of the pieces of every room."""
@@ -80,6 +92,20 @@ def pieces_of(surfaces: Sequence[Surface], period: Lengths | None, largest: floa
         volumes,
         _doorways_of_pieces(images, volumes),
     )
+
+
+def differing_in(union: Surface) -> str | None:
+    """What the parts of a union do not have in common, by the name of the argument; None: all of it is the same."""
+    surfaces = union.surfaces()
+    for name in IN_COMMON:
+        if len({repr(getattr(surface, name)) for surface in surfaces}) > 1:
+            return name
+    volumes = {repr(volume): volume for surface in surfaces for volume in surface.open_volumes()}
+    for surface in surfaces:
+        own = {repr(volume) for volume in surface.open_volumes()}
+        if any(name not in own and reaches(surface, volume) for name, volume in volumes.items()):
+            return "openings"
+    return None
 
 
 def _with_reach(images: Images) -> Images:

@@ -21,6 +21,7 @@ from ..common.checks import Vector
 from ..errors import SceneError
 from .area_samples import NEAR, AreaSample, Random, Region, distances
 from .balls.vault import no_balls_in
+from .fields.one_vault import soft_vault
 from .instant import side_of
 from .part import checked_parts, handed_down, other_side
 from .presence.seams import Seam, joined, seams_of
@@ -164,6 +165,9 @@ class Joined(Surface):
 
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
         return tuple(itertools.chain(*(surface.walls_of_balls(largest) for surface in self.surfaces())))
+
+    def as_one_wall(self) -> Surface:
+        return self if len(self.rooms) == 1 else soft_vault(self)
 
     def holds_balls(self) -> str | None:
         if len(self.rooms) > 1:

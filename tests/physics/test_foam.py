@@ -117,5 +117,5 @@ def test_what_does_not_go_with_a_foam_is_a_sentence():
     with pytest.raises(swarm.SceneError, match='side must be "outside" for Capsules'):
         swarm.Capsules([[0.0, 0.0, 0.0]], 0.1, 0.2, side="inside")
     scene = swarm.Scene([cavities])
-    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\] must not be a Spheres of several rooms with Penalty"):
-        swarm.simulate(scene, swarm.fill(scene, 2, speed=1.0), swarm.Penalty(1e-3, 1e6), until=1.0, every=1.0)
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\] must not be a Spheres of several rooms with Verlet"):
+        swarm.simulate(scene, swarm.fill(scene, 2, speed=1.0), swarm.Verlet(1e-3, 1e6), until=1.0, every=1.0)

@@ -329,8 +329,7 @@ def test_an_opening_is_in_the_wall_of_a_part():
 def test_other_methods_say_that_they_know_no_unions():
     scene = swarm.Scene([swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.5, (0.5, 0.0, 0.0))])])
     start = swarm.fill(scene, 2, speed=1.0)
-    for method in (swarm.Penalty(1e-3, 1e6), swarm.Verlet(1e-3, 1e6)):
-        with pytest.raises(swarm.SceneError, match=r"surfaces\[0\] must not be a Union of several rooms with"):
-            swarm.simulate(scene, start, method, until=1.0, every=1.0)
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\] must not be a Union of several rooms with"):
+        swarm.simulate(scene, start, swarm.Verlet(1e-3, 1e6), until=1.0, every=1.0)
     with pytest.raises(swarm.SceneError, match=r"surfaces\[0\] must be one wall for a single"):
         swarm.contact_history(scene, (0.1, 0.1, 0.0), (0.3, 0.4, 0.0), 1.0, swarm.Impact(contact_step=1e-3))

@@ -18,6 +18,7 @@ from ...scene import Scene
 from ...surfaces.in_motion.drive import drive_of
 from ...surfaces.laws.sticky import Sticky
 from ...surfaces.periodic.images import MASS_AND_PERIOD, WITHOUT_PERIOD
+from ...surfaces.pieces import differing_in
 from ...surfaces.surface import Surface
 from ...surfaces.wall_law import lets_wait
 from ..options import RunOptions
@@ -179,6 +180,12 @@ def _unions(asked: Asked) -> Found:
 def _rooms_that_touch(asked: Asked) -> Found:
     if any(_unions(asked)) and asked.scene.compiled().walls().inset is not None:
         yield from _unions(asked)
+
+
+def _rooms_that_differ(asked: Asked) -> Found:
+    for one in _unions(asked):
+        if (what := differing_in(one["got"])) is not None:
+            yield {**one, "what": what}
 
 
 def _unions_beside_own(asked: Asked) -> Found:
@@ -453,7 +460,7 @@ CAPABILITIES = (
     }),
     Capability("union", _rooms, {
         (SOFT_BODIES, PAPER_BODIES): _of_one_room("bodies and soft walls", "use Impact(dt=...)"),
-        (*_FIXED_STEPS, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
+        (PAPER, BASELINE, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
         (HEAVY,): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
     }),
     Capability("union with walls between its rooms", _rooms_that_touch, {
@@ -461,6 +468,17 @@ CAPABILITIES = (
             "surfaces[{i}] must not have rooms that touch at a wall between them with bodies, got {got!r:.200}: a step "
             "that ends in the next room would not be seen to have passed it",
             "leave a space between the rooms, let them overlap, or use particles and Impact()",
+        ),
+        (SOFT,): Refusal(
+            "surfaces[{i}] must not have rooms that touch at a wall between them with {method}, got {got!r:.200}: a "
+            "soft wall without a thickness holds no point",
+            "leave a space between the rooms, let them overlap, or use Impact",
+        ),
+    }, within="union"),
+    Capability("union of parts that differ", _rooms_that_differ, {
+        (SOFT,): Refusal(
+            "surfaces[{i}] must have the same {what} in all of its parts with {method}, got {got!r:.200}: its walls "
+            "are one spring", "give the {what} to the whole, or use Impact",
         ),
     }, within="union"),
     Capability("union beside guides and cavities", _unions_beside_own, {

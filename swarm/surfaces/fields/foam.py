@@ -7,10 +7,10 @@ from ...kernel.gravity import displacement
 from ...kernel.grid import cell_of, entries_at, until_next
 from ...kernel.jit import outlined
 from ...kernel.limits import ON_FOAM
-from ...kernel.vector import absolute, total
+from ...kernel.vector import Vec, absolute, total
 from ..presence.patched import Patched
 from ..time_of_impact import flights
-from .members import Members, member
+from .members import Members, SignedDistance, member, nearest_body
 
 # By so many times round-off is a flight inside of another cavity where it goes on.
 _INSIDE = 4.0
@@ -34,6 +34,9 @@ class Foam(Members, Patched):
     def deepest_in_cell(self, r):
         """The distance outside of the nearest one."""
         return _nearest(self, r)[1]
+
+    def foot(self, tree, r):
+        return _foot(self, r)
 
     # What is near a point is the wall of the cavity that it is deepest in.
 
@@ -66,6 +69,15 @@ def _nearest(foam, r):
         if distance < least:
             which, least = float(m), distance
     return which, least
+
+
+@outlined
+def _foot(foam, r):
+    """The `SignedDistance` outside of the nearest cavity, which may be one of another cell."""
+    gap, which = nearest_body(foam, r)
+    if not gap < math.inf:
+        return SignedDistance(-math.inf, Vec(1.0, 0.0, 0.0))
+    return SignedDistance(gap, member(foam, index(which - 1)).gradient(r))
 
 
 @outlined

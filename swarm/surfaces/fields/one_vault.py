@@ -1,0 +1,85 @@
+"""A union of several rooms as one wall: the distance outside of all rooms, of soft walls, into which points go.
+
+The gap of a room is the largest of its walls; of a point beyond several of them the root of the sum of the squares, as
+if each were a spring by itself. That of the union is the least of its rooms: in a doorway there is no wall, and behind
+an edge between two rooms a point is pushed back by the nearer one.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from ...kernel.jit import outlined, select
+from ...kernel.record import Record
+from ...kernel.vector import ZERO, either
+from ..balls.vault import Vault
+from ..presence.joined import with_rooms
+from ..time_of_impact import flights
+from ..walls import Walls, all_walls
+from .members import SignedDistance
+from .one_wall import OneWall
+
+# What all parts of a union that is one wall have in common, besides their openings.
+IN_COMMON = "restitution", "friction", "temperature", "accommodation", "laws", "motion", "present"
+
+
+class RoomsTogether(Record):
+    """The rooms of a union as `OneWall` asks for them."""
+
+    walls: Walls
+
+    def foot(self, tree, r):
+        """The `SignedDistance` of a point."""
+        return _foot(self.walls, r)
+
+    def field_hit(self, gravity, r, v):
+        """The `Hit` where a flight leaves the last of the rooms that hold it, or goes on in another one."""
+        return _leaving(self.walls, gravity, r, v)
+
+    def loosened(self, reach):
+        """The same: rooms have no tables."""
+        return self
+
+
+@dataclass(frozen=True, repr=False)
+class SoftVault(Vault):
+    """A union of several rooms, as points meet it that go into its wall."""
+
+    is_one_wall = True
+
+    def walls(self) -> tuple[Any, ...]:
+        whole = all_walls(one for room in self.rooms_of for one in room)
+        return (OneWall(RoomsTogether(with_rooms(whole, [self.rooms_of])), None),)
+
+
+def soft_vault(union: Any) -> SoftVault:
+    """A union of several rooms as one wall, with what all of its parts have in common."""
+    one = union.rooms[0][0]
+    return SoftVault(rooms_of=union.rooms, **{name: getattr(one, name) for name in IN_COMMON})
+
+
+@outlined
+def _foot(walls, r):
+    gap, normal = math.inf, ZERO
+    for rooms in walls.joined():
+        for room in rooms:
+            deepest, steep, squares, sums = -math.inf, ZERO, 0.0, ZERO
+            for _number, wall, _gentle in room:
+                q = wall.inner(r)
+                one, (slope, _bend) = wall.gap_of(q), wall.gap_slope(q, q)
+                n = slope * wall.inner_gradient(r)
+                deeper, depth = one > deepest, select(one > 0.0, one, 0.0)
+                deepest, steep = select(deeper, one, deepest), either(deeper, n, steep)
+                squares, sums = squares + depth * depth, either(one > 0.0, sums + depth * n, sums)
+            away = math.sqrt(squares)
+            is_out = away > 0.0
+            deepest = select(is_out, away, deepest)
+            steep = either(is_out, sums * (1.0 / select(is_out, away, 1.0)), steep)
+            nearer = deepest < gap
+            gap, normal = select(nearer, deepest, gap), either(nearer, steep, normal)
+    return SignedDistance(gap, normal)
+
+
+@outlined
+def _leaving(walls, gravity, r, v):
+    return flights.first_hit(walls, gravity, r, v)
