@@ -89,12 +89,19 @@ def run(draft: cells.Draft, trajectory: str | None = None) -> Ran:
 
 
 @functools.lru_cache(maxsize=256)
-def _without(engine: str, wall: str, base: Any, capability: str) -> Any:
-    """The end of a run without its capability, or None where that is refused: those of the same base are one."""
+def _without(cell: Cell) -> Any:
+    """The end of the run of a cell without its capability, or None where that is refused."""
     try:
-        return run(cells.draft_of(Cell(engine, wall, capability), with_capability=False)).result
+        return run(cells.draft_of(cell, with_capability=False)).result
     except swarm.SceneError:
         return None
+
+
+def _alike(cell: Cell) -> Cell:
+    """The first cell with the same run but for its capability. What a cluster changes `_other_bits` sees."""
+    base = cells.CAPABILITIES[cell.capability].base
+    first = next(name for name, one in cells.CAPABILITIES.items() if one.base == base)
+    return Cell(cell.engine, "box" if cell.wall == cells.ON_A_CLUSTER else cell.wall, first)
 
 
 def outcome(cell: Cell) -> Outcome:
@@ -138,7 +145,7 @@ def _ignored(cell: Cell, done: Ran) -> str:
     # The capability is that of the other run too where the first surface of both is the same.
     if shown and capability.base is cells.nothing and cell.capability not in cells.STATIC:
         return ""
-    without = _without(cell.engine, cell.wall, capability.base, cell.capability)
+    without = _without(_alike(cell))
     return "" if without is None or _differs(done.result, without) else "ignored: the run is the same without it"
 
 
