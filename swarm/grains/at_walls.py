@@ -10,7 +10,7 @@ from ..surfaces.walls import Field
 from .contacts import (
     Closing,
     begin_solve,
-    changed,
+    change_row,
     damper,
     improved,
     lasting,
@@ -29,6 +29,7 @@ from .grain_arrays import (
     DRAG,
     EASE,
     END,
+    GAIN,
     GAP,
     IMPULSE,
     KEPT_ROLL,
@@ -92,7 +93,7 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             set_vector(rows, c, COAST, coast)
             rows[c, EASE] = place[i, LIGHTNESS]
             if law.damping is not None:
-                rows[c, DAMPING] = law.damping / math.sqrt(place[i, LIGHTNESS])
+                rows[c, DAMPING] = law.damping / math.sqrt(place[i, LIGHTNESS]) / matter.h
             way = rising(own, r0, q0, move)
             first = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
             begin_solve(rows, c, first, half * place[i, LIGHTNESS] * square(way.along))
@@ -114,8 +115,8 @@ def press_at_wall(matter, law, own, grains, rows, at, share):
     half, v = 0.5 * matter.h, vector_at(grains.speed, i, AFTER)
     way = rising(own, vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * v)
     wanted, _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
-    rows[c, PUSH] = improved(rows, c, wanted)
-    more, part = changed(rows, c, IMPULSE, rows[c, PUSH] * way.along, share)
+    rows[c, PUSH] = improved(rows[c, PUSH], wanted, rows[c, GAIN])
+    more, part = change_row(rows, c, IMPULSE, rows[c, PUSH] * way.along, share)
     off = weight_of(law) * relative(matter, more, rows[c, PUSH], size_of(v), rows[c, EASE])
     return way, v + part * rows[c, EASE], off
 

@@ -82,14 +82,16 @@ class Matter(Record):
 
 
 def pressed(matter, damping, gap, change):
-    """The impulse at a contact with a gap that changes so in a step, 0 or more, and its derivative by the change."""
+    """The impulse at a contact with a gap that changes so in a step, 0 or more, and its derivative by the change.
+
+    The damping is that over the step.
+    """
     h = matter.h
     force, stiffness = matter.law.energy_slope(gap, gap + change)
     if damping is not None:
         slope, bend = matter.law.constraint_slope(gap, gap + change)
-        c = damping / h
-        force = force + c * slope * change
-        stiffness = stiffness + c * (slope + bend * change)
+        force = force + damping * slope * change
+        stiffness = stiffness + damping * (slope + bend * change)
     return select(force > 0.0, h * force, 0.0), h * stiffness
 
 
@@ -113,10 +115,9 @@ def worse(off, worst):
     return select((off <= worst) | (worst != worst), worst, off)
 
 
-def improved(rows, c, wanted):
+def improved(push, wanted, gain):
     """A Newton step of the size of an impulse."""
-    push = rows[c, PUSH]
-    new = push + (wanted - push) * rows[c, GAIN]
+    new = push + (wanted - push) * gain
     return select(new > 0.0, new, 0.0)
 
 
@@ -130,14 +131,19 @@ def begin_solve(rows, c, pressed_first, ease):
 def relative(matter, more, push, speeds, ease):
     """A change of an impulse, relative to what moves there, and to what weight does in a step."""
     fall = 0.0 if matter.pull is None else matter.h * size_of(matter.pull)
-    return size_of(more) / (push + (speeds + fall) / ease + _TINY)
+    return size_of(more) * ease / (push * ease + (speeds + fall) + _TINY)
 
 
-def changed(rows, c, k, new, share):
-    """The change from an impulse in three columns of a row to the new one, and that share of it, which is made."""
-    old = vector_at(rows, c, k)
+def changed(old, new, share):
+    """The change from an impulse to the new one, and that share of it, which is made."""
     more = new - old
-    part = share * more
+    return more, share * more
+
+
+def change_row(rows, c, k, new, share):
+    """The same of an impulse in three columns of a row, which it changes."""
+    old = vector_at(rows, c, k)
+    more, part = changed(old, new, share)
     set_vector(rows, c, k, old + part)
     return more, part
 
@@ -200,7 +206,7 @@ def gather_pairs(matter, grains, near, touches):
                 ease = place[i, LIGHTNESS] + place[j, LIGHTNESS]
                 rows[c, EASE] = ease
                 if matter.pairs.damping is not None:
-                    rows[c, DAMPING] = matter.pairs.damping / math.sqrt(ease)
+                    rows[c, DAMPING] = matter.pairs.damping / math.sqrt(ease) / matter.h
                 way = closing(s0, size, move)
                 first = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
                 begin_solve(rows, c, first, half * ease)
@@ -214,35 +220,6 @@ def gather_pairs(matter, grains, near, touches):
                 count += 1
     touches.used[0] = count
     return count - known
-
-
-def press_pair(matter, grains, touches, c, ends, share):
-    """Improve the impulse of a pair: its `Closing`, the velocities then, and the change, relative to what moves.
-
-    Only a share of the change is made.
-    """
-    rows, half, (i, j) = touches.rows, 0.5 * matter.h, ends
-    v, u = vector_at(grains.speed, i, AFTER), vector_at(grains.speed, j, AFTER)
-    way = closing(vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * (v - u))
-    wanted, _slope = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
-    rows[c, PUSH] = improved(rows, c, wanted)
-    more, part = changed(rows, c, IMPULSE, rows[c, PUSH] * way.along, share)
-    off = weight_of(matter.pairs) * relative(matter, more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
-    return way, v + part * grains.place[i, LIGHTNESS], u - part * grains.place[j, LIGHTNESS], off
-
-
-@outlined
-def sweep_pairs(matter, grains, touches, share):
-    """Improve the impulse of each pair in turn; the largest change of one, relative to what moves there."""
-    speed, worst = grains.speed, 0.0
-    for k in range(touches.used[0]):
-        c = index(k)
-        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        _way, v, u, off = press_pair(matter, grains, touches, c, (i, j), share)
-        set_vector(speed, i, AFTER, v)
-        set_vector(speed, j, AFTER, u)
-        worst = worse(off, worst)
-    return worst
 
 
 @outlined

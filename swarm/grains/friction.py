@@ -18,7 +18,7 @@ from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, cross, dot, square
 from ..surfaces.in_motion.posed import Posed
 from .at_walls import press_at_wall, rising
-from .contacts import changed, press_pair, relative, size_of, worse
+from .contacts import change_row, relative, size_of, worse
 from .grain_arrays import (
     AFTER,
     BEFORE,
@@ -68,31 +68,6 @@ def arm_of(way, size, change, reach):
     """s/R of two balls, from their `Closing`, |s0| and the change of the gap."""
     # s0 + s1 is `along` times |s0| + |s1|
     return way.along * (0.5 * (2.0 * size - change) / reach)
-
-
-@outlined
-def rub_pairs(matter, grains, touches, share):
-    """Improve the impulse and the friction of each pair in turn; the largest change, relative to what moves there."""
-    rows, place, speed, spin, worst = touches.rows, grains.place, grains.speed, grains.spin, 0.0
-    for k in range(touches.used[0]):
-        c = index(k)
-        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        way, v, u, off = press_pair(matter, grains, touches, c, (i, j), share)
-        radius, other = place[i, RADIUS], place[j, RADIUS]
-        arm = arm_of(way, rows[c, SIZE], way.change, radius + other)
-        slip = across(v - u - cross(_turning(grains, i, j, AFTER), arm), way.along)
-        before, limit = vector_at(rows, c, DRAG), matter.pairs.friction * rows[c, PUSH]
-        new = rubbed(across(before, way.along), slip, rows[c, EASE] * (1.0 + ROUNDNESS * square(arm)), limit)
-        more, part = changed(rows, c, DRAG, new, share)
-        one, two = place[i, LIGHTNESS], place[j, LIGHTNESS]
-        set_vector(speed, i, AFTER, v + part * one)
-        set_vector(speed, j, AFTER, u - part * two)
-        twist = cross(arm, part)
-        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (ROUNDNESS * one / radius))
-        set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (ROUNDNESS * two / other))
-        rubbing = relative(matter, more, rows[c, PUSH], size_of(v) + size_of(u), rows[c, EASE])
-        worst = worse(rubbing, worse(off, worst))
-    return worst
 
 
 @outlined
@@ -156,7 +131,7 @@ def rub_wall(matter, law, wall, grains, touches, number, share):
         slip = across(v - last - radius * cross(w, n), n)
         before = across(vector_at(rows, c, DRAG), n)
         new = rubbed(before, slip, ease * (1.0 + ROUNDNESS), law.friction * rows[c, PUSH])
-        more, part = changed(rows, c, DRAG, new, share)
+        more, part = change_row(rows, c, DRAG, new, share)
         set_vector(speed, i, AFTER, v + part * ease)
         set_vector(spin, i, AFTER, w - cross(n, part) * (ROUNDNESS * ease / radius))
         worst = worse(relative(matter, more, rows[c, PUSH], size_of(v), ease), worse(off, worst))

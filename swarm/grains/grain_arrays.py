@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..kernel.arrays import aligned, spaced
 from ..kernel.jit import Array
 from ..kernel.vector import Vec
 
@@ -36,6 +37,8 @@ START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED
     23,
 )
 COLUMNS, COLUMNS_OF_FRICTION = 16, 24
+# How many contacts of pairs are improved at once, and the columns of theirs, see lanes_of_pairs.py.
+LANES, COLUMNS_OF_LANES = 8, 24
 # Columns of `Neighbours.drag`: where the angular impulse of the resistance to rolling is kept; and in a run with a log
 # of contacts when each has begun, the sum of its normal impulses, the largest force, what friction has taken, and the
 # velocity, of a pair that of the particle with the smaller number, and the slip at its start.
@@ -79,6 +82,15 @@ class Neighbours(NamedTuple):
     wall_is_open: Any = None  # (room of walls,) bool, whether the wall is open to the ball
 
 
+class Tile(NamedTuple):
+    """The contacts of pairs in groups, a row of each group for each column."""
+
+    rows: Array  # (groups * COLUMNS_OF_LANES, LANES)
+
+
+with_lanes = spaced(LANES)
+
+
 class Touches(NamedTuple):
     """The contacts of a step: of pairs, and of walls."""
 
@@ -88,6 +100,9 @@ class Touches(NamedTuple):
     wall_ends: Array  # (room of walls,) int32, the ball
     wall_spans: Array  # (2, walls) where those of each wall begin in `wall_rows`, and how many there are
     used: Array  # (1,) how many rows are of pairs
+    tile: Tile  # the rows of pairs in groups
+    shares: Array  # (groups,) bool, whether two of a group have the same ball
+    marks: Array  # (N,) of each ball the last group that it is in
     spans: Any = None  # (room of walls, 3) int32, of fields, as in `Neighbours`; and the same members
     listed: Any = None
 
@@ -140,11 +155,13 @@ def near_of(
     return made._replace(spans=spans, listed=listed, used=np.zeros(1, np.int64))
 
 
-def touches_of(walls: int, pairs: int, touching: int, is_kept: bool = False, listed: Any = None) -> Touches:
+def touches_of(n: int, walls: int, pairs: int, touching: int, is_kept: bool = False, listed: Any = None) -> Touches:
     """Room for the contacts of so many pairs and of so many balls at walls; `Neighbours` has the members of fields."""
-    columns = COLUMNS_OF_FRICTION if is_kept else COLUMNS
+    columns, groups = COLUMNS_OF_FRICTION if is_kept else COLUMNS, -(-pairs // LANES)
     return Touches(
         np.zeros((pairs, columns)), np.zeros((pairs, 2), np.int32), np.zeros((touching, columns)),
         np.zeros(touching, np.int32), np.zeros((2, walls), np.int64), np.zeros(1, np.int64),
+        Tile(aligned(groups * COLUMNS_OF_LANES * LANES).reshape(-1, LANES)), np.zeros(groups, np.bool_),
+        np.zeros(n, np.int64),
         None if listed is None else np.zeros((touching, 3), np.int32), listed,
     )  # fmt: skip

@@ -269,7 +269,7 @@ class GrainsRun(BaseRun):
         walls, matter = len(self._owners), self._matter
         kept = KEPT if self._impacts is not None else (6 if matter.rolls else 3) if matter.rubs else 0
         near = arrays.near_of(n, walls, pairs, touching, kept, members, matter.openings is not None)
-        return near, arrays.touches_of(walls, pairs, touching, kept > 0, near.listed)
+        return near, arrays.touches_of(n, walls, pairs, touching, kept > 0, near.listed)
 
     def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Neighbours:
         """Make room for so many pairs, balls at walls, and members of fields, and some more."""

@@ -11,7 +11,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, dot, square
 from ..surfaces.in_motion.posed import Posed
-from .contacts import changed, relative, size_of, worse
+from .contacts import change_row, relative, size_of, worse
 from .friction import ROUNDNESS, across, rubbed
 from .grain_arrays import (
     AFTER,
@@ -47,7 +47,7 @@ def _resist(matter, rows, c, rolling, sizes, share):
         set_vector(rows, c, ROLL, ZERO)
         return -1.0 * n, 0.0
     new = rubbed(across(vector_at(rows, c, ROLL), n), across(rolling[0], n), ease, rolling[1] * radius * rows[c, PUSH])
-    more, part = changed(rows, c, ROLL, new, share)
+    more, part = change_row(rows, c, ROLL, new, share)
     return part, relative(matter, more * (1.0 / radius), rows[c, PUSH], speeds, rows[c, EASE])
 
 

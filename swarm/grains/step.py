@@ -16,11 +16,12 @@ from ..kernel.vector import square
 from ..lanes.watching.log import is_full
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall, count_members
-from .contacts import gather_pairs, push_pairs, sweep_pairs, worse
+from .contacts import gather_pairs, push_pairs, worse
 from .exits import let_out, open_wall
-from .friction import book_rubbing, book_rubbing_pairs, rub_pairs, rub_wall, twist_pairs, twist_wall
+from .friction import book_rubbing, book_rubbing_pairs, rub_wall, twist_pairs, twist_wall
 from .grain_arrays import AFTER, BEFORE, DONE, LIGHTNESS, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
 from .held import let_go
+from .lanes_of_pairs import group_pairs, return_pairs, rub_pairs, sweep_pairs
 from .logged import log_pairs, log_wall, note_pairs, note_wall
 from .overlaps import look_at_pairs, look_at_wall
 from .passing import count_moves
@@ -137,6 +138,7 @@ def _rub(matter, walls, world, share):
     rub_or_sweep = sweep_pairs if matter.pairs.friction is None else rub_pairs
     worst = rub_or_sweep(matter, grains, touches, share)
     if matter.pairs.rolling is not None:
+        return_pairs(matter, touches)
         worst = worse(roll_pairs(matter, grains, touches, share), worst)
     for k, wall in enumerate(walls.each):
         rub_or_sweep_wall = sweep_wall if matter.walls[k].friction is None else rub_wall
@@ -174,6 +176,7 @@ def _solve_friction(matter, walls, world):
 def _solve(matter, walls, world):
     """Sweep until the impulses solve the step; whether they do."""
     books, lags = world.books, 0
+    group_pairs(matter, world.grains, world.touches)
     # Friction first, to fewer digits: then it is given, and what is to be exact depends on the others alone.
     if matter.rubs and not _solve_friction(matter, walls, world):
         lags = 1
@@ -191,6 +194,7 @@ def _solve(matter, walls, world):
     if worst > _NEARLY:
         lags = 1
     books.lagging[0] += lags
+    return_pairs(matter, world.touches)
     return worst <= _LAGGING
 
 
