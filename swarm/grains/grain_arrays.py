@@ -58,6 +58,7 @@ class Grains(NamedTuple):
     place: Array  # (N, 8)
     speed: Array  # (N, 8)
     listed: Array  # (N, 4) where it was when pairs were listed
+    change: Array  # (N, 4) of its velocity in the last step, with which the next one begins to solve
     spin: Any  # (N, 8) angular velocities, as `speed`; None where there is no friction
 
 
@@ -126,7 +127,7 @@ def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = 
     turning = None if spin is None else np.zeros((n, 8))
     if turning is not None:
         turning[:, BEFORE : BEFORE + 3] = spin.T
-    return Grains(np.arange(n), place, speed, np.zeros((n, 4)), turning)
+    return Grains(np.arange(n), place, speed, np.zeros((n, 4)), np.zeros((n, 4)), turning)
 
 
 def beside(grains: Grains, more: Grains) -> Grains:

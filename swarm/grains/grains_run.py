@@ -210,7 +210,7 @@ class GrainsRun(BaseRun):
         skin = float(clock[SKIN])
         reach = 2.0 * float(grains.place[:, arrays.RADIUS].max(initial=0.0)) + skin
         cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, matter.period)
-        for rows in (grains.number, grains.place, grains.speed, grains.spin):
+        for rows in (grains.number, grains.place, grains.speed, grains.change, grains.spin):
             if rows is not None:
                 rows[:] = rows[order]
         while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:

@@ -69,12 +69,12 @@ class World(NamedTuple):
 
 @outlined
 def _begin(matter, grains, skin):
-    """The velocities at the end of a step as at its start; whether all may move so within the lists."""
+    """The velocities at the end of a step with the last one's change; whether all may move on within the lists."""
     place, speed, listed, farthest = grains.place, grains.speed, grains.listed, 0.0
     for k in range(place.shape[0]):
         i = index(k)
         v = vector_at(speed, i, BEFORE)
-        set_vector(speed, i, AFTER, v)
+        set_vector(speed, i, AFTER, v + vector_at(grains.change, i, 0))
         farthest = worse(square(vector_at(place, i, X) + v * matter.h - vector_at(listed, i, X)), farthest)
     return farthest <= 0.25 * skin * skin
 
@@ -233,6 +233,7 @@ def _arrive(matter, grains):
         end = r + move
         set_vector(place, i, X, end)
         set_vector(place, i, LOST, move - (end - r))
+        set_vector(grains.change, i, 0, v - vector_at(speed, i, BEFORE))
         set_vector(speed, i, BEFORE, v)
         if grains.spin is not None:
             set_vector(grains.spin, i, BEFORE, vector_at(grains.spin, i, AFTER))
