@@ -31,12 +31,12 @@ def test_balls_that_are_apart_are_admitted(method):
     ("scene", "particles", "method", "options", "sentence"),
     [
         (VESSEL, balls(radius=0.25), None, {},
-         "particles must not overlap at the start, got 1 pairs that do, most particles 0 and 1, by 0.1 m: their "
-         "centres are 0.4 m apart, their radii 0.25 and 0.25 m; move them apart"),
+         "particles must not overlap at the start, got 1 pair that overlaps, particles 0 and 1 the most, by 0.1 m: "
+         "their centres are 0.4 m apart, their radii 0.25 and 0.25 m; move them apart"),
         (VESSEL, balls(((-0.1, 0.3, 0.32), (0.0,) * 3, (0.0,) * 3), (0.1, 0.1, 0.05)), None, {},
-         "1 pairs that do, most particles 1 and 2, by 0.13 m"),
-        (VESSEL, balls(radius=0.25), SOFT, {}, r"\(soft balls may by 0.2 of the smaller radius\), got 1 pairs"),
-        (CELL, balls(((0.05, 0.95), (0.1, 0.1), (0.1, 0.1)), 0.06), None, {}, "1 pairs that do, .*, by 0.02 m"),
+         "1 pair that overlaps, particles 1 and 2 the most, by 0.13 m"),
+        (VESSEL, balls(radius=0.25), SOFT, {}, r"\(soft balls may by 0.2 of the smaller radius\), got 1 pair"),
+        (CELL, balls(((0.05, 0.95), (0.1, 0.1), (0.1, 0.1)), 0.06), None, {}, "1 pair that overlaps, .*, by 0.02 m"),
         (VESSEL, balls(((0.0, 0.45), (0.0, 0.0), (0.0, 0.0))), None, {},
          "particles must start inside their walls, got 1 of 2 outside; the first is particle 1 at .0.45, 0.0, 0.0., "
          r"and its radius of 0.1 m reaches 0.05 m beyond surfaces\[0\] \(Box\)"),

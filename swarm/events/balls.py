@@ -63,9 +63,10 @@ def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
     if found.depth <= (_ROUND_OFF * magnitude if method.is_rigid() else MOST_PRESSED * smaller):
         return
     pressed = "" if method.is_rigid() else f" (soft balls may by {MOST_PRESSED:g} of the smaller radius)"
+    overlap = "1 pair that overlaps" if found.number == 1 else f"{found.number} pairs that overlap"
     raise SceneError(
-        f"particles must not overlap at the start{pressed}, got {found.number} pairs that do, most particles {i} and "
-        f"{k}, by {found.depth:.6g} m: their centres are {radius[i] + radius[k] - found.depth:.6g} m apart, their "
+        f"particles must not overlap at the start{pressed}, got {overlap}, particles {i} and {k} the most, by "
+        f"{found.depth:.6g} m: their centres are {radius[i] + radius[k] - found.depth:.6g} m apart, their "
         f"radii {radius[i]:g} and {radius[k]:g} m; move them apart, or let swarm.fill or swarm.pack place them"
     )
 

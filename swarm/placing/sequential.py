@@ -67,7 +67,8 @@ def require_packing(scene: Scene, radius: Floats, room: VolumeBox, most: float |
     if packing > _ABOUT * densest:
         raise SceneError(
             f"radius must leave a packing of at most {densest:g} to random places, got "
-            f"{packing_of(scene, radius, room)}; use fewer or smaller balls, or swarm.pack, which grows them up to 0.6"
+            f"{packing_of(scene, radius, room)}; use fewer or smaller balls, or swarm.pack, which packs them "
+            f"more closely"
         )
     return packing
 

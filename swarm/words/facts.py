@@ -14,7 +14,7 @@ from ..methods import Method
 from ..scene import Scene
 from ..surfaces.union import part_at
 from . import nouns, titles
-from .amounts import amount, amounts, direction, listed, many, plain
+from .amounts import amount, amounts, direction, listed, many, plain, plural_of
 from .content import Content, content_of, content_of_result
 from .statements import Statement, rows_of
 from .verdicts import judged
@@ -142,7 +142,7 @@ def _of_body(body: Body | None) -> list[Statement]:
     edges = () if body.strain is None else body.strain.edges
     parts: dict[str, Any] = {
         "point": body, "link": body.links, "spring": body.springs, "elastic edge": edges, "anchor": body.anchors,
-        "guide": body.guides,
+        "guide": body.guides, "cavity": body.cavities,
     }  # fmt: skip
     counted = [_counted(len(some), name) for name, some in parts.items() if len(some)]
     return [Statement("body", ", ".join(counted))]
@@ -246,4 +246,4 @@ def of_numbers(seen: dict[str, Any]) -> list[Statement]:
 
 
 def _counted(number: int, noun: str) -> str:
-    return f"{many(number)} {noun}{'s' * (number != 1)}"
+    return f"{many(number)} {noun if number == 1 else plural_of(noun)}"

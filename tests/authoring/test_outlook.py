@@ -35,6 +35,11 @@ def task(folder, text):
     return task_of(job.scene, job.start(), job.method, job.run)
 
 
+def test_a_body_has_all_its_parts(tmp_path):
+    rows = looked(tmp_path, text_of("mechanism"))
+    assert rows["body"] == "3 points, 1 link, 1 anchor, 2 guides, 1 cavity"
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_scenes_to_begin_with(kind, tmp_path):
     rows = looked(tmp_path, text_of(kind))
