@@ -6,10 +6,8 @@ tests, it imports `swarm` itself. A test of how Python begins, or of what is imp
 """
 
 import atexit
-import contextlib
 import ctypes
 import functools
-import importlib
 import json
 import os
 import resource
@@ -82,8 +80,6 @@ def _import_swarm():
 
     for name in swarm.__all__:
         getattr(swarm, name)
-    with contextlib.suppress(ImportError):  # newer versions of typer import it with the first option
-        importlib.import_module("typer._adapters")
 
 
 def _serve():
@@ -150,10 +146,10 @@ def _end(how):
 
 
 if __name__ == "__main__":
+    import click  # noqa: F401
     import h5py  # noqa: F401
     import numba
     import sympy  # noqa: F401
-    import typer  # noqa: F401
 
     numba.njit(lambda x: x + 1.0)(1.0)  # the compiler begins
     if "swarm" in sys.argv:

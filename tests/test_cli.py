@@ -294,7 +294,7 @@ def test_an_interrupt_in_the_import_of_the_compiler_is_one_of_the_run(folder):
     assert command("run", "scene.toml", "--resume", "--quiet", cwd=folder).returncode == 0
 
 
-@pytest.mark.parametrize("name", ["typer", "numpy", "msgspec", "swarm.run.simulation"])
+@pytest.mark.parametrize("name", ["click", "numpy", "msgspec", "swarm.run.simulation"])
 def test_an_interrupt_in_an_import_is_one_word(folder, name):
     done = interrupted(folder, name)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")

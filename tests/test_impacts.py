@@ -7,9 +7,9 @@ import h5py
 import numpy as np
 import pytest
 from children import python
+from click.testing import CliRunner
 from conftest import edited, files_limited_to
 from test_sessions import halted_after, stopped_at
-from typer.testing import CliRunner
 
 import swarm
 from swarm.commands.cli import app

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 from test_cli import command
 
 import swarm
@@ -129,7 +128,7 @@ def test_names_and_options_in_a_page_exist(path):
     """`swarm.NAME` is a public name, and the options in a line with a command are options of it."""
     text = path.read_text().replace("swarm.schema.json", "")
     assert [name for name in re.findall(r"\bswarm\.([A-Za-z_]\w*)", text) if not hasattr(swarm, name)] == []
-    known = typer.main.get_command(app).commands
+    known = app.commands
     for name, rest in re.findall(r"\bswarm ([a-z]+) ([^`\n]*\.[^`\n]*)", text):
         parameters = known[name].params if name in known else []
         options = {option for one in parameters for option in (*one.opts, *one.secondary_opts)}

@@ -3,9 +3,9 @@
 import math
 import time
 
+import click
 import numpy as np
 import pytest
-import typer
 from numba.core import event
 
 import swarm
@@ -195,7 +195,7 @@ def test_the_limit_of_a_command_counts_from_its_begin(tmp_path, clock, monkeypat
         return frames(made, times)
 
     monkeypatch.setattr(Session, "frames", compiling)
-    with pytest.raises(typer.Exit) as stop:
+    with pytest.raises(click.exceptions.Exit) as stop:
         command(tmp_path / "scene.toml", walltime="50s", quiet=True, threads=1)
     assert stop.value.exit_code == 75
     message = "the wall time limit is reached" + ", after a compilation that was under way" * bool(compiled)

@@ -1,9 +1,8 @@
 """The command line: the commands, and what their errors and signals become."""
 
 import sys
-from typing import Annotated
 
-import typer
+import click
 
 from ..common import interrupt
 from ..errors import SceneError, SwarmError
@@ -13,6 +12,7 @@ from .docs import docs
 from .export import export
 from .info import info
 from .new import new
+from .options import Group
 from .pictures import animate, plot, record, view
 from .report import report
 from .run import run
@@ -24,71 +24,74 @@ _CODES = (
     "Exit codes: 0 done, 1 a run failed, 2 bad input, 75 the wall time is over, go on with --resume, 130 interrupted"
 )
 
-app = typer.Typer(
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    help="Simulate particles and bodies bouncing in rigid cavities and off solids, with energy conserved to round-off.",
-    epilog=f"Examples:  swarm run examples/scenes/cavity.toml  |  swarm info cavity.h5\n\n{_CODES}",
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-)
 
-
-def _version(wanted: bool) -> None:
+def _version(ctx: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
     if wanted:
         print(f"swarm {VERSION}")
-        raise typer.Exit
+        ctx.exit()
 
 
-@app.callback()
-def _options(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
-    ] = False,
-) -> None:
-    pass
-
-
-app.command(epilog="Example:  swarm new cavity && swarm run cavity.toml")(new)
-app.command(
+app = Group(
+    no_args_is_help=True,
+    help="Simulate particles and bodies bouncing in rigid cavities and off solids, with energy conserved to round-off.",
+    epilog=f"Examples:  swarm run examples/scenes/cavity.toml  |  swarm info cavity.h5\n\n{_CODES}",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110, "show_default": True},
+    params=[
+        click.Option(
+            ["--version"], is_flag=True, callback=_version, is_eager=True, expose_value=False,
+            help="Print the version and exit.",
+        )
+    ],
+)  # fmt: skip
+app.add(new, epilog="Example:  swarm new cavity && swarm run cavity.toml")
+app.add(
+    check,
     short_help="Say what a scene file will do, without running it.",
     epilog="Example:  swarm check examples/scenes/cavity.toml",
-)(check)
-app.command(epilog=f"Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2\n\n{_CODES}")(run)
-app.command(
+)
+app.add(run, epilog=f"Example:  swarm run examples/scenes/cavity.toml -o cavity.h5 --threads 2\n\n{_CODES}")
+app.add(
+    sweep,
     short_help="Carry out the runs of a sweep file, with a table of results.",
     epilog=f"Example:  swarm sweep examples/sweeps/cooling.toml -o cooling\n\n{_CODES}",
-)(sweep)
-app.command(epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")(info)
-app.command(epilog="Example:  swarm record cavity.h5 -o cavity.rrd")(record)
-app.command(
+)
+app.add(info, epilog="Example:  swarm info cavity.h5, or swarm info --repair cavity.rrd")
+app.add(record, epilog="Example:  swarm record cavity.h5 -o cavity.rrd")
+app.add(
+    view,
     short_help="Draw a contact sheet of a recording, without a screen.",
     epilog="Example:  swarm view cavity.rrd -o cavity.png --times 0,5,10",
-)(view)
-app.command(
+)
+app.add(
+    plot,
     short_help="Draw energies, impacts, speeds and particles of a trajectory.",
     epilog="Example:  swarm plot cavity.h5 -o cavity.png",
-)(plot)
-app.command(
+)
+app.add(
+    report,
     short_help="Make a page of a run or a sweep for any browser.",
     epilog="Example:  swarm report cavity.h5 -o cavity.html, or swarm report FOLDER of a sweep",
-)(report)
-app.command(
-    short_help="Make a film of a trajectory.", epilog="Example:  swarm animate cavity.h5 -o cavity.mp4 --frames 100"
-)(animate)
-app.command(
+)
+app.add(
+    animate,
+    short_help="Make a film of a trajectory.",
+    epilog="Example:  swarm animate cavity.h5 -o cavity.mp4 --frames 100",
+)
+app.add(
+    export,
     short_help="Write a trajectory for ParaView, OVITO, Blender and others.",
     epilog="Example:  swarm export cavity.h5 -o cavity.vtkhdf --frames ::10",
-)(export)
-app.command(
+)
+app.add(
+    schema,
     short_help="Write the JSON Schema of scene files, for editors.",
     epilog="Example:  swarm schema -o swarm.schema.json, and #:schema ./swarm.schema.json in a file",
-)(schema)
-app.command(
+)
+app.add(
+    docs,
     short_help="Write the reference as pages for a browser.",
     epilog="Example:  swarm docs -o reference, then open reference/index.html",
-)(docs)
+)
 
 
 def main() -> None:

@@ -3,20 +3,21 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
+
+from .options import Option
 
 
 def docs(
-    context: typer.Context,
     folder: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Of the pages; index.html is the first.")
+        Path, Option("-o", "--output", metavar="FOLDER", help="Of the pages; index.html is the first.")
     ] = Path("swarm-docs"),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the pages that the folder holds.")] = False,
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace the pages that the folder holds.")] = False,
 ) -> None:
     """Write the reference: pages of all public names, observables, keys of scene files and commands."""
     from ..authoring.reference import write
 
-    print(f"written to {write(folder, commands(context.find_root().command), overwrite)}")
+    print(f"written to {write(folder, commands(click.get_current_context().find_root().command), overwrite)}")
 
 
 def commands(group: Any) -> tuple[Any, ...]:

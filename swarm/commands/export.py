@@ -4,9 +4,8 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ..errors import SceneError
+from .options import Option
 from .shown import TrajectoryFile, written
 
 # More files than these are a sequence.
@@ -17,19 +16,19 @@ def export(
     file: TrajectoryFile,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="OUT", help="OUT.vtkhdf, .xyz, .gsd, .ply, .csv, or .obj of the walls."),
+        Option("-o", "--output", metavar="OUT", help="OUT.vtkhdf, .xyz, .gsd, .ply, .csv, or .obj of the walls."),
     ],
     frames: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="A:B:K", help="Frames A to before B, every K-th, or one, as -1 [default: all; of .obj the first]."
         ),
     ] = None,
-    particles: Annotated[int, typer.Option(metavar="K", help="Every K-th particle or body.")] = 1,
+    particles: Annotated[int, Option(metavar="K", help="Every K-th particle or body.")] = 1,
     surfaces: Annotated[
-        bool, typer.Option("--surfaces/--no-surfaces", help="With .vtkhdf, also the walls: OUT.surfaces.vtkhdf.")
+        bool, Option("--surfaces/--no-surfaces", help="With .vtkhdf, also the walls: OUT.surfaces.vtkhdf.")
     ] = True,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace existing files.")] = False,
 ) -> None:
     """Write a trajectory for ParaView (.vtkhdf), OVITO and ASE (.xyz), HOOMD-blue and freud (.gsd), as files of frames
     for Blender, games and MeshLab (.ply), for spreadsheets (.csv), or its walls for them and CAD (.obj)."""  # noqa: D205, D209

@@ -3,19 +3,16 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ..errors import SceneError
+from .options import Option, Positional
 from .shown import table
 
 
 def info(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A trajectory or a log of impacts (.h5), or a recording (.rrd).")
+        Path, Positional(metavar="FILE", help="A trajectory or a log of impacts (.h5), or a recording (.rrd).")
     ],
-    repair: Annotated[
-        bool, typer.Option("--repair", help="Repair a recording that a crash truncated, in place.")
-    ] = False,
+    repair: Annotated[bool, Option("--repair", help="Repair a recording that a crash truncated, in place.")] = False,
 ) -> None:
     """Show what a trajectory, a log of impacts or a recording holds."""
     from . import summary

@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from .options import Option, Positional
 
 
 def new(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="cavity, hopper, billiard, gas or mechanism.")],
+    kind: Annotated[str, Positional(metavar="KIND", help="cavity, hopper, billiard, gas or mechanism.")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="SCENE.toml", help="File [default: KIND.toml, here].")
+        Path | None, Option("-o", "--output", metavar="SCENE.toml", help="File [default: KIND.toml, here].")
     ] = None,
 ) -> None:
     """Write a scene file with comments to begin with."""

@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ..errors import SceneError
+from .options import Option, Positional
 from .shown import Picture, TrajectoryFile, written
 
 ReplacesPicture = Annotated[bool, typer.Option("--overwrite", help="Replace an existing picture.")]
@@ -14,12 +13,12 @@ ReplacesPicture = Annotated[bool, typer.Option("--overwrite", help="Replace an e
 def record(
     file: TrajectoryFile,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="OUT.rrd", help="Recording [default: FILE.rrd].")
+        Path | None, Option("-o", "--output", metavar="OUT.rrd", help="Recording [default: FILE.rrd].")
     ] = None,
-    particles: Annotated[int, typer.Option(help="Most particles, or points of bodies, recorded.")] = 5000,
-    color: Annotated[str, typer.Option(help="Colour by speed or energy-error.")] = "speed",
-    megabytes: Annotated[float, typer.Option(help="Largest size; if needed, every k-th frame is recorded.")] = 100.0,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing recording.")] = False,
+    particles: Annotated[int, Option(help="Most particles, or points of bodies, recorded.")] = 5000,
+    color: Annotated[str, Option(help="Colour by speed or energy-error.")] = "speed",
+    megabytes: Annotated[float, Option(help="Largest size; if needed, every k-th frame is recorded.")] = 100.0,
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace an existing recording.")] = False,
 ) -> None:
     """Make a Rerun recording of a trajectory."""
     from ..common.extras import needed_by
@@ -38,16 +37,14 @@ def record(
 
 
 def view(
-    file: Annotated[Path, typer.Argument(metavar="FILE.rrd", help="A recording.")],
+    file: Annotated[Path, Positional(metavar="FILE.rrd", help="A recording.")],
     output: Picture = None,
     times: Annotated[
-        str | None, typer.Option(help="Frames near these times [s], as 0,5,10 [default: first, middle, last].")
+        str | None, Option(help="Frames near these times [s], as 0,5,10 [default: first, middle, last].")
     ] = None,
     viewer: Annotated[
         bool | None,
-        typer.Option(
-            "--viewer/--no-viewer", help="By the Rerun viewer or by matplotlib [default: the viewer if it can]."
-        ),
+        Option("--viewer/--no-viewer", help="By the Rerun viewer or by matplotlib [default: the viewer if it can]."),
     ] = None,
     overwrite: ReplacesPicture = False,
 ) -> None:
@@ -81,12 +78,12 @@ def plot(file: TrajectoryFile, output: Picture = None, overwrite: ReplacesPictur
 def animate(
     file: TrajectoryFile,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="OUT.mp4", help="Film, .mp4 or .gif [default: FILE.mp4].")
+        Path | None, Option("-o", "--output", metavar="OUT.mp4", help="Film, .mp4 or .gif [default: FILE.mp4].")
     ] = None,
-    frames: Annotated[int, typer.Option(help="Most frames drawn, evenly chosen.")] = 200,
-    fps: Annotated[float, typer.Option(help="Frames a second.")] = 25.0,
-    particles: Annotated[int, typer.Option(help="Most particles, or points of bodies, drawn.")] = 10_000,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing film.")] = False,
+    frames: Annotated[int, Option(help="Most frames drawn, evenly chosen.")] = 200,
+    fps: Annotated[float, Option(help="Frames a second.")] = 25.0,
+    particles: Annotated[int, Option(help="Most particles, or points of bodies, drawn.")] = 10_000,
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace an existing film.")] = False,
 ) -> None:
     """Make a film of the particles or bodies of a trajectory among their walls."""
     from ..files.trajectory import load

@@ -7,10 +7,11 @@ import time
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
 
 from ..common import interrupt
 from ..errors import CompleteError, SceneError, SwarmError, WallTimeError
+from .options import Option, Positional
 from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
 
 # Behind the reason why a run has stopped.
@@ -18,43 +19,39 @@ _COMPILED = ", after a compilation that was under way"
 
 
 def run(  # noqa: PLR0913  one argument an option
-    scene_file: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene, the method and the run.")],
+    scene_file: Annotated[Path, Positional(metavar="SCENE.toml", help="The scene, the method and the run.")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="OUT.h5", help="Trajectory [default: SCENE.h5, here].")
+        Path | None, Option("-o", "--output", metavar="OUT.h5", help="Trajectory [default: SCENE.h5, here].")
     ] = None,
-    threads: Annotated[
-        int | None, typer.Option(help="Threads [default: all cores]; results do not depend on it.")
-    ] = None,
+    threads: Annotated[int | None, Option(help="Threads [default: all cores]; results do not depend on it.")] = None,
     recording: Annotated[
-        Path | None, typer.Option("--record", metavar="OUT.rrd", help="Recording for Rerun and swarm view.")
+        Path | None, Option("--record", metavar="OUT.rrd", help="Recording for Rerun and swarm view.")
     ] = None,
     impacts: Annotated[
-        Path | None, typer.Option("--impacts", metavar="OUT.h5", help="Log of every impact, for swarm.load_impacts.")
+        Path | None, Option("--impacts", metavar="OUT.h5", help="Log of every impact, for swarm.load_impacts.")
     ] = None,
-    live: Annotated[bool, typer.Option("--live", help="Show the run in a Rerun viewer.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
+    live: Annotated[bool, Option("--live", help="Show the run in a Rerun viewer.")] = False,
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace existing files.")] = False,
     quiet: Quiet = False,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Continue from the last checkpoint of a run that was stopped.")
+        bool, Option("--resume", help="Continue from the last checkpoint of a run that was stopped.")
     ] = False,
     walltime: Annotated[
         str | None,
-        typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint; the exit code is 75."),
+        Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint; the exit code is 75."),
     ] = None,
     compile: Annotated[
-        str | None, typer.Option(metavar="WHEN", help="Compile the kernels: auto, always or never [default: auto].")
+        str | None, Option(metavar="WHEN", help="Compile the kernels: auto, always or never [default: auto].")
     ] = None,
     cluster: Annotated[
         str | None,
-        typer.Option(metavar="WHERE", help="Run on a cluster: local:N, N workers here, or tcp://HOST:PORT of Dask."),
+        Option(metavar="WHERE", help="Run on a cluster: local:N, N workers here, or tcp://HOST:PORT of Dask."),
     ] = None,
     shards: Annotated[
-        int | None, typer.Option(help="Shards of a run on a cluster [default: one for each thread of its workers].")
+        int | None, Option(help="Shards of a run on a cluster [default: one for each thread of its workers].")
     ] = None,
     plugins: Plugins = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the outcome of the run as JSON, also if it fails.")
-    ] = False,
+    as_json: Annotated[bool, Option("--json", help="Print the outcome of the run as JSON, also if it fails.")] = False,
 ) -> None:
     """Simulate a scene file and write its trajectory."""
     began = time.monotonic()
@@ -112,7 +109,7 @@ def run(  # noqa: PLR0913  one argument an option
             reason = REASONS[status] + (_COMPILED * bool(getattr(stop, "compiled", 0.0)))
             again = _stopped(reason, target, has_frames, cluster is not None)
             report(status, target if has_frames else None, **({} if has_frames else {"frames": 0}), resume=again)
-        raise typer.Exit(EXIT_CODES[status]) from None
+        raise click.exceptions.Exit(EXIT_CODES[status]) from None
     except CompleteError as error:
         print(error, file=sys.stderr)
         report("complete", target)

@@ -4,17 +4,16 @@ import json
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from .options import Option
 from .shown import written
 
 
 def schema(
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="OUT.json", help="Schema [default: print it].")
+        Path | None, Option("-o", "--output", metavar="OUT.json", help="Schema [default: print it].")
     ] = None,
-    sweep: Annotated[bool, typer.Option("--sweep", help="Of sweep files, which have a [sweep] table.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing file.")] = False,
+    sweep: Annotated[bool, Option("--sweep", help="Of sweep files, which have a [sweep] table.")] = False,
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace an existing file.")] = False,
 ) -> None:
     """Write the JSON Schema of scene files, by which editors complete and check them."""
     from ..authoring.schema import schema_of

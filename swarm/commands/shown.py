@@ -6,15 +6,15 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from .options import Option, Positional
 
-TrajectoryFile = Annotated[Path, typer.Argument(metavar="FILE.h5", help="A trajectory.")]
-Picture = Annotated[Path | None, typer.Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")]
+TrajectoryFile = Annotated[Path, Positional(metavar="FILE.h5", help="A trajectory.")]
+Picture = Annotated[Path | None, Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")]
 Plugins = Annotated[
     list[str] | None,
-    typer.Option("--plugins", metavar="MODULE", help="Allow code of this module in the file: laws, surfaces, numbers."),
+    Option("--plugins", metavar="MODULE", help="Allow code of this module in the file: laws, surfaces, numbers."),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")]
+Quiet = Annotated[bool, Option("--quiet", help="No progress bar and no summary.")]
 
 # Exit codes of what is stopped: that of a shell for SIGINT; EX_TEMPFAIL of sysexits.h, "try again later", where the
 # wall time is over, by which a chain of jobs knows that another one is needed.

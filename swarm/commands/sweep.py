@@ -5,10 +5,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+import click
 
 from ..common import interrupt
 from ..errors import SwarmError
+from .options import Option, Positional
 from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
 
 if TYPE_CHECKING:
@@ -20,33 +21,31 @@ _SHOWN = 5
 
 
 def sweep(  # noqa: PLR0913  one argument an option
-    sweep_file: Annotated[Path, typer.Argument(metavar="SWEEP.toml", help="A scene file with a [sweep] table.")],
+    sweep_file: Annotated[Path, Positional(metavar="SWEEP.toml", help="A scene file with a [sweep] table.")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FOLDER", help="Of all files [default: SWEEP, here].")
+        Path | None, Option("-o", "--output", metavar="FOLDER", help="Of all files [default: SWEEP, here].")
     ] = None,
     processes: Annotated[
-        int | None, typer.Option(help="Runs at the same time [default: all cores]; results do not depend on it.")
+        int | None, Option(help="Runs at the same time [default: all cores]; results do not depend on it.")
     ] = None,
-    threads: Annotated[int | None, typer.Option(help="Threads of a run [default: the cores for each].")] = None,
-    written: Annotated[
-        str, typer.Option("--table", metavar="KIND", help="Table of the results: csv or parquet.")
-    ] = "csv",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the runs that the folder holds.")] = False,
+    threads: Annotated[int | None, Option(help="Threads of a run [default: the cores for each].")] = None,
+    written: Annotated[str, Option("--table", metavar="KIND", help="Table of the results: csv or parquet.")] = "csv",
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace the runs that the folder holds.")] = False,
     quiet: Quiet = False,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the runs that the folder holds; those done are not run again.")
+        bool, Option("--resume", help="Go on with the runs that the folder holds; those done are not run again.")
     ] = False,
     walltime: Annotated[
         str | None,
-        typer.Option(metavar="TIME", help="Stop after this time, such as 2h, with checkpoints; the exit code is 75."),
+        Option(metavar="TIME", help="Stop after this time, such as 2h, with checkpoints; the exit code is 75."),
     ] = None,
     cluster: Annotated[
         str | None,
-        typer.Option(metavar="WHERE", help="Run on a cluster: local:N, N workers here, or tcp://HOST:PORT of Dask."),
+        Option(metavar="WHERE", help="Run on a cluster: local:N, N workers here, or tcp://HOST:PORT of Dask."),
     ] = None,
     plugins: Plugins = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print the outcome of the sweep as JSON, also if it fails.")
+        bool, Option("--json", help="Print the outcome of the sweep as JSON, also if it fails.")
     ] = False,
 ) -> None:
     """Carry out the runs of a sweep file, and write one table of their results."""
@@ -73,7 +72,7 @@ def sweep(  # noqa: PLR0913  one argument an option
         print("interrupted; with --resume, runs that were under way go on from their last checkpoints", file=sys.stderr)
         if as_json:
             print(json.dumps({"status": "interrupted"}))
-        raise typer.Exit(EXIT_CODES["interrupted"]) from None
+        raise click.exceptions.Exit(EXIT_CODES["interrupted"]) from None
     except SwarmError as error:
         if as_json:
             print(json.dumps({"status": "failed", "error": str(error)}))
@@ -81,9 +80,9 @@ def sweep(  # noqa: PLR0913  one argument an option
     with interrupt.at_once():
         _report(outcome, quiet, as_json)
     if outcome.stopped:
-        raise typer.Exit(EXIT_CODES[outcome.stopped])
+        raise click.exceptions.Exit(EXIT_CODES[outcome.stopped])
     if outcome.results.of_state("failed"):
-        raise typer.Exit(_FAILED)
+        raise click.exceptions.Exit(_FAILED)
 
 
 def _report(outcome: "Outcome", quiet: bool, as_json: bool) -> None:

@@ -8,7 +8,6 @@ from collections import Counter
 import pytest
 from conftest import row
 from test_cli import command
-from typer.main import get_command
 
 import swarm
 from swarm.authoring.docstrings import entries_of, meanings_of, sections_of
@@ -25,7 +24,7 @@ MADE = {"mesh_weld", "args", "kwargs", "common"}
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     target = tmp_path_factory.mktemp("docs") / "pages"
-    write(target, commands(get_command(app)))
+    write(target, commands(app))
     return target
 
 
@@ -78,7 +77,7 @@ def test_every_key_of_a_scene_file_is_on_one_page(places):
 
 
 def test_every_option_of_every_command_is_on_one_page(places):
-    known = get_command(app).commands
+    known = app.commands
     assert len(known) > 10
     assert once(places, [f"command.{name}" for name in known]) == {}
     for name, one in known.items():

@@ -2,8 +2,8 @@
 
 import json
 
+import click
 import pytest
-import typer
 from sweep_sessions import write
 
 import swarm
@@ -26,7 +26,7 @@ def failed(tmp_path_factory):
     carry_out_sweep = sweeping.carry_out_sweep
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sweeping, "carry_out_sweep", kept)
-        with pytest.raises(typer.Exit) as end:
+        with pytest.raises(click.exceptions.Exit) as end:
             sweep(path, folder / "out", processes=1, quiet=True)
     assert end.value.exit_code == 1
     return folder, outcomes[0]
@@ -66,7 +66,7 @@ def test_the_wall_time_has_an_exit_code_of_its_own(tmp_path, capsys):
     """75, "try again" of sysexits.h, by which a chain of jobs knows that another one is needed."""
     path = write(tmp_path / "sweep.toml", '"run.until" = [1e7, 1e8]', run="frames = 1")
     path.write_text(path.read_text().replace("every = 0.5\n", ""))
-    with pytest.raises(typer.Exit) as end:
+    with pytest.raises(click.exceptions.Exit) as end:
         sweep(path, tmp_path / "out", processes=1, quiet=True, walltime="0.000000001s")
     assert end.value.exit_code == 75
     assert "the wall time limit is reached: 2 runs are left; resume with" in capsys.readouterr().err

@@ -6,7 +6,7 @@ import sys
 
 import h5py
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import swarm
 from swarm.commands.cli import app

@@ -9,7 +9,7 @@ import shutil
 import h5py
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import swarm
 from swarm.commands import summary
