@@ -279,6 +279,7 @@ class CollidingRun(BaseRun):
             "kept": None if kept is None else kept.twice, "kept_stamp": None if kept is None else kept.stamp,
             "spin": self._balls.spin, "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
             "window": None if self._windows is None else self._windows.numbers,
+            "held": None if flock.holds is None else self._box.kinds.mass,
         }  # fmt: skip
         crossed = {} if state.crossed is None else named("crossed", state.crossed)
         return found | crossed | {name: array for name, array in some.items() if array is not None}

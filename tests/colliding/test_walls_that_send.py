@@ -138,26 +138,6 @@ def test_thermal_walls_that_move_and_a_gas_under_gravity():
     assert seen["wall_work"][0] != 0.0
 
 
-class Waits(swarm.WallLaw):
-    """Lets them wait."""
-
-    time: float
-
-    def leave(self, v, n, u, random, mass):
-        from swarm.surfaces.wall_law import mirrored
-
-        return swarm.Leave(mirrored(v, n, u), wait=self.time)
-
-
-def test_a_ball_that_would_wait_on_a_wall_is_refused():
-    start = swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), radius=0.1)
-    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws\[0\] must not let particles with a radius wait"):
-        swarm.simulate(swarm.Scene([swarm.Box((1.0,) * 3, laws=[swarm.Sticky(0.1)])]), start, swarm.Impact(), until=1.0)
-    scene = swarm.Scene([swarm.Box((1.0,) * 3, laws=[Waits(0.1)])])
-    with pytest.raises(swarm.RunError, match="particle 0: one of the laws of a wall lets it wait there"):
-        swarm.simulate(scene, start, swarm.Impact(), until=1.0, compile="never")
-
-
 def test_a_box_of_many_holes_lets_all_out():
     """Each face open in its middle: balls leave in the order of time, and each once."""
     holes = [

@@ -19,6 +19,12 @@ def aim_again(box, flock, i, now):
     find_partner(box, flock, i, now)
 
 
+def stay(box, flock, i, now):
+    """Find what is next for a ball that a wall holds: it is let go, or another one collides with it before."""
+    flock.event[index(FLOATS * i + LEAVES)], flock.event[index(FLOATS * i + DUE)] = math.inf, flock.time(i)
+    find_partner(box, flock, i, now)
+
+
 def queue_both(flock, i):
     """Bring a ball to its place in the queue, and its partner too if `tell_partner` has changed the partner's event."""
     requeue(flock, i)

@@ -11,9 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...kernel.arrays import fetch, index, unwritten
+from ...kernel.gravity import accelerated, as_vector, displacement
 from ...kernel.jit import Array, outlined, select
 from ...kernel.record import Record
-from ...kernel.vector import Vec, dot, square
+from ...kernel.vector import ZERO, Vec, dot, either, square
+from ...surfaces.shapes.sphere import ball
 from ...surfaces.time_of_impact.flights import Hit
 from .heavy import meet_heavy
 from .rows import DUE, FACE, FLOATS, MEETS, NO_PARTNER, PARTNER, RADIUS, SEEN, STAMP, WALL, WHOLES
@@ -21,6 +23,10 @@ from .window import OUT, UNKNOWN, next_hit
 
 # So many balls of a cell are copied without a branch, and so many are looked at at once.
 _FEW, _MOST = 4, 128
+# The mass of a ball that a wall holds [kg]: that of two is then the other one's, to the last bit.
+_FIXED = 2.0**200
+# So many parts a fall beside a ball that is held has at most, in each of which it surely meets it or not.
+_PARTS = 100
 # Of the cells around a ball: those beyond no face alone.
 _ANY = 6
 
@@ -38,6 +44,10 @@ class Alike(Record):
     radius: float
     mass: float
     reach2: float  # the square of a diameter
+
+    def is_held(self, i):
+        """Whether a wall holds it."""
+        return False
 
     def radius_of(self, i):
         """Its radius [m]."""
@@ -62,6 +72,10 @@ class Various(Record):
     flight: Array  # rows of flights
     mass: Array  # (N,)
 
+    def is_held(self, i):
+        """Whether a wall holds it."""
+        return False
+
     def radius_of(self, i):
         """Its radius [m]."""
         return self.flight[index(FLOATS * i + RADIUS)]
@@ -79,6 +93,18 @@ class Various(Record):
         """The square of the distance at which two touch."""
         reach = self.radius_of(i) + self.radius_of(j)
         return reach * reach
+
+
+class Holdable(Various):
+    """Balls that walls may hold: meanwhile they are obstacles at rest for others."""
+
+    def hold(self, i):
+        """A wall holds it from now on."""
+        self.mass[index(i)] = _FIXED
+
+    def is_held(self, i):
+        """Whether a wall holds it."""
+        return self.mass[index(i)] == _FIXED
 
 
 def between(grid, r, other):
@@ -116,7 +142,32 @@ def _sight_in(box, b, u, touching2, now):
 
 
 @outlined
-def _meeting_of_any(box, r, other, u, touching2, now):
+def _fall_time(b, u, pull, touching2):
+    """How long a ball that is b away falls, with the velocity u, before it touches another one at rest."""
+    solid, time = ball(ZERO, math.sqrt(touching2)), 0.0
+    for _part in range(_PARTS):
+        free, found = solid.falling_hit(b, u, pull)
+        time += free
+        if found or time == math.inf:
+            return time
+        b, u = b + displacement(pull, u, free), accelerated(pull, u, free)
+    return math.inf
+
+
+def _touch_time(box, flock, pair, b, u, now):
+    """How long a pair flies before it touches, the second b away from the first and with u relative to it."""
+    i, j = pair
+    touching2 = box.kinds.touching2(i, j)
+    if flock.holds is not None and box.pull is not None and flock.is_held(i, now) != flock.is_held(j, now):
+        # One falls, the other one is a solid ball at rest.
+        pull = as_vector(box.pull)
+        return _fall_time(b, u, either(flock.is_held(i, now), pull, -1.0 * pull), touching2)
+    seen = _sight_in(box, b, u, touching2, now)
+    return meeting(*seen) if seen.meets() else math.inf
+
+
+@outlined
+def _meeting_of_any(box, flock, pair, way, u, now):
     """When a ball meets any image of another one, where these are few and far from one another."""
     soonest, grid = math.inf, box.grid
     for kx in range(3):
@@ -126,10 +177,8 @@ def _meeting_of_any(box, r, other, u, touching2, now):
                     float(k - 1) * (0.0 if axis.period is None else axis.period)
                     for k, axis in zip((kx, ky, kz), grid.axes(), strict=True)
                 )
-                b = Vec(*(one - two + shift for one, two, shift in zip(other, r, shifts, strict=True)))
-                seen = _sight_in(box, b, u, touching2, now)
-                if seen.meets():
-                    soonest = min(meeting(*seen), soonest)
+                b = Vec(*(one + shift for one, shift in zip(way, shifts, strict=True)))
+                soonest = min(_touch_time(box, flock, pair, b, u, now), soonest)
     return soonest
 
 
@@ -161,14 +210,17 @@ def _soonest(box, flock, i, now, near, count, known):
 
 
 @outlined
-def _soonest_of_images(box, flock, i, now, near, count, known):
-    """`_soonest` where a ball may meet several images of another one."""
+def _soonest_one_by_one(box, flock, i, now, near, count, known):
+    """`_soonest` where a ball may meet several images of another one, or falls beside those that walls hold."""
     r, v = flock.at(box.pull, i, now)
     first, mate = known
     for k in range(count):
         j = near[index(k)]
         other, w = flock.at(box.pull, j, now)
-        time = now + _meeting_of_any(box, r, other, w - v, box.kinds.touching2(i, j), now)
+        if box.grid.few is None:
+            time = now + _touch_time(box, flock, (i, j), between(box.grid, r, other), w - v, now)
+        else:
+            time = now + _meeting_of_any(box, flock, (i, j), other - r, w - v, now)
         sooner = (time < first) | ((time == first) & (j < mate))
         if sooner and time < math.inf and time <= flock.event[index(FLOATS * j + MEETS)]:
             first, mate = time, j
@@ -176,7 +228,8 @@ def _soonest_of_images(box, flock, i, now, near, count, known):
 
 
 def _looked_at(box, flock, i, now, near, count, known):
-    ask = _soonest if box.grid.few is None else _soonest_of_images
+    falls = flock.holds is not None and box.pull is not None
+    ask = _soonest_one_by_one if falls or box.grid.few is not None else _soonest
     return ask(box, flock, i, now, near, count, known)
 
 
@@ -281,8 +334,8 @@ def find_wall(box, flock, i, now):
     """Find when a ball meets a wall, if its cell is near one and that is not known."""
     row = FLOATS * i
     if box.heavy is not None:
-        # A lease ends for all balls, also for those that are not there.
-        if flock.event[index(row + WALL)] == OUT:
+        # A lease ends for all balls, also for those that are not there, or held.
+        if flock.event[index(row + WALL)] <= OUT:
             return
         meet_heavy(box, flock, i, now, _given_hit(box, flock, i, now))
     elif box.grid.near[index(box.grid.number(i, flock))] and flock.event[index(row + WALL)] == UNKNOWN:

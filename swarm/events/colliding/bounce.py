@@ -1,4 +1,4 @@
-"""The impact of a ball on a wall: it is turned round, sent off by a law, or gone; it never stays there."""
+"""The impact of a ball on a wall: it is turned round, sent off by a law, held for a time, or gone."""
 
 import math
 from typing import Any
@@ -10,7 +10,7 @@ from ...contact.reflection import given, relative, wall_velocity
 from ...contact.wall_impact import Arriving, book, impact_on_wall
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, potential
-from ...kernel.jit import outlined
+from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, dot, either, norm, square, with_square
 from ...lanes.watching.log import Struck
@@ -19,10 +19,10 @@ from .clock import moment_of
 from .followed import follow, settle
 from .rows import FLOATS, WALL
 from .rubbing import rub_wall
-from .window import walls_at
+from .window import HELD, walls_at
 
-# Besides a status that ends the run: it flies on, or is no more among the walls.
-FLIES, GONE = Status.DONE.value, -1
+# Besides a status that ends the run: it flies on, is no more among the walls, or is held by one.
+FLIES, GONE, STAYS = Status.DONE.value, -1, -2
 # Of a radius, how far a closed wall may be from a ball that an open one lets out.
 _TOUCH = 1e-9
 # Of its speed, that with which a ball leaves a wall at least: four roundings.
@@ -57,17 +57,26 @@ def bounce(box, flock, books, clock, i, now):
     row = index(int(walls.row(wall) if box.rows is None else box.rows[index(int(wall))]))
     heat = book(box.laws, books, (row, 0, index(i)), box.kinds.mass_of(i), after)
     if box.watchers.counts is not None:
-        box.watchers.counts.give(owner, heat, 0.0)
+        box.watchers.counts.give(owner, heat, after.wait)
     if box.repose is not None:
         box.repose.count(clock, after.impulse * after.impulse, now)
-    ended = FLIES if box.laws.own is None else _end(box, clock, wall, i, now, after)
-    v1 = either(ended == FLIES, after.v, v)
-    flock.put(i, now, r, v1)
+    ended = FLIES if box.laws.own is None else _end(box, flock, clock, wall, i, now, after)
+    v1 = either((ended == FLIES) | (ended == STAYS), after.v, v)
+    flock.put(i, now if flock.holds is None else now + select(ended == STAYS, after.wait, 0.0), r, v1)
     flock.kept.keep(i, flock.stamp(i), after.twice_energy)
     struck = Struck(i, wall, moment_of(clock, now), r, v, v1, box.kinds.mass_of(i) * after.impulse)
     struck = box.watchers.with_slip(box.laws, walls, struck)
     box.watchers.hit(books.image, struck._replace(wall=box.owner(wall)))
+    if flock.holds is not None and ended == STAYS:
+        flock.event[index(FLOATS * i + WALL)] = HELD - wall
     return ended
+
+
+def press(box, flock, books, i, now, impulse):
+    """Book what a wall gets of the impulse on a ball that it holds, along its normal [N s]."""
+    wall, walls = HELD - flock.event[index(FLOATS * i + WALL)], walls_at(box, i, now)
+    row = index(int(walls.row(wall) if box.rows is None else box.rows[index(int(wall))]))
+    books.impulse[row, 0] += dot(walls.unit_normal(wall, flock.place(i)), impulse)
 
 
 def let_out(box, flock, books, clock, owner, ball):
@@ -79,13 +88,13 @@ def let_out(box, flock, books, clock, owner, ball):
     box.watchers.hit(books.image, Struck(i, owner, moment_of(clock, now), r, v, v, 0.0))
 
 
-def _end(box, clock, wall, i, now, after):
+def _end(box, flock, clock, wall, i, now, after):
     """What becomes of a ball that the laws of a wall have sent off."""
     ended = FLIES
     if math.isnan(after.v.x):
         ended = Status.SENT_WRONG.value
     elif after.wait > 0.0:
-        ended = Status.WAITS.value
+        ended = Status.WAITS.value if flock.holds is None else STAYS
         if box.gates is not None and box.gates.absorbed_time is not None and after.wait == math.inf:
             box.gates.absorbed_time[index(i)], box.gates.absorbed_wall[index(i)] = (
                 moment_of(clock, now),
@@ -132,7 +141,7 @@ def _lifted(box, walls, wall, r, turned):
     # At least so fast that its own velocity has digits of it
     least, away = max(min(0.5 * held * box.shortest, most), _PARTS * norm(turned.v)), -dot(n, w)
     # An absorbed ball stays as it is.
-    if away < least and turned.wait == 0.0:
+    if away < least and turned.wait < math.inf:
         lift = least - away
         v, gained, work, speed2 = turned.v - lift * n, lift * (least + away), given(u, -lift * n), square(turned.v)
         if not box.laws.change_energy and speed2 > 4.0 * least * least:

@@ -14,7 +14,7 @@ from ...particles import Particles
 from ...scene import Scene
 from ...surfaces.in_motion.drive import drive_of
 from ..reacting.described import scenery_of
-from .aim import Alike, Various
+from .aim import Alike, Holdable, Various
 from .box import Domain
 from .cells import Axis, BallGrid
 from .meet import Loss
@@ -112,7 +112,8 @@ def there_at(flock: Flock, pull: Any, now: float) -> tuple[Floats, Floats, Float
     """The balls that are in the vessel at a time of the epoch [s]: places and velocities (3, n), radii (n,)."""
     n = flock.number()
     rows = flock.flight.reshape(n, FLOATS)[flock.event.reshape(n, FLOATS)[:, WALL] != OUT]
-    way = now - rows[:, TIME]
+    # The flight of a ball that is held begins later.
+    way = np.maximum(now - rows[:, TIME], 0.0)
     fall = np.zeros((3, 1)) if pull is None else np.array([tuple(pull)]).T
     position = rows[:, :3].T + rows[:, 3:6].T * way + 0.5 * fall * way * way
     return position, rows[:, 3:6].T + fall * way, rows[:, RADIUS]
@@ -135,7 +136,10 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     flock, grid = with_room(flock_of(particles, grid, loss is not None, bool(scene.surfaces)), grid)
     shortest = max(_SHORTEST * epoch_of(scene, particles, grid), 0.0 if loss is None else loss.duration)
     walls = compiled.walls(0.0) if scenery is None else scenery.given
-    made = Domain(walls, laws, scene.pull(), grid, kinds_of(particles, flock.flight), loss, shortest)
+    kinds = kinds_of(particles, flock.flight)
+    if laws.may_wait:
+        flock, kinds = flock._replace(holds=1.0), Holdable(flock.flight, particles.mass.copy())
+    made = Domain(walls, laws, scene.pull(), grid, kinds, loss, shortest)
     made = made._replace(turning=turning)
     if scene.gravity is not None:
         # Also where nothing is lost: balls may start at rest on a floor.

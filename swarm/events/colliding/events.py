@@ -11,13 +11,14 @@ import math
 
 from ...common.status import Status
 from ...kernel.arrays import index
+from ...kernel.gravity import potential
 from ...kernel.jit import long_kernel, outlined, select
-from ...kernel.vector import norm, put, square
+from ...kernel.vector import either, norm, put, square
 from ...lanes.watching.log import Struck, is_full
-from .again import aim_again, queue_both, vanish
+from .again import aim_again, queue_both, stay, vanish
 from .ahead import fetch_next
 from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
-from .bounce import FLIES, GONE, bounce
+from .bounce import FLIES, GONE, STAYS, bounce, press
 from .cells import cross, mark_near, until_exit
 from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, REACH, SAME, fit, moment_of
 from .followed import come_over, follow
@@ -26,7 +27,7 @@ from .meet import met
 from .queue import FIRST, build, requeue
 from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NO_PARTNER, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
 from .striking import renew_ended, shift_leases, strike_heavy
-from .window import END, OUT
+from .window import END, HELD, OUT
 
 # So many events a ball between which no time passes: then time does not pass at all.
 _AT_ONCE = 1000
@@ -50,20 +51,34 @@ def _collide(box, flock, books, clock, i, now):
         r, v = flock.at(box.pull, one, now)
         there, w = flock.at(box.pull, other, now)
         blow = met(box, flock, (one, r, v), (other, there, w), now)
-        flock.put(one, now, r, blow.one)
-        flock.put(other, now, there, blow.other)
+        _send(box, flock, books, (one, r, blow.one), v, now)
+        _send(box, flock, books, (other, there, blow.other), w, now)
         _book(flock, books, clock, (one, other), blow, now)
         if box.repose is not None:
             box.repose.count(clock, square((blow.other - blow.one) - (w - v)), now)
         if box.watchers.log is not None:
-            impulse = box.kinds.mass_of(one) * norm(blow.one - v)
-            struck = Struck(one, -1.0, moment_of(clock, now), r, v, blow.one, impulse, partner=other)
+            impulse, after = box.kinds.mass_of(one) * norm(blow.one - v), blow.one
+            if flock.holds is not None:
+                held, leaves = flock.is_held(one, now), flock.velocity(one)
+                v, after = either(held, leaves, v), either(held, leaves, after)
+            struck = Struck(one, -1.0, moment_of(clock, now), r, v, after, impulse, partner=other)
             box.watchers.log.hit(books.image, struck)
         flock.event[index(FLOATS * other + MEETS)] = math.inf
-        aim_again(box, flock, one, now)
-        queue_both(flock, one)
-        aim_again(box, flock, other, now)
-        queue_both(flock, other)
+        for k in (one, other):
+            if flock.is_held(k, now):
+                stay(box, flock, k, now)
+            else:
+                aim_again(box, flock, k, now)
+            queue_both(flock, k)
+
+
+def _send(box, flock, books, ball, before, now):
+    """Store the flight of a ball, its number, its place and its velocity, after a collision; one that is held stays."""
+    i, r, v = ball
+    if flock.is_held(i, now):
+        press(box, flock, books, i, now, box.kinds.mass_of(i) * (v - before))
+    else:
+        flock.put(i, now, r, v)
 
 
 def _book(flock, books, clock, pair, blow, now):
@@ -98,11 +113,18 @@ def _look_for_wall(box, flock, i, now):
 
 
 def _at_given_wall(box, flock, books, clock, i, now):
-    ended = FLIES
-    if flock.event[index(FLOATS * i + WALL)] >= 0.0:
+    ended, wall = FLIES, flock.event[index(FLOATS * i + WALL)]
+    if flock.holds is not None and wall <= HELD:
+        _let_go(box, flock, books, i, now)
+    elif wall >= 0.0:
         ended = bounce(box, flock, books, clock, i, now)
         if ended == GONE:
             vanish(box, flock, i)
+            ended = FLIES
+        elif flock.holds is not None and ended == STAYS:
+            box.kinds.hold(i)
+            stay(box, flock, i, now)
+            queue_both(flock, i)
             ended = FLIES
         elif ended == FLIES:
             aim_again(box, flock, i, now)
@@ -110,6 +132,18 @@ def _at_given_wall(box, flock, books, clock, i, now):
     else:
         _look_for_wall(box, flock, i, now)
     return ended
+
+
+@outlined
+def _let_go(box, flock, books, i, now):
+    """A ball leaves the wall that has held it."""
+    box.kinds.mass[index(i)] = books.mass[index(i)]
+    # With another stamp: who was to meet it there looks anew.
+    twice = flock.kept.at(i, flock.stamp(i), square(flock.velocity(i)) + 2.0 * potential(box.pull, flock.place(i)))
+    flock.put(i, now, flock.place(i), flock.velocity(i))
+    flock.kept.keep(i, flock.stamp(i), twice)
+    aim_again(box, flock, i, now)
+    queue_both(flock, i)
 
 
 @outlined
@@ -163,7 +197,7 @@ def begin(box, flock, now, first, last):
     At the start this is the next event of each ball. Later, where a window begins, it is only the next wall of each.
     """
     for i in range(first, last):
-        if flock.event[index(FLOATS * i + WALL)] == OUT:
+        if flock.event[index(FLOATS * i + WALL)] <= OUT:
             continue
         if box.window is not None and now >= 0.0:
             forget_wall(box, flock, i)
@@ -306,6 +340,8 @@ def show(box, flock, state, end, first, last):
         r, v = flock.at(box.pull, k, end)
         if box.gates is not None and flock.event[index(FLOATS * k + WALL)] == OUT:
             r, v = flock.place(k), flock.velocity(k)
+        # That with which it leaves
+        v = either(flock.is_held(k, end), flock.velocity(k), v)
         for axis, cells in enumerate(box.grid.axes()):
             x = r[axis]
             if cells.period is not None:

@@ -10,7 +10,7 @@ from .clock import moment_of
 
 def follow(box, flock, books, clock, i, now):
     """Tell the counters of the flight of a ball until now, from where they know it."""
-    if box.watchers.counters is not None:
+    if box.watchers.counters is not None and not flock.is_held(i, now):
         _tell(box, flock, books, clock, i, now)
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, displacement
 from ...kernel.jit import Array, select
-from ...kernel.vector import Vec
+from ...kernel.vector import ZERO, Vec, either
 
 # Numbers of a row, and whole numbers in the same memory.
 FLOATS, WHOLES = 8, 16
@@ -54,6 +54,7 @@ class Flock(NamedTuple):
     kept: Any = None  # `Kept`, None where there are no walls
     freedoms: Any = None  # of walls with a mass, or None
     followed: Any = None  # (N) until when counters know the flight of each [s since the epoch]; None without counters
+    holds: Any = None  # 1.0 where walls may hold balls: the flight of one that is held begins later than now; or None
 
     def number(self):
         """The number of balls."""
@@ -79,9 +80,15 @@ class Flock(NamedTuple):
         row = FLOATS * i + k
         return Vec(self.flight[index(row)], self.flight[index(row + 1)], self.flight[index(row + 2)])
 
+    def is_held(self, i, now):
+        """Whether a wall holds it at a time."""
+        return False if self.holds is None else self.time(i) > now
+
     def at(self, pull, i, now):
-        """Its position and its velocity at a time, in flight."""
+        """Its position and its velocity at a time, in flight or held."""
         way, v = now - self.time(i), self.velocity(i)
+        if self.holds is not None:
+            way, v = select(way < 0.0, 0.0, way), either(way < 0.0, ZERO, v)
         return self.place(i) + displacement(pull, v, way), accelerated(pull, v, way)
 
     def put(self, i, now, r, v):

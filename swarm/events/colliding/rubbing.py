@@ -17,7 +17,7 @@ from ...contact.reflection import given, relative, wall_velocity
 from ...kernel.arrays import index
 from ...kernel.jit import Array, outlined, select
 from ...kernel.record import Record
-from ...kernel.vector import Vec, cross, dot, square
+from ...kernel.vector import ZERO, Vec, cross, dot, either, square
 
 # Of the slip, what the velocity takes where it stops, and R times the spin: they add up to 1.
 _STOP, _TURN = INERTIA / (1.0 + INERTIA), 1.0 / (1.0 + INERTIA)
@@ -60,13 +60,17 @@ def rub_pair(kinds, turning, pair, n, u, impulse):
     """
     i, j = pair
     one, other = kinds.radius_of(i), kinds.radius_of(j)
-    slip = _across(u, n) - cross(one * turning.at(i) + other * turning.at(j), n)
+    # A ball that is held does not turn; its spin is that with which it leaves.
+    held, holds = kinds.is_held(i), kinds.is_held(j)
+    spin, spins = either(held, ZERO, turning.at(i)), either(holds, ZERO, turning.at(j))
+    slip = _across(u, n) - cross(one * spin + other * spins, n)
     share = _share(turning.friction, impulse, slip)
     change, twist = (-share * _STOP) * slip, (share * _TURN) * cross(n, slip)
     mass = kinds.mass_of(i) * kinds.share(i, j)
     taken = mass * (square(u) - square(u + change))
-    taken += kinds.mass_of(i) * one * one * turning.add(i, (kinds.share(i, j) / one) * twist)
-    taken += kinds.mass_of(j) * other * other * turning.add(j, (kinds.share(j, i) / other) * twist)
+    turn, turns = (kinds.share(i, j) / one) * twist, (kinds.share(j, i) / other) * twist
+    taken += kinds.mass_of(i) * one * one * turning.add(i, either(held, ZERO, turn))
+    taken += kinds.mass_of(j) * other * other * turning.add(j, either(holds, ZERO, turns))
     return change, 0.5 * taken
 
 

@@ -18,8 +18,8 @@ from .rows import FLOATS, LEAVES
 
 # Of a window: its end and its length [s since the epoch], how many instants there were before its end, that end [s].
 END, SPAN, PASSED, MOMENT, WINDOW = 0, 1, 2, 3, 4
-# No wall is known yet; the ball is no more among the walls.
-UNKNOWN, OUT = -2.0, -3.0
+# No wall is known yet; the ball is no more among the walls; from this number on downwards a wall holds it.
+UNKNOWN, OUT, HELD = -2.0, -3.0, -4.0
 
 
 def walls_at(box, i, now):

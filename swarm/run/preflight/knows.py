@@ -16,7 +16,6 @@ from ...methods.fixed_step import SoftWalls
 from ...particles import Particles, TiedParticles
 from ...scene import Scene
 from ...surfaces.in_motion.drive import drive_of
-from ...surfaces.laws.sticky import Sticky
 from ...surfaces.periodic.images import MASS_AND_PERIOD, WITHOUT_PERIOD
 from ...surfaces.pieces import differing_in
 from ...surfaces.surface import Surface
@@ -148,11 +147,6 @@ def _waits_beside_motions(asked: Asked) -> Found:
         yield from _waits(asked)
     else:
         yield from (one for one in _waits(asked) if asked.scene.surfaces[one["i"]].reacts())
-
-
-def _sticky(asked: Asked) -> Found:
-    for i, surface in enumerate(asked.scene.surfaces):
-        yield from ({"i": i, "k": k, "got": law} for k, law in enumerate(surface.laws) if isinstance(law, Sticky))
 
 
 def _doors(asked: Asked) -> Found:
@@ -640,10 +634,11 @@ CAPABILITIES = (
             "would have to move with its wall", "leave that law out, or the motions",
         ),
     }, within="law of a wall"),
-    Capability("wait", _sticky, {
-        _RIGID_BALLS: Refusal(
-            "surfaces[{i}].laws[{k}] must not let particles with a radius wait, got {got!r:.200}",
-            "use a law without a wait, such as Lambert, Penalty, or leave the radius out",
+    Capability("wait", _waits, {
+        (HEAVY,): Refusal(
+            "surfaces[{i}].laws[{k}] must not let particles with a radius wait where a wall has a mass, got "
+            "{got!r:.200}: the wall may come to where they wait",
+            "use a law without a wait, such as Lambert, or give the wall a motion instead of a mass",
         ),
         (BODIES,): Refusal(
             "surfaces[{i}].laws[{k}] must not let bodies wait, got {got!r:.200}: a wall holds one point of a body, and "

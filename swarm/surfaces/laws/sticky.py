@@ -13,8 +13,8 @@ class Sticky(WallLaw):
     With another law it leaves by that: `laws=[Lambert(), Sticky(1e-3)]`. Files and observables have a particle that
     waits where it is on the wall, with the velocity with which it will leave, so its energy and momentum are those
     after the impact, and the log of impacts has the time of the impact. It costs nothing in frames in which it waits.
-    With `Penalty` it leaves at the start of a step; a grain that waits is a fixed sphere for others. The scene must
-    have no motion, and the wall no mass.
+    With `Penalty` it leaves at the start of a step. A ball or a grain that waits is a fixed sphere for others. The
+    scene must have no motion, and the wall no mass; where particles have a radius no wall has one.
 
     Raises:
         SceneError: by the surface: a time below 0; by the run: a wall moves.
