@@ -138,7 +138,7 @@ def _at_given_wall(box, flock, books, clock, i, now):
 def _let_go(box, flock, books, i, now):
     """A ball leaves the wall that has held it."""
     box.kinds.mass[index(i)] = books.mass[index(i)]
-    # With another stamp: who was to meet it there looks anew.
+    # With another stamp: a ball that was to meet it there looks anew.
     twice = flock.kept.at(i, flock.stamp(i), square(flock.velocity(i)) + 2.0 * potential(box.pull, flock.place(i)))
     flock.put(i, now, flock.place(i), flock.velocity(i))
     flock.kept.keep(i, flock.stamp(i), twice)
