@@ -7,7 +7,7 @@ from ..errors import SceneError
 from .options import Option, Positional
 from .shown import Picture, TrajectoryFile, written
 
-ReplacesPicture = Annotated[bool, typer.Option("--overwrite", help="Replace an existing picture.")]
+ReplacesPicture = Annotated[bool, Option("--overwrite", help="Replace an existing picture.")]
 
 
 def record(
