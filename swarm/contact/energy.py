@@ -7,6 +7,7 @@ from ..kernel.gravity import potential, weight
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot, norm, square, total
+from ..surfaces.presence.rooms import least_of
 from ..surfaces.walls import Field
 
 # The force needs these of every wall.
@@ -37,11 +38,20 @@ def contact_energy(law, walls, over_mass, r):
     """Energy per mass that one particle stores in the walls, by 1/mass; rigid walls (None) store none."""
     if law is None:
         return 0.0
+    stored = _stored_in(law, tuple(wall for _number, wall in walls.shared()), r)
+    for rooms in walls.joined():
+        each = tuple(_stored_in(law, tuple(wall for _number, wall, _gentle in room), r) for room in rooms)
+        stored = stored + least_of(each)
+    return stored * over_mass
+
+
+def _stored_in(law, walls, r):
+    """The energy that a particle stores in some walls."""
     stored = 0.0
-    for wall in reversed(walls.each):
+    for wall in reversed(walls):
         gap = wall.members.deepest_in_cell(r) if isinstance(wall, Field) else wall.gap_of(wall.inner(r))
         stored = law.stored_energy(gap) + stored
-    return stored * over_mass
+    return stored
 
 
 def energy_uncertainty(walls, law, over_mass, r, s):

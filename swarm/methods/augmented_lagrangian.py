@@ -84,6 +84,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     impacts; flights are exact (`python -m bench order`). Cost: sweeps times a scalar solve; the sweeps are in the
     observable "sweeps".
     Laws of walls, openings and doors are those of `Penalty`: laws act where a contact ends.
+    In unions of several rooms, and in foams, a step that is cut at an impact takes the walls of the room that it is in.
     Walls may move in fixed steps, which are those of the frame of each wall; steps that are cut at
     impacts, and exact impacts in their place, know walls at rest only.
     Source: García Orden & Ortega 2007, eqs. (6)-(9), and the composite form of contact/discrete_gradient.py.

@@ -248,8 +248,8 @@ class CutSteps(StepNumbers):
         return True
 
     def held(self, walls, start, wall):
-        # Of a field the member that is met: its row is the number of that.
-        if len(walls.fields()) == 0:
+        # Of a field the member that is met: its row is the number of that. Of a union the room.
+        if len(walls.fields()) == 0 and len(walls.unions) == 0:
             return walls, wall
         return as_met(walls, wall), select(wall < 0.0, wall, 1.0 * walls.row(wall))
 

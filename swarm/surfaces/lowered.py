@@ -1,4 +1,4 @@
-"""Walls as a contact step takes them: of a field the member that is met, and lowered for a step centred about it.
+"""Walls as a contact step takes them: of a field the member that is met, of a union the room, and lowered if centred.
 
 A centred step begins in State I, on the level surface of phi through its start, and ends on it: there the gap is 0.
 """
@@ -8,6 +8,7 @@ from typing import Any
 from ..kernel.jit import select
 from .contract import Smooth
 from .frames import Unturned
+from .presence.rooms import is_of_room
 from .walls import Field
 
 
@@ -28,7 +29,7 @@ class Lowered(Unturned):
 
 
 class MetMember(Unturned):
-    """The member of a field that a step is a contact with, if it is `here`; else a wall that nothing reaches."""
+    """A wall of a field or a room that a contact may be one with, if it is `here`; else one that nothing reaches."""
 
     body: Any
     here: Any
@@ -45,15 +46,22 @@ class MetMember(Unturned):
 
 
 def as_met(walls, number):
-    """The walls with one member of each field in its place, that with this number, which others do not reach."""
+    """The walls that a contact with this one may be one with: of fields and unions no other bodies, and no other rooms.
+
+    Of each field one member is in its place, that with this number, which others do not reach.
+    """
     each: Any = ()
-    for first, wall in walls.numbered():
+    for first, wall in walls.shared():
         if isinstance(wall, Field):
             here = (number >= first) & (number < first + wall.count())
             each = (*each, MetMember(wall.members.wall(number - first), here))
         else:
             each = (*each, wall)
-    return walls._replace(each=each)
+    for rooms in walls.joined():
+        for room in rooms:
+            here = is_of_room(room, number)
+            each = (*each, *(MetMember(wall, here) for _number, wall, _gentle in room))
+    return walls.alone(each)
 
 
 def lowered(walls, number, r):

@@ -165,15 +165,76 @@ def test_openings_counters_and_sources():
 
 
 def test_what_one_spring_cannot_be_is_a_sentence():
+    fixed = swarm.AugmentedLagrangian(dt=5e-3, penalty=4e3)
+
     def refused(wall, what):
-        with pytest.raises(swarm.SceneError, match=what):
-            run([wall], starts(1))
+        for method in (SOFT, fixed):
+            with pytest.raises(swarm.SceneError, match=what + f".*{type(method).__name__}"):
+                run([wall], starts(1), method=method)
 
     parts = [swarm.Box((0.35, 0.4, 0.45), (x, 0.0, 0.0)) for x in (-0.35, 0.35)]
     door = swarm.Opening(swarm.Plane((0.0, 1.0, 0.0), 0.0), between=True)
-    refused(swarm.Union(parts, openings=[door]), "must not have rooms that touch at a wall between them with Penalty")
+    refused(swarm.Union(parts, openings=[door]), "must not have rooms that touch at a wall between them with")
     lossy = [swarm.Sphere(0.5, restitution=0.5), swarm.Sphere(0.4, (0.6, 0.1, 0.0))]
-    refused(swarm.Union(lossy), "must have the same restitution in all of its parts with Penalty")
+    refused(swarm.Union(lossy), "must have the same restitution in all of its parts with")
     hole = swarm.Sphere(0.1, (0.0, 0.0, 0.5))
     one = [swarm.Box((0.5, 0.5, 0.5), openings=[hole]), swarm.Box((0.4, 0.4, 0.5), (0.5, 0.0, 0.0))]
     refused(swarm.Union(one), "must have the same openings in all of its parts")
+
+
+# --- Multipliers ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("start", ["impact", "centred"])
+@pytest.mark.parametrize(
+    "wall", [spheres, boxes, lambda **_laws: swarm.Spheres(*BALLS, side="inside")], ids=["spheres", "boxes", "foam"]
+)
+def test_a_loop_that_converges_is_the_chord_on_the_wall_of_one_room(wall, start):
+    # It is found without a loop by `Impact`.
+    place = np.array([(-0.1, 0.2, 0.1), (0.1, 0.1, 0.0), (0.7, 0.15, 0.1)]).T
+    speed = np.array([(-0.9, 0.7, 1.1), (1.2, 0.05, 0.06), (-0.5, 0.9, -0.2)]).T
+    loop = swarm.AugmentedLagrangian(
+        dt=5e-3, penalty=1e6, tolerance=1e-28, adaptive=True, acceleration="reflection", max_sweeps=200,
+        contact_start=start,
+    )  # fmt: skip
+    by_loop = run([wall()], (place, speed), 2.5, loop)
+    chord = run([wall()], (place, speed), 2.5, swarm.Impact(contact_step=5e-3, contact_start=start))
+    assert by_loop.observables["impacts"][-1] > 6
+    assert by_loop.observables["impacts"][-1] == chord.observables["impacts"][-1]
+    assert np.abs(by_loop.particles.position - chord.particles.position).max() < 1e-10
+    assert by_loop.observables["energy_error"].max() < 1e-13
+    assert by_loop.observables["contact_energy"].max() < 1e-20
+    assert swarm.Scene([wall()]).gaps(by_loop.particles.position).max() < 1e-12
+
+
+def test_parts_may_differ_where_steps_are_cut_at_impacts():
+    parts = [swarm.Sphere(0.5, restitution=0.5), swarm.Sphere(0.4, (0.6, 0.1, 0.0), friction=0.3)]
+    loop = swarm.AugmentedLagrangian(dt=1e-6, penalty=1e12, adaptive=True, acceleration="reflection", tolerance=1e-22)
+    start = starts(3)
+    by_loop, exact = (run([swarm.Union(parts)], start, method=method) for method in (loop, swarm.Impact()))
+    assert exact.observables["dissipated_energy"][-1] > 0.3
+    assert by_loop.observables["dissipated_energy"] == pytest.approx(exact.observables["dissipated_energy"], abs=1e-4)
+    assert np.abs(by_loop.particles.position - exact.particles.position).max() < 1e-4
+
+
+@pytest.mark.parametrize("whole", [True, False], ids=["union", "box"])
+def test_the_loop_in_the_edge_of_one_room_takes_the_walls_of_that_room_alone(whole):
+    loop = swarm.AugmentedLagrangian(dt=5e-3, penalty=1e6, tolerance=1e-28, adaptive=True, max_sweeps=200)
+    wall = boxes() if whole else swarm.Box((0.5, 0.5, 0.5))
+    result = run([wall], ([(-0.25,), (-0.25,), (0.0,)], [(-1.0,), (-1.0,), (0.3,)]), 0.4, loop)
+    assert result.observables["impacts"][-1] == 1
+    # An exact impact in its place takes none.
+    assert result.observables["sweeps"].sum() > 1
+    assert result.particles.velocity[:, 0] == pytest.approx([1.0, 1.0, 0.3], abs=1e-12)
+    assert result.observables["energy_error"].max() < 1e-13
+
+
+def test_fixed_steps_of_the_loop_in_two_boxes_are_those_in_one_long_box():
+    halves = [swarm.Box((0.35, 0.4, 0.45), (x, 0.0, 0.0)) for x in (-0.35, 0.35)]
+    loop = swarm.AugmentedLagrangian(dt=5e-3, penalty=4e3, on_unconverged="count", max_sweeps=4)
+    two, one = (run([wall], starts(2), method=loop, gravity=(0.1, -0.2, -1.0)) for wall in (
+        swarm.Union(halves), swarm.Box((0.7, 0.4, 0.45)),
+    ))  # fmt: skip
+    assert one.observables["impacts"][-1] >= 2
+    assert (two.observables["unconverged"] == one.observables["unconverged"]).all()
+    assert np.abs(two.particles.position - one.particles.position).max() < 1e-8

@@ -171,13 +171,18 @@ def _unions(asked: Asked) -> Found:
     yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().unions())
 
 
+def _takes_rooms(asked: Asked) -> bool:
+    """Whether the steps of a method are cut at impacts, so that it knows in which room they are."""
+    return bool(getattr(asked.method, "adaptive", False))
+
+
 def _rooms_that_touch(asked: Asked) -> Found:
-    if any(_unions(asked)) and asked.scene.compiled().walls().inset is not None:
+    if not _takes_rooms(asked) and any(_unions(asked)) and asked.scene.compiled().walls().inset is not None:
         yield from _unions(asked)
 
 
 def _rooms_that_differ(asked: Asked) -> Found:
-    for one in _unions(asked):
+    for one in () if _takes_rooms(asked) else _unions(asked):
         if (what := differing_in(one["got"])) is not None:
             yield {**one, "what": what}
 
@@ -355,6 +360,7 @@ class Refusal(NamedTuple):
 _TO_MOTION = "give that wall a motion instead of a mass"
 _TO_POINTS = "use particles without a radius"
 _TO_EXACT = "use Impact() with contact_step = 0"
+_TO_ROOMS = "use Impact, or AugmentedLagrangian with adaptive=True"
 _NO_STEP = "leave contact_step out"
 _WITH_PENALTY = "particles that have a radius and Penalty"
 _WITH_IMPACT = "particles that have a radius and Impact"
@@ -454,7 +460,7 @@ CAPABILITIES = (
     }),
     Capability("union", _rooms, {
         (SOFT_BODIES, PAPER_BODIES): _of_one_room("bodies and soft walls", "use Impact(dt=...)"),
-        (PAPER, BASELINE, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
+        (BASELINE, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
         (HEAVY,): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
     }),
     Capability("union with walls between its rooms", _rooms_that_touch, {
@@ -463,16 +469,16 @@ CAPABILITIES = (
             "that ends in the next room would not be seen to have passed it",
             "leave a space between the rooms, let them overlap, or use particles and Impact()",
         ),
-        (SOFT,): Refusal(
+        (SOFT, PAPER): Refusal(
             "surfaces[{i}] must not have rooms that touch at a wall between them with {method}, got {got!r:.200}: a "
             "soft wall without a thickness holds no point",
-            "leave a space between the rooms, let them overlap, or use Impact",
+            f"leave a space between the rooms, let them overlap, or {_TO_ROOMS}",
         ),
     }, within="union"),
     Capability("union of parts that differ", _rooms_that_differ, {
-        (SOFT,): Refusal(
+        (SOFT, PAPER): Refusal(
             "surfaces[{i}] must have the same {what} in all of its parts with {method}, got {got!r:.200}: its walls "
-            "are one spring", "give the {what} to the whole, or use Impact",
+            "are one spring", f"give the {{what}} to the whole, or {_TO_ROOMS}",
         ),
     }, within="union"),
     Capability("union beside guides and cavities", _unions_beside_own, {
