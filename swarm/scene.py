@@ -62,7 +62,7 @@ class Scene:
     """Rigid surfaces, with admissible sides that intersect in the volume that holds the particles, and gravity.
 
     Args:
-        surfaces: at least one surface; none where the cell repeats in every direction, for balls.
+        surfaces: at least one surface for points; balls need none, as in a cell that repeats in every direction.
         gravity: None, or three numbers (gx, gy, gz) [m/s^2], each at most 1e100.
         period: None, or three lengths (Lx, Ly, Lz) [m] of a cell that repeats without end, None for a direction in
             which it does not: what leaves [0, L) through a face comes back through the other one, and is counted. A

@@ -46,3 +46,11 @@ def test_an_error_within_a_call_stays_as_it_is():
 
 def test_a_public_function_is_pickled_by_its_name():
     assert pickle.loads(pickle.dumps(swarm.simulate)) is swarm.simulate
+
+
+@pytest.mark.parametrize("name", ["Sphere", "Union", "Mesh", "Boxes", "OwnSurface"])
+def test_help_says_where_the_arguments_of_every_surface_are(name):
+    described = getattr(swarm, name).__doc__
+    assert "those of every surface, see\nhelp(swarm.surfaces.surface.Surface)." in described
+    assert "accommodation: in [0, 1]" in swarm.surfaces.surface.Surface.__doc__
+    assert max(map(len, swarm.surfaces.surface.Surface.__doc__.splitlines())) <= 76

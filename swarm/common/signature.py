@@ -129,12 +129,23 @@ def show_in_lines(value: Any) -> None:
     _line_text(value, _INDENTED)
     for kind in value.__mro__ if isinstance(value, type) else ():
         if kind.__module__.partition(".")[0] == value.__module__.partition(".")[0]:
+            if kind is not value and re.search(r"^ *Args:$", kind.__doc__ or "", re.MULTILINE):
+                _name_others(value, kind)
+            _line_text(kind, _INDENTED)
             for one in vars(kind).values():
                 function = getattr(one, "__func__", one)
                 if isinstance(function, FunctionType):
                     _line(function, _INDENTED)
                 if isinstance(function, FunctionType | property | functools.cached_property):
                     _line_text(function, _OF_METHOD)
+
+
+def _name_others(cls: type[Any], base: type[Any]) -> None:
+    """Say behind the arguments of a class where `help` has those of its base."""
+    first, raises, rest = inspect.cleandoc(cls.__doc__ or "").partition("\n\nRaises:")
+    if raises and "Other arguments:" not in first:
+        of = f"those of every {base.__name__.lower()}, see\nhelp({base.__module__}.{base.__name__})."
+        cls.__doc__ = f"{first}\n\nOther arguments: {of}{raises}{rest}"
 
 
 def _line_text(value: Any, indent: int) -> None:

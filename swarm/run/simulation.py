@@ -78,7 +78,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         every: time between frames [s], at most `until`; None: only the first and the last.
         trajectory: HDF5 file to write; its folder must exist.
         recording: Rerun file to write; its folder must exist. Needs the packages of the extra "record".
-        impacts: HDF5 file for a log of every impact, by Impact; see `load_impacts`. Its folder must exist.
+        impacts: HDF5 file for a log of every impact, not with the baselines; see `load_impacts`. Its folder must
+            exist.
         impact_particles: those with impacts in it, "all", k for every k-th one, or a list of particle numbers.
         member_impacts: True to count the impacts on each member of each surface, and how long particles stay there; see
             `Result`.
@@ -121,8 +122,8 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             on from its checkpoint, by default of every 60 s.
         shards: their number, of a cluster; None: one for each thread of its workers. A run of particles that meet, or
             that move a wall, is one shard.
-        sources: `Source`s of particles that come during the run, not with a contact_step, where no wall has a mass;
-            None: none come. All that is random of births is drawn from `seed`.
+        sources: `Source`s of particles that come during the run, not with a contact_step; None: none come. All
+            that is random of births is drawn from `seed`.
 
     Returns:
         A `Result`.
