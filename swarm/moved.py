@@ -1,13 +1,13 @@
 """Modules that moved: imports of their earlier names find them, with a `DeprecationWarning`."""
 
 import importlib
-import importlib.abc
 import importlib.machinery
 import importlib.util
 import sys
 import warnings
 from collections.abc import Sequence
 from types import ModuleType
+from typing import Any
 
 # The earlier folder, the present one, and the modules that moved from one to the other.
 _FOLDERS = [
@@ -102,7 +102,7 @@ def present_name(name: str) -> str | None:
     return MOVED.get(name) or (f"{_WHOLE[folder]}.{leaf}" if folder in _WHOLE else None)
 
 
-class _Finder(importlib.abc.MetaPathFinder):
+class _Finder:
     def find_spec(
         self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> importlib.machinery.ModuleSpec | None:
@@ -111,10 +111,11 @@ class _Finder(importlib.abc.MetaPathFinder):
             return None
         # Frames of the import system are not counted.
         warnings.warn(f"the module {name} is now {present}", DeprecationWarning, stacklevel=2)
-        return importlib.util.spec_from_loader(name, _Loader(present))
+        loader: Any = _Loader(present)
+        return importlib.util.spec_from_loader(name, loader)
 
 
-class _Loader(importlib.abc.Loader):
+class _Loader:
     """Loads the module of another name."""
 
     def __init__(self, present: str) -> None:

@@ -13,7 +13,9 @@ import pytest
 from conftest import row
 
 import swarm
-from swarm import moved
+from swarm import moved, surfaces
+from swarm.methods import ALL_METHODS
+from swarm.surfaces.laws import ALL_LAWS
 
 PACKAGE = Path(swarm.__file__).parent
 # From the top down; a module imports only from layers below its own, or from its own package. `check` and `numbers` of
@@ -51,6 +53,8 @@ LAYER = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 # What the core reaches of wings it reaches by these modules alone, which load by name: the choice of an engine, and the
 # table of views. The kinds of surfaces are a table too, which has those of data and formulas.
 LOADERS = {("run", "engines"), ("views",)}
+# Of a table of kinds it loads modules of the package that has the table.
+LOADER_OF_KINDS = ("common", "kinds")
 # Modules of Numba and of users, and modules by their earlier names.
 LOADERS_OF_OTHERS = {("kernel", "jit"), ("serialization", "plugins"), ("moved",)}
 KINDS = ("surfaces", "__init__")
@@ -100,7 +104,7 @@ def test_the_core_imports_no_wing():
         with row(".".join(parts)):
             if parts[0] not in wings and parts != ("__init__",):
                 assert [one for one in imported(parts) if one[0] in wings] == []
-                if parts not in LOADERS:
+                if parts not in {*LOADERS, LOADER_OF_KINDS}:
                     assert "importlib.import_module" not in path.read_text() or parts[0] in (
                         "kernel",
                         "serialization",
@@ -108,6 +112,18 @@ def test_the_core_imports_no_wing():
                     )
             if parts[0] == "surfaces" and parts[1] not in WINGS_OF_SURFACES and parts != KINDS:
                 assert [one for one in imported(parts) if one[0] == "surfaces" and one[1] in WINGS_OF_SURFACES] == []
+
+
+def test_kinds_are_classes_of_the_package_that_has_their_table():
+    tables = {"surfaces": surfaces.ALL_SURFACES, "surfaces.laws": ALL_LAWS, "methods": ALL_METHODS}
+    for package, table in tables.items():
+        for kind, cls in table.items():
+            with row(package, kind):
+                assert cls.__module__.startswith(f"swarm.{package}.")
+                assert table.kind_of(cls) == kind
+                assert getattr(importlib.import_module(f"swarm.{package}"), cls.__name__) is cls
+    with pytest.raises(AttributeError, match=r"'swarm\.methods' has no attribute 'Euler'"):
+        importlib.import_module("swarm.methods").Euler  # noqa: B018
 
 
 def test_no_module_has_a_public_name():

@@ -56,16 +56,17 @@ def run(  # noqa: PLR0913  one argument an option
     """Simulate a scene file and write its trajectory."""
     began = time.monotonic()
     # An exception in the middle of an import may be lost; nothing is open yet.
-    with interrupt.at_once():
+    with interrupt.importing():
         from .. import scene_file as files
         from ..authoring.file_run import check_outputs, named_alone
         from ..common.checks import duration
         from ..files import paths
         from ..run.simulation import carry_out
-        from .summary import numbers, of_result
 
     def report(status: str, written: Path | None = None, **more: Any) -> None:
         if as_json:
+            from .summary import numbers
+
             print(json.dumps({"status": status, **(numbers(written) if written else {}), **more}, indent=2))
 
     try:
@@ -117,9 +118,12 @@ def run(  # noqa: PLR0913  one argument an option
     except SwarmError as error:
         report("failed", error=str(error))
         raise
-    report("complete", target, wall_time=result.wall_time, compile_time=result.compile_time)
-    if not (quiet or as_json):
-        table(of_result(result, getattr(start, "volume", None)))
+    with interrupt.at_once():
+        report("complete", target, wall_time=result.wall_time, compile_time=result.compile_time)
+        if not (quiet or as_json):
+            from .summary import of_result
+
+            table(of_result(result, getattr(start, "volume", None)))
 
 
 def _stopped(reason: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:

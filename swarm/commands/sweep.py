@@ -49,7 +49,7 @@ def sweep(  # noqa: PLR0913  one argument an option
     ] = False,
 ) -> None:
     """Carry out the runs of a sweep file, and write one table of their results."""
-    with interrupt.at_once():
+    with interrupt.importing():
         from ..common.checks import duration
         from ..fleet import sweeping
 

@@ -8,6 +8,7 @@ import math
 import operator
 import os
 import re
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -55,11 +56,17 @@ def of_class(name: str, value: Any, cls: type[Any]) -> None:
         raise SceneError(f"{name} must be a swarm.{cls.__name__}, got {shown(value)}")
 
 
+def is_masked(value: Any) -> bool:
+    """Whether it is an array with a mask, which no value is before their module is imported: that takes 8 ms."""
+    module = sys.modules.get("numpy.ma")
+    return module is not None and isinstance(value, module.MaskedArray)
+
+
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
     """`value` as a finite float."""
     try:
         # float() accepts the last two, without the imaginary part and without the mask.
-        if isinstance(value, (bool, str, bytes, np.complexfloating, np.ma.MaskedArray)):
+        if isinstance(value, (bool, str, bytes, np.complexfloating)) or is_masked(value):
             raise TypeError
         result = float(value)
     except Exception:  # of float(), or of an object of others
@@ -124,7 +131,7 @@ def bounded(name: str, value: Any) -> float:
 def count(name: str, value: Any, least: int = 1) -> int:
     """`value` as an integer not below `least`."""
     try:
-        if isinstance(value, (bool, np.bool_, np.ma.MaskedArray)):
+        if isinstance(value, (bool, np.bool_)) or is_masked(value):
             raise TypeError
         result = operator.index(value)
     except TypeError:
@@ -145,7 +152,9 @@ def seed(name: str, value: Any) -> int:
 @functools.cache
 def memory() -> int:
     """Memory of this machine [bytes]."""
-    import psutil
+    if hasattr(os, "sysconf"):
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    import psutil  # on Windows
 
     return int(psutil.virtual_memory().total)
 
@@ -274,7 +283,7 @@ def three_lengths(name: str, value: Any) -> Vector:
 def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """`value` as an array of floats."""
     parts = value if isinstance(value, (list, tuple)) else (value,)
-    if any(isinstance(part, np.ma.MaskedArray) for part in parts):
+    if any(map(is_masked, parts)):
         raise SceneError(f"{name} must be an array without a mask, got a masked one; remove or fill the masked entries")
     try:
         given = np.asarray(value)

@@ -6,20 +6,34 @@ or `flight`), and `contact` in lanes; what needs branches and loops is `hard_pas
 below. examples/own_method.py is a complete method.
 """
 
-from .augmented_lagrangian import AugmentedLagrangian
+from typing import TYPE_CHECKING, Any
+
+from ..common.kinds import Kinds
 from .base import Method
-from .impact import Impact
-from .implicit import Midpoint, Trapezoidal
-from .penalty import Penalty
-from .verlet import Verlet
 
-__all__ = ["ALL_METHODS", "AugmentedLagrangian", "Impact", "Method", "Midpoint", "Penalty", "Trapezoidal", "Verlet"]
+if TYPE_CHECKING:
+    from .augmented_lagrangian import AugmentedLagrangian
+    from .impact import Impact
+    from .implicit import Midpoint, Trapezoidal
+    from .penalty import Penalty
+    from .verlet import Verlet
 
-ALL_METHODS: dict[str, type[Method]] = {
-    "impact": Impact,
-    "penalty": Penalty,
-    "augmented-lagrangian": AugmentedLagrangian,
-    "verlet": Verlet,
-    "midpoint": Midpoint,
-    "trapezoidal": Trapezoidal,
-}
+__all__ = [
+    "ALL_METHODS", "AugmentedLagrangian", "Impact", "Method", "Midpoint", "Penalty", "Trapezoidal", "Verlet",
+]  # fmt: skip
+
+ALL_METHODS: Kinds[Method] = Kinds(
+    __name__,
+    {
+        "impact": "impact:Impact",
+        "penalty": "penalty:Penalty",
+        "augmented-lagrangian": "augmented_lagrangian:AugmentedLagrangian",
+        "verlet": "verlet:Verlet",
+        "midpoint": "implicit:Midpoint",
+        "trapezoidal": "implicit:Trapezoidal",
+    },
+)
+
+
+def __getattr__(name: str) -> Any:
+    return ALL_METHODS.named(name)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.catalog import NAMES
-from ..common.checks import shown
+from ..common.checks import is_masked, shown
 from ..common.frames import Frame
 from ..common.snapshot import Snapshot
 from ..errors import RunError, SceneError
@@ -131,7 +131,7 @@ NONE = Measures({}, 0.0)
 def _numbers(given: Any) -> NDArray[np.float64]:
     """What a function has returned, as float64 of its own; a ValueError says what was expected and came."""
     expected = "a number or an array of numbers"
-    if isinstance(given, np.ma.MaskedArray):
+    if is_masked(given):
         raise ValueError(f"{expected}, got a masked array; fill it")
     try:
         array = np.asarray(given)

@@ -20,7 +20,7 @@ from ..methods import ALL_METHODS, Method
 from ..motion import table_of as motion_table
 from ..pairs import Pairs
 from ..scene import Scene
-from ..surfaces import ALL_SURFACES, OwnSurface, Surface
+from ..surfaces import ALL_SURFACES, Surface
 from ..surfaces.laws import ALL_LAWS
 from ..surfaces.presence.doors import Opening
 from ..surfaces.wall_law import WallLaw
@@ -91,9 +91,8 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
 
     Of a long array it holds the name, a digest, under which `arrays` get it; None: the numbers themselves.
     """
-    if isinstance(described, OwnSurface):
-        return _with_nested(described.table(), described, arrays)
-    kinds = {cls: kind for known in (ALL_SURFACES, ALL_METHODS) for kind, cls in known.items()}
+    if own := getattr(described, "table", None):  # of an OwnSurface
+        return _with_nested(own(), described, arrays)
     given = {
         field.metadata.get("key", field.name): getattr(described, field.name)
         for field in kept_fields(type(described))
@@ -102,7 +101,7 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
     table = {key: value for key, value in given.items() if value is not None}
     table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
     mine = type(described)
-    kind = kinds.get(mine, f"{mine.__module__}:{mine.__qualname__}")
+    kind = ALL_SURFACES.kind_of(mine) or ALL_METHODS.kind_of(mine) or f"{mine.__module__}:{mine.__qualname__}"
     return _with_nested({"kind": kind, **table}, described, arrays)
 
 
@@ -291,10 +290,10 @@ def _no_law(where: str, given: Any) -> Any:
 
 def table_of_law(law: Any) -> Any:
     """The table of a built-in law. Of a user-defined law it is the name, as a file cannot hold its code."""
-    kinds = {cls: kind for kind, cls in ALL_LAWS.items()}
-    if type(law) not in kinds:
+    kind = ALL_LAWS.kind_of(type(law))
+    if kind is None:
         return law if isinstance(law, str) else repr(law)
-    return {"kind": kinds[type(law)], **{name: value for name, value in law._asdict().items() if value is not None}}
+    return {"kind": kind, **{name: value for name, value in law._asdict().items() if value is not None}}
 
 
 def table_of_group(group: Mapping[str, Any]) -> dict[str, Any]:
