@@ -6,13 +6,15 @@ from ..surfaces.periodic.period import cut
 from ..surfaces.presence.rooms import at_the_end, inside_of
 from ..surfaces.time_of_impact import flights, safe, strides
 from ..surfaces.time_of_impact.course import MORE_STEPS, SAFE_STEPS
-from ..surfaces.time_of_impact.polynomial import POLYNOMIAL_STEPS
+from ..surfaces.time_of_impact.polynomial import AIMED, POLYNOMIAL_STEPS
 from .field_hits import hit_of_lane, keep_hit, seek
 from .periodic import cut_steps
 from .table import marked_lanes
 
 # Safe steps to walls in any motion that all lanes take in a pass after the first.
 _STRIDES = 3
+# Safe steps to a polynomial are taken by all lanes together if more than one in so many needs some.
+_MANY = 8
 
 
 def go(method, walls, gravity, lanes, live):
@@ -91,19 +93,58 @@ def _go_by_steps(walls, gravity, lanes, live):
     course = lanes.course
     for i in range(index(live)):
         lane = lanes.lane(i)
-        flights.begin(walls.at(lane.remaining), gravity, course, 0, i, lane.r, lane.v)
-    for _step in range(POLYNOMIAL_STEPS if gravity is None and walls.are_polynomial() else SAFE_STEPS):
+        flights.begin(walls.at(lane.remaining), gravity, course, 0, i, lane.r, lane.v, aims=True)
+    together, more = SAFE_STEPS, MORE_STEPS
+    if gravity is None and walls.are_polynomial():
+        together = POLYNOMIAL_STEPS
+        if any(wall.aims for wall in walls.each):
+            _aim(walls, gravity, lanes, live)
+            # However many lanes take steps with it, a lane takes as many.
+            if _MANY * _mark(walls, gravity, lanes, live) < live:
+                together, more = 0, together + more
+    for _step in range(together):
         for i in range(index(live)):
             _step_on(walls, gravity, lanes, i)
     # The few that need more, one by one: a flight in two parts would look like a short one.
-    for i in range(index(live)):
-        lanes.marked[i] = _needs_more(walls, gravity, lanes, i)
-    for k in range(marked_lanes(lanes, live)):
+    for k in range(_mark(walls, gravity, lanes, live)):
         i = lanes.order[k]
-        for _step in range(MORE_STEPS):
+        for _step in range(more):
             _step_on(walls, gravity, lanes, i)
             if not _needs_more(walls, gravity, lanes, i):
                 break
+
+
+def _aim(walls, gravity, lanes, live):
+    """The guesses of all lanes, and those that lead to a hit.
+
+    In a loop each: the chain of operations of one lane is longer than what a processor looks ahead.
+    """
+    course = lanes.course
+    for i in range(index(live)):
+        flights.turn(walls, course, 0, i)
+    for i in range(index(live)):
+        flights.aim(walls, course, 0, i)
+    for i in range(index(live)):
+        flights.aimed(walls, course, 0, i, False)
+    some = _mark(walls, gravity, lanes, live)
+    if _MANY * some < live:
+        for k in range(some):
+            i = lanes.order[k]
+            for _time in range(AIMED - 1):
+                flights.aimed(walls, course, 0, i, True)
+                if not _needs_more(walls, gravity, lanes, i):
+                    break
+    else:
+        for _time in range(AIMED - 1):
+            for i in range(index(live)):
+                flights.aimed(walls, course, 0, i, True)
+
+
+def _mark(walls, gravity, lanes, live):
+    """The number of lanes that need more safe steps; the lanes are in `lanes.order`."""
+    for i in range(index(live)):
+        lanes.marked[i] = _needs_more(walls, gravity, lanes, i)
+    return marked_lanes(lanes, live)
 
 
 def _step_on(walls, gravity, lanes, i):

@@ -258,6 +258,8 @@ class Smooth(AtRest):
 
     # How many numbers of the steps of a straight flight lanes keep, if those are a `PolynomialFlight`.
     kept = 0
+    # Whether these begin with a guess of the root.
+    aims = False
 
     def refined(self, r, v, time):
         """The time to which these steps lead, by what the level is there: its coefficients have the round-off of r."""

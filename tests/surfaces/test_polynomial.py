@@ -2,6 +2,7 @@
 
 import functools
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -9,10 +10,11 @@ import sympy
 from exact import EXACT, TOUCHED, Flight
 
 import swarm
-from swarm.kernel.vector import vec
+from swarm.kernel.vector import dot, vec
 from swarm.surfaces.formulas.derivatives import derived
 from swarm.surfaces.formulas.numbers import OwnNumbers
 from swarm.surfaces.formulas.polynomial import QuadraticCavity, QuadraticSolid, QuarticCavity, QuarticSolid
+from swarm.surfaces.time_of_impact.polynomial import PolynomialFlight
 
 EPSILON = 2.0**-52
 QUARTIC = "x**4/0.09 + y**4/0.09 + z**4/0.13 - 1"
@@ -104,6 +106,51 @@ def test_no_root_is_missed(family, seed):
 @pytest.mark.parametrize("seed", range(100, 150))
 def test_no_root_is_missed_of_many(family, seed):
     _require_first_roots(family, seed)
+
+
+def _from_wall(text, count):
+    """The levels of flights from places of impact, as lanes take them."""
+    wall, particles = _wall(text), swarm.fill(swarm.Scene([swarm.Formula(text)]), count, speed=0.5, seed=2)
+    for r, v in zip(particles.position.T, particles.velocity.T, strict=True):
+        r, v = vec(r), vec(v)
+        yield wall.steps(None, r, v)
+        place = wall.project(r + wall.first_hit(r, v)[0] * v)
+        normal = wall.unit_normal(place)
+        yield wall.steps(None, place, v - (2.0 * dot(normal, v)) * normal)
+
+
+@pytest.mark.parametrize(("text", "share"), [(QUARTIC, 0.95), (RING, 0.9)])
+def test_guesses_lead_to_most_hits_without_safe_steps(text, share):
+    levels = [level for level in _from_wall(text, 30) if level.a4 == 0.0]
+    assert len(levels) == 30
+    assert np.mean([level.first_step()[1] == 0.0 for level in levels]) >= share
+
+
+def _level_with_roots(random):
+    """A level of degree 4 that is below 0 at first, with some of its roots next to each other."""
+    roots = np.abs(random.normal(size=4)) * random.choice([-1.0, 1.0], 4)
+    near = roots[0] * (1.0 + float(random.choice([0.0, 1e-12, 1e-8, 1e-4, 0.1])) * random.normal())
+    roots[1] = random.choice([near, roots[1]])
+    level = np.polynomial.polynomial.polyfromroots(roots[: random.choice([3, 4])])
+    level *= -np.sign(level[0])
+    c, b, a2, a3, a4 = np.append(level, 0.0)[:5]
+    return PolynomialFlight(c, 0.5 * b, a2, a3, a4, window=1.0)
+
+
+def test_no_guess_leads_beyond_a_first_root():
+    """Judged by the value in exact arithmetic: it is above 0 by no more than round-off on the whole way to the hit."""
+    random, hits = np.random.default_rng(5), 0
+    for _flight in range(300):
+        level = _level_with_roots(random)
+        time, length = level.first_step()
+        if length == 0.0:
+            hits += 1
+            powers = [Fraction(a) for a in (level.c, 2.0 * level.b, level.a2, level.a3, level.a4)]
+            for part in np.linspace(0.0, 1.0, 65)[:-1]:
+                t = Fraction(float(part * time))
+                terms = [a * t**k for k, a in enumerate(powers)]
+                assert sum(terms) <= 2e-15 * sum(map(abs, terms)), (level, time, part)
+    assert hits > 100
 
 
 @pytest.mark.parametrize(

@@ -74,6 +74,7 @@ class QuarticCavity(PolynomialNumbers):
 
     in_steps = True
     kept = 5
+    aims = True
 
     @outlined
     def first_hit(self, r, v):
@@ -106,6 +107,7 @@ class QuarticSolid(QuarticCavity):
 
     is_solid = True
     kept = 7
+    aims = False
 
 
 def base_of(along: Any, is_solid: bool) -> Any:

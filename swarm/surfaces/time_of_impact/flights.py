@@ -93,10 +93,12 @@ COURSE = 9
 _WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
 # Of a polynomial all but its window
 _OF_POLYNOMIAL = 0, 1, 2, 3, 4, 5, 8
+# Where a polynomial has no start and end, a guess
+_GUESS = 8
 
 
-def begin(walls, gravity, course, row, lane, r, v):
-    """The start of a flight for every wall into course[row:, lane]."""
+def begin(walls, gravity, course, row, lane, r, v, aims=False):
+    """The start of a flight for every wall into course[row:, lane]; if it `aims`, without what `turn` to `aimed` do."""
     for k, wall in enumerate(walls.each):
         at, steps = row + k * COURSE, wall.steps(gravity, r, v)
         if steps is None:
@@ -111,7 +113,42 @@ def begin(walls, gravity, course, row, lane, r, v):
             for i, number in zip(_OF_POLYNOMIAL, steps, strict=False):
                 if number is not None:
                     course[at + i, lane] = number
+            if aims and wall.aims:
+                course[at + _WINDOW, lane], course[at + _LAST, lane] = steps.window, 0.5 * steps.window
+                continue
         course[at + _TIME, lane], course[at + _LAST, lane] = steps.first_step()
+
+
+def turn(walls, course, row, lane):
+    """Where to guess the first hits of a straight flight from, with each wall that has a guess."""
+    for k, wall in enumerate(walls.each):
+        if wall.aims:
+            at = row + k * COURSE
+            course[at + _GUESS, lane] = _level(course, at, lane, wall).turn()
+
+
+def aim(walls, course, row, lane):
+    """The guesses."""
+    for k, wall in enumerate(walls.each):
+        if wall.aims:
+            at = row + k * COURSE
+            course[at + _GUESS, lane] = _level(course, at, lane, wall).aim(course[at + _GUESS, lane])
+
+
+def aimed(walls, course, row, lane, is_again):
+    """The guesses improved; with those that lead to a hit the first step."""
+    for k, wall in enumerate(walls.each):
+        if wall.aims:
+            at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall)
+            guess, length = level.aimed(course[at + _GUESS, lane], course[at + _LAST, lane], is_again)
+            course[at + _GUESS, lane], course[at + _LAST, lane] = guess, length
+            course[at + _TIME, lane] = select(length > 0.0, 0.0, guess)
+
+
+def _level(course, at, lane, wall):
+    """The `PolynomialFlight` to a wall."""
+    level = PolynomialFlight(*(course[at + i, lane] for i in _OF_POLYNOMIAL[: wall.kept]))
+    return level._replace(window=course[at + _WINDOW, lane]) if wall.aims else level
 
 
 def step(walls, gravity, course, row, lane, r, v):
@@ -122,7 +159,7 @@ def step(walls, gravity, course, row, lane, r, v):
             level = Quartic(*(course[at + i, lane] for i in range(_WINDOW + 1)))
             steps = Fall(level, course[at + _CLOSE, lane], wall.may_be_far)
         elif gravity is None and wall.kept > 0:
-            steps = PolynomialFlight(*(course[at + i, lane] for i in _OF_POLYNOMIAL[: wall.kept]))
+            steps = _level(course, at, lane, wall)
         else:
             steps = wall.steps(gravity, r, v)
         if steps is not None:

@@ -1,8 +1,10 @@
 """Safe steps along a straight flight with a level that is a polynomial of time of degree 4 at most.
 
 The coefficients are known once for the whole flight. From the wall inwards the level has a root at 0, which is divided
-out: what is left is a cubic; its first root above 0 is the hit. The last step leaves to Newton's method what two
-steps of that make round-off: one by the same coefficients, and one by the level at the place of impact.
+out: what is left is a cubic; its first root above 0 is the hit. Steps of Halley's method lead to it from a guess, and
+Bernstein coefficients prove that it is the first. Where they do not, safe steps are taken. The last of those leaves to
+Newton's method what two steps of that make round-off: one by the same coefficients, and one by the level at the place
+of impact, which the hit by Halley's method takes too.
 """
 
 import math
@@ -13,10 +15,64 @@ from ...kernel.limits import EPSILON
 from ...kernel.record import Record
 from .course import Quartic, positive, rise_by, rise_time, under_way
 
-# Steps that all lanes take: of a hundred flights from a wall of degree 4 one needs more.
+# Steps that all lanes take where many of them need some.
 POLYNOMIAL_STEPS = 4
+# In place of 0 below a fraction: no power of its inverse that is needed overflows.
+_TINY = 1e-30
 # From here two steps of Newton's method leave round-off: part of the slope that it changes by on the way to the root.
 _CONVERGES = 1e-5
+# A guess of the root takes so many times two steps of Halley's method in all; the second of these may change the slope
+# by this part of it: the cube of that is left, the square of which is round-off.
+AIMED, _HALLEY_STEPS, _HALLEY_CONVERGES = 3, 2, 1e-3
+# The root of e x^3 + m x^2 + (1 - 2 m) x = 1 - m is (1 + p e + q e^2)/(1 + (1 + p) e + s e^2), for m of 0 or 1/2 to 9 %
+# up to e = 100.
+_P, _Q, _S = 0.8, 0.01, 0.08
+
+
+def _turn(c, b, a2, a3):
+    """Where a cubic c + b t + a2 t^2 + a3 t^3 turns that is next to its first root above 0, or bends the other way."""
+    discriminant = a2 * a2 - 3.0 * a3 * b
+    turns, root = discriminant > 0.0, math.sqrt(abs(discriminant))
+    # Where it is highest and lowest, without cancellation. A division takes as long as ten sums.
+    third, bottom = select(a3 == 0.0, _TINY, 3.0 * a3), a2 + select(a2 < 0.0, -root, root)
+    both = 1.0 / (third * select(bottom == 0.0, _TINY, bottom))
+    over = both * bottom
+    far, near = -bottom * over, -b * (both * third)
+    top, low = select(a2 < 0.0, near, far), select(a2 < 0.0, far, near)
+    falls = (top > 0.0) & (c + top * (b + top * (a2 + top * a3)) > 0.0)
+    return select(turns, select(falls, top, low), -a2 * over)
+
+
+def _guess(c, b, a2, a3, turn):
+    """About its first root above 0, where c < 0; anything if it has none."""
+    value = c + turn * (b + turn * (a2 + turn * a3))
+    # The parabola from there on, or from there back, or from the start on
+    from_there = (turn > 0.0) & ((value < 0.0) | (b * b < 4.0 * a2 * c) | (a2 * a2 > 3.0 * a3 * b))
+    back = from_there & (value >= 0.0)
+    sign, t = select(back, -1.0, 1.0), select(from_there, turn, 0.0)
+    value = sign * select(from_there, value, c)
+    slope = b + t * (2.0 * a2 + 3.0 * t * a3)
+    half = sign * (a2 + 3.0 * t * a3)
+    rise = math.sqrt(positive(slope * slope - 4.0 * half * value))
+    # Its root over/under, and what the cubic term makes of it, e = more/less
+    over, under = -2.0 * value, slope + rise
+    more, less = a3 * over * over, rise * under * under
+    over = over * (less * less + more * (_P * less + _Q * more))
+    under = under * (less * less + more * ((1.0 + _P) * less + _S * more))
+    return t + sign * (over / select(under == 0.0, _TINY, under))
+
+
+def _are_below(b0, b1, b2, b3):
+    """Whether a level of degree 4 with these Bernstein coefficients and 0 at the end is surely below 0 until then."""
+    return (b0 < 0.0) & (b1 < 0.0) & (b2 < 0.0) & (b3 < 0.0)
+
+
+def _are_below_in_halves(b0, b1, b2, b3):
+    """The same by the coefficients of each half, de Casteljau's."""
+    first, second, third, b3 = 0.5 * (b0 + b1), 0.5 * (b1 + b2), 0.5 * (b2 + b3), 0.5 * b3
+    early, middle, late = 0.5 * (first + second), 0.5 * (second + third), 0.5 * (third + b3)
+    before, after = 0.5 * (early + middle), 0.5 * (middle + late)
+    return _are_below(b0, first, early, before) & _are_below(0.5 * (before + after), after, late, b3)
 
 
 class PolynomialFlight(Record):
@@ -38,8 +94,46 @@ class PolynomialFlight(Record):
     most = 60
 
     def first_step(self):
-        start = 0.0 if self.since is None else select(self.since <= self.until, self.since, math.inf)
-        return start, 0.5 * self.window
+        if self.since is not None:
+            return select(self.since <= self.until, self.since, math.inf), 0.5 * self.window
+        time, length = self.aim(self.turn()), 0.5 * self.window
+        for k in range(AIMED):
+            time, length = self.aimed(time, length, k > 0)
+        return select(length > 0.0, 0.0, time), length
+
+    def turn(self):
+        """Where to guess the first root from."""
+        c, b, a2, a3 = self._cubic()
+        return _turn(c, b, a2, a3)
+
+    def aim(self, turn):
+        """A guess of the first root."""
+        c, b, a2, a3 = self._cubic()
+        return _guess(c, b, a2, a3, turn)
+
+    def _cubic(self):
+        """A cubic that is the level on the wall, and above it elsewhere up to the window."""
+        return self.c, 2.0 * self.b, self.a2, self.a3 + self.a4 * self.window
+
+    def aimed(self, t, length, is_again):
+        """(a time nearer to the root, the length or 0 if one step of Newton's method leads from it to the root)."""
+        c, b, a2, a3, a4 = self.c, 2.0 * self.b, self.a2, self.a3, self.a4
+        root, converges = t, False
+        for _step in range(_HALLEY_STEPS):
+            a3t, a4t = root * a3, root * root * a4
+            value = c + root * (b + root * (a2 + a3t + a4t))
+            slope = b + root * (2.0 * a2 + 3.0 * a3t + 4.0 * a4t)
+            half, bend = a2 + 3.0 * a3t + 6.0 * a4t, abs(a2) + 3.0 * abs(a3t) + 6.0 * abs(a4t)
+            steep = slope * slope
+            converges = (slope > 0.0) & (abs(value) * bend <= _HALLEY_CONVERGES * steep)
+            bottom = steep - value * half
+            root = root - value * slope / select(bottom == 0.0, _TINY, bottom)
+        # The level until there is nowhere above the largest of its Bernstein coefficients.
+        a1, a2, a3 = root * b, root * root * a2, root * root * root * a3
+        second, third, fourth = c + 0.25 * a1, c + 0.5 * a1 + a2 * (1.0 / 6.0), c + 0.75 * a1 + 0.5 * a2 + 0.25 * a3
+        below = _are_below_in_halves if is_again else _are_below
+        found, goes_on = converges & (root > 0.0) & below(c, second, third, fourth), length > 0.0
+        return select(goes_on, root, t), select(goes_on & found, 0.0, length)
 
     def next_step(self, t, last):
         """One step towards the first root: (t, its length, 0 if it is the last), as those of `course.Fall`."""
