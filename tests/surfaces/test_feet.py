@@ -9,6 +9,9 @@ import pytest
 from conftest import call
 
 import swarm
+from swarm.kernel.vector import Vec
+from swarm.surfaces.balls import foot_hit
+from swarm.surfaces.time_of_impact import march
 
 WAVES = "x**4 + 2*y**4 + exp(z*z/2) - 1.4 + 0.2*x*y*z"
 
@@ -141,6 +144,47 @@ def test_a_foot_that_is_far_has_a_lower_bound_above_every_radius():
         directions *= (1.0 - 1e-9) * found.away / np.sqrt((directions**2).sum(axis=0))
         assert surface.phi(y[:, None] + directions).max() <= 1e-12
         assert found.sure or found.away >= (1.0 - 1e-3) * largest
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, 0.0), (0.3, 0.1, -1.0)], ids=["straight", "falling"])
+@pytest.mark.parametrize("name", ["waves", "waves outside", "quadric"])
+def test_the_first_impact_is_that_of_safe_steps(name, gravity):
+    """Newton's method finds any impact: what makes it sure is that no other one is before it, also where it grazes."""
+    surface = {
+        "waves": swarm.Formula(WAVES),
+        "waves outside": swarm.Formula(WAVES, side="outside"),
+        "quadric": swarm.Quadric(((1.5, 0.2, 0.0), (0.2, 2.0, 0.3), (0.0, 0.3, 3.0)), constant=-1.0),
+    }[name]
+    wall, rng, checked = surface.by_foot(0.0)._replace(radius=0.04), np.random.default_rng(7), 0
+    pull = Vec(*np.array(gravity))
+    size = 1.0 if surface.side == "outside" else 0.6
+    for k in range(60):
+        r, v = Vec(*rng.uniform(-size, size, 3)), Vec(*rng.uniform(-1.0, 1.0, 3))
+        if not wall.phi(r) < -0.02:
+            continue
+        if k % 2:
+            # From the wall, nearly along it
+            for _ in range(3):
+                r = wall.project(r)
+            n = wall.unit_normal(r)
+            v = v - (sum(a * b for a, b in zip(n, v, strict=True)) + 10.0 ** -float(k % 5)) * n
+        time, meets = foot_hit.first_impact(wall, r, v, pull)
+        met, until = False, 0.0
+        for _pass in range(30):
+            later = r + until * (v + (0.5 * until) * pull), v + until * pull
+            step, met = march.march(wall, *later, pull)
+            until += step
+            if met or not until < 1e9:
+                break
+        expected = until if until < 1e9 else math.inf
+        if not meets or not met:
+            continue
+        checked += 1
+        if checked > 6:
+            break
+        assert (time == expected == math.inf) or abs(time - expected) <= 1e-9 * max(1.0, expected)
+        assert math.isinf(time) or abs(wall.phi(r + time * (v + (0.5 * time) * pull))) <= 2e-15
+    assert checked > 6
 
 
 @pytest.mark.parametrize("side", ["inside", "outside"])

@@ -29,6 +29,8 @@ _TOUCH = 1e-9
 _PARTS = 2.0**-50
 # And at most, where a wall bends away under it.
 _ENOUGH = 0.25
+# By so much more is surely more, for all round-off.
+_SURELY = 1.01
 
 
 class Gates(Record):
@@ -132,12 +134,14 @@ def _lifted(box, walls, wall, r, turned):
     What it gets so is a loss below 0, which the next impact takes back; along the wall nothing changes. Where nothing
     is lost, it is turned, with the speed that it has.
     """
-    n, u = walls.unit_normal(wall, r), wall_velocity(box.laws.moving, walls, wall, r)
-    w = relative(u, turned.v)
-    pull = accelerated(box.pull, ZERO, 1.0)
-    held = walls.outward_acceleration(wall, r, turned.v, pull)
+    u = wall_velocity(box.laws.moving, walls, wall, r)
+    w, pull = relative(u, turned.v), accelerated(box.pull, ZERO, 1.0)
     # Where the wall bends away within that flight, a part of its speed is enough.
     most = max(_ENOUGH * norm(w), 0.5 * norm(pull) * box.shortest)
+    # Few leave so slowly that the wall is asked again.
+    if 0.5 * turned.twice_away > _SURELY * max(most, _PARTS * norm(turned.v)):
+        return turned
+    n, held = walls.unit_normal(wall, r), walls.outward_acceleration(wall, r, turned.v, pull)
     # At least so fast that its own velocity has digits of it
     least, away = max(min(0.5 * held * box.shortest, most), _PARTS * norm(turned.v)), -dot(n, w)
     # An absorbed ball stays as it is.

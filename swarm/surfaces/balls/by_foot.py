@@ -20,9 +20,10 @@ import numpy as np
 
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
-from ...kernel.vector import Symmetric, Vec, dot, norm, square, total
+from ...kernel.vector import ZERO, Symmetric, Vec, dot, norm, square, total
 from .. import contract
 from ..time_of_impact.course import rise_time
+from .foot_hit import applied, first_impact, inverse, matrix
 
 # Newton's steps to a foot; near it each one doubles the digits. The last one is shorter than this part of the distance.
 _SWEEPS, _LAST = 24, 1e-8
@@ -98,8 +99,8 @@ class ByFoot(contract.Smooth):
         # With M = I - k grad grad f a foot moves by T = M^-1 - M^-1 n n^T M^-1/(n.M^-1 n) of what its place moves by.
         found = self.foot(r)
         n = found.normal
-        c = _inverse(_matrix(self, found.place, found.share))
-        w = _applied(c, n)
+        c = inverse(matrix(self, found.place, found.share))
+        w = applied(c, n)
         f, half = 1.0 / dot(n, w), 0.5 / select(found.away > 0.0, found.away, 1.0)
         return Symmetric(
             half * (c.xx - f * w.x * w.x + n.x * n.x - 1.0),
@@ -138,8 +139,15 @@ class ByFoot(contract.Smooth):
         side = self.side_of_body()
         f, n = side * self.body.phi(p), side * self.body.gradient(p)
         size = norm(n)
-        near = _certain(self, r, f, _free(self, r, p, f, n))
+        # Of all places of the box this is the nearest.
+        near = max(_certain(self, r, f, _free(self, r, p, f, n)), norm(r - p))
         return near, n * (1.0 / select(size > _TINY, size, 1.0))
+
+    def first_hit(self, r, v):
+        return first_impact(self, r, v, ZERO)
+
+    def falling_hit(self, r, v, pull):
+        return first_impact(self, r, v, pull)
 
     def passed(self, r, v):
         low, high, far = self.low, self.high, self.radius
@@ -151,6 +159,12 @@ class ByFoot(contract.Smooth):
         """The nearest place of the box."""
         low, high = self.low, self.high
         return Vec(_clipped(r.x, low.x, high.x), _clipped(r.y, low.y, high.y), _clipped(r.z, low.z, high.z))
+
+    def holds(self, r):
+        """Whether the wall may be at a place: it is in the box."""
+        low, high = self.low, self.high
+        x, y = (r.x >= low.x) & (r.x <= high.x), (r.y >= low.y) & (r.y <= high.y)
+        return x & y & (r.z >= low.z) & (r.z <= high.z)
 
     def side_of_body(self):
         """+1 of a cavity, -1 of a solid."""
@@ -175,33 +189,14 @@ def _certain(wall, y, f, away):
     return away
 
 
-def _matrix(wall, z, share):
-    """I - k grad grad f"""
-    h, k = wall.body.hessian(z), -2.0 * share * wall.side_of_body()
-    return Symmetric(1.0 + k * h.xx, 1.0 + k * h.yy, 1.0 + k * h.zz, k * h.xy, k * h.yz, k * h.zx)
-
-
-def _inverse(a):
-    x, y, z = a.yy * a.zz - a.yz * a.yz, a.xx * a.zz - a.zx * a.zx, a.xx * a.yy - a.xy * a.xy
-    xy, yz, zx = a.zx * a.yz - a.xy * a.zz, a.xy * a.zx - a.yz * a.xx, a.xy * a.yz - a.zx * a.yy
-    whole = a.xx * x + a.xy * xy + a.zx * zx
-    f = 1.0 / select(abs(whole) > _TINY, whole, 1.0)
-    return Symmetric(f * x, f * y, f * z, f * xy, f * yz, f * zx)
-
-
-def _applied(a, v):
-    return Vec(
-        a.xx * v.x + a.xy * v.y + a.zx * v.z, a.xy * v.x + a.yy * v.y + a.yz * v.z, a.zx * v.x + a.yz * v.y + a.zz * v.z
-    )
-
-
 @outlined
 def _foot(wall, y):
     """The `Foot`, by Newton's method for y = z - k grad f(z) and f(z) = 0; k is never above 1/(2 m)."""
     body, side = wall.body, wall.side_of_body()
     p = wall.within(y)
     f, n = side * body.phi(p), side * body.gradient(p)
-    away, size, first = _free(wall, y, p, f, n), norm(n), f
+    beside = norm(y - p)
+    away, size, first = max(_free(wall, y, p, f, n), beside), norm(n), f
     # From there so far along the normal
     ahead = rise_time(f, 0.5 * size, wall.most)
     ahead = select((ahead < math.inf) & (f < 0.0), ahead, -f / select(size > _TINY, size, 1.0))
@@ -215,8 +210,8 @@ def _foot(wall, y):
             away = max(away, _free(wall, y, z, f, n))
         if sweep == 0:
             share = min(dot(d, n) / select(n2 > _TINY, n2, 1.0), largest)
-        inverse = _inverse(_matrix(wall, z, share))
-        u, w = _applied(inverse, d - share * n), _applied(inverse, n)
+        back = inverse(matrix(wall, z, share))
+        u, w = applied(back, d - share * n), applied(back, n)
         bottom = dot(n, w)
         after = min(share + (dot(n, u) - f) / select(abs(bottom) > _TINY, bottom, 1.0), largest)
         step = (after - share) * w - u
@@ -233,4 +228,4 @@ def _foot(wall, y):
     size = select(size > _TINY, size, 1.0)
     here = (dot(z - y, n) - f) / size
     sure = sure & (here <= wall.known)
-    return Foot(select(sure, here, _certain(wall, y, first, away)), n * (1.0 / size), z, share, sure)
+    return Foot(select(sure, here, max(_certain(wall, y, first, away), beside)), n * (1.0 / size), z, share, sure)
