@@ -26,7 +26,7 @@ def test_help_begins_with_lines_as_wide_as_a_terminal(name):
 def test_the_signature_holds_every_name_and_default(name):
     function = getattr(swarm, name)
     shown, plain = inspect.signature(function), inspect.Signature.from_callable(inspect.unwrap(function))
-    code = function.__code__
+    code = inspect.unwrap(function).__code__
     names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
     assert tuple(shown.parameters) == names
     assert shown.parameters == plain.parameters

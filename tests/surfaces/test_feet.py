@@ -168,11 +168,11 @@ def test_the_first_impact_is_that_of_safe_steps(name, gravity):
                 r = wall.project(r)
             n = wall.unit_normal(r)
             v = v - (sum(a * b for a, b in zip(n, v, strict=True)) + 10.0 ** -float(k % 5)) * n
-        time, meets = foot_hit.first_impact(wall, r, v, pull)
+        time, meets = call(foot_hit.first_impact, wall, r, v, pull)
         met, until = False, 0.0
         for _pass in range(30):
             later = r + until * (v + (0.5 * until) * pull), v + until * pull
-            step, met = march.march(wall, *later, pull)
+            step, met = call(march.march, wall, *later, pull)
             until += step
             if met or not until < 1e9:
                 break

@@ -41,7 +41,7 @@ class Sure(Record):
     root: Any
 
 
-class Impact(Record):
+class TouchOfWall(Record):
     """An impact: its time, what its foot says, and the speed along the normal; no speed where none was found."""
 
     time: Any
@@ -52,7 +52,7 @@ class Impact(Record):
 @outlined
 def first_impact(wall, r, v, pull):
     """`first_hit` of a ball, in a fall too."""
-    t, found = 0.0, Impact(0.0, Sure(r, 0.0, v, 0.0), 0.0)
+    t, found = 0.0, TouchOfWall(0.0, Sure(r, 0.0, v, 0.0), 0.0)
     for _place in range(_PLACES):
         y, w = r + t * (v + (0.5 * t) * pull), v + t * pull
         speed, g = norm(w), norm(pull)
@@ -134,7 +134,7 @@ def _touched(wall, sure, y):
 
 @outlined
 def _impact(wall, flight, t, z):
-    """An `Impact` near a time and a place, by Newton's method for f(z) = 0, z - k grad f(z) = y(t), k |grad f(z)| = R.
+    """A `TouchOfWall` near a time and a place, by Newton's method for f(z) = 0, z - k grad f(z) = y(t), k |grad f(z)| = R.
 
     By the last two of these grad f.(z - y) = f + R |grad f| to first order, which is an equation for the time alone.
     """
@@ -166,7 +166,7 @@ def _impact(wall, flight, t, z):
                 time, speed = time + (dot(n, d) - f - radius * size) / rate, rate / size
             break
     left = size * size - 4.0 * wall.most * f
-    return Impact(max(time, 0.0), Sure(z, f, n, math.sqrt(select(left > 0.0, left, 0.0))), speed)
+    return TouchOfWall(max(time, 0.0), Sure(z, f, n, math.sqrt(select(left > 0.0, left, 0.0))), speed)
 
 
 # --- Matrices --------------------------------------------------------------------------------------------
