@@ -29,8 +29,8 @@ from .rolling import book_rolling, book_rolling_pairs, roll_pairs, roll_wall, tu
 from .sent_off import send_off
 from .vessel import SweptWall, moves, sweep_of
 
-# A sweep that changes no impulse by more than this part is the last one; also one that gains no more than half of the
-# one before, if that is round-off of what many large impulses leave of one another.
+# A sweep after which the next one would change no impulse by more than this part is the last one; also one that gains
+# no more than half of the one before, if that is round-off of what many large impulses leave of one another.
 _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 # Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them.
 _RUBBED = 1e-2
@@ -184,7 +184,9 @@ def _solve(matter, walls, world):
     while sweeps < _MOST_SWEEPS:
         worst = _sweep(matter, walls, world, share)
         sweeps += 1
-        if worst <= _SOLVED or (worst <= _NEARLY and worst >= _GAIN * before):
+        # What the next one would change is as much less as this one's is than that before.
+        follows = worst * (worst / before) if sweeps > 1 else worst
+        if follows <= _SOLVED or (worst <= _NEARLY and worst >= _GAIN * before):
             break
         if worst <= _LAGGING and share <= _LEAST_SHARE:
             break
