@@ -33,45 +33,56 @@ class Penalty(fixed_step.SoftWalls):
     Raises:
         SceneError: an argument is out of its range; a frame time is not a whole number of steps.
 
-    Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each particle, to round-off, at any dt: a contact step counts only
-    if its energy balances, and one that cannot be solved (a step longer than the cavity into several walls at once)
-    ends the run with an error. Walls are compliant: for a = 1 a particle is up to |v| sqrt(m/alpha) deep in one.
-    Of bodies the links stay rigid, and walls are springs for their contact points, each alone or in cavities.
-    Order: 2 in dt. Cost: free steps are jumped over in one evaluation; a contact step solves one scalar equation. Steps
-    look at the gap at their ends only: a solid thinner than |v| dt is refused, but a step can miss a chord through the
-    edge of a solid that is shorter than |v| dt. A particle that gets through the middle of a solid ends the run with an
-    error that names a penalty which holds it.
-    Walls may move: the step is that of the frame of each wall, and with the energy less the work of the walls it
-    conserves the same. A wall that turns costs some pushes of one at rest in each evaluation of a contact. Where walls
-    move in any way but uniformly, free steps are jumped over in several parts.
-    In a cell that repeats what a step brings out of it comes back at its end; among solids that have images a step may
-    go a twentieth of the shortest period.
-    Laws of walls, such as `restitution`, `friction`, `temperature` and `laws`, act on points where a contact ends: they
-    make of it what they make of an impact on a rigid wall, and what they take or give is booked. Friction is that of
-    the whole impulse of a contact. A contact that a weight makes last is rubbed each time that it swings back.
-    Openings are asked for at the foot of a point on its wall at the start of a step, and doors are at whole steps; what
-    a contact stores with a wall that opens, or goes, is in "dissipated_energy".
-    A `Union` of several rooms, or a foam, is one wall with the same laws for all of its parts: in a doorway nothing
-    pushes, and behind the edge of one the nearer room does.
-    Particles with a radius press on one another and on walls by the same law, with the gap R_i + R_j - |r_i - r_j|:
-    all impulses of a step are solved together, so that energy, momentum and angular momentum of the whole are conserved
-    at any dt. There `restitution` (0.01 or more) and `friction` of `Pairs` and of surfaces count, walls may move in any
-    way, and what is lost is in "dissipated_energy". `temperature` and `laws` of walls act on a ball where a contact
-    ends, on the velocity that its dampers and its friction leave, mirrored; the ball keeps its spin. A damper that
-    never pulls gives the restitution asked for at any speed; friction sticks where it can, so that a pile comes to rest
-    and stays so, and turns balls; their moment of inertia is 2/5 m R^2, in a plane too. A contact should take 12 steps
-    or more. Energy and momentum are those of the impulses that were used; a step in which the limit of friction, or a
-    damper, is met to fewer digits than others is counted in "unconverged". Balls that roll lose energy by `rolling`
-    alone.
+    Points: a contact step counts only if its energy balances; one that cannot be solved (a step longer than the cavity
+    into several walls at once) ends the run with an error. For a = 1 a particle is up to |v| sqrt(m/alpha) deep in a
+    wall. Steps look at the gap at their ends only. A solid thinner than |v| dt is refused, but a step can miss a chord
+    through the edge of a solid that is shorter than |v| dt. A particle that gets through the middle of a solid ends
+    the run with an error, which names a penalty that holds it.
+
+    Walls that move: the step is that of the frame of each wall. A wall that turns costs some pushes of one at rest in
+    each evaluation of a contact. Where walls move in any way but uniformly, free steps are jumped over in several
+    parts.
+
+    Cells that repeat: a particle that leaves the cell comes back at the end of its step. Among solids that have images
+    a step may go a twentieth of the shortest period.
+
+    Laws of walls: `restitution`, `friction`, `temperature` and `laws` act on points where a contact ends. They make of
+    it what they make of an impact on a rigid wall, and what they take or give is booked. Friction is that of the whole
+    impulse of a contact. A contact that a weight makes last is rubbed each time that it swings back.
+
+    Openings: a step decides at its start whether the wall is open at the foot of the point on it. Doors are at whole
+    steps. What a contact stores with a wall that opens, or goes, is in "dissipated_energy".
+
+    Unions and foams: a `Union` of several rooms, or a foam, is one wall with the same laws for all of its parts. In a
+    doorway nothing pushes, and behind the edge of one the nearer room does.
+
+    Bodies: links stay rigid, and walls are springs for the contact points, each alone or in cavities.
+
+    Particles with a radius (grains) press on one another and on walls by the same law, with the gap
+    R_i + R_j - |r_i - r_j|. All impulses of a step are solved together. `restitution` (0.01 or more) and `friction`
+    are those of `Pairs` and of surfaces; what is lost is in "dissipated_energy". A damper that never pulls gives the
+    restitution asked for at any speed. Friction sticks where it can, so that a pile comes to rest and stays so. It
+    turns balls, with a moment of inertia of 2/5 m R^2, in a plane too. Balls that roll lose energy by `rolling` alone.
+    `temperature` and `laws` of walls act on a ball where a contact ends, on the velocity that its dampers and its
+    friction leave, mirrored; the ball keeps its spin. Walls may move in any way.
+
+    A contact should take 12 steps or more. A step in which the limit of friction, or a damper, is met to fewer digits
+    than others is counted in "unconverged"; energy and momentum are those of the impulses that were used.
+
     Two balls that meet at the relative speed v overlap by up to v sqrt(m/alpha), for a = 1, with their reduced mass m,
-    and a ball and a wall with its own; "largest_overlap" is the largest since the frame before. It should be small
-    against the radii, up to a fifth. An overlap of more than the radius of the smaller ball (its centre then has
-    passed a surface) ends the run with an error, and so does a step in which a ball jumps over another one or over a
-    solid.
-    They meet fields, outlines and meshes too, where nothing moves: each body once, and each face once, which are the
-    triangles of a plane or of a convex body, or sides that join smoothly or at an edge towards the balls. In a corner
-    around them they touch both faces. Within a contact's width of where the faces of one surface join, as on the
+    and a ball and a wall with the mass of the ball. "largest_overlap" is the largest since the frame before; it should
+    be at most a fifth of the radii. An overlap of more than the radius of the smaller ball (its centre then has passed
+    a surface) ends the run with an error, and so does a step in which a ball jumps over another one or over a solid.
+
+    Grains meet fields, outlines and meshes too: each solid once, and each face once. A face is the
+    triangles of a plane or of a convex body, or the sides that join smoothly or at an edge towards the balls. In a
+    corner around them they touch both faces. Within a contact's width of where the faces of one surface join, as on the
     facets of a round hopper, they feel both, and are lifted by less than they overlap.
+
+    Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each point, to round-off, at any dt; with walls that move the same
+    less the work of the walls. Of grains the energy, the momentum and the angular momentum of all, at any dt.
+    Order: 2 in dt.
+    Cost: free steps are jumped over in one evaluation; a contact step solves one scalar equation.
     Source: García Orden & Ortega 2007, eqs. (2)-(5), with the composite discrete gradient of surfaces/contract.py.
 
     >>> Penalty(dt=1e-3, penalty=1e4, exponent=0.5)
