@@ -54,3 +54,13 @@ def test_help_says_where_the_arguments_of_every_surface_are(name):
     assert "those of every surface, see\nhelp(swarm.surfaces.surface.Surface)." in described
     assert "accommodation: in [0, 1]" in swarm.surfaces.surface.Surface.__doc__
     assert max(map(len, swarm.surfaces.surface.Surface.__doc__.splitlines())) <= 76
+
+
+def test_paragraphs_of_help_are_as_wide_as_a_terminal():
+    """All but examples and formulas, which are indented."""
+    for name in CALLED:
+        lines = (getattr(swarm, name).__doc__ or "").partition(">>>")[0].splitlines()
+        assert [line for line in lines if len(line) > 76 and not line.startswith("    ")] == [], name
+    columns = swarm.ImpactLog.table.__doc__
+    assert "act there: `time` is the end of the step" in " ".join(columns.split())
+    assert "\n    its row where it ends, as laws of walls act there: `time` is the end\n" in columns

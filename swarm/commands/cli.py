@@ -20,9 +20,7 @@ from .schema import schema
 from .sweep import sweep
 
 _FAILED, _BAD_INPUT = 1, 2
-_CODES = (
-    "Exit codes: 0 done, 1 a run failed, 2 bad input, 75 the wall time is over, go on with --resume, 130 interrupted"
-)
+_CODES = "Exit codes: 0 done, 1 a run failed, 2 bad input, 75 the wall time is over (--resume goes on), 130 interrupted"
 
 
 def _version(ctx: click.Context, _parameter: click.Parameter, wanted: bool) -> None:

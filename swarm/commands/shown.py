@@ -12,7 +12,7 @@ TrajectoryFile = Annotated[Path, Positional(metavar="FILE.h5", help="A trajector
 Picture = Annotated[Path | None, Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")]
 Plugins = Annotated[
     list[str] | None,
-    Option("--plugins", metavar="MODULE", help="Allow code of this module in the file: laws, surfaces, numbers."),
+    Option("--plugins", metavar="MODULE", help="Allow the file to name code of this module."),
 ]
 Quiet = Annotated[bool, Option("--quiet", help="No progress bar and no summary.")]
 

@@ -22,7 +22,7 @@ _COLUMNS, _MODULES = 80, re.compile(r"\b(?:\w+\.)+(?=[A-Za-z])")
 _INDENTED, _OF_METHOD = 4, 8
 # Headings of sections that have entries, the lines of these, and paragraphs that begin with a word and a colon.
 _SECTION = re.compile(r"(Args|Attributes|Returns|Raises|Yields)\b[^:]*:$")
-_ENTRY = re.compile(r" {4}(?! )[*\w., \"-]+: ")
+_ENTRY = re.compile(r" {4}(?! )[*\w.\"-]+(, [*\w.\"-]+)*: ")
 _NOTE = re.compile(r"(Conserves|Order|Cost|Source|Reference): ")
 # What NumPy's name of all that becomes an array stands for: a line of 300 characters.
 _ARRAY = inspect.formatannotation(ArrayLike)
@@ -100,7 +100,7 @@ def _blocks(lines: list[str]) -> list[tuple[int | None, list[str]]]:
         if indent == 0:
             in_section = _SECTION.match(line) is not None
         begins = not found or not found[-1][1][0].strip()
-        stays = stays or line.lstrip().startswith((">>>", "|")) or (indent > 0 and not in_section and begins)
+        stays = stays or line.lstrip().startswith((">>>", "| ")) or (indent > 0 and not in_section and begins)
         if stays or _SECTION.match(line):
             found.append((None, [line]))
         elif found and found[-1][0] is not None and not _ENTRY.match(line) and not _NOTE.match(line):
