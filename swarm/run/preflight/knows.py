@@ -474,6 +474,11 @@ CAPABILITIES = (
             "soft wall without a thickness holds no point",
             f"leave a space between the rooms, let them overlap, or {_TO_ROOMS}",
         ),
+        (BALLS, GRAINS): Refusal(
+            "surfaces[{i}] must not have rooms that touch at a wall between them where particles have a radius, got "
+            "{got!r:.200}: balls know edges of rooms, not those of a wall of no thickness",
+            "let the rooms overlap, or leave the radius out",
+        ),
     }, within="union"),
     Capability("union of parts that differ", _rooms_that_differ, {
         (SOFT, PAPER): Refusal(

@@ -3,11 +3,11 @@
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ...kernel.vector import Vec
 from ..room import room_bounds
@@ -27,9 +27,9 @@ _SLACK, _FAR = 1e-11, 1e6
 # Places from which edges are looked for, and most rooms; of the smallest radius of curvature at these places, what is
 # taken for certain.
 _PLACES, _MOST, _ROUND = 24, 64, 0.5
-# What all parts of a union that balls meet have in common.
+# What all parts of a union that balls meet have in common: laws, and how the whole moves, comes and goes, and opens.
 _LAWS = "restitution", "friction", "temperature", "accommodation", "laws"
-_AT_REST = "motion", "present"
+_CHANGES = "motion", "openings", "present"
 _KINDS = Sphere, Plane, Slab, Box, Cylinder, Cone
 
 
@@ -58,10 +58,27 @@ class Vault(Surface):
         low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
         return tuple(low.tolist()), tuple(high.tolist())
 
+    def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+        return np.asarray(np.min([np.max(gaps, axis=0) for gaps in self._gaps(points, time)], axis=0))
+
+    def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+        rows, gaps = np.array(self._own_rows(points, time)), self._gaps(points, time)
+        least, found = np.argmin([np.max(some, axis=0) for some in gaps], axis=0), np.zeros(np.shape(points))
+        for k, (room, some) in enumerate(zip(self.rooms_of, gaps, strict=True)):
+            for m, one in enumerate(room):
+                found = np.where((least == k) & (np.argmax(some, axis=0) == m), one.gradient(rows), found)
+        return found
+
+    def _gaps(self, points: ArrayLike, time: float) -> list[list[NDArray[np.float64]]]:
+        """phi of each surface of each room."""
+        rows = np.array(self._own_rows(points, time))
+        return [[one.phi(rows) for one in room] for room in self.rooms_of]
+
     def reaching_outside(
         self, points: NDArray[np.float64], radius: NDArray[np.float64], time: float = 0.0
     ) -> NDArray[np.float64]:
-        gaps = [[one.reaching_outside(points, 0.0 * radius, time) for one in room] for room in self.rooms_of]
+        points = np.array(self._own_rows(points, time))
+        gaps = [[one.reaching_outside(points, 0.0 * radius) for one in room] for room in self.rooms_of]
         outside = np.min([np.max(some, axis=0) for some in gaps], axis=0)
         found = np.array(outside)
         for i in np.flatnonzero(outside <= 0.0):
@@ -73,8 +90,8 @@ class Vault(Surface):
 def vault_of(union: Any) -> Vault:
     """A union of several rooms, or a foam, as balls meet it."""
     rooms = union.rooms_of_balls()
-    one = rooms[0][0]
-    return Vault(rooms_of=rooms, **{name: getattr(one, name) for name in _LAWS})
+    one, still = rooms[0][0], [[replace(one.at_rest(), openings=(), present=None) for one in room] for room in rooms]
+    return Vault(rooms_of=tuple(map(tuple, still)), **{name: getattr(one, name) for name in (*_LAWS, *_CHANGES)})
 
 
 def no_balls_in(union: Any) -> str | None:
@@ -89,11 +106,7 @@ def no_balls_in(union: Any) -> str | None:
         if surface.is_solid() or not isinstance(surface, _KINDS):
             known = ", ".join(kind.__name__ for kind in _KINDS)
             return f"{begin}one is made of a {name}, and edges of rooms are known to balls of the insides of {known}"
-        changes = [what for what in _AT_REST if getattr(surface, what) is not None]
-        changes += ["openings"] if surface.openings else []
-        if changes:
-            return f"{begin}a {name} has {changes[0]}, while edges of rooms that balls meet stay as they are"
-    for what in _LAWS:
+    for what in (*_LAWS, *_CHANGES):
         if len({repr(getattr(surface, what)) for surface in surfaces}) > 1:
             return f"{begin}the parts differ in {what}, while an edge belongs to both"
     if len(rooms) > 2 and _any_corner(vault_of(union)):

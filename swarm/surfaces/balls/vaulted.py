@@ -19,7 +19,7 @@ from ...kernel.vector import ZERO, Vec, absolute, cross, dot, either, norm, squa
 from ..contract import Bent, Smooth
 from ..shapes.plane import PlaneNumbers
 from ..shapes.slab import SlabNumbers
-from ..time_of_impact import march
+from ..time_of_impact import march, rising
 
 # Newton's steps to an edge; one that is so many roundings of a place is the last.
 _SWEEPS, _STILL = 60, 4.0 * EPSILON
@@ -117,6 +117,9 @@ class Vaulted(Smooth):
 
     def look(self, r, v, pull, t, is_first):
         return _look(self, r, v, pull, t, is_first)
+
+    def moving_step(self, seen, longest):
+        return _moving_step(self, seen, longest)
 
 
 @outlined
@@ -272,3 +275,63 @@ def _way_of_foot(roundness, slope, away, depth):
 def _unseen(wall, away, way, w, pull):
     """How long a face or an edge stays hidden, or is farther than a radius, with the way until its foot may be seen."""
     return march.time_to_travel(norm(w), norm(pull), max(away - wall.radius, min(way, wall.radius)))
+
+
+# --- In the frame of a union that moves ------------------------------------------------------------------
+
+
+class Hidden(rising.Ahead):
+    """What is not met before a particle has gone a way, as the frame sees it."""
+
+    seen: rising.InWallFrame
+    way: float
+
+    def rise(self, within):
+        speed = self.seen.bounds(within).speed
+        return select(speed > 0.0, self.way / select(speed > 0.0, speed, 1.0), math.inf)
+
+
+@outlined
+def _moving_step(wall, seen, longest):
+    """The `LevelStep` of all faces and edges."""
+    away, place = nearest(wall, seen.r)
+    half = 0.5 * dot((place - seen.r) * (1.0 / select(away > 0.0, away, 1.0)), seen.v)
+    step = longest
+    for face in wall.faces:
+        step = min(step, _moving_to_face(wall, face, seen, longest))
+    for edge in wall.edges:
+        step = min(step, _moving_to_edge(wall, edge, seen, longest))
+    return rising.LevelStep(wall.radius - away, half, step)
+
+
+@outlined
+def _moving_to_face(wall, face, seen, longest):
+    """As `_to_face`."""
+    away, n = face.wall.distance(seen.r), outward(face.wall, seen.r)
+    foot = seen.r - away * n
+    depth, step = hidden(face, foot, n if isinstance(face.wall, FLAT) else ZERO), 0.0
+    if depth <= wall.slack or away <= -wall.radius:
+        step = face.wall.grown(wall.radius).moving_step(seen, longest).time
+    if depth <= wall.slack:
+        return step
+    way = _way_of_foot(_round_at(face, foot, n), face.slope, abs(away), depth)
+    return max(step, _unseen_in_motion(wall, abs(away), way, seen, longest))
+
+
+@outlined
+def _moving_to_edge(wall, edge, seen, longest):
+    """As `_to_edge`."""
+    least = max(abs(edge.one.distance(seen.r)), abs(edge.other.distance(seen.r)))
+    foot = crossing(edge.one, edge.other, seen.r, _FAR * wall.radius)
+    if max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) > wall.slack:
+        return _unseen_in_motion(wall, least, _UNFOUND * wall.radius, seen, longest)
+    away, depth = norm(foot - seen.r), hidden(edge, foot, ZERO)
+    if depth > wall.slack:
+        way = max(_way_of_foot(edge.bend, 0.0, away, depth), _LEAST * depth)
+        return _unseen_in_motion(wall, away, way, seen, longest)
+    return rising.bent_step(Rim(edge.bend, foot, away, wall.radius), seen, longest).time
+
+
+def _unseen_in_motion(wall, away, way, seen, longest):
+    """As `_unseen`."""
+    return Hidden(seen, max(away - wall.radius, min(way, wall.radius))).longest(longest)
