@@ -73,6 +73,11 @@ class Matter(Record):
         return any(one.friction is not None for one in (self.pairs, *self.walls))
 
     @property
+    def damped(self):
+        """Whether a damper acts at every contact: a constant for the compiler."""
+        return all(one.damping is not None for one in (self.pairs, *self.walls))
+
+    @property
     def rolls(self):
         """Whether any rolling is resisted: a constant for the compiler."""
         return any(one.rolling is not None for one in (self.pairs, *self.walls))

@@ -32,6 +32,8 @@ from .vessel import SweptWall, moves, sweep_of
 # A sweep after which the next one would change no impulse by more than this part is the last one; also one that gains
 # no more than half of the one before, if that is round-off of what many large impulses leave of one another.
 _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
+# A sweep is not counted on to change less than this part of what the one before did.
+_LEAST_RATIO = 0.1
 # Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them.
 _RUBBED = 1e-2
 _MOST_SWEEPS = 1000
@@ -184,8 +186,9 @@ def _solve(matter, walls, world):
     while sweeps < _MOST_SWEEPS:
         worst = _sweep(matter, walls, world, share)
         sweeps += 1
-        # What the next one would change is as much less as this one's is than that before.
-        follows = worst * (worst / before) if sweeps > 1 else worst
+        # What the next one would change, by the ratio of the last two; where only dampers act, as what they take is
+        # booked by what they did.
+        follows = worst * max(worst / before, _LEAST_RATIO) if matter.damped and sweeps > 1 else worst
         if follows <= _SOLVED or (worst <= _NEARLY and worst >= _GAIN * before):
             break
         if worst <= _LAGGING and share <= _LEAST_SHARE:
