@@ -19,7 +19,6 @@ from .particles import Particles
 from .surfaces import plane as planes
 from .surfaces import required
 from .surfaces import rotation as rotations
-from .surfaces.balls.vault import vault_of
 from .surfaces.instant import box_of, distances_of, gaps_of, gradient_of, has_room, planes_of
 from .surfaces.periodic.images import Lengths, cell_of, into_cell, is_same_along, lengths_of
 from .surfaces.pieces import Images, Pieces, pieces_of
@@ -261,6 +260,8 @@ class Scene:
         images = [image for images in self.pieces.images for image in images]
         if not any(len(one.rooms) > 1 or one.is_foam() for one in images):
             return self.pieces
+        from .surfaces.balls.vault import vault_of  # loaded where balls are
+
         return pieces_of([vault_of(one) if len(one.rooms) > 1 or one.is_foam() else one for one in images], None)
 
     def pieces_of_balls(self, largest: float) -> Pieces:

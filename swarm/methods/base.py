@@ -74,6 +74,10 @@ class Method(Validated):
         """Whether contacts run Uzawa's loop; its sweeps are then counted."""
         return False
 
+    def is_explicit(self) -> bool:
+        """Whether its steps gain energy without bound where they are too long for a linear spring."""
+        return False
+
     def may_slide(self) -> bool:
         """Whether a particle may stay on its walls: then the kernels of sliding are compiled at the first one."""
         return False

@@ -41,6 +41,9 @@ class Verlet(fixed_step.SoftWalls):
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         return *super().needs(scene), *FORCE_NEEDS
 
+    def is_explicit(self) -> bool:
+        return self.exponent == 1.0
+
     def numbers(self, scene: Scene) -> fixed_step.SoftNumbers:
         # h/(2m)
         return self.record(VerletNumbers, scene, 0.5 * self.dt)

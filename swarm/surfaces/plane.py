@@ -16,7 +16,6 @@ from ..errors import SceneError
 from ..kernel.vector import vec
 from ..motion import Guide, Oscillation, Path, Rotation, Translation, parts_of
 from .facets.mesh import Mesh
-from .fields.bodies import Spheres
 from .fields.many import Many
 from .outlines.outlined import Outlined
 from .shapes.slab import AXES
@@ -178,7 +177,7 @@ def _walls_in(surface: Surface, across: int, reach: float) -> tuple[Floats, Floa
         phi, slope = _level(surface, across, points)
         steep = np.sqrt((slope**2).sum(axis=0))
         part = slope[across] / steep
-        if isinstance(surface, Many) and not isinstance(surface, Spheres):
+        if isinstance(surface, Many) and type(surface).__name__ != "Spheres":
             # As kernels take their axes.
             part = np.where(np.abs(part) <= _ROUND_OFF, 0.0, part)
         here = np.isfinite(part) & (np.abs(phi) <= _NEAR * reach * steep)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,14 +20,14 @@ from .. import motion as motions
 from ..common.checks import Vector
 from ..errors import SceneError
 from .area_samples import NEAR, AreaSample, Random, Region, distances
-from .balls.vault import no_balls_in
-from .fields.one_vault import soft_vault
 from .instant import side_of
 from .part import checked_parts, handed_down, other_side
-from .presence.seams import Seam, joined, seams_of
 from .room import Floats, Room, has_volume, lasting, may_have_volume, room_bounds
 from .surface import UNBOUNDED, Box, Surface
 from .surface import Place as Place
+
+if TYPE_CHECKING:
+    from .presence.seams import Seam
 
 # Most rooms: each is compiled into the kernels.
 _MOST_ROOMS = 64
@@ -107,15 +107,21 @@ class Joined(Surface):
                 rooms[-1].setdefault(surface, place)
         # What parts have in common may be nothing.
         rooms = [room for room in rooms if may_have_volume(tuple(room))] if len(rooms) > 1 else rooms
-        return tuple(rooms if self.reach is None else joined(rooms, self.seams, self.reach))
+        if self.reach is None:
+            return tuple(rooms)
+        from .presence.seams import joined
+
+        return tuple(joined(rooms, self.seams, self.reach))
 
     @cached_property
-    def seams(self) -> list[Seam]:
+    def seams(self) -> "list[Seam]":
         """The faces that its rooms have in common, and that are no walls."""
         return [seam for seam in self._touching if seam.together]
 
     @cached_property
-    def _touching(self) -> list[Seam]:
+    def _touching(self) -> "list[Seam]":
+        from .presence.seams import seams_of  # loaded where there is a union
+
         return seams_of(self.rooms)
 
     def moving_apart(self) -> list[tuple[Surface, Surface]]:
@@ -167,10 +173,16 @@ class Joined(Surface):
         return tuple(itertools.chain(*(surface.walls_of_balls(largest) for surface in self.surfaces())))
 
     def as_one_wall(self) -> Surface:
-        return self if len(self.rooms) == 1 else soft_vault(self)
+        if len(self.rooms) == 1:
+            return self
+        from .fields.one_vault import soft_vault  # loaded where rooms are joined
+
+        return soft_vault(self)
 
     def holds_balls(self) -> str | None:
         if len(self.rooms) > 1:
+            from .balls.vault import no_balls_in  # loaded where balls are
+
             return no_balls_in(self)
         whys = ((surface, surface.holds_balls()) for surface in self.surfaces())
         return next((f"with a {type(surface).__name__}, {why}" for surface, why in whys if why is not None), None)

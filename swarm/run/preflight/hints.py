@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ...compiled_scene import CompiledScene
 from ...kernel.limits import EPSILON
 from ...methods import Impact
-from ...methods.verlet import Verlet
 from ...scene import Scene
 from ...surfaces.instant import box_of, gaps_of
 from ...surfaces.surface import Surface
@@ -153,7 +152,7 @@ def _warn_of_steps(task: Task, speed: float) -> None:
             "walls; use a larger penalty (%g here), or Impact",
             period, contact, contact / between, depth, method.penalty,  # type: ignore[attr-defined]
         )  # fmt: skip
-    if isinstance(method, Verlet) and method.exponent == 1.0 and step * math.pi > _STABLE * contact:
+    if method.is_explicit() and step * math.pi > _STABLE * contact:
         _LOG.warning(
             "%sdt = %g s is %.2g of a contact, which lasts %.2g s: beyond %.2g of it Verlet is unstable, its energy "
             "grows; use dt <= %.1g s, or Penalty, which keeps the energy at any step",

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 from ...compiled_scene import MOST_WALLS
 from ...errors import SceneError
-from ...methods import AugmentedLagrangian, Impact, Penalty
+from ...methods import Impact
 from ...methods.base import Method
-from ...methods.fixed_step import SoftWalls
 from ...particles import Particles, TiedParticles
 from ...scene import Scene
 from ...surfaces.in_motion.drive import drive_of
@@ -57,13 +56,19 @@ def engine_of(asked: Asked) -> str:
     sizes = [one.radius for one in (options.sources or () if particles is None else [particles])]
     if sizes and sizes[0] is not None:
         return _by_method(method, (HEAVY if scene.reacts() else BALLS, GRAINS, OTHER_BALLS), OTHER_BALLS)
-    rigid = POINTS if not isinstance(method, Impact) else CHORDS if method.contact_step > 0.0 else POINTS
-    soft = BASELINE if isinstance(method, SoftWalls) else OTHER_POINTS
-    return _by_method(method, (MASSIVE if rigid == POINTS and scene.reacts() else rigid, SOFT, PAPER), soft)
+    if isinstance(method, Impact):
+        return CHORDS if method.contact_step > 0.0 else MASSIVE if scene.reacts() else POINTS
+    from ...methods.fixed_step import SoftWalls
+
+    return _by_method(method, (POINTS, SOFT, PAPER), BASELINE if isinstance(method, SoftWalls) else OTHER_POINTS)
 
 
 def _by_method(method: Method, engines: tuple[str, str, str], other: str) -> str:
-    kinds = zip((Impact, Penalty, AugmentedLagrangian), engines, strict=True)
+    if isinstance(method, Impact):
+        return engines[0]
+    from ...methods import AugmentedLagrangian, Penalty  # loaded where one is used
+
+    kinds = zip((Penalty, AugmentedLagrangian), engines[1:], strict=True)
     return next((engine for kind, engine in kinds if isinstance(method, kind)), other)
 
 

@@ -7,8 +7,6 @@ from typing import Any
 from ...common.checks import closest, listed, located
 from ...errors import SceneError
 from ..surface import Surface
-from .arrays import read_samples
-from .mesh import from_mesh
 
 _MESH = ("kind", "file", "spacing", "side", "scale", "weld", *(one.name for one in fields(Surface)))
 
@@ -32,6 +30,9 @@ def samples_of(table: Any, where: str, path: Path) -> Any:
     name = table.get("file")
     if not isinstance(name, str):
         raise SceneError(f"{where}.file: expected the name of a file, got {'nothing' if name is None else repr(name)}")
+    from .arrays import read_samples  # loaded where a file is
+    from .mesh import from_mesh
+
     given = {key: value for key, value in table.items() if key != "file"}
     try:
         if kind == "sampled":

@@ -15,7 +15,6 @@ from ...kernel.grid import Floats, one_cell
 from ...motion.wall import product
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region
-from ..balls.vault import no_balls_in
 from ..presence.patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
@@ -187,6 +186,8 @@ class Many(Surface):
 
     def holds_balls(self) -> str | None:
         if self.is_foam():
+            from ..balls.vault import no_balls_in  # loaded where balls are
+
             return no_balls_in(self)
         return self.solids()[0].holds_balls()
 
