@@ -64,3 +64,19 @@ def test_paragraphs_of_help_are_as_wide_as_a_terminal():
     columns = swarm.ImpactLog.table.__doc__
     assert "act there: `time` is the end of the step" in " ".join(columns.split())
     assert "\n    its row where it ends, as laws of walls act there: `time` is the end\n" in columns
+
+
+def test_an_observable_that_a_run_has_not_says_which_there_are(tmp_path):
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    frames = []
+    start = swarm.fill(scene, 2, speed=1.0, seed=1)
+    path = tmp_path / "run.h5"
+    run = swarm.simulate(scene, start, swarm.Impact(), until=1.0, trajectory=path, progress=frames.append)
+    with swarm.load(path) as trajectory:
+        for seen in (run.observables, trajectory.observables, frames[-1].observables, run.frames[0].observables):
+            with pytest.raises(KeyError, match=r"no observable 'impact'; did you mean 'impacts'\? It has time, "):
+                seen["impact"]
+            with pytest.raises(KeyError, match=r"no observable 'pressure', pressure by the virial .*\. It has time, "):
+                seen["pressure"]
+            assert "pressure" not in seen
+            assert seen.get("pressure") is None

@@ -2,6 +2,8 @@
 
 from typing import Any, Literal, NamedTuple
 
+from .checks import closest
+
 # The length of an axis that is the same in every run; the other axes have one entry for each surface, part and so on.
 LENGTHS = {"sense": 2, "axis": 3, "quaternion": 4}
 # The names of the entries of the last axis of a vector, and of an orientation.
@@ -128,6 +130,20 @@ def components_of(name: str) -> tuple[str, ...] | None:
     (('x', 'y', 'z'), None)
     """
     return OBSERVABLES[name].components() if name in OBSERVABLES else None
+
+
+class Observables(dict[str, Any]):
+    """The observables of a run by their names: an unknown name is a `KeyError` that says which there are.
+
+    >>> Observables(impacts=3)["impact"]
+    Traceback (most recent call last):
+    KeyError: "this run has no observable 'impact'; did you mean 'impacts'? It has impacts"
+    """
+
+    def __missing__(self, name: Any) -> Any:
+        known = OBSERVABLES.get(name)
+        hint = f", {known.meaning}." if known else closest(name, self) or "."
+        raise KeyError(f"this run has no observable {name!r}{hint} It has {', '.join(self)}")
 
 
 def markdown() -> list[str]:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common import notebook
-from ..common.catalog import may_be_nan
+from ..common.catalog import Observables, may_be_nan
 from ..common.columns import frame_of
 from ..errors import SceneError
 from ..particles import Particles
@@ -127,7 +127,7 @@ class Trajectory(Stored):
     @property
     def observables(self) -> dict[str, NDArray[Any]]:
         """All observables, one entry a frame."""
-        return {"time": self.times, **self.observables_of(slice(self._frames))}
+        return Observables(time=self.times, **self.observables_of(slice(self._frames)))
 
     def observables_of(self, some: slice) -> dict[str, NDArray[Any]]:
         """All observables of some frames but their times."""

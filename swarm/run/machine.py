@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common import interrupt
-from ..common.catalog import CHUNK_SUMS
+from ..common.catalog import CHUNK_SUMS, Observables
 from ..common.frames import Frame
 from ..common.snapshot import NOTHING, Read, Snapshot
 from ..kernel.cache import kernels_compiled
@@ -115,7 +115,7 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
                     log.ends[number] = log.total
                 write(number, moment, run.state, seen)
                 shown = _snapshot_of(task, read, moment, True) if callable(task.options.progress) else NOTHING
-                show.frame(Frame(number, moment, until, seen, writer.written if writer else 0, shown))
+                show.frame(Frame(number, moment, until, Observables(seen), writer.written if writer else 0, shown))
                 shown.end()
                 if moment < until:
                     session.look(run, writer, number, moment, None)

@@ -6,6 +6,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from ..common.catalog import Observables
 from ..common.checks import shown
 from ..common.frames import Frame
 from ..common.snapshot import Snapshot
@@ -60,7 +61,7 @@ class Frames(Sequence[Frame]):
             there = self._trajectory.born(k)
         read = functools.partial(values_of, self._trajectory, k)
         arrays = Snapshot(read, self._gravity, self._period, there, copies=True)
-        return Frame(k, seen["time"], until, seen, len(self), arrays)
+        return Frame(k, seen["time"], until, Observables(seen), len(self), arrays)
 
 
 def values_of(trajectory: Trajectory, k: int, name: str) -> Any:

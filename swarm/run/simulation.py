@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..common.catalog import Observables
 from ..common.frames import Frame
 from ..methods.base import Method
 from ..methods.impact import Impact
@@ -174,7 +175,7 @@ def carry_out(
     bodies: Any = None if task.bodies is None else task.bodies.moved(end.particles)
     absorbed_time = np.full(len(end.particles), np.nan) if end.absorbed is None else end.absorbed.time
     return Result(
-        end.particles, end.observables, end.wall_time, options.trajectory, end.multipliers, end.impacts,
+        end.particles, Observables(end.observables), end.wall_time, options.trajectory, end.multipliers, end.impacts,
         end.escape_time, absorbed_time, bodies, scene, method, end.birth_time,
         end.collisions, end.compile_time,
     )  # fmt: skip
