@@ -34,7 +34,7 @@ class Polygon(Outlined):
         side: "inside" or "outside", the admissible part.
 
     Raises:
-        SceneError: an argument is out of its range, the outline crosses itself, or it moves.
+        SceneError: an argument is out of its range, or the outline crosses itself.
 
     >>> Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]).phi([[0.5, 1.5], [1.5, 1.5], [0.0, 9.0]])
     array([-0.5,  0.5])
@@ -61,7 +61,7 @@ class Stadium(Outlined):
         side: "inside" or "outside", the admissible part.
 
     Raises:
-        SceneError: an argument is out of its range, or it moves.
+        SceneError: an argument is out of its range.
 
     >>> Stadium(radius=1.0, length=2.0).phi([[0.0, 3.0], [0.0, 0.0], [0.0, 0.0]])
     array([-1.,  1.])
@@ -93,7 +93,7 @@ class Prism(Outlined):
         side: "inside".
 
     Raises:
-        SceneError: an argument is out of its range, the outline crosses itself, or it moves.
+        SceneError: an argument is out of its range, or the outline crosses itself.
 
     >>> Prism([(0, 0), (1, 0), (0, 1)], height=2.0).phi([[0.25], [0.25], [1.5]])
     array([0.5])

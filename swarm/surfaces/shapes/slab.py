@@ -21,7 +21,7 @@ from .common import Distance, ExactChord
 
 @dataclass(frozen=True, repr=False)
 class Slab(Surface):
-    """Two parallel walls; the space between them or, `side="outside"`, the space around the plate they are.
+    """Two parallel walls; the space between them or, `side="outside"`, the space around a plate.
 
     Args:
         normal: three numbers, not all 0; across the walls.
