@@ -238,7 +238,7 @@ def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None 
         if key not in _TABLES:
             raise SceneError(f"{key}: unknown key, expected {listed(_TABLES)}{closest(key, _TABLES)}")
     if "run" not in document:
-        raise SceneError("run: expected a [run] table, got none")
+        raise SceneError("run: expected a [run] table, got none; add [run] and until = ... below it")
     if "particles" in document and "body" in document:
         raise SceneError("particles: expected a [particles] or a [body] table, got both")
     if not {"particles", "body", "source"} & set(document):

@@ -96,7 +96,7 @@ def _rows_of(path: str | Path) -> list[tuple[int, list[str]]]:
             f"cannot read {path}, row {row}: expected text in UTF-8, got the byte 0x{text[error.start]:02x}"
         ) from error
     except (OSError, csv.Error) as error:
-        raise SceneError(f"cannot read {path}: {error}") from error
+        raise SceneError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
     return [(number, cells) for number, cells in enumerate(table, start=1) if any(cells) or len(cells) > 1]
 
 

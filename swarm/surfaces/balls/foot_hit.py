@@ -134,7 +134,7 @@ def _touched(wall, sure, y):
 
 @outlined
 def _impact(wall, flight, t, z):
-    """A `TouchOfWall` near a time and a place, by Newton's method for f(z) = 0, z - k grad f(z) = y(t), k |grad f(z)| = R.
+    """A `TouchOfWall` near a time and a place: f(z) = 0, z - k grad f(z) = y(t), k |grad f(z)| = R by Newton's method.
 
     By the last two of these grad f.(z - y) = f + R |grad f| to first order, which is an equation for the time alone.
     """

@@ -29,7 +29,8 @@ def samples_of(table: Any, where: str, path: Path) -> Any:
         return table
     name = table.get("file")
     if not isinstance(name, str):
-        raise SceneError(f"{where}.file: expected the name of a file, got {'nothing' if name is None else repr(name)}")
+        came = 'nothing; add file = "part.stl"' if name is None else repr(name)
+        raise SceneError(f"{where}.file: expected the name of a file, got {came}")
     from .arrays import read_samples  # loaded where a file is
     from .mesh import from_mesh
 

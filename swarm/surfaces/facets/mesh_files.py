@@ -67,7 +67,8 @@ def read_soup(path: Path, scale: float) -> Soup:
             f"pip install {name}, or write the mesh as STL"
         ) from error
     except Exception as error:  # what readers of a dozen formats raise
-        raise SceneError(f"cannot read the mesh {path}: {error or type(error).__name__}") from error
+        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        raise SceneError(f"cannot read the mesh {path}: {reason}") from error
     if not len(triangles):
         raise SceneError(f"the mesh {path} must hold triangles, got none")
     wrong = np.argwhere(~np.isfinite(vertices[triangles]).all(axis=2))
