@@ -210,8 +210,10 @@ def _fields(asked: Asked) -> Found:
     yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().fields())
 
 
-def _fields_in_fixed_steps(asked: Asked) -> Found:
-    yield from _fields(asked) if not getattr(asked.method, "adaptive", True) else ()
+def _in_fixed_steps_beside_motions(asked: Asked) -> Found:
+    """Fields, and unions of several rooms, where walls move, in steps of fixed length."""
+    if asked.scene.moves() and not _takes_rooms(asked):
+        yield from (*_fields(asked), *_unions(asked))
 
 
 def _sheets(asked: Asked) -> Found:
@@ -508,12 +510,12 @@ CAPABILITIES = (
         (SOFT_BODIES, PAPER_BODIES): _listed("bodies and soft walls", "use Impact(dt=...)"),
         (BASELINE, OTHER_POINTS): _listed("{method}", _TO_EXACT),
     }),
-    Capability("field in fixed steps of multipliers", _fields_in_fixed_steps, {
+    Capability("many walls as one in fixed steps beside motions", _in_fixed_steps_beside_motions, {
         (PAPER,): Refusal(
-            "surfaces[{i}] must not be {kind} with adaptive = False, got {got!r:.200}: a step of fixed length has no "
-            "face or body to begin at", "give adaptive=True, or use Penalty or Impact",
+            "surfaces[{i}] must not be {kind} with adaptive = False where walls move, got {got!r:.200}: loops that do "
+            "not converge take too long there", "use Penalty or Impact",
         ),
-    }, True, within="field"),
+    }, True, within="motion"),
     Capability("dt of Impact", _argument("dt", None), {
         (*_RIGID_POINTS, *_RIGID_BALLS): Refusal(
             "dt of Impact must be left out with particles, got {got}: it is the step of bodies", "leave it out"

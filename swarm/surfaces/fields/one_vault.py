@@ -7,6 +7,7 @@ an edge between two rooms a point is pushed back by the nearer one.
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from ...kernel.jit import outlined, select
@@ -48,8 +49,12 @@ class SoftVault(Vault):
     is_one_wall = True
 
     def walls(self) -> tuple[Any, ...]:
+        return (self._whole,)
+
+    @cached_property
+    def _whole(self) -> OneWall:
         whole = all_walls(one for room in self.rooms_of for one in room)
-        return (OneWall(RoomsTogether(with_rooms(whole, [self.rooms_of])), None),)
+        return OneWall(RoomsTogether(with_rooms(whole, [self.rooms_of])), None)
 
 
 def soft_vault(union: Any) -> SoftVault:
