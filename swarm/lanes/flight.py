@@ -1,6 +1,7 @@
 """A flight of every lane of a block: to its next contact, or to the end of the frame."""
 
 from ..kernel.arrays import index
+from ..kernel.jit import outlined
 from ..surfaces.in_motion.moving import Carried, Marched, Strided
 from ..surfaces.periodic.period import cut
 from ..surfaces.presence.rooms import at_the_end, inside_of
@@ -13,7 +14,7 @@ from .table import marked_lanes
 
 # Safe steps to walls in any motion that all lanes take in a pass after the first.
 _STRIDES = 3
-# Safe steps to a polynomial are taken by all lanes together if more than one in so many needs some.
+# Guesses are improved in all lanes together if more than one in so many needs it.
 _MANY = 8
 
 
@@ -94,24 +95,21 @@ def _go_by_steps(walls, gravity, lanes, live):
     for i in range(index(live)):
         lane = lanes.lane(i)
         flights.begin(walls.at(lane.remaining), gravity, course, 0, i, lane.r, lane.v, aims=True)
-    together, more = SAFE_STEPS, MORE_STEPS
-    if gravity is None and walls.are_polynomial():
-        together = POLYNOMIAL_STEPS
-        if any(wall.aims for wall in walls.each):
-            _aim(walls, gravity, lanes, live)
-            # However many lanes take steps with it, a lane takes as many.
-            if _MANY * _mark(walls, gravity, lanes, live) < live:
-                together, more = 0, together + more
-    for _step in range(together):
+    if gravity is None and walls.aim():
+        _aim(walls, gravity, lanes, live)
+    for _step in range(_together(gravity, walls)):
         for i in range(index(live)):
             _step_on(walls, gravity, lanes, i)
     # The few that need more, one by one: a flight in two parts would look like a short one.
     for k in range(_mark(walls, gravity, lanes, live)):
-        i = lanes.order[k]
-        for _step in range(more):
-            _step_on(walls, gravity, lanes, i)
-            if not _needs_more(walls, gravity, lanes, i):
-                break
+        _go_on(walls, gravity, lanes, lanes.order[k])
+
+
+def _together(gravity, walls):
+    """How many safe steps all lanes take, before those that need more take them one by one."""
+    if gravity is None and walls.are_polynomial():
+        return 0 if walls.aim() else POLYNOMIAL_STEPS
+    return SAFE_STEPS
 
 
 def _aim(walls, gravity, lanes, live):
@@ -119,27 +117,30 @@ def _aim(walls, gravity, lanes, live):
 
     In a loop each: the chain of operations of one lane is longer than what a processor looks ahead.
     """
-    course = lanes.course
+    course, tries, some = lanes.course, AIMED, live
     for i in range(index(live)):
-        flights.turn(walls, course, 0, i)
+        flights.turn(walls, course, 0, i, lanes.lane(i).remaining)
     for i in range(index(live)):
         flights.aim(walls, course, 0, i)
-    for i in range(index(live)):
-        flights.aimed(walls, course, 0, i, False)
-    some = _mark(walls, gravity, lanes, live)
-    if _MANY * some < live:
-        for k in range(some):
-            i = lanes.order[k]
-            for _time in range(AIMED - 1):
-                flights.aimed(walls, course, 0, i, True)
-                if not _needs_more(walls, gravity, lanes, i):
-                    break
-    else:
-        for _time in range(AIMED - 1):
-            for i in range(index(live)):
-                flights.aimed(walls, course, 0, i, True)
+    while tries > 0 and _MANY * some >= live:
+        for i in range(index(live)):
+            flights.aimed(walls, course, 0, i)
+        tries, some = tries - 1, _mark(walls, gravity, lanes, live)
+    # However many lanes try with it, a lane tries as often.
+    for k in range(some):
+        for _time in range(tries):
+            flights.aimed(walls, course, 0, lanes.order[k])
 
 
+def _go_on(walls, gravity, lanes, i):
+    """More safe steps of a lane, if need be."""
+    for _step in range(MORE_STEPS):
+        if not _needs_more(walls, gravity, lanes, i):
+            break
+        _step_on(walls, gravity, lanes, i)
+
+
+@outlined
 def _mark(walls, gravity, lanes, live):
     """The number of lanes that need more safe steps; the lanes are in `lanes.order`."""
     for i in range(index(live)):

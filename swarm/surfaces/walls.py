@@ -91,6 +91,10 @@ class Walls(Record):
         """Whether all of these walls are asked for the level along a straight flight once."""
         return all(wall.kept > 0 for wall in self.each if wall.in_steps)
 
+    def aim(self):
+        """Whether safe steps to some of these walls along a straight flight begin with a guess of the root."""
+        return any(wall.aims for wall in self.each)
+
     # --- Their numbers and rows ---
 
     def numbered(self):

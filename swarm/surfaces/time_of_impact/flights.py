@@ -114,17 +114,20 @@ def begin(walls, gravity, course, row, lane, r, v, aims=False):
                 if number is not None:
                     course[at + i, lane] = number
             if aims and wall.aims:
-                course[at + _WINDOW, lane], course[at + _LAST, lane] = steps.window, 0.5 * steps.window
+                course[at + _WINDOW, lane] = steps.window
                 continue
         course[at + _TIME, lane], course[at + _LAST, lane] = steps.first_step()
 
 
-def turn(walls, course, row, lane):
-    """Where to guess the first hits of a straight flight from, with each wall that has a guess."""
+def turn(walls, course, row, lane, remaining):
+    """Where to guess the first hits of a straight flight from, with each wall that it may meet in this frame."""
     for k, wall in enumerate(walls.each):
         if wall.aims:
             at = row + k * COURSE
-            course[at + _GUESS, lane] = _level(course, at, lane, wall).turn()
+            level = _level(course, at, lane, wall)
+            free = level.is_free(remaining)
+            course[at + _GUESS, lane] = select(free, remaining, level.turn())
+            course[at + _LAST, lane] = select(free, -1.0, 0.5 * level.window)
 
 
 def aim(walls, course, row, lane):
@@ -132,15 +135,17 @@ def aim(walls, course, row, lane):
     for k, wall in enumerate(walls.each):
         if wall.aims:
             at = row + k * COURSE
-            course[at + _GUESS, lane] = _level(course, at, lane, wall).aim(course[at + _GUESS, lane])
+            guess = course[at + _GUESS, lane]
+            aim = _level(course, at, lane, wall).aim(guess)
+            course[at + _GUESS, lane] = select(course[at + _LAST, lane] > 0.0, aim, guess)
 
 
-def aimed(walls, course, row, lane, is_again):
+def aimed(walls, course, row, lane):
     """The guesses improved; with those that lead to a hit the first step."""
     for k, wall in enumerate(walls.each):
         if wall.aims:
             at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall)
-            guess, length = level.aimed(course[at + _GUESS, lane], course[at + _LAST, lane], is_again)
+            guess, length = level.aimed(course[at + _GUESS, lane], course[at + _LAST, lane])
             course[at + _GUESS, lane], course[at + _LAST, lane] = guess, length
             course[at + _TIME, lane] = select(length > 0.0, 0.0, guess)
 
@@ -192,7 +197,7 @@ def _known(wall, course, row, k, lane, flight):
     at = row + k * COURSE
     time, found = course[at + _TIME, lane], course[at + _LAST, lane] == 0.0
     if flight is not None and wall.kept > 0:
-        time = wall.refined(*flight, time)
+        time = select(found, wall.refined(*flight, time), time)
     return time, found
 
 

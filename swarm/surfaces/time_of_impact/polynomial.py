@@ -15,7 +15,7 @@ from ...kernel.limits import EPSILON
 from ...kernel.record import Record
 from .course import Quartic, positive, rise_by, rise_time, under_way
 
-# Steps that all lanes take where many of them need some.
+# Steps that all lanes take to a solid.
 POLYNOMIAL_STEPS = 4
 # In place of 0 below a fraction: no power of its inverse that is needed overflows.
 _TINY = 1e-30
@@ -69,10 +69,11 @@ def _are_below(b0, b1, b2, b3):
 
 def _are_below_in_halves(b0, b1, b2, b3):
     """The same by the coefficients of each half, de Casteljau's."""
-    first, second, third, b3 = 0.5 * (b0 + b1), 0.5 * (b1 + b2), 0.5 * (b2 + b3), 0.5 * b3
-    early, middle, late = 0.5 * (first + second), 0.5 * (second + third), 0.5 * (third + b3)
-    before, after = 0.5 * (early + middle), 0.5 * (middle + late)
-    return _are_below(b0, first, early, before) & _are_below(0.5 * (before + after), after, late, b3)
+    # Twice, four, eight and sixteen times as large
+    first, second, third = b0 + b1, b1 + b2, b2 + b3
+    early, middle, late = first + second, second + third, third + b3
+    before, after = early + middle, middle + late
+    return _are_below(b0, first, early, before) & _are_below(before + after, after, late, b3)
 
 
 class PolynomialFlight(Record):
@@ -97,8 +98,8 @@ class PolynomialFlight(Record):
         if self.since is not None:
             return select(self.since <= self.until, self.since, math.inf), 0.5 * self.window
         time, length = self.aim(self.turn()), 0.5 * self.window
-        for k in range(AIMED):
-            time, length = self.aimed(time, length, k > 0)
+        for _time in range(AIMED):
+            time, length = self.aimed(time, length)
         return select(length > 0.0, 0.0, time), length
 
     def turn(self):
@@ -115,7 +116,7 @@ class PolynomialFlight(Record):
         """A cubic that is the level on the wall, and above it elsewhere up to the window."""
         return self.c, 2.0 * self.b, self.a2, self.a3 + self.a4 * self.window
 
-    def aimed(self, t, length, is_again):
+    def aimed(self, t, length):
         """(a time nearer to the root, the length or 0 if one step of Newton's method leads from it to the root)."""
         c, b, a2, a3, a4 = self.c, 2.0 * self.b, self.a2, self.a3, self.a4
         root, converges = t, False
@@ -128,12 +129,19 @@ class PolynomialFlight(Record):
             converges = (slope > 0.0) & (abs(value) * bend <= _HALLEY_CONVERGES * steep)
             bottom = steep - value * half
             root = root - value * slope / select(bottom == 0.0, _TINY, bottom)
-        # The level until there is nowhere above the largest of its Bernstein coefficients.
-        a1, a2, a3 = root * b, root * root * a2, root * root * root * a3
-        second, third, fourth = c + 0.25 * a1, c + 0.5 * a1 + a2 * (1.0 / 6.0), c + 0.75 * a1 + 0.5 * a2 + 0.25 * a3
-        below = _are_below_in_halves if is_again else _are_below
-        found, goes_on = converges & (root > 0.0) & below(c, second, third, fourth), length > 0.0
+        found = converges & (root > 0.0) & _are_below_in_halves(*self._before(root))
+        goes_on = length > 0.0
         return select(goes_on, root, t), select(goes_on & found, 0.0, length)
+
+    def is_free(self, until):
+        """Whether it is surely below 0 until this time."""
+        last = self.c + until * (2.0 * self.b + until * (self.a2 + until * (self.a3 + until * self.a4)))
+        return _are_below(*self._before(until)) & (last < 0.0)
+
+    def _before(self, t):
+        """Its Bernstein coefficients from 0 to t but for the last; until then it is nowhere above the largest."""
+        c, q1, q2, q3 = self.c, 2.0 * t * self.b, t * t * self.a2, t * t * t * self.a3
+        return c, c + 0.25 * q1, c + 0.5 * q1 + (1.0 / 6.0) * q2, c + 0.75 * q1 + 0.5 * q2 + 0.25 * q3
 
     def next_step(self, t, last):
         """One step towards the first root: (t, its length, 0 if it is the last), as those of `course.Fall`."""
