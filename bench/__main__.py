@@ -54,7 +54,10 @@ def main() -> None:
     commands.add_parser("bars", help="speed, memory, start-up and accuracy against their bars")
     commands.add_parser("peers", help="the same job by other programs, those that are installed")
     commands.add_parser("endurance", help="checkpoints, memory over many frames, reading a large trajectory")
-    commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
+    some = commands.add_parser("scenes", help="nanoseconds an impact in scenes from one sphere to the fullest")
+    some.add_argument(
+        "--scenes", metavar="NAME", nargs="+", choices=list(scenes.SCENES), help="these alone, and nothing is written"
+    )
     commands.add_parser(
         "plane", help="nanoseconds an impact in billiards of two dimensions: outlines of lines and arcs"
     )

@@ -32,10 +32,15 @@ SPEED = 0.5
 
 
 def advance_seconds(
-    scene: swarm.Scene, method: swarm.Impact | swarm.Penalty, n: int, until: float, threads: int = 1
+    scene: swarm.Scene,
+    method: swarm.Impact | swarm.Penalty,
+    n: int,
+    until: float,
+    threads: int = 1,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> Callable[[], tuple[float, int]]:
     """A measurement: seconds of the kernels for one frame of `until`, and impacts."""
-    return advance_of(scene, swarm.fill(scene, n, speed=SPEED, seed=1), method, until, threads)
+    return advance_of(scene, swarm.fill(scene, n, speed=SPEED, seed=1), method, until, threads, clock)
 
 
 def advance_of(
@@ -44,6 +49,7 @@ def advance_of(
     method: swarm.Impact | swarm.Penalty,
     until: float,
     threads: int = 1,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> Callable[[], tuple[float, int]]:
     """The same for these particles."""
     span = method.span("until", until)
@@ -51,9 +57,9 @@ def advance_of(
     def measure() -> tuple[float, int]:
         with Run(scene.compiled(), particles.copy(), method, threads, None, tier()) as run:
             run.advance(0.0, 0.0)  # compiles, and touches the arrays
-            start = time.perf_counter()
+            start = clock()
             run.advance(span, until)
-            return time.perf_counter() - start, int(run.state.impacts.sum())
+            return clock() - start, int(run.state.impacts.sum())
 
     return measure
 
