@@ -86,8 +86,9 @@ class RowSums:
         file[_COLUMNS] = np.bytes_(
             "\n".join(f"{name} {count} {block}" for name, (count, block) in blocks.items()).encode()
         )
-        objects = _objects(file)
-        known = {name: one for name, one in objects if _is_constant(name, one) and name not in other}
+        # To open an object takes longer than to visit it.
+        objects = _objects(file, lambda name, about: about.num_attrs > 0 or name not in growing)
+        known = {name: one for name, one in objects if _is_constant(name, one) and name not in (*growing, *other)}
         sums = {name: checksum_of(_value(known[name])) for name in sorted(known)}
         file[_CONSTANTS] = np.bytes_(_serialized(sums | _attributes(objects)))
         # From a full disk nothing can be read back.
@@ -130,11 +131,20 @@ def checksum_of_attribute(group: Any, name: str) -> int:
     return checksum_of("\n".join(map(str, np.ravel(group.attrs[name]))))
 
 
-def _objects(file: Any) -> list[tuple[str, Any]]:
-    """The names of groups and datasets, and these: each once, though links give some of them several names."""
-    found: list[tuple[str, Any]] = []
-    file.visititems(lambda *named: found.append(named))
-    return found
+def _objects(file: Any, is_wanted: Callable[[str, Any], bool]) -> list[tuple[str, Any]]:
+    """The names of groups with attributes, and of datasets that are wanted for what HDF5 says about them, and these.
+
+    Each comes once, though links give some of them several names.
+    """
+    found: list[str] = []
+
+    def visit(name: bytes, about: Any) -> None:
+        text = name.decode("utf-8", "surrogateescape")
+        if (about.num_attrs > 0 or about.type == h5py.h5o.TYPE_DATASET) and is_wanted(text, about):
+            found.append(text)
+
+    h5py.h5o.visit(file.id, visit, info=True)
+    return [(name, file[name]) for name in found]
 
 
 def _attributes(objects: list[tuple[str, Any]]) -> dict[str, int]:
@@ -174,7 +184,7 @@ def _is_constant(name: str, one: Any) -> bool:
 
 def constants(file: Any) -> list[str]:
     """The names of the datasets that do not grow."""
-    return sorted(name for name, one in _objects(file) if _is_constant(name, one))
+    return sorted(name for name, one in _objects(file, lambda *_: True) if _is_constant(name, one))
 
 
 class Checked:
