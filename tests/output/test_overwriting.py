@@ -3,6 +3,7 @@
 import os
 import shutil
 import sys
+from importlib.metadata import version
 
 import h5py
 import pytest
@@ -10,7 +11,7 @@ from click.testing import CliRunner
 
 import swarm
 from swarm.commands.cli import app
-from swarm.files import marks, paths
+from swarm.files import marks, paths, provenance
 from swarm.fleet import shards
 from swarm.serialization import plugins
 
@@ -406,6 +407,10 @@ def test_a_date_that_is_none_is_damage(whole, tmp_path, value):
         swarm.load(tmp_path / "run.h5")
     for name in ("report", "info"):
         assert "date of h5md/creator must be a" in command(name, tmp_path / "run.h5")[1]
+
+
+def test_the_version_of_numba_is_that_of_its_package():
+    assert provenance.makers()["numba"] == version("numba")
 
 
 def test_an_attribute_of_another_type_is_damage_and_one_that_is_not_there_is_not(whole, tmp_path):
