@@ -2,7 +2,7 @@
 
 import datetime
 import functools
-import importlib.util
+import importlib.machinery
 import os
 import platform
 from collections.abc import Callable
@@ -48,7 +48,7 @@ def _numba() -> str:
 
     `importlib.metadata` imports what parses mails for it, which takes 20 ms.
     """
-    found = importlib.util.find_spec("numba")
+    found = importlib.machinery.PathFinder.find_spec("numba")
     beside = Path(str(found.origin)).parents[1].glob("numba-*.dist-info") if found else iter(())
     names = [folder.name.removeprefix("numba-").removesuffix(".dist-info") for folder in beside]
     if len(names) == 1:
