@@ -12,6 +12,7 @@ TYPING = {
     "core.typing.context.BaseContext.resolve_value_type": "self val",
     "core.typing.context.BaseContext.unify_types": "self *typelist",
     "core.typing.templates.Signature": "return_type args recvr",
+    "core.typing.templates.signature": "return_type *args",
     "core.types.abstract.Literal": None,
     "core.types.functions.BoundFunction": None,
     "core.types.misc.Omitted": None,
@@ -29,6 +30,7 @@ LOWERING = {
     "core.base.BaseContext.get_function": "self fn sig",
     "core.base.BaseContext.get_getattr": "self typ attr",
     "core.base.BaseContext.get_value_type": "self ty",
+    "core.cpu.CPUContext.get_ufunc_info": "self ufunc_key",
     "core.base.BaseContext.make_array": "self typ",
     "core.base.BaseContext.make_tuple": "self builder typ values",
     "core.callconv.CPUCallConv.get_function_type": "self restype argtypes",
@@ -40,6 +42,7 @@ LOWERING = {
     "np.arrayobj.populate_array": "array data shape strides itemsize meminfo",
     "np.arrayobj.store_item": "context builder arrayty val ptr",
     "np.linalg.ensure_blas": "",
+    "np.numpy_support.ufunc_find_matching_loop": "ufunc arg_types",
 }
 # Templates that type a call by its trace or else by Numba: trace/helpers.py
 TEMPLATES = {

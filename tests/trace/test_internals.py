@@ -20,7 +20,7 @@ from numba_internals import ALL
 from test_helpers import loop_with_else
 
 import swarm
-from swarm.kernel import compilers, jit, machine_code
+from swarm.kernel import compilers, jit, machine_code, trace
 
 pytestmark = compiled_only
 PACKAGE = Path(swarm.__file__).parent
@@ -129,6 +129,25 @@ def test_an_operation_is_an_instruction():
     assert target.cast(builder, args[0], types.float64, types.int64).type == ir.IntType(64)
     assert target.get_constant_generic(builder, types.int64, 7).constant == 7
     assert target.get_constant(types.float64, 0.5).constant == 0.5
+
+
+def test_a_universal_function_of_numbers_is_its_own_instructions():
+    """Numba makes variables for its argument and its result, and a loop of one round; for arrays it has to."""
+    typing, target = contexts()
+    symbol = typing.resolve_value_type(np.sqrt)
+
+    def names(emitted):
+        builder, args = builder_of(target, types.float64)
+        with target.push_code_library(target.codegen().create_library("root")):
+            emitted(builder, args)
+        return [one.opname for block in builder.function.blocks for one in block.instructions]
+
+    found = signature_of(np.sqrt, types.float64)
+    assert names(trace.emit._of_numbers(target, symbol, found)) == ["call"]
+    assert {"alloca", "phi", "call"} < {*names(target.get_function(symbol, found))}
+    row = types.Array(types.float64, 1, "C")
+    assert trace.emit._of_numbers(target, symbol, signature_of(np.sqrt, row)) is None
+    assert trace.emit._of_numbers(target, typing.resolve_value_type(operator.add), found) is None
 
 
 def test_the_fields_of_an_array():

@@ -12,7 +12,9 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel.registry import default_manager
+from numba.core.typing.templates import signature
 from numba.np.arrayobj import load_item, store_item
+from numba.np.numpy_support import ufunc_find_matching_loop
 
 from .notes import Argument, Assign, Attribute, Branch, Call, Element, Jump, Label, Load, PartCall, Slot, add
 from .values import TraceError, Value, is_defined, kind_of, leaves, made_of, opened
@@ -158,7 +160,8 @@ class _Emission:
         found, given = note.signature, note.given
         key = note.symbol, found
         if key not in self._functions:
-            self._functions[key] = self._context.get_function(note.symbol, found)
+            of_numbers = _of_numbers(self._context, note.symbol, found)
+            self._functions[key] = of_numbers or self._context.get_function(note.symbol, found)
         kinds = list(found.args if found.recvr is None else (found.recvr, *found.args))
         if kinds and isinstance(kinds[-1], (types.StarArgTuple, types.StarArgUniTuple)):
             fixed = len(kinds) - 1
@@ -245,6 +248,30 @@ class _Emission:
         Branch: _branch,
         PartCall: _call_part,
     }
+
+
+def _of_numbers(context: Any, symbol: Any, found: Any) -> Any:
+    """What emits a universal function of numbers, or None.
+
+    Numba writes a loop of one round around it, with variables for what it takes and gives: a third of all instructions
+    for grains in a silo, and a quarter of the time to compile them.
+    """
+    ufunc = getattr(symbol, "typing_key", None)
+    if not isinstance(ufunc, np.ufunc) or ufunc.nout != 1:
+        return None
+    kinds = (*found.args, found.return_type)
+    if not all(isinstance(kind, (types.Integer, types.Float, types.Boolean)) for kind in kinds):
+        return None
+    loop: Any = ufunc_find_matching_loop(ufunc, kinds)
+    (result,), inner = loop.outputs, signature(*loop.outputs, *loop.inputs)
+    emitted = context.get_ufunc_info(ufunc)[loop.ufunc_sig]
+
+    def emit_it(builder: Any, values: list[Any]) -> Any:
+        given = [context.cast(builder, *one) for one in zip(values, found.args, loop.inputs, strict=True)]
+        made = default_manager[result].from_return(builder, emitted(context, builder, inner, given))
+        return context.cast(builder, made, result, found.return_type)
+
+    return emit_it
 
 
 def _function_of(context: Any, module: Any, part: FunctionPart) -> tuple[Any, Any]:
