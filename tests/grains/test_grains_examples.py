@@ -26,7 +26,7 @@ def run_of(name, count, until, measured):
     ).observables
 
 
-def test_a_drum_carries_grains_up_to_a_slope(compiled_at_once, optimized):
+def test_a_drum_carries_grains_up_to_a_slope(compiled_at_once):
     """The centre of grains that fill half of a drum is as far from below the axis as their surface is from level."""
     seen = run_of("drum_grains", 200, 0.3, lambda snapshot: snapshot.position.mean(axis=1))
     x, _y, z = seen["measured"].T
@@ -36,7 +36,7 @@ def test_a_drum_carries_grains_up_to_a_slope(compiled_at_once, optimized):
     assert seen["energy_error"].max() < 1e-13
 
 
-def test_a_silo_is_poured(compiled_at_once, optimized):
+def test_a_silo_is_poured(compiled_at_once):
     """Before its door is gone: all that have come are above the floor."""
     job = read(SCENES / "poured_silo.toml")
     result = swarm.simulate(
@@ -49,7 +49,7 @@ def test_a_silo_is_poured(compiled_at_once, optimized):
     assert seen["energy_error"].max() < 1e-12
 
 
-def test_a_silo_runs_out_through_its_orifice(compiled_at_once, optimized):
+def test_a_silo_runs_out_through_its_orifice(compiled_at_once):
     seen = run_of("silo", 300, 0.4, lambda snapshot: float((snapshot.position[2] < -0.055).sum()))
     assert seen["measured"][-1] > seen["measured"][0] + 30.0
     assert (np.diff(seen["measured"]) >= 0.0).all()
