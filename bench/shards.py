@@ -13,6 +13,7 @@ import numpy as np
 import swarm
 from swarm import observables
 from swarm.bodies import body_run
+from swarm.events import walls_run
 from swarm.fleet import jobs, joined, shard_run, sharded_run, shards
 from swarm.run.machine import RunEnd
 from swarm.run.measures import Measures
@@ -59,7 +60,7 @@ def here() -> Iterator[None]:
 def of_single_particles() -> Iterator[None]:
     """Within it shards may begin at every particle, and sums over the particles of a run in plain Python are of one."""
     # A module that is imported for the first time within would keep the patched constant.
-    assert body_run.__name__ in sys.modules
+    assert {body_run.__name__, walls_run.__name__} <= sys.modules.keys()
     known = [one for name, one in sys.modules.items() if name.startswith("swarm.") and hasattr(one, "CHUNK")]
     with contextlib.ExitStack() as stack:
         for module in known:
