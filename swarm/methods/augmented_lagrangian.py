@@ -27,19 +27,25 @@ _ACCELERATIONS = {"none": uzawa.PLAIN, "secant": uzawa.SECANT, "reflection": uza
 class AugmentedLagrangian(fixed_step.SoftWalls):
     """Rigid walls by the paper's nested loops: the step (7) with multipliers, and Uzawa's update (8) of them.
 
-    (v0 + v1)/2 = (r1 - r0)/h,   m (v1 - v0) = h m G - h D (alpha (Phi0 + Phi1)/2 + lambda),
-    lambda <- lambda + alpha (Phi0 + Phi1)/2   until   V = alpha Phi1^2/2 <= tolerance.
+        (v0 + v1)/2 = (r1 - r0)/h
+        m (v1 - v0) = h m G - h D (alpha (Phi0 + Phi1)/2 + lambda)
+        lambda <- lambda + alpha (Phi0 + Phi1)/2   until   V = alpha Phi1^2/2 <= tolerance
 
-    When does the loop converge? Its limit is a step with Phi1 = 0.
-        exponent 1, on the surface at t0 (State I): always, linearly, with the composite gradient on every smooth
-            surface. At the limit the force is lambda D with D != 0, so a finite multiplier carries the particle.
-        exponent 1, inside at t0 (State II): never. D = Phi1/(g1 - g0) dg vanishes with Phi1, so lambda grows without
-            end, while the energy misses lambda Phi1. Use adaptive=True, which starts every contact on the surface.
-        exponent above 1: not in a useful number of sweeps, as Phi'(0) = 0: lambda grows without end, and V falls only
-            as a power of the sweeps. Such walls are for Penalty, as Hertz's law is.
-        In an edge sharper than about 0.1 rad the sweeps over its walls are too many: use on_unconverged="impact".
-    The converged step is a reflection about D: `Impact(contact_step=dt)` takes it without the loop, at a twentieth of
-    the cost and to round-off. This method is for the paper's results, and for studies of multipliers.
+    When does the loop converge? Its limit is a step with Phi1 = 0. There are three cases.
+
+    With exponent 1, on the surface at t0 (State I), it always converges, linearly, with the composite gradient on every
+    smooth surface. At the limit the force is lambda D with D != 0, so a finite multiplier carries the particle.
+
+    With exponent 1, inside at t0 (State II), it never converges. D = Phi1/(g1 - g0) dg vanishes with Phi1, so lambda
+    grows without end, while the energy misses lambda Phi1. Use adaptive=True, which starts every contact on the
+    surface.
+
+    With an exponent above 1 it does not converge in a useful number of sweeps, as Phi'(0) = 0: lambda grows without
+    end, and V falls only as a power of the sweeps. Such walls are for Penalty, as Hertz's law is.
+
+    In an edge sharper than about 0.1 rad the sweeps over its walls are too many: use on_unconverged="impact". The
+    converged step is a reflection about D: `Impact(contact_step=dt)` takes it without the loop, at a twentieth of the
+    cost and to round-off. This method is for the paper's results, and for studies of multipliers.
 
     What does it converge to? With dt -> 0 to the rigid wall, `Impact()`, of first order in dt, on every surface: the
     step begins at the impact, and at its end the particle is (dt/2)(v0 - v1) from where it would be. A sweep divides

@@ -64,13 +64,13 @@ class Impact(base.Method):
     ends after the sum of its geometric series. At rest, or inside the friction cone, it costs nothing. A corner of
     three walls that move carries it in steps of their motion. An impulse of less than 1e-12 of the speed is no impact.
 
-    Particles with a radius meet at instants too, and neither slide nor rest: where a contact would last they bounce, so
+    Particles with a radius meet at instants too, and neither slide nor rest. Where a contact would last they bounce, so
     high that a flight from a wall back to it takes t_c (`contact_duration` of `Pairs`; without losses 1e-7 crossings
-    or so). A ball that has met another one in the last t_c loses no energy. What such a bounce gives is a negative part
-    of the dissipated energy, m (a t_c)^2/8 where a pulls back to the wall, and the next impact takes it. So each
-    lasting contact costs an impact or some in t_c: for grains that rest on each other for long use `Penalty`. Walls may
-    move, have a mass, come and go, be open, hot, or have laws of their own, but for those on which particles wait. A
-    ball leaves where its point of contact is in an opening.
+    or so). A ball that has met another one in the last t_c loses no energy. The energy that such a bounce gives,
+    m (a t_c)^2/8 with the acceleration a back to the wall, is a negative part of the dissipated energy, and the next
+    impact takes it. So a lasting contact costs at least an impact in t_c: for grains that rest on each other for long
+    use `Penalty`. Walls may move, have a mass, come and go, be open or hot, or have laws. A ball leaves where its point
+    of contact is in an opening.
 
     Raises:
         SceneError: an argument is out of its range.

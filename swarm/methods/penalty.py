@@ -22,7 +22,8 @@ from . import fixed_step
 class Penalty(fixed_step.SoftWalls):
     """Energy-conserving penalty contact with a fixed step (the paper's eq. (5), composite discrete gradient).
 
-    (v0 + v1)/2 = (r1 - r0)/h,   m (v1 - v0) = h m G - h D alpha (Phi0 + Phi1)/2.
+        (v0 + v1)/2 = (r1 - r0)/h
+        m (v1 - v0) = h m G - h D alpha (Phi0 + Phi1)/2
 
     Args:
         dt: step h > 0 [s]; frames must fall on whole steps.
