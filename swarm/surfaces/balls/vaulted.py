@@ -281,7 +281,7 @@ def _unseen(wall, away, way, w, pull):
 
 
 class Hidden(rising.Ahead):
-    """What is not met before a particle has gone a way, as the frame sees it."""
+    """What is not met on the first part of a way, as the frame sees it."""
 
     seen: rising.InWallFrame
     way: float
