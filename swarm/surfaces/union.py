@@ -70,7 +70,6 @@ class Joined(Surface):
             )
         if len(self.rooms) > 1:
             _require_alone(self)
-            _require_still(self)
         _require_room(self)
 
     def _turn(self) -> None:
@@ -364,16 +363,6 @@ def _require_alone(whole: Joined) -> None:
             raise SceneError(
                 f"parts must be known everywhere, got {surface!r:.200}, which reaches the border of its grid; sample "
                 "it in a larger box"
-            )
-
-
-def _require_still(whole: Joined) -> None:
-    """Raise a `SceneError` where impacts would move several rooms."""
-    for name in ("mass", "inertia"):
-        if (value := getattr(whole, name)) is not None:
-            raise SceneError(
-                f"{name} must be None for {type(whole).__name__} of several rooms, got {value}; a surface without "
-                "re-entrant edges, or a mesh of the whole, may have it"
             )
 
 

@@ -92,6 +92,34 @@ def test_no_point_of_a_ball_is_outside_of_rooms_that_move(name, motion):
     assert max(farthest) <= 1e-9
 
 
+@pytest.mark.parametrize("change", [{"mass": 3.0}, {"inertia": 2.0, "motion": swarm.Rotation((1.0, -2.0, 3.0), 0.4)}])
+def test_rooms_with_a_mass_are_one_box_with_that(change):
+    halves = swarm.Union([swarm.Box((0.35, 0.4, 0.45), (x, 0.0, 0.0)) for x in (-0.35, 0.35)], **change)
+    box = swarm.Box((0.7, 0.4, 0.45), **change)
+    one, other = (ran(vessel, some(), swarm.Impact(), 0.5) for vessel in (halves, box))
+    assert one.observables["impacts"][-1] == other.observables["impacts"][-1] > 3
+    assert one.particles.position == pytest.approx(other.particles.position, abs=1e-9)
+    assert one.observables["energy_error"].max() < 1e-12
+
+
+@pytest.mark.parametrize("name", ["spheres", "pipe"])
+def test_rooms_with_a_mass_take_what_balls_lose(name):
+    result = ran(swarm.Union(ROOMS[name], mass=3.0), some(), swarm.Impact(), 0.4, every=0.1)
+    seen = result.observables
+    assert seen["impacts"][-1] > 2
+    assert seen["energy_error"].max() < 1e-12
+    assert seen["max_penetration"].max() < 1e-14
+    whole = seen["momentum"] + 3.0 * seen["wall_velocity"][:, 0]
+    assert whole == pytest.approx(np.tile(some().velocity.sum(axis=1), (len(whole), 1)), abs=1e-12)
+
+
+def test_points_meet_no_rooms_with_a_mass():
+    points, turns = swarm.Particles((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), swarm.Rotation((0.0, 0.0, 1.0), 0.4)
+    for given in ({"mass": 3.0}, {"inertia": 3.0, "motion": turns}):
+        with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].\w+ must be None for a Union of several rooms and"):
+            ran(swarm.Union(SPHERES, **given), points, swarm.Impact())
+
+
 def test_rooms_that_go_let_a_ball_fly_on():
     still, gone = (
         ran(swarm.Union(SPHERES, **given), some(1), swarm.Impact(), until)

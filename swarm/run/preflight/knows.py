@@ -192,6 +192,12 @@ def _rooms_that_differ(asked: Asked) -> Found:
             yield {**one, "what": what}
 
 
+def _heavy_rooms(asked: Asked) -> Found:
+    for one in _rooms(asked):
+        if (surface := one["got"]).reacts():
+            yield {**one, "name": "inertia" if surface.mass is None else "mass"}
+
+
 def _unions_beside_own(asked: Asked) -> Found:
     body = asked.particles.body if isinstance(asked.particles, TiedParticles) else None
     if body is not None and (body.guides or body.cavities):
@@ -468,7 +474,6 @@ CAPABILITIES = (
     Capability("union", _rooms, {
         (SOFT_BODIES, PAPER_BODIES): _of_one_room("bodies and soft walls", "use Impact(dt=...)"),
         (BASELINE, OTHER_POINTS): _of_one_room("{method}", _TO_EXACT),
-        (HEAVY,): _of_one_room("particles that have a radius", f"{_TO_POINTS}, and Impact()"),
     }),
     Capability("union with walls between its rooms", _rooms_that_touch, {
         (BODIES,): Refusal(
@@ -481,7 +486,7 @@ CAPABILITIES = (
             "soft wall without a thickness holds no point",
             f"leave a space between the rooms, let them overlap, or {_TO_ROOMS}",
         ),
-        (BALLS, GRAINS): Refusal(
+        (BALLS, HEAVY, GRAINS): Refusal(
             "surfaces[{i}] must not have rooms that touch at a wall between them where particles have a radius, got "
             "{got!r:.200}: balls know edges of rooms, not those of a wall of no thickness",
             "let the rooms overlap, or leave the radius out",
@@ -676,6 +681,13 @@ CAPABILITIES = (
             f"{_TO_MOTION}, or use Impact",
         ),
     }),
+    Capability("mass of a union", _heavy_rooms, {
+        (MASSIVE,): Refusal(
+            "surfaces[{i}].{name} must be None for a {kind} of several rooms and particles without a radius, got "
+            "{got!r:.200}",
+            "give it to a surface without re-entrant edges, or a mesh of the whole, or give the particles a radius",
+        ),
+    }, within="mass of a wall"),
     Capability("opening", _of_walls("openings", ()), {
         (SOFT_BODIES, PAPER_BODIES): _with_method("openings", "left out", "count"),
         (BASELINE,): _with_method("openings", "left out", "count"),

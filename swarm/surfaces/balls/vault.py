@@ -29,7 +29,7 @@ _SLACK, _FAR = 1e-11, 1e6
 _PLACES, _MOST, _ROUND = 24, 64, 0.5
 # What all parts of a union that balls meet have in common: laws, and how the whole moves, comes and goes, and opens.
 _LAWS = "restitution", "friction", "temperature", "accommodation", "laws"
-_CHANGES = "motion", "openings", "present"
+_CHANGES = "motion", "openings", "present", "mass", "inertia"
 _KINDS = Sphere, Plane, Slab, Box, Cylinder, Cone
 
 
