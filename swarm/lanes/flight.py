@@ -117,19 +117,20 @@ def _aim(walls, gravity, lanes, live):
 
     In a loop each: the chain of operations of one lane is longer than what a processor looks ahead.
     """
-    course, tries, some = lanes.course, AIMED, live
+    course, tries, some = lanes.course, AIMED - 1, live
     for i in range(index(live)):
         flights.turn(walls, course, 0, i, lanes.lane(i).remaining)
     for i in range(index(live)):
         flights.aim(walls, course, 0, i)
     while tries > 0 and _MANY * some >= live:
         for i in range(index(live)):
-            flights.aimed(walls, course, 0, i)
+            flights.aimed(walls, course, 0, i, False)
         tries, some = tries - 1, _mark(walls, gravity, lanes, live)
     # However many lanes try with it, a lane tries as often.
     for k in range(some):
         for _time in range(tries):
-            flights.aimed(walls, course, 0, lanes.order[k])
+            flights.aimed(walls, course, 0, lanes.order[k], False)
+        flights.aimed(walls, course, 0, lanes.order[k], True)
 
 
 def _go_on(walls, gravity, lanes, i):

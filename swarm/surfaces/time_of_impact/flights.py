@@ -140,12 +140,12 @@ def aim(walls, course, row, lane):
             course[at + _GUESS, lane] = select(course[at + _LAST, lane] > 0.0, aim, guess)
 
 
-def aimed(walls, course, row, lane):
+def aimed(walls, course, row, lane, is_last):
     """The guesses improved; with those that lead to a hit the first step."""
     for k, wall in enumerate(walls.each):
         if wall.aims:
             at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall)
-            guess, length = level.aimed(course[at + _GUESS, lane], course[at + _LAST, lane])
+            guess, length = level.aimed(course[at + _GUESS, lane], course[at + _LAST, lane], is_last)
             course[at + _GUESS, lane], course[at + _LAST, lane] = guess, length
             course[at + _TIME, lane] = select(length > 0.0, 0.0, guess)
 

@@ -22,8 +22,8 @@ _TINY = 1e-30
 # From here two steps of Newton's method leave round-off: part of the slope that it changes by on the way to the root.
 _CONVERGES = 1e-5
 # A guess of the root takes so many times two steps of Halley's method in all; the second of these may change the slope
-# by this part of it: the cube of that is left, the square of which is round-off.
-AIMED, _HALLEY_STEPS, _HALLEY_CONVERGES = 3, 2, 1e-3
+# and the time by these parts: the square of one times the other is left, the square of which is round-off.
+AIMED, _HALLEY_STEPS, _HALLEY_CONVERGES, _HALLEY_WAY = 3, 2, 1e-3, 1e-2
 # The root of e x^3 + m x^2 + (1 - 2 m) x = 1 - m is (1 + p e + q e^2)/(1 + (1 + p) e + s e^2), for m of 0 or 1/2 to 9 %
 # up to e = 100.
 _P, _Q, _S = 0.8, 0.01, 0.08
@@ -98,8 +98,8 @@ class PolynomialFlight(Record):
         if self.since is not None:
             return select(self.since <= self.until, self.since, math.inf), 0.5 * self.window
         time, length = self.aim(self.turn()), 0.5 * self.window
-        for _time in range(AIMED):
-            time, length = self.aimed(time, length)
+        for k in range(AIMED):
+            time, length = self.aimed(time, length, k == AIMED - 1)
         return select(length > 0.0, 0.0, time), length
 
     def turn(self):
@@ -116,7 +116,7 @@ class PolynomialFlight(Record):
         """A cubic that is the level on the wall, and above it elsewhere up to the window."""
         return self.c, 2.0 * self.b, self.a2, self.a3 + self.a4 * self.window
 
-    def aimed(self, t, length):
+    def aimed(self, t, length, is_last):
         """(a time nearer to the root, the length or 0 if one step of Newton's method leads from it to the root)."""
         c, b, a2, a3, a4 = self.c, 2.0 * self.b, self.a2, self.a3, self.a4
         root, converges = t, False
@@ -128,8 +128,11 @@ class PolynomialFlight(Record):
             steep = slope * slope
             converges = (slope > 0.0) & (abs(value) * bend <= _HALLEY_CONVERGES * steep)
             bottom = steep - value * half
-            root = root - value * slope / select(bottom == 0.0, _TINY, bottom)
-        found = converges & (root > 0.0) & _are_below_in_halves(*self._before(root))
+            way = value * slope / select(bottom == 0.0, _TINY, bottom)
+            root = root - way
+            converges = converges & (abs(way) <= _HALLEY_WAY * root)
+        below = _are_below_in_halves if is_last else _are_below
+        found = converges & below(*self._before(root))
         goes_on = length > 0.0
         return select(goes_on, root, t), select(goes_on & found, 0.0, length)
 
