@@ -157,20 +157,17 @@ def test_ci_runs_the_readme_test_command():
     assert 'python -m pytest -q -n auto --dist worksteal -m "not long"\n' in ci
 
 
-def copy_examples(folder, count, rate=20.0, every=1.0):
-    """The scenes and sweeps of the examples with few particles and births, two seeds, and longer steps and frames.
+def copy_examples(folder, count):
+    """The scenes and sweeps of the examples with few particles and births, two seeds and long steps.
 
     How they run is tested.
     """
-    longer = {"dt": 10.0, "every": every}
     for name in ("scenes", "sweeps"):
         shutil.copytree(ROOT / "examples" / name, folder / "examples" / name)
         for path in (folder / "examples" / name).glob("*.toml"):
             text = re.sub(r"^count = [\d_]+", f"count = {count}", path.read_text(), flags=re.MULTILINE)
-            text = re.sub(r"^rate = \S+", f"rate = {rate}", text, flags=re.MULTILINE)
-            text = re.sub(
-                r"^(dt|every) = (\S+)", lambda one: f"{one[1]} = {longer[one[1]] * float(one[2])}", text, flags=re.M
-            )
+            text = re.sub(r"^rate = \S+", "rate = 20.0", text, flags=re.MULTILINE)
+            text = re.sub(r"^dt = (\S+)", lambda found: f"dt = {10.0 * float(found[1])}", text, flags=re.MULTILINE)
             text = text.replace('kind = "impact"', 'kind = "impact"\nsliding_tolerance = 1e-4')
             path.write_text(re.sub(r"range = \d+", "range = 2", text))
 
@@ -278,7 +275,7 @@ def settings():
 def test_the_commands_run_in_their_order(tmp_path, monkeypatch):
     # Each process of a sweep takes two seconds to begin.
     monkeypatch.setattr(os, "sched_getaffinity", lambda _process: {0})
-    copy_examples(tmp_path, 1, rate=1.0, every=4.0)
+    copy_examples(tmp_path, 1)
     (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "sweep.toml").write_text(f'{SCENE}\n[sweep]\n"particles.seed" = [1, 2]\n')
     found = list(commands())
