@@ -15,11 +15,14 @@ from ..surfaces.facets.mesh import Mesh
 from ..surfaces.rotation import matrix
 from ..surfaces.surface import Surface
 from . import curves, given
-from .cut import MOST_BODIES, Indices, SmoothSurface, cut, found_in
+from .cut import MOST_BODIES, Cut, Indices, SmoothSurface, cut, found_in
 from .parts import Cover, Part
 
 # Of the size of what is drawn, a step along edges of a mesh that others may cut.
 _FINE = 200
+# A point this near to a cut, as a part of the size of a wall, is on it, and this near to a corner
+# it is there; moves to a corner.
+_ON_A_CUT, _AT_A_CORNER, _MOVES = 1e-8, 1e-4, 4
 # A wall of which this part of its box is seen is found again in the box of that, so often.
 _SEEN, _AGAIN = 0.4, 3
 
@@ -151,7 +154,51 @@ def _pieces(placed: _Placed) -> Iterator[tuple[Any, SmoothSurface]]:
             room = 0.05 * (high - low).max()
             low, high = low - room, high + room
         if len(found.points):
-            yield found, wall
+            level = placed.level(wall, covers, others)
+            yield _with_corners(found, wall, others, level), wall
+
+
+def _with_corners(found: Cut, wall: SmoothSurface, others: list[SmoothSurface], level: Any) -> Cut:
+    """A wall with its corners, at which two others meet on it: a cut is straight within each triangle.
+
+    An edge from one of the others to another one goes by the corner; what is between these is one more triangle.
+    """
+    size = float(np.ptp(found.points, axis=0).max())
+    for one, other in itertools.combinations(others, 2):
+        points, triangles, rims = found
+        walls = wall, one, other
+        ends = np.unique(rims)
+        ends = ends[np.max([np.abs(each.distance(points[ends])) for each in walls], axis=0) <= _AT_A_CORNER * size]
+        if len(ends):
+            points = points.copy()
+            points[ends] = _crossing(walls, points[ends], _AT_A_CORNER * size)
+        on_one, on_other = (np.abs(each.distance(points)) <= _ON_A_CUT * size for each in (one, other))
+        first, second = rims.T
+        turns = (on_one[first] & on_other[second]) | (on_other[first] & on_one[second])
+        turns &= ~(on_one & on_other)[rims].any(axis=1)
+        if turns.any():
+            a, b = rims[turns].T
+            middle, reach = 0.5 * (points[a] + points[b]), np.linalg.norm(points[b] - points[a], axis=1)
+            corners = _crossing(walls, middle, reach)
+            near = (corners != middle).any(axis=1) & (level(corners) <= _ON_A_CUT * size)
+            number = len(points) + np.arange(np.count_nonzero(near))
+            a, b, turns[turns] = a[near], b[near], near
+            made = np.stack([a, number, b], axis=1)
+            points, triangles = np.concatenate([points, corners[near]]), np.concatenate([triangles, made])
+            rims = np.concatenate([rims[~turns], made[:, :2], made[:, 1:]])
+        found = Cut(points, triangles, rims)
+    return found
+
+
+def _crossing(walls: tuple[SmoothSurface, ...], points: Floats, reach: Any) -> Floats:
+    """The place near each point at which three walls cross; the point where that is farther than its reach."""
+    places = points
+    for _move in range(_MOVES):
+        slopes = np.stack([each.gradient(places) for each in walls], axis=1)
+        values = np.stack([each.phi(places) for each in walls], axis=1)
+        places = places - (np.linalg.pinv(slopes) @ values[:, :, None])[:, :, 0]
+    near = np.linalg.norm(places - points, axis=1) <= reach
+    return np.where(near[:, None], places, points)
 
 
 def _near(placed: _Placed, points: Floats) -> list[Cover]:

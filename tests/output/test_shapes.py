@@ -126,3 +126,13 @@ def test_more_bodies_than_are_wanted_are_not_drawn():
         shapes = shapes_of(scene, somewhere, most=most)
         assert [len(shape.triangles) > 0 for shape in shapes] == drawn
         assert [shape.name for shape in shapes] == ["0_spheres", "1_sphere"]
+
+
+def test_a_box_is_closed_at_its_corners():
+    """A cut is straight within a triangle: corners, where two cuts meet, were left out."""
+    turned = {"axis": (1.0, 2.0, 3.0), "angle": 0.5}
+    scene = swarm.Scene(
+        [swarm.Box((0.5, 0.4, 0.3), rotation=turned), swarm.Box((0.1, 0.05, 0.07), (0.1, 0.1, 0.0), "outside")]
+    )
+    for shape, volume in zip(shapes_of(scene, NOWHERE), (8.0 * 0.5 * 0.4 * 0.3, 8.0 * 0.1 * 0.05 * 0.07), strict=True):
+        assert abs(swarm.Mesh(shape.vertices, shape.triangles).volume()) == pytest.approx(volume, rel=1e-12)
