@@ -249,7 +249,7 @@ class _Rooms(NamedTuple):
         for one in (opening for piece in pieces for opening in piece.openings):
             if not any(one is known for known in doors):
                 doors.append(one)
-        return any(self._places(face, (volume_of(door),)).shape[1] for door in doors)
+        return any(self._places(face, (volume_of(door).at_rest(),)).shape[1] for door in doors)
 
     def _places(self, face: Face, within: Sequence[Surface]) -> Floats:
         """Places on a face of the first room that are inside it, at the other one, and in some volumes (3, N)."""
