@@ -55,7 +55,8 @@ class Penalty(fixed_step.SoftWalls):
     steps. What a contact stores with a wall that opens, or goes, is in "dissipated_energy".
 
     Unions and foams: a `Union` of several rooms, or a foam, is one wall with the same laws for all of its parts. In a
-    doorway nothing pushes, and behind the edge of one the nearer room does.
+    doorway nothing pushes, and behind the edge of one the nearer room does. A step that is longer than the wall
+    between two rooms is thick may pass it without a contact.
 
     Bodies: links stay rigid, and walls are springs for the contact points, each alone or in cavities.
 
