@@ -96,3 +96,21 @@ def test_the_lists_are_those_of_all_pairs(period):
     reach = radius[:, None] + radius + skin
     expected = {frozenset((i, j)) for i in range(n) for j in range(i) if apart[i, j] < reach[i, j]}
     assert set(pairs) == expected
+
+
+def test_a_pair_among_others_ends_as_it_does_alone():
+    """Its contact is in a group with those of others, each of which goes by itself."""
+    n, scene = 9, swarm.Scene([swarm.Sphere(3.0)])
+    position, velocity = np.zeros((3, 2 * n)), np.random.default_rng(3).uniform(-1.0, 1.0, (3, 2 * n))
+    position[1] = np.repeat(np.linspace(-1.0, 1.0, n), 2)
+    position[0, 0::2], position[0, 1::2], velocity[0, 0::2], velocity[0, 1::2] = -RADIUS, RADIUS, 1.0, -1.0
+
+    def end_of(some):
+        start = swarm.Particles(position[:, some], velocity[:, some], MASS, radius=RADIUS)
+        return ran(scene, start, swarm.Penalty(2e-5, ALPHA, 1.0), 2e-4).particles
+
+    together = end_of(slice(None))
+    for k in range(0, 2 * n, 2):
+        alone = end_of(slice(k, k + 2))
+        assert together.velocity[:, k : k + 2] == pytest.approx(alone.velocity, rel=1e-12, abs=1e-12)
+        assert together.position[:, k : k + 2] == pytest.approx(alone.position, rel=1e-14, abs=1e-14)
