@@ -148,6 +148,7 @@ def test_a_foot_that_is_far_has_a_lower_bound_above_every_radius():
 
 @pytest.mark.parametrize("gravity", [(0.0, 0.0, 0.0), (0.3, 0.1, -1.0)], ids=["straight", "falling"])
 @pytest.mark.parametrize("name", ["waves", "waves outside", "quadric"])
+@np.errstate(all="ignore")
 def test_the_first_impact_is_that_of_safe_steps(name, gravity):
     """Newton's method finds any impact: what makes it sure is that no other one is before it, also where it grazes."""
     surface = {
