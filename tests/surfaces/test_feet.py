@@ -147,19 +147,20 @@ def test_a_foot_that_is_far_has_a_lower_bound_above_every_radius():
 
 
 @pytest.mark.parametrize("gravity", [(0.0, 0.0, 0.0), (0.3, 0.1, -1.0)], ids=["straight", "falling"])
-@pytest.mark.parametrize("name", ["waves", "waves outside", "quadric"])
+@pytest.mark.parametrize("name", ["waves", "waves outside", "quadric", "waist"])
 @np.errstate(all="ignore")
 def test_the_first_impact_is_that_of_safe_steps(name, gravity):
     """Newton's method finds any impact: what makes it sure is that no other one is before it, also where it grazes."""
     surface = {
         "waves": swarm.Formula(WAVES),
         "waves outside": swarm.Formula(WAVES, side="outside"),
+        "waist": swarm.Formula("y**2 + z**2 - 0.02 - 0.5*x**2 + x**4"),
         "quadric": swarm.Quadric(((1.5, 0.2, 0.0), (0.2, 2.0, 0.3), (0.0, 0.3, 3.0)), constant=-1.0),
     }[name]
     wall, rng, checked = surface.by_foot(0.0)._replace(radius=0.04), np.random.default_rng(7), 0
     pull = Vec(*np.array(gravity))
     size = 1.0 if surface.side == "outside" else 0.6
-    for k in range(60):
+    for k in range(400):
         r, v = Vec(*rng.uniform(-size, size, 3)), Vec(*rng.uniform(-1.0, 1.0, 3))
         if not wall.phi(r) < -0.02:
             continue
