@@ -189,7 +189,7 @@ def _rooms_that_touch(asked: Asked) -> Found:
 def _rooms_that_differ(asked: Asked) -> Found:
     for one in () if _takes_rooms(asked) else _unions(asked):
         if (what := differing_in(one["got"])) is not None:
-            yield {**one, "what": what}
+            yield {**one, "name": what}
 
 
 def _heavy_rooms(asked: Asked) -> Found:
@@ -489,13 +489,13 @@ CAPABILITIES = (
         (BALLS, HEAVY, GRAINS): Refusal(
             "surfaces[{i}] must not have rooms that touch at a wall between them where particles have a radius, got "
             "{got!r:.200}: balls know edges of rooms, not those of a wall of no thickness",
-            "let the rooms overlap, or leave the radius out",
+            "make the rooms overlap, or leave the radius out",
         ),
     }, within="union"),
     Capability("union of parts that differ", _rooms_that_differ, {
         (SOFT, PAPER): Refusal(
-            "surfaces[{i}] must have the same {what} in all of its parts with {method}, got {got!r:.200}: its walls "
-            "are one spring", f"give the {{what}} to the whole, or {_TO_ROOMS}",
+            "surfaces[{i}] must have the same {name} in all of its parts with {method}, got {got!r:.200}: its walls "
+            "are one spring", f"give the {{name}} to the whole, or {_TO_ROOMS}",
         ),
     }, within="union"),
     Capability("union beside guides and cavities", _unions_beside_own, {
