@@ -661,7 +661,7 @@ CAPABILITIES = (
         (HEAVY,): Refusal(
             "surfaces[{i}].laws[{k}] must not let particles with a radius wait where a wall has a mass, got "
             "{got!r:.200}: the wall may come to where they wait",
-            "use a law without a wait, such as Lambert, or give the wall a motion instead of a mass",
+            "use a law without a wait, such as Lambert, or leave the mass out",
         ),
         (BODIES,): Refusal(
             "surfaces[{i}].laws[{k}] must not let bodies wait, got {got!r:.200}: a wall holds one point of a body, and "
