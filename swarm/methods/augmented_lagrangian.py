@@ -192,8 +192,8 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         )
         if not self.adaptive or self.exponent != 1.0:
             return message + (
-                "The loop converges for exponent = 1 from the surface: use exponent = 1 and adaptive=True, or "
-                'on_unconverged="count" or "impact"'
+                "The loop converges for exponent = 1 from the surface: use exponent = 1 and adaptive=True "
+                '(which needs gravity=None), or on_unconverged="count" or "impact"'
             )
         stiffness = self.penalty * self.dt * self.dt / mass
         message += (

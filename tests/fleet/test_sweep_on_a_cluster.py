@@ -39,6 +39,22 @@ def client():
 
 
 @pytest.fixture
+def no_second_worker(client):
+    """A run whose worker died is given to no other one."""
+
+    def allow(n):
+        def on_scheduler(dask_scheduler):
+            before, dask_scheduler.allowed_failures = dask_scheduler.allowed_failures, n
+            return before
+
+        return client.run_on_scheduler(on_scheduler)
+
+    before = allow(0)
+    yield
+    allow(before)
+
+
+@pytest.fixture
 def killed(client):
     """The process ids of the workers that were killed, once a run had a checkpoint; its frames wait for that."""
     gone = []
@@ -137,7 +153,7 @@ def test_runs_whose_workers_are_killed_are_run_again(here, client, killed, tmp_p
     assert_the_same(folder, tmp_path / "out")
 
 
-def test_a_run_that_kills_each_worker_fails_alone(client, tmp_path, monkeypatch):
+def test_a_run_that_kills_each_worker_fails_alone(client, no_second_worker, tmp_path, monkeypatch):
     """By a function of the user, in a folder that the workers do not have."""
     (tmp_path / "deadly.py").write_text(
         "import os, signal\n\n\ndef worth(frame):\n    if frame.mass[0] == 2.0:\n"
@@ -145,7 +161,6 @@ def test_a_run_that_kills_each_worker_fails_alone(client, tmp_path, monkeypatch)
     )
     path = write(tmp_path / "sweep.toml", '"particles.mass" = [1.0, 2.0]', run='observables = {worth = "deadly:worth"}')
     monkeypatch.chdir(tmp_path)
-    client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 0))
     frame = swarm.sweep(path, tmp_path / "out", plugins=["deadly"], cluster=client)
     assert frame["state"].tolist() == ["done", "failed"]
     assert "each of the 1 workers that took it has died" in frame["error"][1]
