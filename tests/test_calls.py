@@ -33,6 +33,15 @@ def test_a_misspelt_argument_names_the_nearest(name):
         getattr(swarm, name)(**{f"{last.name}x": 1})
 
 
+@pytest.mark.parametrize(("kind", "method"), [(swarm.Trajectory, "export"), (swarm.Result, "plot")])
+def test_a_misspelt_argument_of_a_method_names_the_nearest(kind, method):
+    parameters = [one.name for one in list(inspect.signature(getattr(kind, method)).parameters.values())[1:]]
+    last = parameters[-1]
+    sentence = rf"^{kind.__name__}\.{method}\(\) .*; did you mean '{last}'\? Its arguments: {', '.join(parameters)}$"
+    with pytest.raises(TypeError, match=sentence):
+        getattr(kind, method)(None, **{f"{last}x": 1})
+
+
 def test_an_error_within_a_call_stays_as_it_is():
     def inner(radius):
         return radius

@@ -17,7 +17,7 @@ from ..errors import SceneError
 from ..files import marks
 from ..files.background import CHUNK_FRAMES, waiting_bytes
 from ..files.writer import size_of
-from ..fleet.plan import in_one_line
+from ..fleet.plan import Plan, in_one_line
 from ..fleet.plan import read as plan_of
 from ..kernel import cache
 from ..run.engines import run_of
@@ -44,10 +44,10 @@ _STRAIGHT, _FALL, _STEPS, _FIELD = 4e-9, 2e-8, 5e-7, 1e-7
 _BALLS, _GRAIN, _SPRING, _SWEEPS, _PART = 2e-7, 2e-6, 5e-10, 5e-7, 2e-8
 # Steps of a crossing of a particle that slides, and what each takes.
 _STEPS_A_CROSSING, _SLIDING = 150, 1e-6
-# An impact in plain Python, a kernel to compile, and what a run takes to begin and to end [s].
-_PYTHON, _COMPILING, _BEGINNING = 1e-4, 1.2, 0.5
-# Particles of which the engine is made, to see which kernels it needs.
-_MOST = 200_000
+# An impact in plain Python, a kernel to compile; to begin and end a run, and the next run of a sweep [s].
+_PYTHON, _COMPILING, _BEGINNING, _NEXT = 1e-4, 1.2, 0.5, 0.03
+# Particles of which the engine is made, to see which kernels it needs; the runs that are looked at for the size of a sweep.
+_MOST, _MOST_RUNS = 200_000, 24
 
 
 class Workload(NamedTuple):
@@ -106,7 +106,8 @@ def outlook_of_file(
         kinds = len({variant.kind for variant in plan.variants})
         over = f"{many(len(plan.variants))} over {listed(list(first.parameters))}"
         runs = f"{over}, {many(kinds)} kind{'s' * (kinds != 1)} of scene, each compiled once"
-        about = {"runs": runs, "first run": f"{in_one_line(first.parameters)}; the other rows are of this one"}
+        about = {"runs": runs, "all runs": _of_all(plan, path, plugins, threads)}
+        about["first run"] = f"{in_one_line(first.parameters)}; the other rows are of this one"
     else:
         job, about = scene_file.read(path, plugins), {}
         stored = path.with_suffix(".h5").name if job.run.trajectory is None else job.run.trajectory
@@ -114,6 +115,23 @@ def outlook_of_file(
         named_alone(job, trajectory=output)
     options = replace(job.run, trajectory=target, threads=job.run.threads if threads is None else threads)
     return about | outlook(replace(job, run=options), target, makes_folder=bool(about))
+
+
+def _of_all(plan: Plan, path: Path, plugins: Iterable[str], threads: int | None) -> str:
+    """The size of the trajectories of a sweep and the time of its runs, from some of them where they are many."""
+    some = plan.variants[:: -(-len(plan.variants) // _MOST_RUNS)]
+    size = seconds = 0.0
+    with allowed(plugins):
+        for variant in some:
+            text = plan.text(variant)
+            job = scene_file.job_of(scene_file.document_of(text, path), text, path)
+            options = job.run if threads is None else replace(job.run, threads=threads)
+            task = task_of(job.scene, job.start(), job.method, options)
+            size += _on_disk(task)
+            seconds += _seconds(task) - _BEGINNING + _NEXT
+    share = len(plan.variants) / len(some)
+    most = "at most " * (task.options.storage.compression != "none")
+    return f"trajectories {most}{in_bytes(size * share)}, about {_about(seconds * share)} one after the other"
 
 
 def _content(task: Task, start: Any, name: str) -> Content:
@@ -148,7 +166,7 @@ def _caught() -> Iterator[list[str]]:
 def _sizes(task: Task, target: Path, there: str) -> dict[str, str]:
     options, n = task.options, len(task.particles)
     storage, surfaces = options.storage, len(task.scene.surfaces)
-    size = options.times.on_disk(surfaces) + size_of(task.scene, task.particles, storage, options.times.count)
+    size = _on_disk(task)
     most = "at most " * (storage.compression != "none")
     files = [(f"trajectory {target}", f"{most}{in_bytes(size)}", there)]
     if options.impacts is not None:
@@ -165,6 +183,12 @@ def _sizes(task: Task, target: Path, there: str) -> dict[str, str]:
         "files": "\n".join(f"{name}, {size}{there}" for name, size, there in files),
         "memory": f"about {in_bytes(memory)}, besides the {in_bytes(_PROGRAM)} of Python, Numba and HDF5",
     }
+
+
+def _on_disk(task: Task) -> float:
+    """The bytes of the trajectory, before compression."""
+    times, storage = task.options.times, task.options.storage
+    return times.on_disk(len(task.scene.surfaces)) + size_of(task.scene, task.particles, storage, times.count)
 
 
 def _logged(particles: Any, n: int) -> float:
@@ -190,10 +214,8 @@ def _time(task: Task) -> dict[str, str]:
     """About how long the run takes, from the flights at its start and the costs of `bench/results`."""
     loads, options = _loads(task), task.options
     threads = options.thread_count()
-    n, frames = len(task.particles), options.times.count
-    seconds = _BEGINNING + frames * (_SEEN * n + options.storage.bytes_of(n) / _WRITTEN)
-    python = seconds + _PYTHON * sum(one.events for one in loads)
-    seconds += sum(one.events * one.cost / (threads if one.shared else 1) for one in loads)
+    python = _of_frames(task) + _PYTHON * sum(one.events for one in loads)
+    seconds = _seconds(task)
     work = " and ".join(f"{many(float(f'{one.events:.2g}'))} {one.noun}" for one in loads)
     stated = {"work": f"about {work}"} if work else {}
     missing, kernels = _kernels(task)
@@ -205,6 +227,18 @@ def _time(task: Task) -> dict[str, str]:
     on = f" on {threads} threads" if threads > 1 and any(one.shared for one in loads) else ""
     once = f", and once {_about(_COMPILING * missing)} to compile {missing} of {kernels} kernels" if missing else ""
     return stated | {"time": f"about {_about(seconds)}{on}{once}{more}; from the start, to a factor of a few"}
+
+
+def _of_frames(task: Task) -> float:
+    """The time of the beginning, the end and the frames of a run [s]."""
+    n, options = len(task.particles), task.options
+    return _BEGINNING + options.times.count * (_SEEN * n + options.storage.bytes_of(n) / _WRITTEN)
+
+
+def _seconds(task: Task) -> float:
+    """The time of a run with compiled kernels [s]."""
+    threads = task.options.thread_count()
+    return _of_frames(task) + sum(one.events * one.cost / (threads if one.shared else 1) for one in _loads(task))
 
 
 def _about(seconds: float) -> str:

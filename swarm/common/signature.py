@@ -9,7 +9,7 @@ import re
 import sys
 import textwrap
 from types import FunctionType
-from typing import Any
+from typing import Any, TypeVar
 
 from numpy.typing import ArrayLike
 
@@ -28,6 +28,7 @@ _NOTE = re.compile(r"(Conserves|Order|Cost|Source|Reference): ")
 _ARRAY = inspect.formatannotation(ArrayLike)
 # An error of Python about the arguments of a call: the function, and what Python 3.13 proposes.
 _CALLED, _PROPOSED = re.compile(r"^[\w.<>]+\(\)"), re.compile(r"\. Did you mean '\w+'\?$")
+_Kind = TypeVar("_Kind")
 _OF_NUMPY = re.compile(r"ndarray\[tuple\[Any, \.\.\.\], dtype\[(\w+)\]\]")
 
 
@@ -188,6 +189,14 @@ def explain_calls(value: Any) -> Any:
     return value
 
 
+def explain_methods(kind: type[_Kind]) -> type[_Kind]:
+    """A class; its public methods say which arguments they have when they are called with others."""
+    for name, method in list(vars(kind).items()):
+        if isinstance(method, FunctionType) and not name.startswith("_"):
+            setattr(kind, name, _explained(method, method))
+    return kind
+
+
 def _explained(function: FunctionType, public: Any) -> Any:
     @functools.wraps(function)
     def call(*args: Any, **named: Any) -> Any:
@@ -204,7 +213,8 @@ def _explained(function: FunctionType, public: Any) -> Any:
 def _with_arguments(message: str, public: Any) -> str:
     """An error of Python about the arguments of a call, with those that there are, and the nearest."""
     parameters = inspect.signature(public).parameters.values()
-    known = [one.name for one in parameters if one.kind != one.VAR_KEYWORD and not one.name.startswith("_")]
-    message = _PROPOSED.sub("", _CALLED.sub(f"{public.__name__}()", message))
+    given = [one.name for one in parameters if one.kind != one.VAR_KEYWORD and not one.name.startswith("_")]
+    known = [name for name in given if name != "self"]
+    message = _PROPOSED.sub("", _CALLED.sub(f"{public.__qualname__}()", message))
     wrong = re.search(r"unexpected keyword argument '(\w+)'", message)
     return f"{message}{(closest(wrong[1], known) if wrong else '') or '.'} Its arguments: {', '.join(known)}"

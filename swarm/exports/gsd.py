@@ -28,6 +28,8 @@ def write(chosen: Exported, path: Path) -> None:
     repeats = chosen.periods > 0.0
     center[repeats] = 0.5 * (low[repeats] + high[repeats])
     needed = np.where(np.isfinite(high - low), 2.0 * np.maximum(abs(low - center), abs(high - center)), 0.0)
+    # Of a file that is there its library keeps the permissions; a new one would not be readable for all.
+    path.touch()
     with gsd.hoomd.open(str(path), "w") as file:
         for moment in chosen.moments():
             file.append(_frame(chosen, moment, center, needed))

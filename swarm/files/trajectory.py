@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from ..common import notebook
 from ..common.catalog import Observables, may_be_nan
 from ..common.columns import frame_of
+from ..common.signature import explain_methods
 from ..errors import SceneError
 from ..particles import Particles
 from ..views import view
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from ..pictures.shown_film import Film
 
 
+@explain_methods
 class Trajectory(Stored):
     """A trajectory on disk, read on demand.
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..common import notebook
 from ..common.columns import frame_of
+from ..common.signature import explain_methods
 from ..errors import SceneError
 from ..methods.base import Method
 from ..particles import Particles
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from .sequence import Frames
 
 
+@explain_methods
 @dataclass(frozen=True, repr=False)
 class Result:
     """The end of a run.

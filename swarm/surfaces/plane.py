@@ -19,6 +19,7 @@ from .facets.mesh import Mesh
 from .fields.many import Many
 from .outlines.outlined import Outlined
 from .shapes.slab import AXES
+from .shapes.sphere import Sphere
 from .surface import Surface
 from .upright import upright
 from .wall_law import leave_of, tries_of
@@ -177,7 +178,7 @@ def _walls_in(surface: Surface, across: int, reach: float) -> tuple[Floats, Floa
         phi, slope = _level(surface, across, points)
         steep = np.sqrt((slope**2).sum(axis=0))
         part = slope[across] / steep
-        if isinstance(surface, Many) and type(surface).__name__ != "Spheres":
+        if isinstance(surface, Many) and surface.kind is not Sphere:
             # As kernels take their axes.
             part = np.where(np.abs(part) <= _ROUND_OFF, 0.0, part)
         here = np.isfinite(part) & (np.abs(phi) <= _NEAR * reach * steep)

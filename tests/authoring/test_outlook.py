@@ -48,6 +48,22 @@ def test_scenes_to_begin_with(kind, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
 
 
+def test_a_sweep_takes_what_its_runs_take(tmp_path):
+    """Three of 10 particles and three of 1000, as files of their own; of 30 runs every second one is looked at."""
+    lists = '[sweep]\n"particles.count" = [{}]\n"particles.seed" = {{range = {}}}\n'
+    rows = []
+    for name, counts, seeds in (("few", "10, 1000", 3), ("many", "1000", 30)):
+        (tmp_path / f"{name}.toml").write_text(GOOD + lists.format(counts, seeds))
+        rows.append(outlook.outlook_of_file(tmp_path / f"{name}.toml")["all runs"])
+    few, thousand = (looked(tmp_path, GOOD.replace("count = 10", f"count = {n}"))["files"] for n in (10, 1000))
+    of = {"kB": 1e3, "MB": 1e6}
+    sizes = [
+        float(number) * of[unit] for number, unit in re.findall(r"([\d.]+) (kB|MB)", " ".join([*rows, few, thousand]))
+    ]
+    assert sizes[0] == pytest.approx(3.0 * (sizes[2] + sizes[3]), rel=0.01)
+    assert sizes[1] == pytest.approx(30.0 * sizes[3], rel=0.01)
+
+
 def test_the_command(tmp_path):
     (tmp_path / "scene.toml").write_text(GOOD)
     done = command("check", "scene.toml", cwd=tmp_path)

@@ -1,5 +1,6 @@
 """Exported files, opened by the programs they are for: VTK, ASE and GSD's own reader."""
 
+import os
 import sys
 from decimal import Decimal
 
@@ -215,6 +216,17 @@ def test_gsd_reads_float32(stored, tmp_path, kind):
                     np.testing.assert_allclose(edges, [1.0, 1.0, 0.8], rtol=1e-6)
                     np.testing.assert_array_equal(frame.particles.image, expected["image"])
                     assert frame.log["center"].tolist() == center
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions are those of POSIX")
+@pytest.mark.parametrize("suffix", [".gsd", ".xyz"])
+def test_a_new_file_has_the_permissions_of_every_new_file(stored, tmp_path, suffix):
+    """The gsd library makes files that only the owner and the group may read."""
+    (tmp_path / "new").touch()
+    path = tmp_path / f"gas{suffix}"
+    with swarm.load(stored["cavity"]) as trajectory:
+        trajectory.export(path)
+    assert path.stat().st_mode == (tmp_path / "new").stat().st_mode
 
 
 def test_images_say_where_particles_have_come(stored, tmp_path):

@@ -488,7 +488,7 @@ CAPABILITIES = (
         ),
         (BALLS, HEAVY, GRAINS): Refusal(
             "surfaces[{i}] must not have rooms that touch at a wall between them where particles have a radius, got "
-            "{got!r:.200}: balls know edges of rooms, not those of a wall of no thickness",
+            "{got!r:.200}: the path of a centre around the edge of a wall of no thickness is not supported",
             "make the rooms overlap, or leave the radius out",
         ),
     }, within="union"),
