@@ -46,7 +46,7 @@ _BALLS, _GRAIN, _SPRING, _SWEEPS, _PART = 2e-7, 2e-6, 5e-10, 5e-7, 2e-8
 _STEPS_A_CROSSING, _SLIDING = 150, 1e-6
 # An impact in plain Python, a kernel to compile; to begin and end a run, and the next run of a sweep [s].
 _PYTHON, _COMPILING, _BEGINNING, _NEXT = 1e-4, 1.2, 0.5, 0.03
-# Particles of which the engine is made, to see which kernels it needs; the runs that are looked at for the size of a sweep.
+# Particles of which the engine is made, to see which kernels it needs; runs from which the size of a sweep follows.
 _MOST, _MOST_RUNS = 200_000, 24
 
 
