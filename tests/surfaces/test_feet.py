@@ -189,6 +189,19 @@ def test_the_first_impact_is_that_of_safe_steps(name, gravity):
     assert checked > 6
 
 
+@pytest.mark.parametrize("slope", [1e-2, 1e-3])
+def test_a_bump_is_met_before_the_floor_behind_it(slope):
+    """From close above the floor Newton's method finds where the ball would come down behind the bump, at x = 2."""
+    surface = swarm.Formula("0.06*exp(-20*((x-1)**2 + y**2)) - z", bounds=((-1.0, -1.0, -1.0), (3.0, 1.0, 1.0)))
+    wall = surface.by_foot(0.0)._replace(radius=0.03)
+    r, v = Vec(0.0, 0.0, 0.03 + 2.0 * slope), Vec(1.0, 0.0, -slope)
+    time, meets = call(foot_hit.first_impact, wall, r, v, Vec(0.0, 0.0, 0.0))
+    assert meets
+    assert 0.5 < time < 0.8
+    assert abs(call(wall.foot, r + time * v).away - 0.03) <= 1e-15
+    assert all(call(wall.foot, r + share * time * v).away > 0.03 for share in np.linspace(0.0, 0.999, 50))
+
+
 @pytest.mark.parametrize("side", ["inside", "outside"])
 def test_an_ellipsoid_by_its_formula_is_an_ellipsoid(side):
     """Distances and normals, as the kernels of an ellipsoid say."""
