@@ -164,7 +164,7 @@ def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most:
     )
     shown = values(drawn.points(end.position), drawn.points(end.velocity))
     drawing.colour_bar(figure, axes, scale.quantity, scale.low, scale.high, [packed], shown)
-    count = content.count // (1 if content.body is None else len(content.body))
+    count = words.count_of(content) // (1 if content.body is None else len(content.body))
     left = how_many_left(content.seen, content.gone.get(name))
     here = drawn.shown if content.body else int((~np.isnan(position[0])).sum())
     count -= sum(left.values())

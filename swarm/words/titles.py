@@ -115,7 +115,7 @@ def of_particles(content: Any) -> str:
 
     `content` is the `Content` of a run.
     """
-    count, body, radius = content.count, content.body, _radius(content)
+    count, body, radius = count_of(content), content.body, _radius(content)
     if body is not None:
         copies = count // len(body)
         noun = noun_of_body(body)
@@ -129,6 +129,14 @@ def of_particles(content: Any) -> str:
         size = amount(low, "m") if low == high else amounts([low, high], "m").replace(" and ", " to ")
         text += f" of {size} radius"
     return text
+
+
+def count_of(content: Any) -> int:
+    """How many particles, or points of bodies, a run has had: of those of its sources the ones that have come."""
+    end = content.frames.get("end")
+    if "born" in content.seen and end is not None and len(end.mass) == content.count:
+        return int(np.count_nonzero(~np.isnan(end.position[0])))
+    return int(content.count)
 
 
 def noun_of_body(body: Body) -> str:

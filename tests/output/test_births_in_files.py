@@ -7,7 +7,8 @@ from conftest import edited
 import swarm
 from swarm.commands.summary import numbers
 from swarm.scene_file import read
-from swarm.words import facts
+from swarm.words import facts, titles
+from swarm.words.content import content_of
 
 BOX = swarm.Scene([swarm.Box((0.5, 0.5, 0.5))])
 # One more at each frame.
@@ -224,3 +225,17 @@ def test_frames_of_a_result_are_of_those_that_are_there(tmp_path):
     assert counts == [frame.position.shape[1] for frame in result.frames]
     assert counts == result.observables["born"][:, 0].tolist()
     assert not any(np.isnan(frame.velocity).any() for frame in result.frames)
+
+
+def test_titles_count_the_balls_that_have_come(tmp_path):
+    """A ball that stays in the place of the others keeps them from coming."""
+    source = swarm.Source(
+        swarm.Box((0.01, 0.01, 0.01)), volume=True, times=TIMES, speed=1e-3, radius=0.1, density=1.0, blocked="wait"
+    )
+    seen = swarm.simulate(
+        BOX, None, swarm.Impact(), until=1.0, every=0.5, trajectory=tmp_path / "run.h5", sources=source, compile="never"
+    ).observables
+    assert seen["born"][-1, 0] == 1
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        assert trajectory.count == len(TIMES)
+        assert titles.title(content_of(trajectory)).startswith("1 ball of 0.1 m radius from sources")
