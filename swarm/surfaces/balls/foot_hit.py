@@ -1,12 +1,13 @@
-"""When a ball meets a wall of a smooth phi: Newton's method for the time and the foot at once, and what makes it sure.
+"""The time of impact of a ball on a wall of a smooth phi: Newton's method for time and foot at once, and its proof.
 
-With f and m as in by_foot.py, what a place p says is f(p + s) <= f(p) + grad f.s + m |s|^2. A ball of the radius R
-around p + w has no wall in it where
-    f + grad f.w + m |w|^2 + R sqrt(|grad f|^2 - 4 m f) - m R^2 <= 0,
-within a ball around another centre for m > 0, a half-space for m = 0: a flight stays there until the root of a parabola
-or, in a fall, of a quartic. The place where a ball touches the wall says this up to the very impact, so nothing is left
-to be searched for there. Newton's method may begin anywhere and find any impact: it is the first one where a chain of
-places leads up to it. Where that does not succeed, as where a flight grazes, safe steps go on, march.py.
+With f and m as in by_foot.py, a place p bounds f around it: f(p + s) <= f(p) + grad f.s + m |s|^2. So a ball of the
+radius R around p + w holds no point of the wall if
+    f + grad f.w + m |w|^2 + R sqrt(|grad f|^2 - 4 m f) - m R^2 <= 0.
+The centres for which this holds fill a ball for m > 0, and a half-space for m = 0. A flight is in it until the root of
+a parabola or, in a fall, of a quartic. The bound of the place at which a ball touches the wall reaches up to the impact.
+
+Newton's method may begin anywhere and may find any impact. That impact is the first one if a chain of places bounds
+the flight up to it. If the chain does not get there, as where a flight grazes, safe steps go on (march.py).
 """
 
 import math
@@ -23,17 +24,17 @@ from ..time_of_impact.course import Fall, Quartic, close, first_rise, rise_time
 
 # Places of a chain, Newton's steps, and the last one in parts of a radius: each one doubles the digits.
 _PLACES, _SWEEPS, _LAST = 24, 8, 1e-8
-# How deep an impact may be beyond what is sure, in roundings of the place: it is the same impact.
+# How far behind the bound an impact may be, in roundings of the place, and still be the impact at the bound.
 _SAME = 16.0 * EPSILON
 # The sine of the angle of an impact at least: at less its time has few digits.
 _STEEP = 1e-4
-# Another impact is looked for where a wall is surely this near, in radii.
+# Newton's method begins again where the bound ends within this many radii.
 _CLOSE = 0.1
 _TINY = float(np.finfo(np.float64).tiny)
 
 
 class Sure(Record):
-    """What a place says: f, its gradient n, and sqrt(|n|^2 - 4 m f)."""
+    """The bound by a place: f, its gradient n, and sqrt(|n|^2 - 4 m f)."""
 
     place: Vec
     f: Any
@@ -42,7 +43,7 @@ class Sure(Record):
 
 
 class TouchOfWall(Record):
-    """An impact: its time, what its foot says, and the speed along the normal; no speed where none was found."""
+    """An impact: its time, the bound by its foot, and the speed along the normal, which is 0 if none was found."""
 
     time: Any
     foot: Sure
@@ -51,7 +52,7 @@ class TouchOfWall(Record):
 
 @outlined
 def first_impact(wall, r, v, pull):
-    """`first_hit` of a ball, in a fall too."""
+    """`first_hit` of a ball, in a straight flight or a fall."""
     t, found = 0.0, TouchOfWall(0.0, Sure(r, 0.0, v, 0.0), 0.0)
     for _place in range(_PLACES):
         y, w = r + t * (v + (0.5 * t) * pull), v + t * pull
@@ -79,7 +80,7 @@ def first_impact(wall, r, v, pull):
 
 
 def _here(wall, y, v, pull):
-    """What is said at a place of a flight, and how long the flight is surely free by that: of its foot, near a wall."""
+    """The bound at a place of a flight, near a wall that of its foot; and how long the flight meets no wall by it."""
     p = wall.within(y)
     sure, near = _sure(wall, p), norm(y - p)
     if wall.known < math.inf:
@@ -95,7 +96,7 @@ def _here(wall, y, v, pull):
 
 
 def _sure(wall, p):
-    """What a place says."""
+    """The bound by a place."""
     f, n = wall.side_of_body() * wall.body.phi(p), wall.side_of_body() * wall.body.gradient(p)
     left = square(n) - 4.0 * wall.most * f
     return Sure(p, f, n, math.sqrt(select(left > 0.0, left, 0.0)))
@@ -103,7 +104,7 @@ def _sure(wall, p):
 
 @outlined
 def _free(wall, sure, y, v, pull):
-    """How long a ball at y surely meets no wall, by what a place says; 0 where that is nothing."""
+    """How long a ball at y meets no wall, by the bound of a place; 0 where the bound does not hold y."""
     m, w, size = wall.most, y - sure.place, norm(sure.n)
     c = sure.f + dot(sure.n + m * w, w) + wall.radius * (sure.root - m * wall.radius)
     if 2.0 * m * wall.radius > sure.root or c > _SAME * size * total(absolute(y) + absolute(sure.place)):
@@ -113,7 +114,7 @@ def _free(wall, sure, y, v, pull):
     if pull2 == 0.0:
         time = rise_time(c, b, a2)
     else:
-        # How long it takes to cross what these places are in
+        # How long it takes to cross the ball of centres
         across = abs(sure.root / (2.0 * m)) if m != 0.0 else 0.0
         window = 2.0 * across / math.sqrt(square(v) + across * math.sqrt(pull2)) if m != 0.0 else math.inf
         level = Quartic(c, b, a2 + 0.5 * dot(steep, pull), m * dot(v, pull), 0.25 * m * pull2, window)
@@ -126,7 +127,7 @@ def _free(wall, sure, y, v, pull):
 
 
 def _touched(wall, sure, y):
-    """Where a ball at y touches the edge of what a place says."""
+    """Where a ball at y touches the edge of the bound by a place."""
     u = sure.n + (2.0 * wall.most) * (y - sure.place)
     size = norm(u)
     return y + (wall.radius / select(size > _TINY, size, 1.0)) * u
