@@ -4,7 +4,7 @@ With f and m as in by_foot.py, a place p bounds f around it: f(p + s) <= f(p) + 
 radius R around p + w holds no point of the wall if
     f + grad f.w + m |w|^2 + R sqrt(|grad f|^2 - 4 m f) - m R^2 <= 0.
 The centres for which this holds fill a ball for m > 0, and a half-space for m = 0. A flight is in it until the root of
-a parabola or, in a fall, of a quartic. The bound of the place at which a ball touches the wall reaches up to the impact.
+a parabola or, in a fall, of a quartic. The bound of the place of the impact reaches up to the impact.
 
 Newton's method may begin anywhere and may find any impact. That impact is the first one if a chain of places bounds
 the flight up to it. If the chain does not get there, as where a flight grazes, safe steps go on (march.py).
