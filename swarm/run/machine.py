@@ -26,6 +26,7 @@ from .measures import Measures
 from .options import Task
 from .outputs import recorder_of, writer_of
 from .preflight import hints
+from .preflight.user_code import explained
 from .progress import Display, display
 from .session import Session
 from .tally import Watched, tally_of
@@ -86,7 +87,7 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
     if not task.is_shard:
         hints.give(task)
     until, span_of, kept = task.options.until, task.method.span, Columns()
-    with _begun(task, session) as (run, writer, show, (log, tally, _counters), measures):
+    with explained(task), _begun(task, session) as (run, writer, show, (log, tally, _counters), measures):
         with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
             for number, before, moment in session.frames(task.options.times):
                 if number == 0:

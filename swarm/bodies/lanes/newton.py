@@ -27,7 +27,7 @@ def solve(contacts):
     has_guides = more > 0
     alone = rule.stages.size == 1 and not has_guides and not rule.loop
     contacts.launch()
-    is_rigid = (not has_guides) and ties.links == ties.ends.shape[0]
+    is_rigid = ties.links == ties.ends.shape[0]
     for i in range(count):
         brief = is_rigid & (pace.active[i] == 0) & (abs(pace.h[i]) < BRIEF * rule.dt)
         if contacts.touching.is_dissipative and is_rigid and not pace.done[i]:

@@ -16,9 +16,9 @@ from ...kernel.vector import dot, norm
 from . import impact, impact_time, sent_off, sticking
 from .contacts import MOST_CONTACTS, NEAR, ROOM, BodyContacts, direction, put_direction, put_frame, sweep
 
-# From this correction of a stage on the equations may be worse by the factor, in units of round-off: where more
-# contacts than three hold a rigid body, their forces converge slowly.
-_PATIENT, _LARGER = 20, 1e3
+# From this correction of a stage on the equations may be worse by the factor, in units of round-off, where more contacts
+# than these hold a body: their forces are not determined, and converge slowly.
+_PATIENT, _LARGER, _DETERMINED = 20, 1e3, 3
 # Sweeps over the contacts in one correction, and the change of their forces that ends them.
 _SWEEPS = 60, 1e-16
 # The most that an error of friction moves a contact [m/s].
@@ -108,7 +108,7 @@ class HardContacts(BodyContacts):
             error = max(error, off / rule.room)
         before = pace.unsettled[i] if number > 0 else 1.0
         pace.unsettled[i] = error
-        late = number >= _PATIENT
+        late = number >= _PATIENT and found > _DETERMINED
         # One correction more than errors of round-off ask for, since directions lag behind forces: to stop where the
         # next would be within round-off loses 4e-10 J of 40 J in a step of examples/slider_crank.py.
         last = error <= 1.0 or (late and error <= _LARGER and error >= 0.5 * before)
