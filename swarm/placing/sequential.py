@@ -167,6 +167,6 @@ def _full(
     reached = balls_volume(scene, radius[done]) / room.volume
     return SceneError(
         f"fill found places for {int(done.sum())} of {radius.size} balls, a packing of {reached:.4g}, in {tried} "
-        f"tries, got {packing_of(scene, radius, room)}; use fewer or smaller balls, or swarm.pack, which grows "
-        "them up to 0.6"
+        f"tries, got {packing_of(scene, radius, room)}; use fewer or smaller balls, or swarm.pack, in a file "
+        "the key fraction, which grows them up to 0.6"
     )

@@ -182,7 +182,8 @@ class PointBatches:
             if tried >= next_report and count < n:
                 next_report = 2 * tried
                 _LOG.warning(
-                    "%s: %d of %d births have a place so far, in a small part of what is searched, after %d points",
+                    "%s: still looking for places of births, %d of %d found after %d points tried: few points of its "
+                    "where= are admissible; a smaller where=, or an opening, takes less time",
                     self._name, count, n, tried,
                 )  # fmt: skip
         points, normals = np.concatenate(found, axis=1).reshape(2, 3, n)

@@ -124,7 +124,7 @@ def _what_runs(content: Content) -> str:
         velocity = body.center_of(np.ascontiguousarray(velocity).reshape(3, len(body), -1))
     speeds = np.sqrt((velocity**2).sum(axis=0))
     for what, values, unit in (
-        (" of" if body is None else ", each of", masses, "kg"),
+        (" of" if body is None else ", each body of", masses, "kg"),
         (", at the start with", speeds[~np.isnan(speeds)], "m/s"),
     ):
         if not len(values):

@@ -16,8 +16,8 @@ from ...kernel.vector import dot, norm
 from . import impact, impact_time, sent_off, sticking
 from .contacts import MOST_CONTACTS, NEAR, ROOM, BodyContacts, direction, put_direction, put_frame, sweep
 
-# From this correction of a stage on the equations may be worse by the factor, in units of round-off, where more contacts
-# than these hold a body: their forces are not determined, and converge slowly.
+# From this correction of a stage on the equations may be worse by the factor, in units of round-off, where more than so
+# many contacts hold a body: their forces are not determined, and converge slowly.
 _PATIENT, _LARGER, _DETERMINED = 20, 1e3, 3
 # Sweeps over the contacts in one correction, and the change of their forces that ends them.
 _SWEEPS = 60, 1e-16

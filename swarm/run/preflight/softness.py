@@ -103,7 +103,7 @@ def _warn_of_walls(scene: Scene, particles: Particles, radius: Floats, method: M
     speeds = _speeds(scene, particles)
     depths = depths_of(method, particles.mass, speeds, max(surface.restitution for surface in scene.surfaces))
     k = int(np.nanargmax(depths / radius))
-    _warn(method, f"particle {k}, with {speeds[k]:.3g} m/s,", "a wall", float(depths[k]), float(radius[k]))
+    _warn(method, f"particle {k}, which may reach {speeds[k]:.3g} m/s,", "a wall", float(depths[k]), float(radius[k]))
 
 
 def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: Method) -> None:
@@ -121,8 +121,8 @@ def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: M
 def _warn(method: Method, subject: str, what: str, depth: float, radius: float) -> None:
     if depth > MOST_PRESSED * radius:
         _LOG.warning(
-            "contacts are soft for the speed: %s sinks up to %.2g m into %s, %.2g radii, where %g is small and 1 ends "
-            "the run; use a penalty of %.1e or more (%g here) with a dt that fits it, or Impact",
+            "contacts are soft for the speed: %s may sink %.2g m into %s, %.2g of its radius; up to %g is small, and at "
+            "1 the run ends; use a penalty of %.1e or more (%g here) with a dt that fits it, or Impact",
             subject, depth, what, depth / radius, MOST_PRESSED, _penalty(method, depth, MOST_PRESSED * radius),
             method.penalty,  # type: ignore[attr-defined]
         )  # fmt: skip
@@ -143,7 +143,7 @@ def _warn_of_solids(task: Task) -> None:
     thickness = 2.0 * thinnest.size()
     if depth > MOST_PRESSED * thickness:
         _LOG.warning(
-            "contacts are soft for the speed: particle %d, with %.3g m/s, sinks up to %.2g m into a wall, and "
+            "contacts are soft for the speed: particle %d, which may reach %.3g m/s, may sink %.2g m into a wall, and "
             "surfaces[%d] (%s) is %.2g m thick: beyond its middle a particle leaves on the other side; use a penalty "
             "of %.1e or more (%g here) with a dt that fits it, or Impact",
             k, speeds[k], depth, i, type(thinnest).__name__, thickness,
