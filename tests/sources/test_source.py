@@ -187,7 +187,10 @@ def test_a_long_search_for_places_is_reported(caplog, monkeypatch):
     with pytest.raises(swarm.SceneError, match="of which 0 of 1638400 points are"):
         run(SPHERE, corner)
     reports = [message for message in caplog.messages if "still looking for places of births" in message]
-    assert [re.findall("0 of 12 found after (.*) points", message)[0] for message in reports] == ["524288", "1048576"]
+    assert [re.findall("0 of 12 found after (.*) points tried", message)[0] for message in reports] == [
+        "524288",
+        "1048576",
+    ]
     assert reports[0].startswith("sources[0]: still looking")
 
 

@@ -121,7 +121,7 @@ def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: M
 def _warn(method: Method, subject: str, what: str, depth: float, radius: float) -> None:
     if depth > MOST_PRESSED * radius:
         _LOG.warning(
-            "contacts are soft for the speed: %s may sink %.2g m into %s, %.2g of its radius; up to %g is small, and at "
+            "contacts are soft for the speed: %s may sink %.2g m into %s, %.2g of its radius; %g is small, and at "
             "1 the run ends; use a penalty of %.1e or more (%g here) with a dt that fits it, or Impact",
             subject, depth, what, depth / radius, MOST_PRESSED, _penalty(method, depth, MOST_PRESSED * radius),
             method.penalty,  # type: ignore[attr-defined]
