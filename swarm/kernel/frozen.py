@@ -9,6 +9,7 @@ import collections
 import contextlib
 import dis
 import enum
+import functools
 import hashlib
 import operator
 import os
@@ -89,11 +90,8 @@ class Frozen:
         copy = self._copies[function] = types.FunctionType(code, scope, function.__name__, None, cells or None)
         if own:
             self._copies[function] = function
-        names: set[str] = set()
-        for part in _parts(code):
-            taken = _taken(part, names)
-            self.add(*_CODE(part))
-            self.add(*(sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in taken))
+        names, text = _text_of_code(code)
+        self._hash.update(text)
         copy.__defaults__ = self.value(function.__defaults__, own=own)
         self.add(*sorted((function.__kwdefaults__ or {}).items()))
         copy.__kwdefaults__ = function.__kwdefaults__
@@ -101,7 +99,7 @@ class Frozen:
             # A cell is empty while the name has no value: its use fails as in the original.
             with contextlib.suppress(ValueError):
                 cell.cell_contents = self.value(original.cell_contents, code, own)
-        for name in sorted(names):
+        for name in names:
             self.add("global", name)
             if name in function.__globals__:
                 scope[name] = self.value(function.__globals__[name], code, own)
@@ -203,10 +201,25 @@ class Frozen:
 
     def add(self, *parts: Any) -> None:
         """Add parts by what they print."""
-        # The length of each, so that two parts are never taken for one.
         for part in parts:
-            text = repr(part).encode()
-            self._hash.update(b"%d:" % len(text) + text)
+            self._hash.update(_text_of(part))
+
+
+def _text_of(part: Any) -> bytes:
+    """What a part prints, with its length, so that two parts are never taken for one."""
+    text = repr(part).encode()
+    return b"%d:%b" % (len(text), text)
+
+
+@functools.cache
+def _text_of_code(code: types.CodeType) -> tuple[list[str], bytes]:
+    """The names of globals of a function in their order, and the text of its code: of the kernels of a process once."""
+    names, text = set[str](), b""
+    for part in _parts(code):
+        taken = _taken(part, names)
+        shown = (sorted(map(repr, one)) if isinstance(one, frozenset) else one for one in taken)
+        text += b"".join(map(_text_of, (*_CODE(part), *shown)))
+    return sorted(names), text
 
 
 def _taken(code: types.CodeType, names: set[str]) -> list[Any]:
