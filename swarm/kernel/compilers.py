@@ -6,6 +6,7 @@ kernel compiles.
 """
 
 import contextlib
+import functools
 import gc
 import sys
 import threading
@@ -16,6 +17,8 @@ import llvmlite.binding as llvm
 import numba
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+
+from .arguments import wrap
 
 _CONFIG: Any = numba.config
 # Frames that a trace may nest; 1600 take less than 512 kB of a stack.
@@ -101,6 +104,8 @@ class KernelCompiler(Compiler):  # type: ignore[misc]
         """Numba's passes, into a library that is a `_Kernel`."""
         self.state.library = self.library(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
         self.state.library.enable_object_caching()
+        # Of this kernel alone: Numba has made this target for it.
+        self.state.targetctx.create_cpython_wrapper = functools.partial(wrap, self.state.targetctx)
         return super().define_pipelines()
 
     def compile_extra(self, func: Any) -> Any:

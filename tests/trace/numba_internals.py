@@ -4,7 +4,7 @@ Each name is here with the parameters by which the package calls it, or None for
 is taken from them is held by test_internals.py.
 """
 
-# Types of functions and operations, and their implementations: trace/values.py, trace/emit.py
+# Types of functions and operations, and their implementations: trace/values.py, trace/emit.py, arguments.py
 TYPING = {
     "core.typing.context.BaseContext.refresh": "self",
     "core.typing.context.BaseContext.resolve_function_type": "self func args kws",
@@ -35,13 +35,21 @@ LOWERING = {
     "core.base.BaseContext.make_tuple": "self builder typ values",
     "core.callconv.CPUCallConv.get_function_type": "self restype argtypes",
     "core.callconv.CPUCallConv._get_excinfo_argument": "self func",
+    "core.callwrapper.PyCallWrapper": "context module func fndesc env call_helper release_gil",
+    "core.callwrapper.PyCallWrapper.build": "self",
+    "core.callwrapper.PyCallWrapper.build_wrapper": "self api builder closure args kws",
     "core.cgutils": None,
+    "core.cpu.CPUContext.create_cpython_wrapper": "self library fndesc env call_helper release_gil",
     "core.datamodel.registry.default_manager": None,
     "core.imputils.impl_ret_borrowed": "ctx builder retty ret",
+    "core.pythonapi.NativeValue": "value is_error cleanup",
+    "core.pythonapi.PythonAPI.long_as_longlong": "self numobj",
+    "core.pythonapi.PythonAPI.to_native_value": "self typ obj",
     "np.arrayobj.load_item": "context builder arrayty ptr",
     "np.arrayobj.populate_array": "array data shape strides itemsize meminfo",
     "np.arrayobj.store_item": "context builder arrayty val ptr",
     "np.linalg.ensure_blas": "",
+    "np.numpy_support.as_dtype": "nbtype",
     "np.numpy_support.ufunc_find_matching_loop": "ufunc arg_types",
 }
 # Templates that type a call by its trace or else by Numba: trace/helpers.py

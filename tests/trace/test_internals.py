@@ -3,14 +3,17 @@
 import ast
 import functools
 import inspect
+import itertools
+import math
 import operator
 import pkgutil
+import sys
 from pathlib import Path
 
 import numba
 import numpy as np
 import pytest
-from compared import Record, compiled_only, in_kernel
+from compared import Inner, Record, bits, compiled_only, in_kernel
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -247,6 +250,28 @@ def test_numba_asks_a_kernel_to_optimise_its_functions(monkeypatch, tmp_path):
     assert kernel(1.0) == 4.0
     assert asked
     assert min(asked) > 0
+
+
+def of_arguments(x, n, record, tables, nothing, flag):
+    plain, turned, spaced, narrow, counts, point = tables
+    numbers = x + record.x, n + record.n, record.inner.y, record.inner.flag, flag, nothing is None
+    sizes = plain.shape[0], turned.shape[0], turned.shape[1], spaced.shape[0], point.ndim
+    return *numbers, *sizes, plain[-1], turned[1, 2], spaced[1], spaced[-1], narrow[1], counts[2], counts.size
+
+
+def test_a_kernel_reads_its_arguments_from_where_python_has_them(monkeypatch, tmp_path):
+    """The fields of floats, tuples and arrays are not documented; none of them is taken, or given back twice."""
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    kernel = jit.kernel(of_arguments)
+    turned = np.asfortranarray(np.arange(12.0).reshape(3, 4))
+    arrays = np.arange(3.0), turned, turned[::2, 1], np.arange(4, dtype=np.float32), np.arange(5)[::-1], np.array(7.0)
+    arrays[0].flags.writeable = False
+    for float_, int_ in itertools.product((0.1, np.float64(-0.0), math.nan), (3, np.int64(-(2**62)), True + 0)):
+        given = float_, int_, Record(float_, int_, Inner(2.5, True)), arrays, None, np.False_
+        before = [*map(sys.getrefcount, arrays), sys.getrefcount(given[2])]
+        assert bits(kernel(*given)) == bits(of_arguments(*given))
+        assert [*map(sys.getrefcount, arrays), sys.getrefcount(given[2])] == before
+    assert len(kernel.signatures) == 1
 
 
 def test_what_numba_compiles_of_a_helper_is_no_machine_code(monkeypatch, tmp_path):
