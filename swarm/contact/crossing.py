@@ -69,13 +69,16 @@ def _meets_one(field, ends, number, active, path, near):
     # A step without a solution has no end.
     if not (square(path.r1) < math.inf and square(path.v1) < math.inf):
         return True
-    block = block_of_path(grid, own_path(field, ends, path), near)
-    return over_entries(grid, block, False, _meets_body, field, ends, number, active, path, near)
+    own = own_path(field, ends, path)
+    block = block_of_path(grid, own, near)
+    return over_entries(grid, block, False, _meets_body, field, ends, number, active, (path, own), near)
 
 
-def _meets_body(found, m, field, ends, number, active, path, near):
-    m = float(m)
-    if isinstance(field, Patched) and not field.is_ahead(m, path.r0, path.r1, _reach(path) + near):
+def _meets_body(found, m, field, ends, number, active, paths, near):
+    m, (path, own) = float(m), paths
+    # In the frame of a field that moves: a particle that rests on a patch comes through no other, however fast they go.
+    patches = members_of(field)
+    if isinstance(patches, Patched) and not patches.is_ahead(m, own.r0, own.r1, _reach(own) + near):
         return found
     return found or ((not _is_held(field, number, m, active)) and _may_meet(field.wall(m), ends.wall(m), path, near))
 

@@ -111,7 +111,7 @@ def _clear(slide, lane, low, high):
             continue
         found = crossing.arrival(walls, active, path, near, remaining - time)
         met = found.wall
-        if found.time == 0.0 or not time < end:
+        if found.time == 0.0 or not remaining - end < remaining - time:
             break
         step = (end - time) * min(found.time, 0.5)
     # A path that no wall is found on, however short, is clear of them.

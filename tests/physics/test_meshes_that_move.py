@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import swarm
+from swarm.contact import crossing
 from swarm.kernel.vector import Vec, vec
 from swarm.observables import drift
 from swarm.surfaces.in_motion.drive import drive_of
@@ -139,6 +140,24 @@ def test_its_laws_act_in_its_frame(laws):
     assert one.observables["wall_work"][-1].sum() != 0.0
     if "temperature" not in laws:
         assert one.particles.position == pytest.approx(other.particles.position, abs=1e-11)
+
+
+@pytest.mark.parametrize("motion", [LED, swarm.Oscillation((0.02, 0.0, 0.0), 1.5)], ids=["led", "shaken"])
+def test_what_rests_on_a_thin_mesh_looks_for_no_wall_behind_it(monkeypatch, motion):
+    """The planes of the other faces are never met, however far the mesh goes in a step; looks are counted."""
+    looks, arrival = [], crossing.arrival
+    monkeypatch.setattr(crossing, "arrival", lambda *given: looks.append(1) or arrival(*given))
+    how = {"motion": motion, "friction": 0.8, "restitution": 0.2}
+    thin, still = HALF * CUBE * (1.0, 1.0, 0.05), [0.0, 0.0]
+    dropped = swarm.Particles([[0.02, -0.1], [0.01, 0.15], [0.016, 0.02]], [still, still, still])
+    solids = (
+        swarm.Mesh(thin, TRIANGLES, "outside", **how),
+        swarm.Box((HALF, HALF, 0.05 * HALF), side="outside", **how),
+    )
+    one, other = (run([swarm.Sphere(0.9), solid], dropped, 0.12, DOWN, every=0.06) for solid in solids)
+    assert len(looks) <= 10
+    assert one.observables["sliding"][-1] == 2
+    same(one, other, 2)
 
 
 def test_its_distance_is_that_of_a_time():
