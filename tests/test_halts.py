@@ -183,6 +183,37 @@ def test_a_frame_that_becomes_long_frees_the_callers_thread():
         assert run._cut_short
 
 
+def test_passes_that_become_dear_free_the_callers_thread(monkeypatch):
+    """The passes that it computes were cheap until now: it is free in a quarter of a second, whatever one costs."""
+    dear, cheap = [], block._pass
+
+    def rest(*about):
+        dear.append(time.sleep(0.05))
+        return cheap(*about)
+
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    with Run(scene.compiled(), swarm.fill(scene, 1, speed=1.0), swarm.Impact(), 1, None, "never") as run:
+        assert run.advance(1e-3, 1e-3)
+        run._watch._born = -np.inf
+        monkeypatch.setattr(block, "_pass", rest)
+        run._pace, alone = 0.0, run._watch._alone[True]
+        assert not run.advance(1e9, 1e9, 0.0, time.monotonic() + 0.1)
+    assert len(dear) < 100 < alone
+
+
+def test_a_guard_lets_the_halt_that_is_asked_for_come():
+    watch = Watch(10)
+    watch._born = -np.inf
+    watch.halt(5)
+    watch.begin(0.0, helps=True, plain=True)
+    time.sleep(0.15)
+    assert watch.passes[0] == 5
+    watch.end()
+    watch.begin(0.0, helps=True, plain=True)
+    time.sleep(0.25)
+    assert watch.passes[0] == 0
+
+
 def test_a_frame_in_two_threads_has_the_same_bits():
     """Wherever the caller's thread leaves it: after any number of passes."""
     scene = swarm.Scene([swarm.Sphere(0.5)], (0.0, 0.0, -9.81))

@@ -37,7 +37,7 @@ def slide_block(kind, method, walls, gravity, share, lanes):
     place, live, passes = impact_log.gone_on(share.log)
     loaded = True
     while live < LANES and loaded:
-        place, loaded = _refill(slide, share, live, place, passes)
+        place, loaded, passes = _refill(slide, share, live, place, passes)
         if loaded:
             lanes.lane(live).looked_particle = -1.0
             live += 1
@@ -57,7 +57,7 @@ def slide_block(kind, method, walls, gravity, share, lanes):
             phase = _next_phase(slide, share, i)
             if phase != slide.phase():
                 _retire(slide, share, i, phase)
-                place, loaded = _refill(slide, share, i, place, passes)
+                place, loaded, passes = _refill(slide, share, i, place, passes)
                 if not loaded:
                     live -= 1
                     lanes.move(live, i)
@@ -139,18 +139,21 @@ def _count_return(slide, share, i, before, end):
 
 @outlined
 def _refill(slide, share, i, place, passes):
-    """The next particle that slides into lane i: the `Place` to go on from, and whether there is one.
+    """The next particle that slides into lane i: the `Place` to go on from, whether there is one, and the passes.
 
-    None after a halt: what is loaded may rest or fly at once, one particle after the other.
+    None after a halt: what is loaded may rest or fly at once, one particle after the other. To rest where walls move
+    takes as long as a pass, and counts as one.
     """
     while passes < share.halt[0]:
         place = share.following(slide.phase(), place)
         if place.is_end():
-            return place, False
+            return place, False, passes
         place = place.after()
         if _load(slide, share, i, place.i - 1):
-            return place, True
-    return place, False
+            return place, True, passes
+        if slide.moves():
+            passes += 1
+    return place, False, passes
 
 
 @outlined

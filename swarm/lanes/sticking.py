@@ -19,15 +19,17 @@ _HALVINGS = 60
 # So many paces it stays at a time, and is asked again: a frame may have millions of them, and between them halts count.
 # (Rejected: a halt in any of them. What is carried in two parts is rounded twice.)
 _MOST_PACES = 128.0
-# Steps in the search for another wall that comes. A wall that is not found after so many is too near to be resolved.
-_MOST_STEPS = 10_000
+# Steps in the search for another wall that comes. A wall that is not found after so many is too near to be resolved;
+# after so many of all paces it is asked again too.
+_MOST_STEPS = 1e4
 
 
 class Clear(Record):
-    """Until when no other wall is met, and the wall that is met then, or -1."""
+    """Until when no other wall is met, the wall that is met then, or -1, and how many steps the search took."""
 
     time: float
     wall: float
+    steps: float
 
 
 @outlined
@@ -40,9 +42,9 @@ def stay(slide, i):
     moves_on = square(lane.v - u) > slowest or _rubs(slide, now, lane, slowest)
     if moves_on or not _rests(slide, now, lane, lane.r):
         return slide.phase()
-    pace, low, high, met, paces = now.shortest_time_scale(), 0.0, 0.0, -1.0, 0.0
+    pace, low, high, met, paces, steps = now.shortest_time_scale(), 0.0, 0.0, -1.0, 0.0, 0.0
     pressed, pressed_second = 0.0, 0.0
-    while low < remaining and met < 0.0 and paces < _MOST_PACES:
+    while low < remaining and met < 0.0 and paces < _MOST_PACES and steps < _MOST_STEPS:
         step = min(pace, remaining - low)
         clear = _clear(slide, lane, low, remaining if low + step >= remaining else low + step)
         high = clear.time
@@ -53,8 +55,8 @@ def stay(slide, i):
         one, two, three = tuple(_press_later(slide, lane, t) for t in (low, middle, high))
         pressed += (one.n + 4.0 * two.n + three.n) * ((high - low) / 6.0)
         pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
-        low, met, paces = high, clear.wall, paces + 1.0
-    end, start, goes_on = low, low, paces == _MOST_PACES and met < 0.0
+        low, met, paces, steps = high, clear.wall, paces + 1.0, steps + clear.steps
+    end, start, goes_on = low, low, met < 0.0 and (paces == _MOST_PACES or not steps < _MOST_STEPS)
     if low < remaining and met < 0.0 and not goes_on:
         for _k in range(_HALVINGS):
             middle = 0.5 * (low + high)
@@ -100,13 +102,14 @@ def _clear(slide, lane, low, high):
     """`Clear` of a lane that moves with its first wall, from one time to another."""
     walls, remaining, active = slide.walls, lane.remaining, slide.active(lane)
     near = crossing.near(slide.method, lane.r)
-    time, step, met = low, high - low, -1.0
-    for _k in range(_MOST_STEPS):
+    time, step, met, steps = low, high - low, -1.0, 0.0
+    while steps < _MOST_STEPS:
+        steps += 1.0
         end = high if time + step >= high else time + step
         start, then, path = walls.at(remaining - time), walls.at(remaining - end), _way(walls, lane, time, end)
         if not crossing.meets(start, then, active, path, near):
             if end == high:
-                return Clear(high, -1.0)
+                return Clear(high, -1.0, steps)
             time, step = end, 2.0 * step
             continue
         found = crossing.arrival(walls, active, path, near, remaining - time)
@@ -115,7 +118,7 @@ def _clear(slide, lane, low, high):
             break
         step = (end - time) * min(found.time, 0.5)
     # A path that no wall is found on, however short, is clear of them.
-    return Clear(time, met) if met >= 0.0 else Clear(high, -1.0)
+    return Clear(time, met, steps) if met >= 0.0 else Clear(high, -1.0, steps)
 
 
 @outlined

@@ -1,6 +1,7 @@
 """When the kernels of a frame return: after how many passes, and how many the caller's thread may compute."""
 
 import math
+import threading
 import time
 
 import numpy as np
@@ -12,15 +13,19 @@ from ..lanes.table import LANES
 # or so of dear ones. Then their number is doubled as long as they take less than the second time [s], and halved where
 # they take more than the first: whatever a flight costs, a short frame never meets them.
 _FLIGHTS, _PLAIN_FLIGHTS, _LONG, _SHORT = 1 << 16, 1 << 10, 0.05, 0.025
+# A guard looks so often whether the caller's thread computes for as long as the second time [s]; it begins in a run
+# that is so old, since to start it takes a tenth of the shortest runs, and ends after so many looks at an idle thread.
+_GLANCE, _FREED, _YOUNG, _IDLE = 0.1, 0.25, 0.1, 10
 
 
 class Watch:
     """The halt of the kernels of a frame.
 
     Python hands a signal to the main thread alone, between two of its instructions. So a thread that may be this one
-    computes for a few passes only, in which no other thread halts it. Then it leaves the frame to others and watches
-    them.
-    (Rejected: a thread that halts it in time. It would learn of a signal only by a descriptor, which asyncio uses.)
+    computes for a few passes only, and then leaves the frame to others and watches them. Where these passes are dearer
+    than those of the frames before, as of particles that come to rest where walls move, a guard frees it: a thread that
+    looks at the clock alone.
+    (Rejected: a thread that learns of signals. It would only by a descriptor, which asyncio uses.)
 
     Attributes:
         passes: (1,) what kernels ask: after so many passes they return.
@@ -31,6 +36,9 @@ class Watch:
         self.passes = np.full(1, NEVER)
         self._asked, self._latest, self._plain = NEVER, math.inf, False
         self._alone = {False: _FLIGHTS // lanes, True: _PLAIN_FLIGHTS // lanes}
+        # When the caller's thread began to compute, infinite where it does not, and when it first did [s].
+        self._since, self._born = math.inf, math.inf
+        self._guard: threading.Thread | None = None
 
     def halt(self, passes: int = 0) -> None:
         """Make every kernel call of this frame return after so many passes.
@@ -50,6 +58,11 @@ class Watch:
         self._reset()
         if helps:
             np.minimum(self.passes, self._alone[plain], out=self.passes)
+            self._since = time.perf_counter()
+            self._born = min(self._born, self._since)
+            if self._guard is None and self._since - self._born > _YOUNG:
+                self._guard = threading.Thread(target=self._free_in_time, name="swarm guard", daemon=True)
+                self._guard.start()
 
     def is_over(self, turns: int) -> bool:
         """Whether a thread that has called kernels so often ends: many calls of a few passes each are passes too."""
@@ -68,6 +81,19 @@ class Watch:
             self._alone[self._plain] = max(1, alone // 2)
         return True
 
+    def _free_in_time(self) -> None:
+        """Free the caller's thread where it computes for long, or beyond the time at which kernels are halted."""
+        idle = 0
+        while idle < _IDLE:
+            time.sleep(_GLANCE)
+            since = self._since
+            idle = idle + 1 if since == math.inf else 0
+            is_late = time.perf_counter() - since > _FREED or (since < math.inf and time.monotonic() >= self._latest)
+            # What is asked for comes sooner, and counts.
+            if is_late and self._asked == NEVER:
+                np.minimum(self.passes, 0, out=self.passes)
+        self._guard = None
+
     def end(self) -> None:
         """The frame is done, or cut short."""
         self._asked = NEVER
@@ -75,5 +101,6 @@ class Watch:
 
     def _reset(self) -> None:
         """Halted as was asked, also by a signal that comes just now."""
+        self._since = math.inf
         self.passes[0] = NEVER
         np.minimum(self.passes, self._asked, out=self.passes)
