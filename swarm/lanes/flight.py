@@ -2,13 +2,14 @@
 
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
-from ..surfaces.in_motion.moving import Carried, Marched, Strided
+from ..surfaces.in_motion.moving import Carried, Leaping, Marched, Strided
 from ..surfaces.periodic.period import cut
 from ..surfaces.presence.rooms import at_the_end, inside_of
 from ..surfaces.time_of_impact import flights, safe, strides
 from ..surfaces.time_of_impact.course import MORE_STEPS, SAFE_STEPS
 from ..surfaces.time_of_impact.polynomial import AIMED, POLYNOMIAL_STEPS
 from .field_hits import hit_of_lane, keep_hit, seek
+from .in_moving_cells import go_through_moving
 from .periodic import cut_steps
 from .table import marked_lanes
 
@@ -43,6 +44,8 @@ def _search(met, walls, gravity, lanes, live):
         for i in range(index(live)):
             keep_hit(lanes, i, _first_hit(free, free, gravity, lanes.lane(i), lanes, i), before)
         seek(walls, gravity, lanes, live)
+    elif _leaps(met):
+        _leap(walls, gravity, lanes, live)
     elif isinstance(met, Strided):
         _stride(walls, gravity, lanes, live)
     elif met.each and not isinstance(met, Marched) and not _is_closed(gravity, walls):
@@ -53,7 +56,7 @@ def _first_hit(met, walls, gravity, lane, lanes, i):
     """The first hit of a lane with the walls that the method lands on."""
     if met is None or not met.each:
         return flights.NEVER
-    if _has_fields(met):
+    if _has_fields(met) or _leaps(met):
         return hit_of_lane(lanes, i)
     if isinstance(met, Strided):
         return strides.met(lanes.course, i)
@@ -67,6 +70,24 @@ def _first_hit(met, walls, gravity, lane, lanes, i):
 def _has_fields(met):
     """Whether walls at rest are bodies of a field."""
     return len(met.fields()) > 0 and not isinstance(met, Carried)
+
+
+def _leaps(met):
+    """Whether lanes leap through the cells of all fields, which move."""
+    return isinstance(met, Leaping) and len(met.fields()) > 0 and not met.unions
+
+
+def _leap(walls, gravity, lanes, live):
+    """Every lane to its first hit with walls in no field, and from there with the fields."""
+    free, before = walls.others(), walls.count_in_fields()
+    for i in range(index(live)):
+        lane = lanes.lane(i)
+        found = flights.NEVER
+        if free.each:
+            found = safe.first_hit_moving(free, gravity, lane.r, lane.v, lane.remaining)
+        keep_hit(lanes, i, found, before)
+    for number, field in reversed(walls.fields()):
+        go_through_moving(gravity, field.members, number, lanes, live)
 
 
 def _is_closed(gravity, walls):

@@ -165,41 +165,45 @@ def passes(cells, k, here):
 
 
 class WayInCell(Record):
-    """A flight of which the acceleration has a bound, in a cell: how far it comes at most."""
+    """A flight of which the jerk has a bound, in a cell: how far it comes at most."""
 
     from_middle: Vec
     v: Vec
+    half_pull: Vec
     span: float
-    bent: float  # what it may come farther than by its velocity
-    way: float
+    bent: float  # what it may come farther than by its velocity and acceleration
+    halfway: Vec  # half its way by the velocity alone, and how far from there it may be
+    beside: float
     near: float
     slow: float
 
 
-def way_in(cells, place, r, v, bound):
-    """A flight at r in the cell at this place, with a bound of its acceleration, and how long it is there."""
-    w, (acceleration, span) = cells.width, bound
+def way_in(cells, place, seen, span):
+    """A flight in the cell at this place for some time, as the frame of the cells sees it."""
+    w, v, bounds = cells.width, seen.v, seen.bounds(span)
     middle = cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z)
-    bent, near = 0.5 * acceleration * span * span, _OFF * math.sqrt(square(w))
-    slow = _OFF_SPEED * total(absolute(v))
-    return WayInCell(r - middle, v, span, bent, math.sqrt(square(v)) * span + bent, near, slow)
+    near, half = _OFF * math.sqrt(square(w)), 0.5 * seen.a
+    slow = _OFF_SPEED * (total(absolute(v)) + span * total(absolute(half)))
+    here, ahead = seen.r - middle, (0.5 * span) * v
+    beside = math.sqrt(square(ahead)) + 0.5 * bounds.acceleration * span * span + near
+    bent = bounds.jerk * span * span * span * (1.0 / 6.0)
+    return WayInCell(here, v, half, span, bent, here + ahead, beside, near, slow)
 
 
 def may_pass(cells, k, way):
     """As `passes` of such a flight."""
     normal = _row(cells.known.planes, k, 0, 1.0 / _FULL)
     depth = dot(normal, way.from_middle) - float(cells.known.planes[k, 3]) * (way.near * (1.0 / (_FULL * _OFF)))
-    rate = dot(normal, way.v)
-    rises, falls = (rate + way.slow) * way.span + way.bent, (way.slow - rate) * way.span + way.bent
+    rate, bend = dot(normal, way.v) * way.span, dot(normal, way.half_pull) * way.span * way.span
+    rises, falls = rate + select(bend > 0.0, bend, 0.0), select(bend < 0.0, -bend, 0.0) - rate
+    more = way.slow * way.span + way.bent + way.near
     # What is behind the plane comes back first.
-    meets = (depth + select(rises > 0.0, rises, 0.0) >= -way.near) & (
-        depth - select(falls > 0.0, falls, 0.0) <= way.near
-    )
+    meets = (depth + select(rises > 0.0, rises, 0.0) >= -more) & (depth - select(falls > 0.0, falls, 0.0) <= more)
     radius, scale = float(cells.known.planes[k, 7]), way.near * (_REACH / (_FULL * _OFF))
     if not meets or radius == _FULL:
         return meets
-    reach = radius * scale + way.way + way.near
-    return square(way.from_middle - _row(cells.known.planes, k, 4, scale)) <= reach * reach
+    reach = radius * scale + way.beside
+    return square(way.halfway - _row(cells.known.planes, k, 4, scale)) <= reach * reach
 
 
 def _row(rows, k, first, scale):

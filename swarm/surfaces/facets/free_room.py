@@ -44,6 +44,12 @@ def all_away(rows, cell, v):
     return dot(axis, v) < -float(rows[cell, SINE]) * norm(v)
 
 
+def all_away_for(rows, cell, v, change):
+    """The same while its velocity changes by so much at most."""
+    axis = Vec(float(rows[cell, 0]), float(rows[cell, 1]), float(rows[cell, 2]))
+    return dot(axis, v) + _FULL * change < -float(rows[cell, SINE]) * (norm(v) + change)
+
+
 def rooms_of(held: NDArray[np.bool_], normals: NDArray[np.float64], starts: NDArray[np.int32]) -> NDArray[np.int8]:
     """The rows of a grid, those of its empty cells without their blocks, as free ones.
 

@@ -26,6 +26,8 @@ _PARALLEL, _ON = 1e-9, 1.0
 class Facets(Members, Patched):
     """The facets of a mesh: walls on one side, each between its edges; what is known of their grid is `FacetCells`."""
 
+    in_blocks = True
+
     def field_hit(self, gravity, r, v):
         return _first_hit(self, gravity, r, v)
 
@@ -46,7 +48,7 @@ class Facets(Members, Patched):
         return until if cell.inside else until_next(gravity, cells, cell, r, v)
 
     def way_in_cell(self, cell, seen, span):
-        return way_in(self.grid, cell.place, seen.r, seen.v, (seen.bounds(span).acceleration, span))
+        return way_in(self.grid, cell.place, seen, span)
 
     def may_meet(self, k, here):
         return may_pass(self.grid, k, here)

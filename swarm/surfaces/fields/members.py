@@ -79,6 +79,8 @@ class Members(Record):
 
     # Whether each lane looks at all of them on a straight flight.
     few = False
+    # Whether it is known how many cells around an empty one are empty.
+    in_blocks = False
 
     def in_cells(self):
         """The field of bodies that a flight meets in the cells that it passes, and nowhere else."""

@@ -102,6 +102,10 @@ class Strided(Marched):
     """The same where all of these steps are taken in lanes: see strides.py."""
 
 
+class Leaping(Marched):
+    """The same where what moves otherwise as a field are facets: lanes leap through their cells."""
+
+
 def _during(wall, last, remaining, after):
     """A wall over a step; `last` is the one before it then."""
     if isinstance(wall, Following):
@@ -124,11 +128,17 @@ def carried(
     if all(surface.motion is None for surface in (*fields, *surfaces)):
         return Walls(all_walls)
     if fields:
-        return Marched(all_walls)
+        return (Leaping if all(map(_may_leap, all_walls[: len(fields)])) else Marched)(all_walls)
     marched = [walls for walls in of_surfaces if type(walls[0]) in (Moving, TurningWall)]
     if not marched:
         return Carried(all_walls)
     return (Strided if all(map(_may_stride, marched)) else Marched)(all_walls)
+
+
+def _may_leap(field: Field) -> bool:
+    """Whether lanes can leap through the cells of a field; of a spline each would look for its piece."""
+    wall = field.members
+    return isinstance(wall, Moving) and wall.accelerates and wall.body.in_blocks and wall.drive.track is None
 
 
 def _may_stride(walls: list[Any]) -> bool:
