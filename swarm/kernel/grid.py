@@ -231,7 +231,9 @@ def one_cell(count: int) -> Grid:
     return Grid(low, width, Vec(*3 * [1.0 / ENDLESS]), margin, Vec(1.0, 1.0, 1.0), first, entries)
 
 
-def filled_grid(low: Floats, shape: Floats, width: Floats, enter: Callable[[Grid, Any, Any], None]) -> Grid:
+def filled_grid(
+    low: Floats, shape: Floats, width: Floats, enter: Callable[[Grid, Any, Any], None], margin: float = MARGIN
+) -> Grid:
     """The grid of cells from a corner on, filled by a counting sort.
 
     Args:
@@ -240,9 +242,10 @@ def filled_grid(low: Floats, shape: Floats, width: Floats, enter: Callable[[Grid
         width: how wide they are [m].
         enter: `enter(grid, place, entries)` writes each entry to the place of each cell that it is in, which is then
             one more; where `entries` has no room it only counts.
+        margin: the part of a cell that a flight ends beyond its wall.
     """
     first, nothing = np.zeros(int(shape.prod()) + 2, np.int32), np.empty(0, np.int32)
-    grid = Grid(*(vec(row.tolist()) for row in (low, width, 1.0 / width, MARGIN * width, shape)), first, nothing)
+    grid = Grid(*(vec(row.tolist()) for row in (low, width, 1.0 / width, margin * width, shape)), first, nothing)
     # What is in a cell counts in the one after it, so that the sums are where the entries of a cell begin.
     enter(grid, first[1:], nothing)
     np.cumsum(first, out=first)

@@ -32,6 +32,9 @@ _FULL, _OFF, _OFF_SPEED, _TOGETHER = 32767.0, 6e-5, 6e-5, 1_000_000
 _REACH = 2.0
 # How far beside the true place a flight may seem to come through a plane, by a distance and a speed that may be none.
 _BESIDE = 4.0 / _OFF_SPEED
+# A flight to a mesh that turns or swings is known to be in a cell until shortly before its end: it ends so much
+# farther, in cells, that this is beyond the cell's wall.
+MOVING_MARGIN = 0.02
 # So few facets are entered in plain Python.
 _SOME = 60
 
@@ -43,7 +46,7 @@ class FacetCells(Record):
     room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
 
 
-def cells_around(like, table: Floats, corners: Floats, beyond: float = 0.0) -> Grid:
+def cells_around(like, table: Floats, corners: Floats, beyond: float = 0.0, margin: float = MARGIN) -> Grid:
     """The grid of the facets of a table, without what is free around its cells.
 
     Args:
@@ -51,18 +54,19 @@ def cells_around(like, table: Floats, corners: Floats, beyond: float = 0.0) -> G
         table: their numbers, one in each row.
         corners: of each its three (T, 3, 3) [m].
         beyond: how far each goes on beyond the box of these [m].
+        margin: the part of a cell that a flight ends beyond its wall.
     """
     low, high = (
         np.ascontiguousarray(end(corners, axis=1).T + way * beyond) for end, way in ((np.min, -1.0), (np.max, 1.0))
     )
     enter = cache.in_python(enter_bodies) if len(table) <= _SOME else enter_bodies
-    cells = _cells(corners, low.min(axis=1), high.max(axis=1))
-    grid = filled_grid(*cells, partial(enter, like, table, (low, high)))
+    cells = _cells(corners, low.min(axis=1), high.max(axis=1), margin)
+    grid = filled_grid(*cells, partial(enter, like, table, (low, high)), margin)
     numbers = np.repeat(np.arange(len(grid.first) - 2), np.diff(grid.first[:-1]))
     return grid._replace(known=FacetCells(_planes(grid, table, corners, numbers), np.empty((0, 8), np.int8)))
 
 
-def _cells(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
+def _cells(corners: Floats, low: Floats, high: Floats, margin: float) -> tuple[Floats, Floats, Floats]:
     """The corner of the first cell, how many there are along each axis, and how wide they are."""
     a, b, c = np.moveaxis(corners, 1, 0)
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / len(corners)
@@ -73,7 +77,7 @@ def _cells(corners: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, 
     wide = _AREA * (min(max(len(corners), _FEW), _MANY) / _FEW) ** _DOUBLES
     side = max(math.sqrt(wide * area), (extent.prod() / most) ** (1.0 / 3.0))
     shape = np.maximum(np.ceil(extent / side), 1.0)
-    room = 4.0 * MARGIN * extent
+    room = 4.0 * np.where(margin > MARGIN, margin * extent / shape, MARGIN * extent)
     middle = 0.5 * (low + high)
     width = (extent + 2.0 * room) / shape
     return middle - 0.5 * shape * width, shape, width

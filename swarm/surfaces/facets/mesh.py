@@ -17,6 +17,7 @@ from ...common.extras import needed_by
 from ...common.validated import Flag, Length, Magnitude
 from ...errors import SceneError
 from ...kernel.arrays import aligned_copy
+from ...kernel.grid import MARGIN
 from ...kernel.vector import Vec
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region, of_triangles
@@ -25,7 +26,7 @@ from ..fields.one_wall import OneWall, one_wall
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
 from .facet import OVERLAP, ROOM, THIN, FacetNumbers, Shared, SheetSide
-from .facet_cells import cells_around
+from .facet_cells import MOVING_MARGIN, cells_around
 from .made import given_arrays, sorted_by_place, table_of_facets, table_of_sides, triangles_of_balls, with_room
 from .members import Facets
 from .mending import sizes
@@ -199,10 +200,18 @@ class Mesh(Surface):
         numbers = zero, 0.0, 3 * ((zero, 0.0),), Shared(room)
         if self.open:
             like, table = SheetSide(*numbers), table_of_sides(corners, room)
-            grid = cells_around(like, table, np.repeat(corners, 2, axis=0), OVERLAP * room)
+            grid = cells_around(like, table, np.repeat(corners, 2, axis=0), OVERLAP * room, self._margin)
             return with_room(Facets(like, table, grid), None, True)
         like, table = FacetNumbers(*numbers), table_of_facets(corners)
-        return with_room(Facets(like, table, cells_around(like, table, corners)), self._tree, self.is_solid())
+        grid = cells_around(like, table, corners, margin=self._margin)
+        return with_room(Facets(like, table, grid), self._tree, self.is_solid())
+
+    @property
+    def _margin(self) -> float:
+        """The part of a cell that a flight ends beyond its wall."""
+        accelerates = motions.Rotation, motions.Oscillation, motions.Path
+        moves = any(isinstance(one, accelerates) for one in motions.parts_of(self.motion))
+        return MOVING_MARGIN if moves else MARGIN
 
     @property
     def _room(self) -> float:
