@@ -1,4 +1,4 @@
-"""The sine and the versine of an angle against 40 digits."""
+"""The sine, the cosine and the versine of an angle against 40 digits."""
 
 import math
 
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import compiled
 
-from swarm.kernel.angle import sine_and_versine
+from swarm.kernel.angle import sine_and_cosine, sine_and_versine
 
 EPSILON = np.finfo(np.float64).eps
 RNG = np.random.default_rng(7)
@@ -39,6 +39,14 @@ def test_beyond_the_error_is_that_of_the_rounded_angle():
             sine, versine = sine_and_versine(angle)
             assert abs(sine - mpmath.sin(mpmath.mpf(angle))) <= EPSILON * angle
             assert abs(versine - 1 + mpmath.cos(mpmath.mpf(angle))) <= EPSILON * angle
+
+
+@pytest.mark.parametrize("angles", ANGLES.values(), ids=ANGLES)
+def test_sines_and_cosines_of_arrays(angles):
+    sines, cosines = sine_and_cosine(angles)
+    assert sines.tolist() == [sine_and_cosine(angle)[0] for angle in angles.tolist()]
+    assert abs(sines - np.sin(angles)).max() <= 2.0 * EPSILON
+    assert abs(cosines - np.cos(angles)).max() <= 2.0 * EPSILON
 
 
 def test_an_odd_and_an_even_function():

@@ -1,4 +1,4 @@
-"""The sine and the versine of an angle, of sums and products alone: a library's sine ends a lane loop."""
+"""The sine, the cosine and the versine of an angle, of sums and products alone: a library's sine ends a lane loop."""
 
 from .jit import select
 
@@ -21,15 +21,32 @@ _COSINE = (
 
 def sine_and_versine(angle):
     """(sin a, 1 - cos a), the second without cancellation."""
-    # a = n pi + 2 y: sin a = +-2 sin y cos y and 1 - cos a = 2 sin^2 y where n is even, 2 cos^2 y where it is odd
+    # sin a = +-2 sin y cos y and 1 - cos a = 2 sin^2 y where n is even, 2 cos^2 y where it is odd
+    n, sine, cosine = _of_half(angle)
+    is_odd = _odd(n) != 0.0
+    twice, one = 2.0 * (sine * cosine), select(is_odd, cosine, sine)
+    return select(is_odd, -twice, twice), 2.0 * (one * one)
+
+
+def sine_and_cosine(angle):
+    """(sin a, cos a), each with an error of 2 ulp of 1; in Python also of arrays."""
+    n, sine, cosine = _of_half(angle)
+    sign = 1.0 - 4.0 * abs(_odd(n))
+    return sign * (2.0 * (sine * cosine)), sign * ((cosine - sine) * (cosine + sine))
+
+
+def _of_half(angle):
+    """(n, sin y, cos y) for a = n pi + 2 y."""
     n = (angle * _INVERSE_PI + _WHOLE) - _WHOLE
     y = 0.5 * (((angle - n * _PI[0]) - n * _PI[1]) - n * _PI[2])
     z = y * y
     a, b, c, d, e, f = _SINE
     sine = y + (y * z) * (a + z * (b + z * (c + z * (d + z * (e + z * f)))))
     a, b, c, d, e, f = _COSINE
-    cosine = 1.0 - (0.5 * z - z * z * (a + z * (b + z * (c + z * (d + z * (e + z * f))))))
+    return n, sine, 1.0 - (0.5 * z - z * z * (a + z * (b + z * (c + z * (d + z * (e + z * f))))))
+
+
+def _odd(n):
+    """+-1/2 of an odd number, 0 of an even one."""
     half = 0.5 * n
-    is_odd = (half + _WHOLE) - _WHOLE != half
-    twice, one = 2.0 * (sine * cosine), select(is_odd, cosine, sine)
-    return select(is_odd, -twice, twice), 2.0 * (one * one)
+    return (half + _WHOLE) - _WHOLE - half

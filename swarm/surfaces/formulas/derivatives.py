@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import SceneError
+from ...kernel.angle import sine_and_cosine
 from ..surface import Box, side_sign
 from .expression import COORDINATES, NonSmoothTerm, parse
 from .form import Form
@@ -190,7 +191,7 @@ def _along(phi: Any) -> Any:
 def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", results: list[str]) -> Any:
     """The function of what is written."""
     lines = [f"def {name}(p, {', '.join(arguments)}):", *writer.lines, f"return {', '.join(results)}"]
-    scope: dict[str, Any] = {"np": np, "__name__": __name__}
+    scope: dict[str, Any] = {"np": np, "sine_and_cosine": sine_and_cosine, "__name__": __name__}
     text = "\n    ".join(lines)
     file = f"<{name} {hashlib.sha256(text.encode()).hexdigest()}>"
     linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file  # kernels are made of its text
@@ -203,7 +204,9 @@ class _DerivativeWriter:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.known: dict[Any, str] = {}
-        # Whether there is only + - * / and sqrt.
+        # The names of the sine and the cosine of an angle.
+        self.sines: dict[str, tuple[str, str]] = {}
+        # Whether there is only + - * /, sqrt and what is made of them.
         self.same_in_python = True
 
     def name_of(self, expression: Any) -> str:
@@ -228,8 +231,15 @@ class _DerivativeWriter:
             return self._product(expression)
         if expression.is_Pow:
             return self._power(self.name_of(expression.base), expression.exp)
+        name, argument = expression.func.__name__, self.name_of(expression.args[0])
+        if name in ("sin", "cos", "tan"):
+            if argument not in self.sines:
+                sine, cosine = self.sines[argument] = f"t{len(self.lines)}s", f"t{len(self.lines)}c"
+                self.lines.append(f"{sine}, {cosine} = sine_and_cosine({argument})")
+            sine, cosine = self.sines[argument]
+            return {"sin": sine, "cos": cosine}.get(name) or self.assign(f"{sine} / {cosine}")
         self.same_in_python = False
-        return self.assign(f"np.{expression.func.__name__}({self.name_of(expression.args[0])})")
+        return self.assign(f"np.{name}({argument})")
 
     def _product(self, expression: Any) -> str:
         above: list[str] = []

@@ -1,0 +1,70 @@
+"""First hits of straight flights with smooth formulas: none is missed, each is on the wall, in few looks."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import swarm
+from swarm.kernel.limits import EPSILON
+from swarm.kernel.vector import Vec, dot, square
+
+BALL = "x**2/0.09 + y**2/0.09 + z**2/0.16 - 1 + {}*sin(10*x)*sin(10*y)"
+# The formula, what else it needs, and how many looks a flight takes on average: of a convex one, 5 at most.
+FORMULAS: dict[str, tuple[str, dict[str, Any], float]] = {
+    "convex": (BALL.format(0.1), {}, 5.0),
+    "wavy": (BALL.format(0.5), {}, 8.0),
+    "folded": (BALL.format(2.0), {}, 12.0),
+    "solid": (BALL.format(0.5), {"side": "outside"}, 12.0),
+    "exponential": ("exp(x*x) + exp(y*y) + exp(z*z) - 4", {}, 6.0),
+    "gyroid": ("sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)", {"bounds": ((-6.0,) * 3, (6.0,) * 3)}, 16.0),
+}
+
+
+def _flights(surface, count):
+    """Flights from places near the surface on its admissible side, and after each impact the reflected one."""
+    numbers, (low, high) = surface.numbers(), np.array(surface._form.box)
+    generator = np.random.default_rng(3)
+    while count > 0:
+        r = Vec(*generator.uniform(low, high).tolist())
+        if numbers.side * numbers.phi(r) > 0.0:
+            continue
+        v = Vec(*generator.normal(size=3).tolist())
+        for _bounce in range(4):
+            time, found = numbers.first_hit(r, v)
+            assert found
+            yield r, v, time
+            count -= 1
+            if math.isinf(time):
+                break
+            r = r + time * v
+            n = numbers.gradient(r)
+            v = v - (2.0 * dot(v, n) / square(n)) * n
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_nothing_is_missed_and_every_hit_is_on_the_wall(name, monkeypatch):
+    text, more, most = FORMULAS[name]
+    surface = swarm.Formula(text, **more)
+    numbers, looks = surface.numbers(), list[Vec]()
+    kind, phi = type(numbers), type(numbers).phi
+
+    def counted(self, r):
+        looks.append(r)
+        return phi(self, r)
+
+    monkeypatch.setattr(kind, "phi", counted)
+    flights = list(_flights(surface, 100))
+    assert len(looks) <= most * len(flights)
+    monkeypatch.undo()
+    reach = np.abs(np.array(surface._form.box)).max()
+    for r, v, time in flights:
+        ways = np.linspace(0.0, min(time, 4.0 * reach / math.sqrt(square(v))), 402)[1:-1]
+        levels = numbers.side * surface.phi(np.array(r)[:, None] + ways * np.array(v)[:, None])
+        if not math.isinf(time):
+            end = r + time * v
+            steepness = math.sqrt(square(numbers.gradient(end)))
+            assert abs(numbers.phi(end)) <= 4.0 * EPSILON * max(1.0, steepness * reach)
+            # Not through the wall before
+            assert levels.max() <= 4.0 * EPSILON * max(1.0, steepness * reach)
