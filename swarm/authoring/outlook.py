@@ -44,8 +44,11 @@ _STRAIGHT, _FALL, _STEPS, _FIELD = 4e-9, 2e-8, 5e-7, 1e-7
 _BALLS, _GRAIN, _SPRING, _SWEEPS, _PART = 2e-7, 2e-6, 5e-10, 5e-7, 2e-8
 # Steps of a crossing of a particle that slides, and what each takes.
 _STEPS_A_CROSSING, _SLIDING = 150, 1e-6
-# An impact in plain Python, a kernel to compile; to begin and end a run, and the next run of a sweep [s].
-_PYTHON, _COMPILING, _BEGINNING, _NEXT = 1e-4, 1.2, 0.5, 0.03
+# In plain Python: an impact, and a step of a point or link of a body. A kernel to compile, and that of bodies. To begin
+# and end a run, and the next run of a sweep [s].
+_PYTHON, _PYTHON_PART, _COMPILING, _COMPILING_BODIES, _BEGINNING, _NEXT = 1e-4, 4e-4, 1.2, 7.0, 0.5, 0.03
+# So long a run stays in plain Python, see run/tiers.py [s].
+_IN_PYTHON = 1.0
 # Particles of which the engine is made, to see which kernels it needs; runs from which the size of a sweep follows.
 _MOST, _MOST_RUNS = 200_000, 24
 
@@ -58,12 +61,14 @@ class Workload(NamedTuple):
         noun: what they are.
         cost: of one [s of a core].
         shared: whether threads share them.
+        plain: the cost of one in plain Python [s].
     """
 
     events: float
     noun: str
     cost: float
     shared: bool = True
+    plain: float = _PYTHON
 
 
 def outlook(job: Job, target: Path, makes_folder: bool = False) -> dict[str, str]:
@@ -128,7 +133,7 @@ def _of_all(plan: Plan, path: Path, plugins: Iterable[str], threads: int | None)
             options = job.run if threads is None else replace(job.run, threads=threads)
             task = task_of(job.scene, job.start(), job.method, options)
             size += _on_disk(task)
-            seconds += _seconds(task) - _BEGINNING + _NEXT
+            seconds += (_in_python if options.compile == "never" else _seconds)(task) - _BEGINNING + _NEXT
     share = len(plan.variants) / len(some)
     most = "at most " * (task.options.storage.compression != "none")
     return f"trajectories {most}{in_bytes(size * share)}, about {_about(seconds * share)} one after the other"
@@ -214,18 +219,18 @@ def _time(task: Task) -> dict[str, str]:
     """About how long the run takes, from the flights at its start and the costs of `bench/results`."""
     loads, options = _loads(task), task.options
     threads = options.thread_count()
-    python = _of_frames(task) + _PYTHON * sum(one.events for one in loads)
-    seconds = _seconds(task)
+    python, seconds = _in_python(task), _seconds(task)
+    compiling = _COMPILING if task.bodies is None else _COMPILING_BODIES
     work = " and ".join(f"{many(float(f'{one.events:.2g}'))} {one.noun}" for one in loads)
     stated = {"work": f"about {work}"} if work else {}
     missing, kernels = _kernels(task)
-    is_plain = missing > 0 and python < _COMPILING and options.compile != "always"
+    is_plain = missing > 0 and python < _BEGINNING + _IN_PYTHON and options.compile != "always"
     # Balls that settle meet one another and walls far more often, how often the start does not show.
     more = ", and more where balls settle" if task.particles.radius is not None and _settles(task) else ""
     if options.compile == "never" or is_plain:
         return stated | {"time": f"about {_about(python)}, in plain Python{more}"}
     on = f" on {threads} threads" if threads > 1 and any(one.shared for one in loads) else ""
-    once = f", and once {_about(_COMPILING * missing)} to compile {missing} of {kernels} kernels" if missing else ""
+    once = f", and once {_about(compiling * missing)} to compile {missing} of {kernels} kernels" if missing else ""
     return stated | {"time": f"about {_about(seconds)}{on}{once}{more}; from the start, to a factor of a few"}
 
 
@@ -233,6 +238,11 @@ def _of_frames(task: Task) -> float:
     """The time of the beginning, the end and the frames of a run [s]."""
     n, options = len(task.particles), task.options
     return _BEGINNING + options.times.count * (_SEEN * n + options.storage.bytes_of(n) / _WRITTEN)
+
+
+def _in_python(task: Task) -> float:
+    """The time of a run in plain Python [s]."""
+    return _of_frames(task) + sum(one.events * one.plain for one in _loads(task))
 
 
 def _seconds(task: Task) -> float:
@@ -258,7 +268,7 @@ def _loads(task: Task) -> list[Workload]:
     if task.bodies is not None:
         body = task.bodies.body
         parts = len(body) + len(body.links) + len(body.springs)
-        return [Workload(steps * len(task.bodies), "steps of bodies", _PART * parts)]
+        return [Workload(steps * len(task.bodies), "steps of bodies", _PART * parts, plain=_PYTHON_PART * parts)]
     if engine == knows.GRAINS:
         return [Workload(steps * n, "steps of balls", _GRAIN, shared=False)]
     impacts = _impacts(task)

@@ -45,7 +45,10 @@ def of_result(result: Any) -> dict[str, str]:
     """The outcome of a run: the rows of a table."""
     seen = result.observables
     # What a second run of the kind will do.
-    rate = seen["impacts"][-1] / max(result.wall_time - result.compile_time, 1e-3)
+    met, noun = seen["impacts"][-1], "impacts"
+    if "collisions" in seen:
+        met, noun = met + seen["collisions"][-1], "impacts and collisions"
+    rate = met / max(result.wall_time - result.compile_time, 1e-3)
     compiled = f", {result.compile_time:.2f} s of it compiling" if result.compile_time > 0.0 else ""
     # A page counts all of the wall time: it is all that a file keeps.
     rest = " in the rest" if result.compile_time > 0.0 else ""
@@ -53,7 +56,7 @@ def of_result(result: Any) -> dict[str, str]:
     stated = of_content(content_of_result(result, "a summary"), MOST) if known else of_numbers(seen)
     return {
         **rows_of(stated),
-        "wall time": f"{result.wall_time:.2f} s{compiled}, {plain(float(f'{rate:.3g}'))} impacts/s{rest}",
+        "wall time": f"{result.wall_time:.2f} s{compiled}, {plain(float(f'{rate:.3g}'))} {noun}/s{rest}",
         "trajectory": str(result.trajectory or "none"),
     }
 
@@ -166,10 +169,10 @@ def of_surroundings(scene: Scene, most: int | None = None, impacts: Sequence[int
         stated.append(Statement(f"surface {i}, {names[i, ()]}", nouns.in_full(surface, scene) + met))
     if shown < count:
         stated.append(Statement("more surfaces", many(count - shown)))
-    for i, where in scene.parts:
+    for k, (i, where) in enumerate(scene.parts):
         part = part_at(scene.surfaces[i], where)
         if i < shown and (changed := nouns.laws_of(part) + nouns.changes_of(part)):
-            label = f"part {'.'.join(map(str, where))} of surface {i}, {names[i, where]}"
+            label = f"part {k}, {names[i, where]} of surface {i}"
             stated.append(Statement(label, ", ".join(changed)))
     return stated + _of_space(scene)
 

@@ -78,7 +78,7 @@ def _energy(content: Any) -> list[Statement]:
     one, name = "particle" if content.body is None else "body", type(content.method).__name__
     figure = f"the worst {one}'s error is {plain(worst, 2)} of its energy"
     if worst == 0.0:
-        return [Statement("energy", f"exact to the last bit for every {one}", True)]
+        return [Statement("energy", "the balance closes to the last bit", True)]
     if worst <= max(ROUND_OFF, limit if not content.method.has_multipliers() else 0.0):
         return [Statement("energy", f"kept to round-off: {figure}", True)]
     if worst <= limit:
