@@ -12,7 +12,7 @@ from exact import EXACT, TOUCHED, Flight
 import swarm
 from swarm.kernel.vector import dot, vec
 from swarm.surfaces.formulas.derivatives import derived
-from swarm.surfaces.formulas.numbers import OwnNumbers
+from swarm.surfaces.formulas.numbers import OwnNumbers, SmoothCavity, SmoothSolid
 from swarm.surfaces.formulas.polynomial import QuadraticCavity, QuadraticSolid, QuarticCavity, QuarticSolid
 from swarm.surfaces.time_of_impact.polynomial import PolynomialFlight
 
@@ -160,9 +160,11 @@ def test_no_guess_leads_beyond_a_first_root():
         (RING, "outside", QuarticSolid),
         ("x**2/p + y**2 + z*x + z**2 - sqrt(p)", "inside", QuadraticCavity),
         ("x**2 + y**2 + z**2 - 1", "outside", QuadraticSolid),
-        ("x**6 + y**2 + z**2 - 1", "inside", OwnNumbers),
-        ("x**2 + y**2 + sin(z)**2 + z**2 - 1", "inside", OwnNumbers),
-        ("x**2/(1 + y**2) + y**2 + z**2 - 1", "inside", OwnNumbers),
+        ("x**6 + y**2 + z**2 - 1", "inside", SmoothCavity),
+        ("x**2 + y**2 + sin(z)**2 + z**2 - 1", "inside", SmoothCavity),
+        ("x**2/(1 + y**2) + y**2 + z**2 - 1", "inside", SmoothCavity),
+        ("x**6 + y**2 + z**2 - 1", "outside", SmoothSolid),
+        ("x**2 + y**2 + exp(z*z) - 2", "inside", OwnNumbers),
     ],
 )
 def test_what_is_a_polynomial_is_recognised(text, side, kind):

@@ -68,3 +68,25 @@ def test_nothing_is_missed_and_every_hit_is_on_the_wall(name, monkeypatch):
             assert abs(numbers.phi(end)) <= 4.0 * EPSILON * max(1.0, steepness * reach)
             # Not through the wall before
             assert levels.max() <= 4.0 * EPSILON * max(1.0, steepness * reach)
+
+
+def test_flights_in_lanes_are_those_one_by_one():
+    cavity = swarm.Formula(BALL.format(0.5), rotation=(0.9, 0.1, 0.2, 0.3))
+    solid = swarm.Formula("x**2 + y**2 + z**2 - 0.01 + 0.001*sin(30*x)", center=(0.05, 0.0, 0.0), side="outside")
+    scene = swarm.Scene([cavity, solid])
+    start = swarm.fill(scene, 4, speed=1.0, seed=2)
+    result = swarm.simulate(scene, start, swarm.Impact(), until=1.0, compile="never")
+    walls, impacts = scene.compiled().walls().each, 0
+    for k in range(4):
+        r, v, left = Vec(*start.position[:, k].tolist()), Vec(*start.velocity[:, k].tolist()), 1.0
+        while True:
+            times = [wall.first_hit(r, v)[0] for wall in walls]
+            time = min(times)
+            if not time < left:
+                break
+            r, left = r + time * v, left - time
+            n = walls[times.index(time)].gradient(r)
+            v, impacts = v - (2.0 * dot(v, n) / square(n)) * n, impacts + 1
+        assert np.abs(result.particles.position[:, k] - np.array(r + left * v)).max() <= 1e-9
+    assert result.observables["impacts"][-1] == impacts > 10
+    assert result.observables["max_penetration"][-1] <= 4.0 * EPSILON

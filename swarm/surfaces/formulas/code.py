@@ -47,8 +47,8 @@ def class_of(
         if function is not None:
             _check_function(name, function)
             copies.append(frozen.function(function))
+    frozen.value(base.__name__)
     if along is not None:
-        frozen.value(base.__name__)
         copies.append(frozen.function(along))
     name = f"Own_{frozen.digest()}"
     if name not in _classes:

@@ -94,10 +94,11 @@ def _form_of(
     if size is None:
         size = math.inf if box is None else min(b - a for a, b in zip(*box, strict=True)) / 2.0
     make: Any = collections.namedtuple("Parameters", [f"p{i}" for i in range(len(values))])  # type: ignore[misc]
-    base = base_of(code.along, side == "outside" and box is not None)
     phi, gradient, hessian = code.functions
+    same_in_python = all(part.same_in_python for part in code.functions)
+    base = base_of(code.along, side == "outside" and box is not None, same_in_python)
     kind = class_of(make(*values), phi, gradient, hessian, code.along, base)
-    kind.same_in_python = all(part.same_in_python for part in code.functions)
+    kind.same_in_python = same_in_python
     form = Form(kind, values, box, size, side)
     if box is not None:
         form.check()

@@ -7,11 +7,10 @@ import numpy as np
 
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
-from ...kernel.record import Record
-from ...kernel.vector import Symmetric, Vec, absolute, dot, largest, square, total
+from ...kernel.vector import Symmetric, Vec, dot, largest, square
 from .. import contract
-from ..time_of_impact.course import positive, rise_time
-from ..time_of_impact.march import LOOKS
+from ..time_of_impact.course import positive
+from ..time_of_impact.straight import Straight, first_found
 
 # Points this close, relative to the size, are joined by Gauss's rule, with an error of the 7th power; its outer node.
 _SHORT = 1e-2
@@ -132,25 +131,20 @@ class OwnNumbers(contract.Smooth):
 
     @outlined
     def first_hit(self, r, v):
-        t, end = 0.0, math.inf
-        speed2 = square(v)
-        if speed2 == 0.0:
-            return math.inf, True
-        if self.closed > 0.0:
-            t, end = self._in_box(r, v)
-            if not t <= end:
-                return math.inf, True
-        bend = self.bends
+        return first_found(self.straight(r, v))
+
+    def straight(self, r, v):
+        """A straight flight as looks at it take it."""
+        bend, speed2 = self.bends, square(v)
+        start, end = self.span(r, v)
         # least <= v.side H v <= most
-        most = min(_quadratic(v, bend.high, bend.low), bend.most * speed2)
-        least = max(_quadratic(v, bend.low, bend.high), bend.least * speed2)
-        flight = Straight(self, r, v, t, end, least, most, math.sqrt(speed2))
-        known = flight.first()
-        for _look in range(LOOKS):
-            if not known.goes_on:
-                break
-            known = flight.look(known)
-        return known.free, not known.goes_on
+        most = -_larger(-_quadratic(v, bend.high, bend.low), -bend.most * speed2)
+        least = _larger(_quadratic(v, bend.low, bend.high), bend.least * speed2)
+        return Straight(self, r, v, start, end, least, most)
+
+    def span(self, r, v):
+        """When a straight flight may meet the wall: (from, until), the first after the second if never."""
+        return self._in_box(r, v) if self.closed > 0.0 else (0.0, math.inf)
 
     def _in_box(self, r, v):
         """When a straight flight is in the box of a solid: (from, until), the first after the second if never."""
@@ -162,70 +156,20 @@ class OwnNumbers(contract.Smooth):
         return start, -_larger(-until_x, _larger(-until_y, -until_z))
 
 
-class Looked(Record):
-    """What looks at a flight have found of its first hit so far."""
+class SmoothCavity(OwnNumbers):
+    """A formula of + - * /, roots, sines and cosines: its straight flights go in lanes. A cavity."""
 
-    free: Any  # a time until which it surely meets nothing; that of the hit once there are no more looks
-    at: Any  # the time of the next look
-    goes_on: Any  # whether there is a next look
-    # The time of the last look, that of the next one before the first, and what it has found
-    before: Any
-    level: Any
-    half: Any
+    in_steps = True
+
+    def steps(self, gravity, r, v):
+        return self.straight(r, v) if gravity is None else None
+
+    def span(self, r, v):
+        return 0.0, math.inf
 
 
-class Straight(Record):
-    """A straight flight from its `start` to its end: its level's second derivative has the same bounds everywhere.
+class SmoothSolid(SmoothCavity):
+    """The same of a solid."""
 
-    A safe step ends where the highest parabola that the bounds allow rises through 0. Where even the lowest one does,
-    the level rises all the way from the first root to there: it has no other root, and nothing is left to be proven.
-    Looks then go to the root from both sides, by the cubic through the last two of them.
-    """
-
-    surface: "OwnNumbers"
-    r: Vec
-    v: Vec
-    start: Any
-    end: Any
-    least: Any
-    most: Any
-    speed: Any
-
-    def first(self):
-        goes_on = self.start <= self.end
-        return Looked(select(goes_on, self.start, math.inf), self.start, goes_on, self.start, 0.0, 0.0)
-
-    def look(self, known):
-        """What is known after one look more."""
-        surface, t, is_first = self.surface, known.at, known.at == known.before
-        p = self.r + t * self.v
-        level = surface.side * surface.phi(p)
-        half = 0.5 * surface.side * dot(surface.gradient(p), self.v)
-        # Past the root, or past the wall by round-off or because the surface bends more than was said
-        past = (level > 0.0) & (half > 0.0) & (not is_first)
-        one_root = rise_time(level, half, self.least)
-        one_root = (one_root < math.inf) & (t + one_root <= self.end)
-        bend = select(one_root | past, self._bend(known, level, half, is_first), self.most)
-        bottom = half + math.sqrt(positive(half * half - bend * level))
-        step = select(past, level / select(past, bottom, 1.0), rise_time(level, half, bend))
-        is_free = (not past) & (not t + step <= self.end)
-        # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
-        way = select(is_free, 0.0, step)
-        rising = half + way * select(past, -self.most, self.least)
-        shortest = 2.0 * EPSILON / self.speed * (total(absolute(p)) + self.speed * way)
-        arrives = (not is_first) | (rising > 0.0) | (way == 0.0)
-        arrives &= (way <= shortest) | ((self.most - self.least) * way * way <= 2.0 * shortest * rising)
-        free, after = select(past, known.free, t), select(past, t - way, t + way)
-        # A level that bends more than was said has its root anywhere between.
-        after = select(past & (not after > free), 0.5 * (free + t), after)
-        arrives |= past & (not after > free)
-        goes_on = (not is_free) & (not arrives)
-        found = select(is_free, math.inf, select(arrives, after, free))
-        return Looked(found, after, goes_on, t, level, half)
-
-    def _bend(self, known, level, half, is_first):
-        """Half the second derivative, by the cubic through the last look and this one; at the first the middle."""
-        since = select(is_first, 1.0, known.at - known.before)
-        bend = (3.0 * (known.level - level) / since + 2.0 * known.half + 4.0 * half) / since
-        bend = select(is_first, 0.5 * (self.least + self.most), bend)
-        return select(bend > self.least, select(bend < self.most, bend, self.most), self.least)
+    def span(self, r, v):
+        return self._in_box(r, v)

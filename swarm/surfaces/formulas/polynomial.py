@@ -8,7 +8,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.vector import absolute, total
 from ..time_of_impact.course import first_rise
 from ..time_of_impact.polynomial import PolynomialFlight
-from .numbers import OwnNumbers
+from .numbers import OwnNumbers, SmoothCavity, SmoothSolid
 
 # The first step goes at most so many sizes, by the sum of the components of the velocity: about the longest chord.
 _WINDOW = 2.8
@@ -110,9 +110,10 @@ class QuarticSolid(QuarticCavity):
     aims = False
 
 
-def base_of(along: Any, is_solid: bool) -> Any:
+def base_of(along: Any, is_solid: bool, is_smooth: bool) -> Any:
     """The class of numbers of a formula with these coefficients along a flight, None if it is no polynomial."""
-    if along is None:
-        return OwnNumbers
-    cavity, solid = (QuadraticCavity, QuadraticSolid) if along.degree <= 2 else (QuarticCavity, QuarticSolid)
-    return solid if is_solid else cavity
+    if along is not None:
+        cavity, solid = (QuadraticCavity, QuadraticSolid) if along.degree <= 2 else (QuarticCavity, QuarticSolid)
+        return solid if is_solid else cavity
+    # A call of the library ends a lane loop.
+    return (SmoothSolid if is_solid else SmoothCavity) if is_smooth else OwnNumbers

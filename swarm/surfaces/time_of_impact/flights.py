@@ -9,6 +9,7 @@ from ..presence.rooms import is_of_room, leaving
 from ..walls import Field
 from .course import Fall, Quartic
 from .polynomial import PolynomialFlight
+from .straight import Looked, Straight
 
 
 class Hit(NamedTuple):
@@ -95,6 +96,9 @@ _WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
 _OF_POLYNOMIAL = 0, 1, 2, 3, 4, 5, 8
 # Where a polynomial has no start and end, a guess
 _GUESS = 8
+# Of a flight that is looked at its bounds and its end, and the next look and the last one
+_OF_STRAIGHT = 4, 5, 8
+_OF_LOOKS = 0, 1, 2, 3
 
 
 def begin(walls, gravity, course, row, lane, r, v, aims=False):
@@ -116,7 +120,33 @@ def begin(walls, gravity, course, row, lane, r, v, aims=False):
             if aims and wall.aims:
                 course[at + _WINDOW, lane] = steps.window
                 continue
+        elif isinstance(steps, Straight):
+            _begin_looks(course, at, lane, steps)
+            continue
         course[at + _TIME, lane], course[at + _LAST, lane] = steps.first_step()
+
+
+def _begin_looks(course, at, lane, flight):
+    """The start of a flight that is looked at."""
+    for i, number in zip(_OF_STRAIGHT, (flight.least, flight.most, flight.end), strict=True):
+        course[at + i, lane] = number
+    _keep(course, at, lane, flight.first())
+
+
+def _look_on(course, at, lane, flight):
+    """One look more at it, if that is needed."""
+    least, most, end = (course[at + i, lane] for i in _OF_STRAIGHT)
+    goes_on = course[at + _LAST, lane] > 0.0
+    known = Looked(course[at + _TIME, lane], goes_on, *(course[at + i, lane] for i in _OF_LOOKS))
+    after = flight._replace(least=least, most=most, end=end).look(known)
+    _keep(course, at, lane, Looked(*(select(goes_on, new, old) for new, old in zip(after, known, strict=True))))
+
+
+def _keep(course, at, lane, known):
+    """What is `Looked` at."""
+    for i, number in zip(_OF_LOOKS, (known.at, known.before, known.level, known.half), strict=True):
+        course[at + i, lane] = number
+    course[at + _TIME, lane], course[at + _LAST, lane] = known.free, select(known.goes_on, 1.0, 0.0)
 
 
 def turn(walls, course, row, lane, remaining):
@@ -167,7 +197,9 @@ def step(walls, gravity, course, row, lane, r, v):
             steps = _level(course, at, lane, wall)
         else:
             steps = wall.steps(gravity, r, v)
-        if steps is not None:
+        if isinstance(steps, Straight):
+            _look_on(course, at, lane, steps)
+        elif steps is not None:
             t, last = steps.next_step(course[at + _TIME, lane], course[at + _LAST, lane])
             course[at + _TIME, lane], course[at + _LAST, lane] = t, last
 
