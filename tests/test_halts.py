@@ -4,6 +4,7 @@ Runs without end are made by force: in plain Python steps of kernels are replace
 compiled ones a kernel is. So they stay without end when scenes that were are mended.
 """
 
+import itertools
 import time
 
 import numpy as np
@@ -346,6 +347,29 @@ def test_what_rests_where_walls_move_has_the_same_bits_after_halts():
     assert ends[0] == ends[1] == ends[2]
     carried = np.frombuffer(ends[0]["position"])
     assert carried == pytest.approx([0.01 * np.sin(2.0 * np.pi * 0.5 * 10.0), 0.0, 0.0], abs=1e-14)
+
+
+def test_what_comes_to_rest_on_a_mesh_that_moves_has_the_same_bits_after_halts():
+    """Wherever they come: in flights, in slides, and between two particles that rest."""
+    corners = 0.3 * np.array(list(itertools.product((-1.0, 1.0), (-1.0, 1.0), (-0.05, 0.05))))
+    squares = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    triangles = [part for a, b, c, d in squares for part in ((a, b, c), (a, c, d))]
+    how = {"motion": swarm.Oscillation((0.02, 0.0, 0.0), 1.5), "friction": 0.8, "restitution": 0.2}
+    scene = swarm.Scene([swarm.Mesh(corners, triangles, "outside", **how)], (0.0, 0.0, -9.81))
+    as_fast = np.array([3 * [0.06 * np.pi], 3 * [0.0], 3 * [0.0]])
+    start = swarm.Particles([[0.02, -0.1, 0.1], [0.01, 0.15, -0.1], [0.01502, 0.0151, 0.01505]], as_fast)
+    ends = []
+    for passes in (None, 1):
+        with Run(scene.compiled(), start.copy(), swarm.Impact(), 1, None, "never") as run:
+            halts = 0
+            run.halt(10**6 if passes is None else passes)
+            while not run.advance(0.02, 0.02):
+                halts += 1
+                run.halt(passes)
+            assert (halts > 3) == (passes is not None)
+            assert run.state.contacts.sliding.min() > 0.0
+            ends.append({name: array.tobytes() for name, array in run.arrays().items()})
+    assert ends[0] == ends[1]
 
 
 def test_a_collapse_on_a_wall_that_reacts_is_bounded():
