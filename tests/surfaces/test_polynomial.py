@@ -13,7 +13,13 @@ import swarm
 from swarm.kernel.vector import dot, vec
 from swarm.surfaces.formulas.derivatives import derived
 from swarm.surfaces.formulas.numbers import OwnNumbers, SmoothCavity, SmoothSolid
-from swarm.surfaces.formulas.polynomial import QuadraticCavity, QuadraticSolid, QuarticCavity, QuarticSolid
+from swarm.surfaces.formulas.polynomial import (
+    ConvexQuadraticCavity,
+    QuadraticCavity,
+    QuadraticSolid,
+    QuarticCavity,
+    QuarticSolid,
+)
 from swarm.surfaces.time_of_impact.polynomial import PolynomialFlight
 
 EPSILON = 2.0**-52
@@ -158,7 +164,8 @@ def test_no_guess_leads_beyond_a_first_root():
     [
         (QUARTIC, "inside", QuarticCavity),
         (RING, "outside", QuarticSolid),
-        ("x**2/p + y**2 + z*x + z**2 - sqrt(p)", "inside", QuadraticCavity),
+        ("x**2/p + y**2 + z*x + z**2 - sqrt(p)", "inside", ConvexQuadraticCavity),
+        ("x**2 + y**2 - z**2 - 1", "inside", QuadraticCavity),
         ("x**2 + y**2 + z**2 - 1", "outside", QuadraticSolid),
         ("x**6 + y**2 + z**2 - 1", "inside", SmoothCavity),
         ("x**2 + y**2 + sin(z)**2 + z**2 - 1", "inside", SmoothCavity),

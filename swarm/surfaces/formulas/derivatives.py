@@ -126,6 +126,14 @@ class Derived(NamedTuple):
     def _varies(self) -> bool:
         return any(one.free_symbols for one in self.hessian)
 
+    def is_convex(self, side: str) -> bool:
+        """Whether the formula is a quadric of which this side is surely convex."""
+        return not self._varies() and self._constant_bend(side_sign(side)).least > 0.0
+
+    def _constant_bend(self, side: float) -> Bend:
+        entries = side * np.array([float(one) for one in self.hessian])[:, None]
+        return Bend.of_entries(entries, entries)
+
     def bend(self, form: Form) -> Bend:
         """Bounds of side H over the box of a form, a solid's with its margin.
 
@@ -134,8 +142,7 @@ class Derived(NamedTuple):
         """
         side = side_sign(form.side)
         if not self._varies():
-            entries = side * np.array([float(one) for one in self.hessian])[:, None]
-            return Bend.of_entries(entries, entries)
+            return self._constant_bend(side)
         cells = IntervalBoxes.grid(self.axes, form.domain(), (_CELLS, _CELLS, _CELLS))
         # Flights are in the admissible part only, so its cells are enough.
         admissible = cells.may_be_admissible(self.phi, side)

@@ -96,7 +96,8 @@ def _form_of(
     make: Any = collections.namedtuple("Parameters", [f"p{i}" for i in range(len(values))])  # type: ignore[misc]
     phi, gradient, hessian = code.functions
     same_in_python = all(part.same_in_python for part in code.functions)
-    base = base_of(code.along, side == "outside" and box is not None, same_in_python)
+    is_solid = side == "outside" and box is not None
+    base = base_of(code.along, is_solid, exact.is_convex(side), same_in_python)
     kind = class_of(make(*values), phi, gradient, hessian, code.along, base)
     kind.same_in_python = same_in_python
     form = Form(kind, values, box, size, side)

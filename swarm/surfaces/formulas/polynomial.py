@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from ...kernel.gravity import rise_time_by
+from ...kernel.gravity import rise_time_by, rise_time_inside
 from ...kernel.jit import outlined, select
 from ...kernel.vector import absolute, total
 from ..time_of_impact.course import first_rise
@@ -69,6 +69,14 @@ class QuadraticSolid(QuadraticCavity):
     is_solid = True
 
 
+class ConvexQuadraticCavity(QuadraticCavity):
+    """One that is convex: the level along a flight has no maximum, and the root of a long flight loses no digits."""
+
+    def first_hit(self, r, v):
+        c, twice_b, a = self.along(r, v)
+        return rise_time_inside(self.side * c, 0.5 * self.side * twice_b, self.side * a), True
+
+
 class QuarticCavity(PolynomialNumbers):
     """A polynomial of degree 3 or 4."""
 
@@ -110,10 +118,13 @@ class QuarticSolid(QuarticCavity):
     aims = False
 
 
-def base_of(along: Any, is_solid: bool, is_smooth: bool) -> Any:
+def base_of(along: Any, is_solid: bool, is_convex: bool, is_smooth: bool) -> Any:
     """The class of numbers of a formula with these coefficients along a flight, None if it is no polynomial."""
-    if along is not None:
-        cavity, solid = (QuadraticCavity, QuadraticSolid) if along.degree <= 2 else (QuarticCavity, QuarticSolid)
-        return solid if is_solid else cavity
-    # A call of the library ends a lane loop.
-    return (SmoothSolid if is_solid else SmoothCavity) if is_smooth else OwnNumbers
+    if along is None:
+        # A call of the library ends a lane loop.
+        cavity, solid = (SmoothCavity, SmoothSolid) if is_smooth else (OwnNumbers, OwnNumbers)
+    elif along.degree <= 2:
+        cavity, solid = ConvexQuadraticCavity if is_convex else QuadraticCavity, QuadraticSolid
+    else:
+        cavity, solid = QuarticCavity, QuarticSolid
+    return solid if is_solid else cavity
