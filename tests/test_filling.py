@@ -243,3 +243,23 @@ def test_few_particles_have_the_bits_of_a_whole_batch(scene, n, monkeypatch):
     np.testing.assert_array_equal(few.position, whole.position)
     np.testing.assert_array_equal(few.velocity, whole.velocity)
     assert few.volume == kept.volume == whole.volume
+
+
+@pytest.mark.parametrize(
+    "surfaces",
+    [[swarm.Sphere(0.5)], [swarm.Box((0.5, 0.4, 0.3))], [swarm.Sphere(0.5), swarm.Sphere(0.3, side="outside")]],
+    ids=["sphere", "box", "hollow"],
+)
+def test_few_balls_have_the_bits_of_whole_batches(surfaces, monkeypatch):
+    """Their volume is that of the random points, all of which need not be looked at."""
+    scene = swarm.Scene(surfaces)
+    few = swarm.fill(scene, 5, temperature=1.0, seed=3, radius=0.02)
+    kept = pickle.loads(pickle.dumps(few.copy()))
+    volume = few.volume
+    monkeypatch.setattr(filling, "_roomy", lambda *_: None)
+    monkeypatch.setattr(filling, "_is_its_box", lambda *_: False)
+    whole = swarm.fill(scene, 5, temperature=1.0, seed=3, radius=0.02)
+    np.testing.assert_array_equal(few.position, whole.position)
+    np.testing.assert_array_equal(few.velocity, whole.velocity)
+    assert volume == kept.volume == whole.volume
+    assert volume == filling._points(scene, filling._POINTS, np.random.default_rng(3))[1]

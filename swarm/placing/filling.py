@@ -1,7 +1,10 @@
 """Random particles, uniform in the admissible volume of a scene."""
 
 import functools
-from collections.abc import Callable
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +15,7 @@ from ..particles import Particles
 from ..scene import Scene
 from ..state import Floats
 from .fitting_shapes import require_shapes
-from .sequential import VolumeBox, place_balls, require_packing, require_size
+from .sequential import VolumeBox, is_sparse, place_balls, require_packing, require_size
 
 _BATCH = 1 << 18
 # Trials for each point that is asked for, before a whole batch is looked at.
@@ -21,6 +24,9 @@ _TRIALS_A_POINT, _FEWEST_TRIALS = 8, 64
 _TRIES = 20_000_000
 # Of balls the volume is estimated from as many admissible points, to 0.1 %.
 _POINTS = 1 << 18
+# How many of these tell whether balls are few, so many standard deviations from where it would be another answer; and
+# how many are looked at together.
+_SOME, _CERTAIN, _AT_ONCE = 1 << 15, 7.0, 1 << 14
 _INSTEAD = "the particles as arrays or a CSV file"
 
 
@@ -119,21 +125,82 @@ def fill_velocities(
         particles.velocity = normal * np.sqrt(temperature / particles.mass)
 
 
-def _place(scene: Scene, particles: Particles, random: np.random.Generator) -> float:
-    """Put balls where they overlap nothing; returns the volume."""
+def _place(scene: Scene, particles: Particles, random: np.random.Generator) -> Callable[[], float]:
+    """Put balls where they overlap nothing; returns what measures the volume."""
     assert particles.radius is not None
     require_shapes(scene, particles.radius)
     require_size(scene, particles.radius)
-    room = room_of(scene, random, "fill")
-    require_packing(scene, particles.radius, room)
+    room = _roomy(scene, particles.radius, random)
+    if room is None:
+        room = room_of(scene, random, "fill")
+        require_packing(scene, particles.radius, room)
     particles.position = place_balls(scene, particles.radius, room, random)
-    return room.volume
+    return room.measured
 
 
 def room_of(scene: Scene, random: np.random.Generator, user: str) -> VolumeBox:
     """The volume of a scene, from random points, for the `user` that a sentence names."""
-    _points_of_it, volume = _points(scene, _POINTS, random, user)
-    return VolumeBox(*bounding_box(scene, user, _INSTEAD), volume)
+    low, high = bounding_box(scene, user, _INSTEAD)
+    axes = scene.axes()
+    box, found, tried = float(np.prod((high - low)[axes])), 0, 0
+    if _is_its_box(scene, low, high):
+        random.bit_generator.advance(len(axes) * _BATCH)  # type: ignore[attr-defined]
+        return VolumeBox(low, high, functools.partial(float, box))
+    while found < _POINTS:
+        found += sum(int(scene.admits(trial).sum()) for trial in _trials(scene, low, high, random, _BATCH))
+        random.bit_generator.advance(len(axes) * _BATCH)  # type: ignore[attr-defined]
+        tried += _BATCH
+        _require_share(scene, user, (low, high), found, tried)
+    return VolumeBox(low, high, functools.partial(float, box * found / tried))
+
+
+def _roomy(scene: Scene, radius: Floats, random: np.random.Generator) -> VolumeBox | None:
+    """What `room_of` returns, with the volume for later, where some of its points show that balls fill little of it.
+
+    Returns None, with nothing drawn, if they do not, or do not show how many points it looks at.
+    """
+    low, high = bounding_box(scene, "fill", _INSTEAD)
+    if _is_its_box(scene, low, high):
+        return None
+    found = sum(int(scene.admits(trial).sum()) for trial in _trials(scene, low, high, random, _SOME))
+    share = found / _SOME
+    off = _CERTAIN * math.sqrt(share * (1.0 - share) / _SOME) + _CERTAIN / _SOME
+    least, most = (math.ceil(1.0 / max(share + way * off, 1e-6)) for way in (1.0, -1.0))
+    sure = VolumeBox(low, high, lambda: float(np.prod((high - low)[scene.axes()])) * (share - off))
+    if least != most or not is_sparse(scene, radius, sure):
+        return None
+    state = random.bit_generator.state
+    random.bit_generator.advance(least * len(scene.axes()) * _BATCH)  # type: ignore[attr-defined]
+    return VolumeBox(low, high, functools.partial(_measured, scene, state))
+
+
+def _measured(scene: Scene, state: Any) -> float:
+    """The volume that `room_of` finds from a state of a generator."""
+    random = np.random.default_rng(0)
+    random.bit_generator.state = state
+    return room_of(scene, random, "fill").volume
+
+
+def _is_its_box(scene: Scene, low: Floats, high: Floats) -> bool:
+    """Whether all of the box is admissible: its corners are, and the cavities are convex."""
+    if scene.period is not None or any(one.openings or one.may_be_passed() for one in scene.surfaces):
+        return False
+    corners = np.array(list(itertools.product(*np.hstack([low, high])))).T
+    return bool(scene.admits(corners).all())
+
+
+def _trials(scene: Scene, low: Floats, high: Floats, random: np.random.Generator, count: int) -> Iterator[Floats]:
+    """The first points of a batch, of which the generator draws none: some at a time, which fit into the cache."""
+    draws = []
+    for k in range(len(scene.axes())):
+        bits = np.random.PCG64()
+        bits.state = random.bit_generator.state  # type: ignore[assignment]
+        draws.append(np.random.Generator(bits.advance(k * _BATCH)))
+    for _ in range(count // _AT_ONCE):
+        trial = np.zeros((3, _AT_ONCE))
+        for axis, draw in zip(scene.axes(), draws, strict=True):
+            trial[axis] = low[axis] + (high - low)[axis] * draw.random(_AT_ONCE)
+        yield trial
 
 
 def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]:
@@ -176,9 +243,9 @@ def _volume_of(scene: Scene, seed: int) -> float:
     return _points(scene, 1, np.random.default_rng(seed))[1]
 
 
-def _points(scene: Scene, n: int, random: np.random.Generator, user: str = "fill") -> tuple[Floats, float]:
+def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, float]:
     """Admissible points, and the volume from their share of the random points of the bounding box."""
-    low, high = bounding_box(scene, user, _INSTEAD)
+    low, high = bounding_box(scene, "fill", _INSTEAD)
     points, found, tried, admissible = np.empty((3, n)), 0, 0, 0
     axes = scene.axes()
     box = float(np.prod((high - low)[axes]))
@@ -191,10 +258,16 @@ def _points(scene: Scene, n: int, random: np.random.Generator, user: str = "fill
         points[:, found : found + inside.shape[1]] = inside
         found += inside.shape[1]
         tried += _BATCH
-        if tried >= _TRIES and found < 1e-6 * tried:
-            raise SceneError(
-                f"{user} found {found} admissible points in {tried} tries, a volume of about "
-                f"{box * found / tried:.2g} m^{len(axes)}: the admissible part of the box {low.ravel()} to "
-                f"{high.ravel()} is below 1e-6 of it; give the particles as arrays or a CSV file"
-            )
+        _require_share(scene, "fill", (low, high), found, tried)
     return points, box * admissible / tried
+
+
+def _require_share(scene: Scene, user: str, corners: tuple[Floats, Floats], found: int, tried: int) -> None:
+    """Raise a `SceneError` where next to none of the random points between two corners are admissible."""
+    if tried >= _TRIES and found < 1e-6 * tried:
+        (low, high), axes = corners, scene.axes()
+        raise SceneError(
+            f"{user} found {found} admissible points in {tried} tries, a volume of about "
+            f"{float(np.prod((high - low)[axes])) * found / tried:.2g} m^{len(axes)}: the admissible part of the box "
+            f"{low.ravel()} to {high.ravel()} is below 1e-6 of it; give the particles as arrays or a CSV file"
+        )

@@ -1,5 +1,6 @@
 """Balls at random places where they overlap neither one another nor walls: random sequential addition."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -31,11 +32,16 @@ _SEARCHED = 8
 
 
 class VolumeBox(NamedTuple):
-    """What is known of a volume: a box around it (3, 1), and how large it is."""
+    """What is known of a volume: a box around it (3, 1), and what measures it."""
 
     low: Floats
     high: Floats
-    volume: float
+    measured: Callable[[], float]
+
+    @property
+    def volume(self) -> float:
+        """How large it is."""
+        return self.measured()
 
 
 def require_size(scene: Scene, radius: Floats) -> None:
@@ -71,6 +77,11 @@ def require_packing(scene: Scene, radius: Floats, room: VolumeBox, most: float |
             f"more closely"
         )
     return packing
+
+
+def is_sparse(scene: Scene, radius: Floats, room: VolumeBox) -> bool:
+    """Whether the balls fill less of a volume than `require_packing` allows."""
+    return balls_volume(scene, radius) <= _DENSEST[len(scene.axes())] * room.volume
 
 
 def packing_of(scene: Scene, radius: Floats, room: VolumeBox) -> str:
@@ -141,7 +152,7 @@ def _enter(
     """Let balls of these numbers enter where they overlap nothing: how many of the places are within the walls."""
     # Most places overlap a ball where many have entered, which is looked up faster than where the walls are.
     radius: Floats = cells.radius[numbers]  # type: ignore[assignment]
-    free = np.flatnonzero(find_free(cells, points, radius))
+    free = np.flatnonzero(find_free(cells, points, radius)) if done.any() else np.arange(numbers.size)
     free = free[admits(scene, points[:, free], wide[numbers[free]])]
     enter_free(cells, points[:, free], numbers[free], done)
     return int(free.size)
