@@ -215,18 +215,47 @@ def _met(gravity, mesh, leaps, i, m):
 def _step_to(facet, seen, longest) -> Any:
     """A safe step to a facet: its wall is 0 if it leads to the hit, else _NEARER; or _BEYOND an edge, or _BEHIND it."""
     depth, rate, bend = facet.phi(seen.r), 0.5 * dot(facet.normal, seen.v), 0.5 * dot(facet.normal, seen.a)
-    # From behind its plane a flight comes back first.
-    is_behind, within = depth > facet.room.value, facet.within(seen.r)
+    is_behind, room = depth > facet.room.value, 2.0 * EPSILON * seen.coordinates
     if is_behind:
+        # It comes back first.
         depth, rate, bend = -depth, -rate, -bend
-    ahead = min(2.0 * rise_time(depth, rate, bend), longest)
+    own = rise_time(depth, rate, bend)
+    ahead, whole = min(2.0 * own, longest), seen.bounds(longest)
+    if not is_behind and own < longest and _is_beside(facet, seen, (depth, rate, bend), own, longest, whole):
+        return Hit(math.inf, -1.0)
     bounds = seen.bounds(ahead)
-    time = min(rise_time(depth, rate, bend + bounds.jerk * ahead * (1.0 / 6.0)), ahead)
-    if within < 0.0:
-        return Hit(max(time, min(-within / seen.bounds(longest).speed, longest)), _BEYOND)
+    sixth = bounds.jerk * (1.0 / 6.0)
+    time = min(rise_time(depth, rate, bend + sixth * ahead), ahead)
     if is_behind:
         return Hit(time, _BEHIND)
-    return Hit(time, 0.0 if time * bounds.speed <= 2.0 * EPSILON * seen.coordinates else _NEARER)
+    # How deep a flight may be at the end of the step
+    left = 2.0 * sixth * ahead * time * time
+    if (left <= room) & (time < longest) and facet.within(_place(seen, time)) >= 0.0:
+        return Hit(time, 0.0)
+    within = facet.within(seen.r)
+    if within < 0.0:
+        return Hit(max(time, min(-within / whole.speed, longest)), _BEYOND)
+    return Hit(time, 0.0 if time * bounds.speed <= room else _NEARER)
+
+
+def _place(seen, t):
+    """Where a flight is after a time, but for its jerk."""
+    return seen.r + t * (seen.v + (0.5 * t) * seen.a)
+
+
+def _is_beside(facet, seen, level, own, longest, bounds):
+    """Whether a flight surely comes through the plane of a facet beyond an edge, and not back to it.
+
+    Its level c + 2 b t + a t^2 has the root `own`, as in `facet_cells.may_pass`.
+    """
+    (depth, rate, bend), more = level, bounds.jerk * longest * longest * longest * (1.0 / 6.0) + facet.room.value
+    below = rate * rate - bend * depth
+    if (rate <= 0.0) | (below <= 4.0 * abs(bend) * more):
+        return False
+    if bend < 0.0 and depth + longest * (2.0 * rate + longest * bend) <= more:
+        return False
+    beside = more * (1.0 + bounds.speed / math.sqrt(below))
+    return facet.within(_place(seen, own)) < -beside
 
 
 def _go_on(gravity, mesh, before, course, leaps, n):

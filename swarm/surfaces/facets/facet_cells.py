@@ -178,6 +178,7 @@ class WayInCell(Record):
     bent: float  # what it may come farther than by its velocity and acceleration
     halfway: Vec  # half its way by the velocity alone, and how far from there it may be
     beside: float
+    way: float  # a bound of its length, and of that of the parabola in the time before or after it
     near: float
     slow: float
 
@@ -189,9 +190,11 @@ def way_in(cells, place, seen, span):
     near, half = _OFF * math.sqrt(square(w)), 0.5 * seen.a
     slow = _OFF_SPEED * (total(absolute(v)) + span * total(absolute(half)))
     here, ahead = seen.r - middle, (0.5 * span) * v
-    beside = math.sqrt(square(ahead)) + 0.5 * bounds.acceleration * span * span + near
+    curved = 0.5 * bounds.acceleration * span * span
+    straight = math.sqrt(square(ahead))
+    beside, way = straight + curved + near, 2.0 * straight + 4.0 * curved
     bent = bounds.jerk * span * span * span * (1.0 / 6.0)
-    return WayInCell(here, v, half, span, bent, here + ahead, beside, near, slow)
+    return WayInCell(here, v, half, span, bent, here + ahead, beside, way, near, slow)
 
 
 def may_pass(cells, k, way):
@@ -206,8 +209,21 @@ def may_pass(cells, k, way):
     radius, scale = float(cells.known.planes[k, 7]), way.near * (_REACH / (_FULL * _OFF))
     if not meets or radius == _FULL:
         return meets
-    reach = radius * scale + way.beside
-    return square(way.halfway - _row(cells.known.planes, k, 4, scale)) <= reach * reach
+    center, reach = _row(cells.known.planes, k, 4, scale), radius * scale + way.beside
+    if square(way.halfway - center) > reach * reach:
+        return False
+    # Where it comes through the plane: the level is depth + rate s + bend s^2 give or take `more`, at the part s of its
+    # time, and rises by 2 root there. It is that near to 0 for so short a time only, unless it comes back.
+    below = 0.25 * rate * rate - bend * depth
+    if (rate <= 0.0) | (below <= 4.0 * abs(bend) * more) | ((bend < 0.0) & (depth + rate + bend <= more)):
+        return True
+    root = math.sqrt(below)
+    if root <= more:
+        return True
+    s = -depth / (0.5 * rate + root)
+    place = way.from_middle + (s * way.span) * (way.v + (s * way.span) * way.half_pull)
+    reach = radius * scale + way.near + way.bent + way.way * (more / root)
+    return square(place - center) <= reach * reach
 
 
 def _row(rows, k, first, scale):
