@@ -36,6 +36,8 @@ _PER_LINE, _LINES = 4, 4
 _MOST, _STEPS = 4000, 100
 # The bounds of a flight hold for so many times as long as it would be among its cells if it went straight on.
 _CURVED = 1.5
+# And for at most so many times the time in which the motion changes little: a turn by a radian.
+_AHEAD = 20.0
 # A part of the room of a facet, by which a flight goes on that comes to its plane just beyond an edge.
 _ON = 0.5
 # Where a step to a facet ends that does not lead to the hit.
@@ -117,7 +119,7 @@ def go_through_moving(gravity, mesh, before, lanes, live):
 
 def _find_cells(gravity, mesh, leaps, n):
     """Where every lane is in the frame of the mesh, in which cell, and how far it surely comes from there."""
-    cells, rows = mesh.body.grid, leaps.rows
+    cells, rows, most = mesh.body.grid, leaps.rows, _AHEAD * mesh.drive.time_scale
     for i in range(index(n)):
         seen = mesh.seen(leaps.flight(gravity, i), leaps.time[i])
         put(rows, _OWN, i, seen.r)
@@ -138,12 +140,10 @@ def _find_cells(gravity, mesh, leaps, n):
         # The bound of the acceleration grows with the time that it holds for.
         straight = _CURVED * until_out(None, cells, at - back, at + ahead, seen.r, seen.v)
         within = select(straight < longest, straight, longest)
+        within = select(within < most, within, most)
         time = until_out(seen.pulls(within), cells, at - back, at + ahead, seen.r, seen.v)
         time = select(time < within, time, within)
-        shorter = math.sqrt(time * within)
-        again = until_out(seen.pulls(shorter), cells, at - back, at + ahead, seen.r, seen.v)
-        again = select(again < shorter, again, shorter)
-        leaps.until[i], leaps.wall[i] = leaps.time[i] + select(again > time, again, time), -1.0
+        leaps.until[i], leaps.wall[i] = leaps.time[i] + time, -1.0
     for i in range(index(n)):
         cell = index(leaps.cell[i])
         leaps.count[i] = 0
