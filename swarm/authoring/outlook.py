@@ -39,10 +39,12 @@ _ROW, _PROGRAM = 112, 2.5e8
 _SEEN, _WRITTEN = 7e-8, 3e8
 # Times of one core [s], from `bench/results`: an impact on a wall in straight flights, in a fall, where a flight takes
 # steps, on one of many bodies or triangles; an impact of balls; a step of a ball by Penalty, of a point by springs and
-# by multipliers, and of a point or link of a body.
+# by multipliers, and of a point or link of a body; an impact on a wall, or on one of many, that moves other than
+# uniformly.
 _STRAIGHT, _FALL, _STEPS, _FIELD = 4e-9, 2e-8, 5e-7, 1e-7
+_MOVED, _MOVED_FIELD = 1e-6, 5e-6
 _BALLS, _GRAIN, _SPRING, _SWEEPS, _PART = 2e-7, 2e-6, 5e-10, 5e-7, 2e-8
-# Steps of a crossing of a particle that slides, and what each takes.
+# Steps of a crossing of a particle that slides, and what each takes, also where it rests on a wall that moves [s].
 _STEPS_A_CROSSING, _SLIDING = 150, 1e-6
 # In plain Python: an impact, and a step of a point or link of a body. A kernel to compile, and that of bodies. To begin
 # and end a run, and the next run of a sweep [s].
@@ -295,7 +297,11 @@ def _sliding(task: Task) -> list[Workload]:
     if scene.gravity is None or not _settles(task):
         return []
     crossing = math.sqrt(scene.finite_size() / math.hypot(*scene.gravity))
-    steps = len(task.particles) * task.options.until / crossing * _STEPS_A_CROSSING
+    a_second = _STEPS_A_CROSSING / crossing
+    if scene.moves() and not scene.reacts():
+        # What rests goes with its wall for so long at a time.
+        a_second = max(a_second, 1.0 / task.compiled.walls().at(0.0).shortest_time_scale())
+    steps = len(task.particles) * task.options.until * a_second
     return [Workload(steps, "steps of sliding at most", _SLIDING)]
 
 
@@ -343,6 +349,8 @@ def _collisions(task: Task) -> float:
 
 def _cost_of_an_impact(task: Task) -> float:
     walls, falls = task.compiled.walls(), task.scene.gravity is not None
+    if walls.accelerate:
+        return _MOVED_FIELD if walls.fields() else _MOVED * max(1, len(walls.each))
     if walls.fields():
         return _FIELD * (2.0 if falls else 1.0)
     each = _STEPS if walls.in_steps() else _FALL if falls else _STRAIGHT

@@ -157,3 +157,8 @@ def test_what_slides_moves_or_falls(tmp_path):
     falls = GOOD.replace("radius = 0.5", "radius = 0.5\nrestitution = 0.5")
     loads = outlook._loads(task(tmp_path, f"gravity = [0, 0, -9.81]\n{falls}"))
     assert [one.noun for one in loads] == ["impacts", "steps of sliding at most"]
+    # What rests on a wall that swings goes with it for 1/20 of a radian at a time; hits are found by steps there.
+    shaken = 'radius = 0.5\nmotion = {kind = "oscillation", amplitude = [0.01, 0, 0], frequency = 20.0}'
+    swung = outlook._loads(task(tmp_path, f"gravity = [0, 0, -9.81]\n{falls.replace('radius = 0.5', shaken)}"))
+    assert swung[1].events == pytest.approx(10 * 1.0 * 20.0 * 2.0 * math.pi * 20.0)
+    assert swung[0].cost >= 10.0 * loads[0].cost
