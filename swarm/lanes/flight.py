@@ -149,9 +149,8 @@ def _aim(walls, gravity, lanes, live):
         tries, some = tries - 1, _mark(walls, gravity, lanes, live)
     # However many lanes try with it, a lane tries as often.
     for k in range(some):
-        for _time in range(tries):
-            flights.aimed(walls, course, 0, lanes.order[k], False)
-        flights.aimed(walls, course, 0, lanes.order[k], True)
+        for left in range(tries, -1, -1):
+            flights.aimed(walls, course, 0, lanes.order[k], left == 0)
 
 
 def _go_on(walls, gravity, lanes, i):

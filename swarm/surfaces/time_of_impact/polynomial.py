@@ -131,8 +131,10 @@ class PolynomialFlight(Record):
             way = value * slope / select(bottom == 0.0, _TINY, bottom)
             root = root - way
             converges = converges & (abs(way) <= _HALLEY_WAY * root)
-        below = _are_below_in_halves if is_last else _are_below
-        found = converges & below(*self._before(root))
+        before = self._before(root)
+        # What is below 0 by its coefficients is so by those of its halves.
+        below = _are_below(*before) | (is_last & _are_below_in_halves(*before))
+        found = converges & below
         goes_on = length > 0.0
         return select(goes_on, root, t), select(goes_on & found, 0.0, length)
 
