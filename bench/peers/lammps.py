@@ -65,9 +65,9 @@ def run(job: Job) -> tuple[Floats, float]:
         timestep {job.dt}
         run 0
         """)
-    start = time.perf_counter()
+    start = time.process_time()
     simulator.command(f"run {job.steps} pre no post no")
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     position = np.array(simulator.gather_atoms("x", 1, 3)).reshape(n, 3)
     simulator.close()
     return position, seconds

@@ -38,8 +38,8 @@ def run(job: Job) -> tuple[Floats, float]:
     context.setPositions(job.position)
     context.setVelocities(job.velocity)
     context.getIntegrator().step(1)  # compiles the force
-    start = time.perf_counter()
+    start = time.process_time()
     context.getIntegrator().step(job.steps - 1)
     state = context.getState(getPositions=True)
-    seconds = (time.perf_counter() - start) * job.steps / max(job.steps - 1, 1)
+    seconds = (time.process_time() - start) * job.steps / max(job.steps - 1, 1)
     return np.array(state.getPositions(asNumpy=True)._value), seconds
