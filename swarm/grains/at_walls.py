@@ -68,6 +68,8 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
     count = touches.wall_spans[1, number]
     known, start = count, touches.wall_spans[0, number]
     for k in range(begin, near.wall_first[number + 1]):
+        if near.wall_is_on[index(k)]:
+            continue
         a = near.slot[index(k)]
         i = index(a)
         r0, own = vector_at(place, i, X), met(wall, near.listed, near.spans, index(k), place[i, RADIUS])
@@ -79,7 +81,7 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             is_in = is_in & (not near.wall_is_open[index(k)])
         if matter.holds is not None:
             is_in = is_in & (place[i, LIGHTNESS] > 0.0)
-        if is_in & (not near.wall_is_on[index(k)]):
+        if is_in:
             near.wall_is_on[index(k)] = True
             c = index(start + count)
             touches.wall_ends[c] = a

@@ -193,12 +193,14 @@ def gather_pairs(matter, grains, near, touches):
         i = index(a)
         here, radius = vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER), place[i, RADIUS]
         for k in range(near.first[i], near.first[i + 1]):
+            if near.is_on[index(k)]:
+                continue
             b = near.mate[index(k)]
             j = index(b)
             s0 = apart(matter, place, i, j)
             move = half * (here - (vector_at(speed, j, BEFORE) + vector_at(speed, j, AFTER)))
             reach, q0 = radius + place[j, RADIUS], square(s0)
-            is_in = (min(q0, square(s0 + move)) < reach * reach) & (not near.is_on[index(k)])
+            is_in = min(q0, square(s0 + move)) < reach * reach
             if matter.holds is not None:
                 is_in = is_in & (place[i, LIGHTNESS] + place[j, LIGHTNESS] > 0.0)
             if is_in:
