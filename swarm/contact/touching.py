@@ -27,6 +27,8 @@ _SAME_INSTANT = 1e-6
 _BLOWS = 64
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
 _SWEEPS = 60
+# The part of the speed of a wall that a velocity may be off along its normal.
+_OFF = 1e-13
 # Times that a step is cut because another wall is in the way.
 _CUTS = 60
 # These need of every wall; exact reflections need no more.
@@ -114,7 +116,7 @@ def _slide(method, walls, gravity, wall, flight, energy, impulse, lane):
     w = accelerated(gravity, 2.0 * u - accelerated(gravity, v, 0.5 * h), 0.5 * h)
     u = from_relative(frame, u)
     if moves(u):
-        r = _settled(carried.at(flight.remaining - h), wall, touch, r + h * u)
+        r = _settled(carried.at(flight.remaining - h), wall, touch, r + h * u, method.touch)
     w = from_relative(frame, w)
     if moving is not None:
         # Walls do work.
@@ -135,8 +137,19 @@ def _slide(method, walls, gravity, wall, flight, energy, impulse, lane):
 @outlined
 def _frame_of(walls, number, touched, r):
     """A velocity with which all touched walls move along their normals."""
-    u = ZERO
-    # One wall after the other, as in Kaczmarz' method
+    u = _swept(walls, number, touched, r, ZERO)
+    for i in range(touched.size):
+        if touched[i]:
+            v = walls.velocity(number[i], r)
+            if abs(dot(v - u, walls.unit_normal(number[i], r))) > _OFF * norm(v):
+                # In an obtuse edge each sweep gains little, but walls of one body have one velocity.
+                return _swept(walls, number, touched, r, v)
+    return u
+
+
+@outlined
+def _swept(walls, number, touched, r, u):
+    """Such a velocity near another one: of one wall after the other, as in Kaczmarz' method."""
     for _sweep in range(_SWEEPS):
         for i in range(touched.size):
             if touched[i]:
@@ -176,7 +189,7 @@ def _unhindered(walls, gravity, touch, r, v, h, near):
 
 
 @outlined
-def _settled(walls, wall, touch, r):
+def _settled(walls, wall, touch, r, near):
     """The end of a step on the wall that holds the particle, and on every touched one that it has left by round-off.
 
     Round-off adds up step by step: 3e-13 of the size after 5e4 steps along an edge. Each wall once: a second time only
@@ -187,6 +200,12 @@ def _settled(walls, wall, touch, r):
         holds = touch.number[i] == wall and touch.active[i] > 0.0
         if holds or (touch.touched[i] and touch.depth[i] > 0.0):
             r = walls.project(touch.number[i], r)
+    if touch.frame is not None:
+        # A wall that moves is left by more than round-off; where another one ends it is met on that one only.
+        _depths(walls, touch.number, r, touch.depth)
+        for i in range(touch.touched.size):
+            if touch.touched[i] and touch.depth[i] > near:
+                r = walls.project(touch.number[i], r)
     return r
 
 
