@@ -264,6 +264,8 @@ def _module_of(value: Any) -> str:
         return "numpy"
     if isinstance(value, types.ModuleType):
         return value.__name__
+    if isinstance(value, types.BuiltinFunctionType) and isinstance(value.__self__, type):
+        return value.__self__.__module__  # `tuple.__new__`
     # Where an instance comes from says nothing about its value; NumPy's functions have a class of their own.
     named = isinstance(value, (type, types.FunctionType, types.BuiltinFunctionType))
     named = named or (callable(value) and type(value).__module__.split(".")[0] == "numpy")
