@@ -13,7 +13,7 @@ from ..kernel.vector import Vec, column, put
 from ..methods import contract as methods
 from ..surfaces.in_motion.moving import Carried
 from ..surfaces.presence.ajar import Faced
-from ..surfaces.time_of_impact import flights
+from ..surfaces.time_of_impact import aim, flights
 from .table import EIGHT, STRIDE, Advanced, Number, Rows, copy_lane, table
 
 _named = Rows()
@@ -48,7 +48,7 @@ class Lanes(NamedTuple):
     unsolved: Array  # bool, whether its solve goes on
     sweeping: Array  # bool, whether the loop of its multiplier goes on
     record: Array  # (RECORDS, stride) the loop of its multiplier
-    course: Array  # (walls COURSE, stride) the safe steps of a fall
+    course: Array  # (walls COURSE and more, stride) the safe steps of a flight, or what is known of its first hit
     turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
     flown: Array  # the time of the flight before the contact, where the method asks for it
     particle: Array  # int64, the particle in the lane
@@ -186,7 +186,7 @@ def empty(walls: int, given: int, period: Any = None, rows: int = Flying.ALL) ->
         unsolved=np.zeros(STRIDE, np.bool_),
         sweeping=np.zeros(STRIDE, np.bool_),
         record=table(RECORDS),
-        course=table(walls * flights.COURSE),
+        course=table(walls * flights.COURSE + aim.WALLS),
         turned=table(4),
         flown=table(1)[0],
         particle=np.zeros(STRIDE, np.int64),

@@ -71,13 +71,21 @@ class AtRest(Record):
 
     # --- Overridden by a shape: safe steps in the frame of a wall that moves other than uniformly; see rising.py ---
 
-    def core(self, depth):
-        """What lies so deep that walls displaced by less never reach it, as the cavity that it is; None if unknown."""
-        return
+    def passage(self, r, v, depth):
+        """The `Passage` of a straight flight through what lies so deep that walls displaced by less never reach it.
+
+        It is known where the surface `has_core`.
+        """
+        raise NotImplementedError
+
+    has_core = False
 
     def level_along(self, seen):
         """The level along a flight with a bound of its third derivative: a `Level`, or `Between` of rising.py."""
         raise NotImplementedError
+
+    # Whether that bound is near to what a flight does, however a wall moves: see aim.py.
+    proves = False
 
     @property
     def has_levels(self):

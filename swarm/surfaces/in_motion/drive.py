@@ -199,6 +199,16 @@ class Drive(Record):
             middle = middle - swing.cosine
         return middle
 
+    def passage(self, body, r, v, remaining):
+        """The `Passage` of a straight flight, with so much of the frame left, through what a surface never reaches.
+
+        None where the surface has no core, or moves in other ways than swings.
+        """
+        within = self.swing_amplitude()
+        if within is None or not body.has_core:
+            return None
+        return body.passage(r - self.swing_center(-remaining), v - self.velocity, within)
+
     def angular_speed(self):
         """The angular speed of the surface [rad/s]."""
         return 0.0 if self.turn is None else abs(self.turn.rate)

@@ -7,7 +7,6 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
-from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import norm
 from ...motion import Guide
@@ -47,16 +46,6 @@ class Moving(Record):
         """A particle as safe steps to the wall see it after a time of its flight: None where none are needed."""
         remaining = flight.remaining - t
         return flight.seen(t, self.during(remaining, remaining), flight.pull)
-
-    def leaves_core(self, r, v, remaining, t):
-        """When a straight flight that is there after a time leaves what the wall never reaches; that time elsewhere."""
-        within, drive = self.drive.swing_amplitude(), self.drive
-        core = None if within is None else self.body.core(within)
-        if core is None:
-            return t
-        r, v = r - drive.swing_center(-remaining), v - drive.velocity
-        leaves, _is_met = core.first_hit(r, v)
-        return select(core.level_of(core.inner(r + t * v)) < 0.0, leaves, t)
 
 
 class TurningWall(Moving):
@@ -102,6 +91,10 @@ class Strided(Marched):
     """The same where all of these steps are taken in lanes: see strides.py."""
 
 
+class Aimed(Strided):
+    """The same where most flights need none of them: see aim.py."""
+
+
 class Leaping(Marched):
     """The same where what moves otherwise as a field are facets: lanes leap through their cells."""
 
@@ -132,7 +125,9 @@ def carried(
     marched = [walls for walls in of_surfaces if type(walls[0]) in (Moving, TurningWall)]
     if not marched:
         return Carried(all_walls)
-    return (Strided if all(map(_may_stride, marched)) else Marched)(all_walls)
+    if not all(map(_may_stride, marched)):
+        return Marched(all_walls)
+    return (Aimed if all(map(_may_aim, marched)) else Strided)(all_walls)
 
 
 def _may_leap(field: Field) -> bool:
@@ -144,6 +139,12 @@ def _may_leap(field: Field) -> bool:
 def _may_stride(walls: list[Any]) -> bool:
     """Whether lanes can take the safe steps of the walls of a surface; of a spline each would look for its piece."""
     return walls[0].drive.track is None and all(wall.body.has_levels for wall in walls)
+
+
+def _may_aim(walls: list[Any]) -> bool:
+    """Whether most first hits of the walls of a surface are proven by what two Taylor polynomials bound."""
+    swings = walls[0].drive.turn is None
+    return all(wall.body.proves or (swings and wall.body.has_core) for wall in walls)
 
 
 def walls_of(surface: Surface, moment: float, largest: float | None = None) -> list[Any]:

@@ -132,4 +132,4 @@ class EllipsoidCavity(EllipsoidNumbers):
         return rise_time_inside(c, b, a), True
 
     may_be_far = False
-    leaves_once = True
+    leaves_once = has_core = True

@@ -11,7 +11,7 @@ from ...kernel.vector import Vec, dot, vec
 from ..rotation import Direction, turned
 from ..surface import UNBOUNDED, Box, HalfSpace, Surface, is_along
 from ..time_of_impact.course import rise_time
-from ..time_of_impact.rising import Level
+from ..time_of_impact.rising import CORE, Level, Passage
 from .common import ExactChord
 
 
@@ -137,8 +137,18 @@ class PlaneNumbers(Flat):
     normal: Vec
     offset: float
 
-    leaves_once = True
+    leaves_once = has_core = True
     degree = 1
+
+    def passage(self, r, v, depth):
+        place, u = dot(self.normal, r), dot(self.normal, v)
+        c = (place - self.offset) + depth + (1.0 - CORE) * (abs(place) + abs(self.offset))
+        moves = abs(u) > 0.0
+        inverse = select(moves, 1.0 / select(moves, u, 1.0), 0.0)
+        # A flight that goes along is there for ever, or never.
+        enters, leaves = select(u < 0.0, -c * inverse, -math.inf), select(u > 0.0, -c * inverse, math.inf)
+        enters = select(moves | (c < 0.0), enters, math.inf)
+        return Passage(enters, leaves, select(u > 0.0, (self.offset - place) * inverse, math.inf))
 
     def reversible(self):
         return self if type(self) is PlaneNumbers else None

@@ -14,7 +14,7 @@ from ...kernel.vector import Symmetric, Vec, absolute, cross, dot, largest, norm
 from .. import contract
 from ..surface import side_sign
 from ..time_of_impact.course import Quartic, level_and_window, rise_time_by, rise_time_inside
-from ..time_of_impact.rising import Level
+from ..time_of_impact.rising import CORE, Level, passage_of
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
 _CHORD_SWEEPS = 12
@@ -195,10 +195,26 @@ class QuadricNumbers(contract.Smooth):
     # --- Of walls that move other than uniformly ---
 
     def level_along(self, seen):
-        n, most, side = self.inner_gradient(seen.r), absolute(self.a), self.side
-        bend = form(self.a, seen.v, seen.v) + 0.5 * dot(n, seen.a)
-        level = self.level_of(self.inner(seen.r))
-        return Level(level, 0.5 * side * dot(n, seen.v), side * bend, norm(n), max(most.x, most.y, most.z))
+        n, most, side = self.inner_gradient(seen.r), largest(self.a), self.side
+        q, bend = self.inner(seen.r), form(self.a, seen.v, seen.v) + 0.5 * dot(n, seen.a)
+        half = 0.5 * side * dot(n, seen.v)
+        if not self.has_core:
+            return Level(self.level_of(q), half, side * bend, norm(n), most)
+        # |grad q| <= 2 sqrt(A q), and 2 sqrt(L q) <= L + q
+        level = abs(self.level)
+        size, q = select(level > 0.0, level, 1.0), abs(q)
+        steepness = (level + select(q > level, q, level)) * math.sqrt(most / size)
+        return Level(self.level_of(self.inner(seen.r)), half, side * bend, steepness, most, False)
+
+    def passage(self, r, v, depth):
+        # An ellipsoid holds its own image that is smaller by a part, with a ball about each point of that of this part
+        # of its smallest half-axis.
+        d, level, most = r - self.center, self.side * self.level, largest(self.a)
+        width = CORE - depth * math.sqrt(select(level > 0.0, most / select(level > 0.0, level, 1.0), 1.0))
+        width = select((width > 0.0) & (level > 0.0), width, 0.0)
+        magnitude = absolute(self.a)
+        c, b, a = form(magnitude, d, d), form(magnitude, d, v), form(magnitude, v, v)
+        return passage_of(c, b, a, level, width * width * level)
 
     def hessian_bounds(self, r):
         a, side = self.a, self.side
@@ -209,6 +225,7 @@ class ConvexQuadric(QuadricNumbers):
     """A convex cavity: the level along a straight flight has no maximum."""
 
     leaves_once = True
+    has_core = property(lambda self: self.b is None)
 
     def first_hit(self, r, v):
         c, b, a = self.parabola(r, v)

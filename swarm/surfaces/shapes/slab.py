@@ -15,7 +15,7 @@ from ...kernel.vector import Vec, dot, vec
 from ..rotation import Direction, turned
 from ..surface import TILT, Box, HalfSpace, Surface, box_around, farthest, is_along, side_sign
 from ..time_of_impact.course import rise_time
-from ..time_of_impact.rising import Between, Level, level_step
+from ..time_of_impact.rising import CORE, Between, Level, Passage, level_step
 from .common import Distance, ExactChord
 
 
@@ -270,6 +270,17 @@ class SlabNumbers(Distance, ExactChord):
         # Without a speed the plane behind is the near one, from which it leaves.
         sign = math.copysign(1.0, select(half == 0.0, -x, half))
         return Between(sign * x, abs(half), sign * bend, self.radius)
+
+    has_core = proves = True
+
+    def passage(self, r, v, depth):
+        x, u = self.off(r), self.along(v)
+        moves = abs(u) > 0.0
+        inverse = select(moves, 1.0 / select(moves, u, 1.0), 0.0)
+        middle, width = -x * inverse, CORE * self.radius - depth
+        inverse = abs(inverse)
+        half = select(width > 0.0, width, 0.0) * inverse
+        return Passage(middle - half, middle + half, select(moves, middle + self.radius * inverse, math.inf))
 
     def moving_step(self, seen, longest):
         x, side = self.off(seen.r), self.side

@@ -12,13 +12,11 @@ from ...kernel.vector import ZERO, Vec, absolute, dot, highest, norm, square, to
 from ..area_samples import AreaSample, Region, directions
 from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
 from ..time_of_impact.course import Quartic, ball_rise_time, level_and_window, rise_time, rise_time_inside
-from ..time_of_impact.rising import Bounds, Level
+from ..time_of_impact.rising import CORE, Bounds, Level, passage_of
 from .common import Distance, ExactChord
 
 # Trials of a time for which the fall is bounded.
 _TRIALS = 3
-# Of a core, of the radius: what is computed to be in it is in it.
-_ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, repr=False)
@@ -199,11 +197,11 @@ class SphereNumbers(Distance, ExactChord):
     def level_along(self, seen):
         d, side = seen.r - self.center, self.side
         q, bend = square(d), square(seen.v) + dot(d, seen.a)
-        return Level(side * (q - self.radius2), side * dot(d, seen.v), side * bend, self._steepness(q), 1.0)
+        return Level(side * (q - self.radius2), side * dot(d, seen.v), side * bend, *self._steepness(q))
 
     def _steepness(self, q):
-        """|grad q|, or a number above it that is nearly it at the wall."""
-        return 2.0 * math.sqrt(q)
+        """|grad q|, the magnitude of H, and whether |grad q| may grow before a flight meets the wall."""
+        return 2.0 * math.sqrt(q), 1.0, True
 
     def bounds_along(self, seen, within):
         # In a frame that its centre carries along: it does not turn.
@@ -226,15 +224,16 @@ class SphereCavity(SphereNumbers):
 
     def _steepness(self, q):
         # 2 R |d| <= R^2 + |d|^2: no square root
-        return (self.radius2 + q) * self.curvature
+        return (self.radius2 + select(q > self.radius2, q, self.radius2)) * self.curvature, 1.0, False
 
-    def core(self, depth):
-        width = (1.0 - _ROUND_OFF) * self.radius - depth
+    def passage(self, r, v, depth):
+        d, width = r - self.center, CORE * self.radius - depth
         width = select(width > 0.0, width, 0.0)
-        return self._replace(radius=width, radius2=width * width)
+        return passage_of(square(d), dot(d, v), square(v), self.radius2, width * width)
 
     may_be_far = False
     leaves_once = True
+    has_core = proves = True
 
 
 def ball(center, radius):

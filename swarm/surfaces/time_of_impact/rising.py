@@ -90,26 +90,71 @@ def flight_of(r, v, pull, remaining, speed=None):
     return Flight(r, v, pull, remaining, norm(v) if speed is None else speed, norm(pull))
 
 
+# --- What walls that move never reach --------------------------------------------------------------------
+
+# Of the size of a cavity: what is computed to be so deep is as deep as it is to be.
+CORE = 1.0 - 1e-12
+
+
+class Passage(Record):
+    """When a straight flight enters what a wall never reaches, and leaves it, and when it meets the wall on average.
+
+    It misses it if it does not enter it before it leaves it.
+    """
+
+    enters: float
+    leaves: float
+    hits: float
+
+
+def passage_of(c, b, a, level, core):
+    """The `Passage` of a flight along which q is c + 2 b t + a t^2, of a wall where it is `level`, at its `core`."""
+    moves = a > 0.0
+    inverse = select(moves, 1.0 / select(moves, a, 1.0), 0.0)
+    middle = -b * inverse
+    half, out = _root(b * b - a * (c - core)) * inverse, _root(b * b - a * (c - level)) * inverse
+    return Passage(middle - half, middle + half, select(moves, middle + out, math.inf))
+
+
 # --- Levels with a known second derivative: below c + 2 b t + a t^2 + k t^3, with a bound k of f'''/6 -------
 
 
 class Level(Majorant):
-    """A level with a bound of its third derivative: f, f'/2, f''/2, |grad q| and m."""
+    """A level with a bound of its third derivative: f, f'/2, f''/2, |grad q| and m.
+
+    A convex cavity has a steepest place, on its wall: `steepness` is nowhere less than there, and does not grow.
+    """
 
     c: float
     b: float
     a2: float
     steepness: float
     magnitude: float
+    grows: Any = True
 
     def third(self, bounds, within):
         """The bound of f''' within that time."""
-        moved = self.steepness + 2.0 * self.magnitude * bounds.speed * within
+        moved = self.steepness
+        if self.grows:
+            moved = moved + 2.0 * self.magnitude * bounds.speed * within
         return 6.0 * self.magnitude * bounds.speed * bounds.acceleration + moved * bounds.jerk
 
     def own_rise(self):
         """When its own parabola rises."""
         return rise_time(self.c, self.b, self.a2)
+
+    def nearest_root(self):
+        """How far ahead, or back, its own parabola rises through 0 next to here; infinite if it does not rise here."""
+        return _nearest_root(self.c, self.b, self.a2)
+
+    def moved(self, way, meets):
+        """Its own parabola from a little later on, where it is 0 if it meets the wall."""
+        here = self.a2 * way
+        return self._replace(c=select(meets, 0.0, self.c + way * (2.0 * self.b + here)), b=self.b + here)
+
+    def is_below(self, sign, sixth, within, at_wall):
+        """Whether it is surely below 0 for so long, ahead or, with a sign of -1, back, but for here, at a wall."""
+        return _is_below(self.c, 2.0 * sign * self.b, self.a2, sixth, within, at_wall)
 
     def soonest(self, sixth, within, is_first):
         """When it rises at the soonest, if a sixth of f''' is bounded within that time.
@@ -132,6 +177,22 @@ class Between(Record):
     def third(self, bounds, within):
         """The bound of f''' within that time."""
         return bounds.jerk
+
+    def nearest_root(self):
+        """As of a `Level`, of the plane ahead."""
+        return _nearest_root(self.place - self.radius, self.half, self.bend)
+
+    def moved(self, way, meets):
+        """As of a `Level`."""
+        here = self.bend * way
+        place = select(meets, self.radius, self.place + way * (2.0 * self.half + here))
+        return self._replace(place=place, half=self.half + here)
+
+    def is_below(self, sign, sixth, within, at_wall):
+        """As of a `Level`."""
+        slope = 2.0 * sign * self.half
+        ahead = _is_below(self.place - self.radius, slope, self.bend, sixth, within, at_wall)
+        return ahead & _is_below(-self.place - self.radius, -slope, -self.bend, sixth, within, at_wall)
 
     def own_rise(self):
         """When the parabola of one of them rises."""
@@ -159,6 +220,23 @@ class Between(Record):
             leaving = rise_time(-2.0 * b, -0.5 * self.bend, sixth)
             behind = select(leaving > behind, leaving, behind)
         return select(behind < ahead, behind, ahead)
+
+
+def _nearest_root(c, b, a):
+    bottom = b + _root(b * b - a * c)
+    return select(b > 0.0, -c / select(b > 0.0, bottom, 1.0), math.inf)
+
+
+def _is_below(c, slope, a, sixth, within, at_wall):
+    """Whether c + slope t + a t^2 + sixth t^3 is surely not above 0 for so long; at a wall c is at most round-off."""
+    c, rest, bend = select(at_wall & (c > 0.0), 0.0, c), within * sixth, within * a
+    # What the bracket is at most at both ends, or, without a bend down, the whole of it: both are convex.
+    last = slope + bend + within * rest
+    steepest = select(last > slope, last, slope)
+    convex = select(a > 0.0, last, last - bend)
+    lower = select(convex < steepest, convex, steepest)
+    # Or the parabola above it has no root.
+    return (c + within * select(lower > 0.0, lower, 0.0) <= 0.0) | ((c < 0.0) & (slope * slope < 4.0 * c * (a + rest)))
 
 
 def _root(discriminant):

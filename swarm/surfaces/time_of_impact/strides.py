@@ -12,67 +12,66 @@ from ...kernel.jit import select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import ZERO, norm
 from ..in_motion.moving import Moving
-from ..walls import Following
 from .flights import Hit
 from .rising import ThirdDerivativeBound, flight_of
 from .safe import closed_hit, seen_by_walls
 
 # What a lane knows of its way: the time of the flight so far, the wall that it has met or -1, and the first hit with
 # the walls that have a closed form; the speed at its start.
-_TIME, _MET, _CLOSED, _OTHER, _SPEED = 0, 1, 2, 3, 4
+TIME, MET, CLOSED, OTHER, SPEED = 0, 1, 2, 3, 4
 # The bounds of a stride hold for at most so many times the pace of a wall: beyond, a power series says little.
-_AHEAD = 32.0
+AHEAD = 32.0
 
 
 def start(walls, gravity, course, lane, r, v, remaining):
     """The way of a flight with so much of the frame left [s] into a lane of the course."""
     found = closed_hit(walls.at(remaining), gravity, r, v)
-    course[_TIME, lane], course[_MET, lane] = 0.0, -1.0
-    course[_CLOSED, lane], course[_OTHER, lane], course[_SPEED, lane] = found.time, found.wall, norm(v)
+    course[TIME, lane], course[MET, lane] = 0.0, -1.0
+    course[CLOSED, lane], course[OTHER, lane], course[SPEED, lane] = found.time, found.wall, norm(v)
 
 
 def stride(walls, gravity, course, lane, r, v, remaining, is_first):
     """One stride of a lane that has not met a wall."""
-    t, met, closed = course[_TIME, lane], course[_MET, lane], course[_CLOSED, lane]
+    t, met, closed = course[TIME, lane], course[MET, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining) - t
-    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining, course[_SPEED, lane])
+    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining, course[SPEED, lane])
     known = tuple(
         (number, ThirdDerivativeBound(wall.body, seen, wall.body.level_along(seen)))
         for wall, number, seen in seen_by_walls(walls, flight, t)
     )
-    within, ahead = _first_rise(known), _AHEAD * _pace(walls)
+    within, ahead = _first_rise(known), AHEAD * pace(walls)
     ahead = select(ahead < longest, ahead, longest)
     within = select(within < ahead, within, ahead)
     time, wall, meets = _first_stride(known, within, is_first)
     after = t + select(time < within, time, within)
     if is_first and gravity is None:
-        after = _through_cores(walls, r, v, remaining, after, t + longest)
+        after = _through_cores(known, r, v, remaining, after, t + longest)
     under_way = (met < 0.0) & (longest > 0.0)
-    course[_TIME, lane] = select(under_way, after, t)
-    course[_MET, lane] = select(under_way & meets & (time <= within), wall, met)
+    course[TIME, lane] = select(under_way, after, t)
+    course[MET, lane] = select(under_way & meets & (time <= within), wall, met)
 
 
-def _through_cores(walls, r, v, remaining, t, longest):
+def _through_cores(known, r, v, remaining, t, longest):
     """A time up to the longest until which a straight flight, free until t, surely stays where no wall ever comes."""
     first = longest
-    for wall in reversed(walls.each):
-        if isinstance(wall, Following):
+    for _number, one in known:
+        way = one.seen.drive.passage(one.body, r, v, remaining)
+        if way is None:
             return t
-        if wall.accelerates:
-            leaves = wall.leaves_core(r, v, remaining, t)
-            first = select(leaves < first, leaves, first)
+        leaves = select((way.enters < t) & (t < way.leaves), way.leaves, t)
+        first = select(leaves < first, leaves, first)
     return select(t < first, first, t)
 
 
 def met(course, lane):
     """The first `Hit` of a lane, if its strides have found it."""
-    t, met, closed = course[_TIME, lane], course[_MET, lane], course[_CLOSED, lane]
+    t, met, closed = course[TIME, lane], course[MET, lane], course[CLOSED, lane]
     # No wall in any motion before the closed hit
     arrives = (met < 0.0) & (t >= closed)
-    return Hit(select(arrives, closed, t), select(arrives, course[_OTHER, lane], met))
+    return Hit(select(arrives, closed, t), select(arrives, course[OTHER, lane], met))
 
 
-def _pace(walls):
+def pace(walls):
     """The shortest pace of all walls that move."""
     shortest = math.inf
     for wall in reversed(walls.each):

@@ -1,0 +1,130 @@
+"""First hits that a guess and two Taylor polynomials prove: those of safe steps, and to the last digits those of 50."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+import swarm
+from swarm.kernel.vector import dot, vec
+from swarm.surfaces.in_motion.moving import Aimed
+from swarm.surfaces.time_of_impact import aim, strides
+
+TURN = swarm.Rotation((1.0, 2.0, 3.0), rate=1.3, center=(0.1, 0.0, -0.05))
+MOTIONS = {
+    "swing": swarm.Oscillation((0.05, 0.03, 0.08), frequency=0.7, phase=0.4),
+    "wide swing": swarm.Oscillation((0.3, -0.2, 0.25), frequency=0.5),
+    "fast swing": swarm.Oscillation((0.004, 0.01, -0.006), frequency=5.0, phase=1.0),
+    "turn": TURN,
+    "sum": swarm.Translation((0.3, -0.2, 0.1)) + swarm.Oscillation((0.05, 0.03, 0.08), frequency=0.7) + TURN,
+}
+CAVITIES = {
+    "sphere": lambda motion: swarm.Sphere(0.5, (0.1, -0.05, 0.02), motion=motion),
+    "box": lambda motion: swarm.Box((0.5, 0.4, 0.3), rotation=(1.0, 0.3, -0.2, 0.5), motion=motion),
+    "plane": lambda motion: swarm.Plane((0.0, 1.0, 1.0), 0.3, motion=motion),
+    "ellipsoid": lambda motion: swarm.Ellipsoid((0.5, 0.6, 0.4), rotation=(1.0, 0.3, -0.2, 0.5), motion=motion),
+}
+START, SPAN, FLIGHTS = 0.6, 2.5, 24
+
+
+def course_of(walls):
+    return np.full((aim.WALLS + aim._OF_WALL * len(walls.each), 1), math.nan)
+
+
+def aimed_hit(walls, flight):
+    """The hit that is proven, or None."""
+    course = course_of(walls)
+    with np.errstate(all="ignore"):
+        aim.start(walls, None, course, 0, *flight)
+        for _round in range(aim.AIMS):
+            aim.improve(walls, None, course, 0, *flight)
+        aim.prove(walls, None, course, 0, *flight)
+        return None if aim.is_open(course, 0, flight[2]) else strides.met(course, 0)
+
+
+def strode_hit(walls, flight):
+    """The hit of safe steps alone."""
+    course = course_of(walls)
+    with np.errstate(all="ignore"):
+        strides.start(walls, None, course, 0, *flight)
+        for k in range(200):
+            strides.stride(walls, None, course, 0, *flight, k == 0)
+            if not aim.is_open(course, 0, flight[2]):
+                break
+        return strides.met(course, 0)
+
+
+def flights(scene, walls, seed):
+    """(a flight, its hit by safe steps): some that begin inside, each with those that follow after reflections."""
+    rng = np.random.default_rng(seed)
+    left, r, v, remaining = 0, None, None, 0.0
+    for _flight in range(FLIGHTS):
+        while left == 0:
+            r, v, remaining = rng.uniform(-0.4, 0.4, 3), rng.standard_normal(3), SPAN
+            left = 8 * bool((scene.gaps(r[:, None], START) < -1e-3).all())
+            r, v = vec(r), vec(v)
+        flight = r, v, remaining
+        hit = strode_hit(walls, flight)
+        yield flight, hit
+        left -= 1
+        if hit.wall < 0.0 or not hit.time < remaining:
+            left = 0
+            continue
+        r, remaining = r + hit.time * v, remaining - hit.time
+        now = walls.at(remaining)
+        n = now.unit_normal(hit.wall, r)
+        v = v - 2.0 * max(dot(v - now.velocity(hit.wall, r), n), 0.0) * n
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("name", CAVITIES)
+def test_what_is_proven_is_the_hit_of_safe_steps(name, motion):
+    scene = swarm.Scene([CAVITIES[name](MOTIONS[motion])])
+    walls = scene.compiled().walls(START + SPAN)
+    if not isinstance(walls, Aimed):
+        assert name in ("plane", "ellipsoid")
+        assert motion in ("turn", "sum")
+        return
+    proven = 0
+    for flight, wanted in flights(scene, walls, 7):
+        found = aimed_hit(walls, flight)
+        if found is not None:
+            proven += 1
+            assert found.wall == wanted.wall
+            assert found.time == pytest.approx(wanted.time, rel=1e-11, abs=1e-13)
+    assert proven >= FLIGHTS // 3
+
+
+@pytest.mark.parametrize("motion", ["swing", "wide swing", "fast swing"])
+def test_roots_are_those_of_fifty_digits(motion):
+    """Of a plane: n.(r + v t - d(t)) = offset."""
+    given, offset = MOTIONS[motion], 0.3
+    scene = swarm.Scene([swarm.Plane((0.0, 0.6, 0.8), offset, motion=given)])
+    walls, found = scene.compiled().walls(START + SPAN), 0
+    for (r, v, remaining), _hit in flights(scene, walls, 11):
+        hit = aimed_hit(walls, (r, v, remaining))
+        if hit is None or hit.wall < 0.0 or not hit.time < remaining:
+            continue
+        found += 1
+        with mpmath.workdps(50):
+            at = mpmath.mpf(START + SPAN) - mpmath.mpf(remaining)
+            level = _plane_in_digits(given, offset, r, v, at)
+            root = mpmath.findroot(level, hit.time)
+            slope = abs(mpmath.diff(level, root))
+            late = float(abs(root - hit.time) * slope)
+        assert late <= 4.0 * np.finfo(float).eps * (sum(map(abs, r)) + math.hypot(*v) * hit.time + 1.0)
+    assert found >= 5
+
+
+def _plane_in_digits(given, offset, r, v, at):
+    """The level at a time after `at`."""
+    n = mpmath.matrix([0.0, 0.6, 0.8]) / mpmath.norm(mpmath.matrix([0.0, 0.6, 0.8]))
+    r, v = mpmath.matrix(r), mpmath.matrix(v)
+    amplitude, rate = mpmath.matrix(given.amplitude), 2 * mpmath.pi * given.frequency
+
+    def level(t):
+        wave = mpmath.sin(rate * (at + t) + given.phase) - mpmath.sin(given.phase)
+        return mpmath.fdot(n, r + v * t - amplitude * wave) - offset
+
+    return level
