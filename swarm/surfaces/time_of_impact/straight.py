@@ -54,12 +54,14 @@ class Straight(Record):
         half = 0.5 * surface.side * dot(surface.gradient(p), self.v)
         # Past the root, or past the wall by round-off or because the surface bends more than was said
         past = (level > 0.0) & (half > 0.0) & (not is_first)
-        one_root = rise_time(level, half, self.least)
-        one_root = (one_root < math.inf) & (t + one_root <= self.end)
+        # Whether the lowest parabola rises through 0
+        one_root = ((half > 0.0) | (self.least > 0.0)) & (half * half >= self.least * level)
         bend = select(one_root | past, self._bend(known, level, half, is_first), self.most)
         bottom = half + math.sqrt(positive(half * half - bend * level))
         step = select(past, level / select(past, bottom, 1.0), rise_time(level, half, bend))
-        is_free = (not past) & (not ((t + step <= self.end) & (step < math.inf)))
+        beyond = not (t + step <= self.end)
+        # Where there is one root, a look at the end says whether it is before that.
+        is_free = (not past) & ((beyond & (not one_root)) | (t >= self.end) | (not step < math.inf))
         # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
         way = select(is_free, 0.0, step)
         rising = half + way * select(past, -self.most, self.least)
@@ -67,7 +69,8 @@ class Straight(Record):
         shortest = 2.0 * EPSILON * (total(absolute(p)) / select(speed > 0.0, speed, 1.0) + way)
         arrives = (not is_first) | (rising > 0.0) | (way == 0.0)
         arrives &= (way <= shortest) | ((self.most - self.least) * way * way <= 2.0 * shortest * rising)
-        free, after = select(past, known.free, t), select(past, t - way, t + way)
+        arrives &= past | (not beyond)
+        free, after = select(past, known.free, t), select(past, t - way, select(beyond, self.end, t + way))
         # A level that bends more than was said has its root anywhere between.
         after = select(past & (not after > free), 0.5 * (free + t), after)
         arrives |= past & (not after > free)
