@@ -9,6 +9,7 @@ from grains_runs import ran
 import swarm
 from swarm import RunError, SceneError
 from swarm.commands.summary import numbers, of_trajectory
+from swarm.grains import contacts
 from swarm.pictures.series import lines_of
 from swarm.run.preflight import softness
 from swarm.words.content import Content
@@ -368,3 +369,26 @@ def test_balls_meet_across_the_faces_of_a_cell():
     )
     with pytest.raises(RunError, match="it overlaps particle"):
         ran(scene, start, SOFT, 0.01)
+
+
+@pytest.mark.parametrize(("friction", "off"), [(0.0, 1e-10), (0.5, 1e-7)])
+def test_overlaps_where_dampers_act_are_those_of_sweeps_to_round_off(friction, off, monkeypatch):
+    """There sweeps end early, as energy is booked by what dampers did: overlaps stay the same to a part of a radius.
+
+    Friction is solved to fewer digits, and more sweeps of it lead to another slip.
+    """
+    laws = {"restitution": 0.3, "friction": friction}
+    box = swarm.Box((0.0106, 0.0106, 0.1), (0.0, 0.0, 0.1), **laws)
+    scene = swarm.Scene([box], gravity=(0.0, 0.0, -9.81), pairs=swarm.Pairs(**laws))
+    k, wobble = np.arange(8), np.random.default_rng(0).uniform(-1.5e-4, 1.5e-4, (3, 8))
+    places = 0.0103 * np.array([k % 2 - 0.5, k // 2 % 2 - 0.5, k // 4 + 0.55]) + wobble
+    start = swarm.Particles(places, np.zeros((3, 8)), 1.3e-3, radius=0.005)
+
+    def overlaps():
+        run = swarm.simulate(scene, start, swarm.Penalty(2e-4, 1600.0, 1.0), until=0.02, every=2e-3, compile="never")
+        return run.observables["largest_overlap"]
+
+    found = overlaps()
+    monkeypatch.setattr(contacts, "_DAMPED", 1.0)
+    assert found.max() > 5e-5
+    np.testing.assert_allclose(found, overlaps(), rtol=0.0, atol=off * 0.005)
