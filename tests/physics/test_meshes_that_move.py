@@ -10,6 +10,7 @@ from swarm.contact import crossing, touching
 from swarm.contact.projection import Touch
 from swarm.kernel.vector import Vec, vec
 from swarm.observables import drift
+from swarm.surfaces.in_motion import moving
 from swarm.surfaces.in_motion.drive import drive_of
 from swarm.surfaces.rotation import Rotated
 from swarm.surfaces.shapes.plane import PlaneNumbers
@@ -330,3 +331,15 @@ def test_a_mesh_that_turns_and_comes_for_a_time():
         for wall in (cube("outside", **how), swarm.Boxes([3 * [0.0]], 3 * (HALF,), **how))
     )
     assert one.particles.position == pytest.approx(other.particles.position, abs=1e-11)
+
+
+@pytest.mark.parametrize("others", [False, True])
+@pytest.mark.parametrize("gravity", [None, (0.0, 1.0, -2.0)])
+@pytest.mark.parametrize("motion", [TURNED, swarm.Rotation((0.3, 0.0, 1.0), 12.0), TURNED + SHAKEN], ids=str)
+def test_lanes_that_leap_through_cells_meet_what_safe_steps_one_by_one_meet(motion, gravity, others, monkeypatch):
+    block = swarm.Mesh(0.05 * CUBE, TRIANGLES, "outside", motion=motion)
+    walls = [cube(motion=motion), block, *([swarm.Sphere(0.4)] if others else [])]
+    particles = start()
+    in_lanes = run(walls, particles, 1.0, gravity)
+    monkeypatch.setattr(moving, "Leaping", moving.Marched)
+    same(in_lanes, run(walls, particles, 1.0, gravity), impacts=6)
