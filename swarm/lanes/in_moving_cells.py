@@ -30,8 +30,6 @@ from .table import STRIDE
 _TIME, _WALL = 0, 1
 # So many facets are looked at together; the column of one in the second line of the cache.
 _ROOM, _SECOND = 1024, 8
-# Entries of a cell in a line of the cache, and lines of a cell that are looked up together.
-_PER_LINE, _LINES = 4, 4
 # Steps of a lane after which its flight is said to be free so far, and safe steps to one facet.
 _MOST, _STEPS = 4000, 100
 # The bounds of a flight hold for so many times as long as it would be among its cells if it went straight on.
@@ -158,11 +156,6 @@ def _find_cells(gravity, mesh, leaps, n):
 def _look(gravity, mesh, leaps, maybe, n):
     """Every lane at the facets in its cell, by their planes first."""
     cells, some = mesh.body.grid, 0
-    for line in range(_LINES):
-        for i in range(index(n)):
-            ahead = line * _PER_LINE
-            if leaps.count[i] > ahead:
-                maybe.seen[i] = float(cells.known.planes[index(leaps.first[i] + ahead), 0])
     for i in range(index(n)):
         if leaps.count[i] > 0:
             seen, span = leaps.seen(mesh, gravity, i), leaps.until[i] - leaps.time[i]
