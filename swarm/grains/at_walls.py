@@ -102,13 +102,18 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
             if near.wall_drag is not None:
                 rows[c, LISTED] = k
-            if law.friction is not None:
-                set_vector(rows, c, DRAG, vector_at(near.wall_drag, index(k), 0) * lasting(rows[c, GAP]))
-            if law.rolling is not None:
-                set_vector(rows, c, ROLL, vector_at(near.wall_drag, index(k), KEPT_ROLL) * lasting(rows[c, GAP]))
+            _recall(law, near, rows, c, index(k))
             count += 1
     touches.wall_spans[1, number] = count
     return count - known
+
+
+def _recall(law, near, rows, c, k):
+    """Begin friction and rolling with their impulses of the step before, where the contact has lasted."""
+    if law.friction is not None:
+        set_vector(rows, c, DRAG, vector_at(near.wall_drag, k, 0) * lasting(rows[c, GAP]))
+    if law.rolling is not None:
+        set_vector(rows, c, ROLL, vector_at(near.wall_drag, k, KEPT_ROLL) * lasting(rows[c, GAP]))
 
 
 def press_at_wall(matter, law, own, grains, rows, at, share):
