@@ -25,7 +25,8 @@ were improved eight at once, from the last step's change: 1.4e-10 at their ends,
 One cell of `AugmentedLagrangian` in an intersection that swings was written again when safe steps in a convex cavity
 took the steepest place of its wall for a bound of |grad q|: 4e-12 at its end. One of samples beside a
 wall that moves was written again when first hits were guessed and proven, aim.py: 2e-16 at its end.
-Twelve cells of a user-defined surface were written again when straight flights looked from both sides: hits to round-off.
+Twelve cells of a user-defined surface were written again when straight flights to it looked from both sides: hits to
+round-off.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,
