@@ -371,3 +371,20 @@ def test_a_sweep_goes_over_the_numbers_of_laws(folder, tmp_path):
     absorbed = found["absorbed_0"].tolist()
     assert absorbed[0] == 0 < absorbed[1] <= absorbed[2] == 20
     assert found["depth"].notna().all()
+
+
+def test_a_trajectory_of_a_user_defined_method_is_read_without_its_code(tmp_path):
+    """By its name: it says what was run, and is asked for nothing that kernels need."""
+    scene = swarm.Scene([swarm.Sphere(0.5)])
+    path = tmp_path / "run.h5"
+    swarm.simulate(
+        scene, swarm.fill(scene, 5, speed=1.0, seed=1), Mirror(), until=1.0, trajectory=path, compile="never"
+    )
+    with swarm.load(path) as trajectory:
+        assert type(trajectory.method).__name__ == "Mirror"
+        assert not isinstance(trajectory.method, Mirror)
+        assert trajectory.report().html
+    shown = command("info", str(path), cwd=tmp_path)
+    assert (shown.returncode, "Mirror" in shown.stdout) == (0, True)
+    with plugins.allowed([METHOD]), swarm.load(path) as trajectory:
+        assert trajectory.method == Mirror()

@@ -34,7 +34,7 @@ from ..words.statements import rows_of
 from .file_run import named_alone
 
 # Bytes of a row of a log of impacts, and of Python with NumPy, Numba and HDF5.
-_ROW, _PROGRAM = 112, 2.5e8
+_ROW, _PROGRAM = 112, 2e8
 # What a frame takes besides its impacts: of each particle [s], and of its bytes on the disk [bytes/s].
 _SEEN, _WRITTEN = 7e-8, 3e8
 # Times of one core [s], from `bench/results`: an impact on a wall in straight flights, in a fall, where a flight takes
@@ -188,7 +188,7 @@ def _sizes(task: Task, target: Path, there: str) -> dict[str, str]:
     memory = PARTICLE * n + options.times.in_memory(surfaces) + held + waiting_bytes(n)
     return {
         "files": "\n".join(f"{name}, {size}{there}" for name, size, there in files),
-        "memory": f"about {in_bytes(memory)}, besides the {in_bytes(_PROGRAM)} of Python, Numba and HDF5",
+        "memory": f"at most {in_bytes(memory)}, besides the {in_bytes(_PROGRAM)} of Python, Numba and HDF5",
     }
 
 

@@ -116,9 +116,9 @@ class Stored:
 
     @property
     def method(self) -> Method:
-        """The method that was run."""
+        """The method that was run; of a user-defined one its name alone."""
         with self._reading("its method"):
-            return tables.method_of(parsed(self._text("method")))
+            return tables.method_by_name(parsed(self._text("method")))
 
     def _has(self, name: str) -> bool:
         with self._reading(f"its {name}") as file:

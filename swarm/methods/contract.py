@@ -73,7 +73,8 @@ class Sweep(NamedTuple):
 class Contact(NamedTuple):
     """The result of a contact of a lane, with the normal impulse per mass that the wall gave, and new impacts.
 
-    Where contacts change the energy, twice_energy is twice the energy per mass that is left. Where a method `holds`
+    Where walls have a restitution or laws, twice_energy is twice the energy per mass that is left. What a method itself
+    loses is in no book: losses are for a `WallLaw`. Where a method `holds`
     particles on walls, `lasts` says that another kernel decides what follows, at this wall. Where walls move, `work` is
     what this wall gave by its motion, per mass.
     """

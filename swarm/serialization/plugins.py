@@ -100,6 +100,11 @@ def is_named(text: Any) -> bool:
     return isinstance(text, str) and _NAMED.fullmatch(text) is not None
 
 
+def is_allowed(text: str) -> bool:
+    """Whether the module of named code is allowed now."""
+    return text.partition(":")[0] in _ALLOWED.get()
+
+
 def named(where: str, text: Any, what: str) -> Any:
     """The object that a value of a file names; `where` is its key, `what` says what it should be.
 

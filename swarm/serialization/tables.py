@@ -86,6 +86,18 @@ def method_of(table: Any) -> Method:
     return of_kind(table, "method", ALL_METHODS, Method)
 
 
+class NamedMethod(Method):
+    """A user-defined method of which a file has the name: what was run by it is read without its code."""
+
+
+def method_by_name(table: dict[str, Any]) -> Method:
+    """A method from its table; of a user-defined one that is not allowed a class with its name, which does not run."""
+    kind = table.get("kind")
+    if plugins.is_named(kind) and not plugins.is_allowed(kind):
+        return type(kind.partition(":")[2], (NamedMethod,), {})()
+    return method_of(table)
+
+
 def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) -> dict[str, Any]:
     """The table of a surface or a method: its kind, and every argument that is not None.
 

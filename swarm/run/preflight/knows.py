@@ -223,7 +223,7 @@ def _in_fixed_steps_beside_motions(asked: Asked) -> Found:
 
 
 def _sheets(asked: Asked) -> Found:
-    yield from ({"i": i, "got": one} for i, one in _walls(asked) if getattr(one, "open", False))
+    yield from ({"i": i, "got": one} for i, one in _walls(asked) if one.face_noun and getattr(one, "open", False))
 
 
 def _members_of_fields(asked: Asked) -> Found:

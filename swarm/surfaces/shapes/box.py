@@ -42,7 +42,8 @@ class Box(Surface):
         half_widths: three numbers > 0 [m], from the centre to the faces.
         center: three numbers [m].
         side: "inside" or "outside", the admissible part.
-        open: faces without a wall, of "-x", "+x", "-y", "+y", "-z", "+z"; for a cavity only, and not all of them.
+        open: faces without a wall, of "-x", "+x", "-y", "+y", "-z", "+z"; for a cavity only, and not all of them. The
+            others go on without end beyond them.
 
     Raises:
         SceneError: an argument is out of its range.
