@@ -538,3 +538,24 @@ def test_the_smallest_rim_and_a_flat_volume_reach_the_wall():
         swarm.Spheres([(0.0, 0.0, 0.5), (0.0, 0.0, 0.0)], [0.1, 0.1]),
     ):
         assert swarm.Scene([swarm.Sphere(0.5, openings=[volume])]).pieces.volumes == ((volume,),)
+
+
+@pytest.mark.parametrize("radius", [0.9, 1.2, 3.0])
+def test_an_opening_of_one_wall_leaves_the_common_face_of_two_rooms_open(radius):
+    """It reaches the face x = 0, which is that of other walls of the rooms: particles fly through as in one tube."""
+    tube, ends = swarm.Cylinder(1.0, axis=(1.0, 0.0, 0.0)), [(sign, 0.0, 0.0) for sign in (-1.0, 1.0)]
+    rooms = [
+        swarm.Intersection([
+            tube,
+            swarm.Plane(end, 1.0, openings=[swarm.Sphere(radius, end)]),
+            swarm.Plane(tuple(-x for x in end), 0.0),
+        ])
+        for end in ends
+    ]  # fmt: skip
+    start = swarm.Particles(
+        [[-0.5, -0.6, 0.7], [0.0, 0.7, 0.0], [0.3, 0.0, -0.6]], [[1.0, 1.0, -1.0], [0.0] * 3, [0.0] * 3]
+    )
+    seen = swarm.simulate(
+        swarm.Scene([swarm.Union(rooms)]), start, swarm.Impact(), until=3.0, compile="never"
+    ).observables
+    assert (seen["impacts"][-1], seen["escaped"][-1]) == (0, 3)

@@ -42,3 +42,17 @@ def test_the_same_law_runs_in_plain_python():
     scene = swarm.Scene([swarm.Sphere(1.0, laws=[TwoKinds()])])
     result = swarm.simulate(scene, swarm.fill(scene, 3, speed=1.0, seed=1), until=1.0, compile="never")
     assert result.observables["energy_error"].max() < 1e-14
+
+
+class Subtracts(swarm.WallLaw):
+    """It takes the velocity of the wall for a number."""
+
+    def leave(self, v, n, u, random, mass):
+        return random.diffuse(n, u, 1)
+
+
+def test_a_law_that_raises_is_a_sentence_with_its_line():
+    line = Subtracts.leave.__code__.co_firstlineno + 1
+    sentence = rf"Subtracts\.leave raised TypeError: .*, line {line} of .*test_user_code\.py; vectors have"
+    with pytest.raises(swarm.SceneError, match=sentence):
+        swarm.Sphere(1.0, laws=[Subtracts()])

@@ -183,7 +183,7 @@ class PointBatches:
                 next_report = 2 * tried
                 _LOG.warning(
                     "%s: still looking for places of births, %d of %d found after %d points tried: few points of its "
-                    "where= are admissible; a smaller where=, or an opening, takes less time",
+                    "surface are admissible; a thinner surface around them takes less time",
                     self._name, count, n, tried,
                 )  # fmt: skip
         points, normals = np.concatenate(found, axis=1).reshape(2, 3, n)

@@ -1,6 +1,7 @@
 """The law of a wall as users write it."""
 
 import math
+import traceback
 from collections.abc import Iterator
 from typing import Any
 
@@ -89,8 +90,8 @@ class WallLaw(Record):
             u: the velocity of the wall [m/s].
             random: random numbers of this impact and law: `random.uniform(k)` in (0, 1), `random.normal(k)`, which
                 takes k and k + 1, and `random.exponential(k)`, for k = 0, 1, ...; the same for any threads and any
-                resume. 2 k and 2 k + 1 together cost as much as one. `random.diffuse(n, u, k)` is a unit vector of the
-                cosine law, `random.across` the axis across the plane of the scene, or None.
+                resume. 2 k and 2 k + 1 together cost as much as one. `random.diffuse(n, random.uniform(k), k + 1)` is
+                a unit vector of the cosine law, `random.across` the axis across the plane of the scene, or None.
             mass: of the particle [kg]. Of a body it is what its contact point has along the normal, 1/(n K n), with
                 the inverse mass K of the body there; v is such across the normal that mass |v - u|^2/2 is the energy
                 that an impulse at this point can change.
@@ -143,7 +144,17 @@ def _checked(name: str, law: Any) -> Any:
 
 def _try(name: str, law: Any) -> None:
     """Raise a `SceneError` where a law sends a particle into the wall, or gives no velocity."""
-    for v, n, given in tries_of(law):
+    try:
+        tries = list(tries_of(law))
+    except Exception as error:
+        file = type(law).leave.__code__.co_filename
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+        raise SceneError(
+            f"{name} must return a velocity for any other, and {type(law).__name__}.leave raised "
+            f"{type(error).__name__}: {error}{f', line {lines[-1]} of {file}' if lines else ''}; vectors have +, - and "
+            "products with numbers, and dot, norm and cross of swarm.kernel.vector"
+        ) from error
+    for v, n, given in tries:
         if wrong := why_wrong(given, v, n, ZERO):
             raise SceneError(f"{name} {wrong}; {sentence_of(law, given, v, n, ZERO)}")
 

@@ -194,7 +194,7 @@ def _between(rooms: Sequence[Room], pair: tuple[int, int], box: tuple[Floats, Fl
         for (a, face), (b, mate) in itertools.product(enumerate(faces_of(mine)), enumerate(faces_of(yours))):
             if not _may_be_one(face, mate, size) or not still.touch(face, mate):
                 continue
-            if room[i].present is not None or other[k].present is not None or still.has_door(face, (*room, *other)):
+            if room[i].present is not None or other[k].present is not None or still.has_door(face, (room[i], other[k])):
                 continue
             together = room[i].motion == other[k].motion
             both = ((i, face), (k, mate))
@@ -244,7 +244,7 @@ class _Rooms(NamedTuple):
         return bool(there.any())
 
     def has_door(self, face: Face, pieces: Sequence[Surface]) -> bool:
-        """Whether an opening of one of the pieces is at a place on the face where both rooms are."""
+        """Whether an opening of one of the surfaces with the face is at a place on it where both rooms are."""
         doors: list[Surface | Opening] = []
         for one in (opening for piece in pieces for opening in piece.openings):
             if not any(one is known for known in doors):
