@@ -92,9 +92,10 @@ class NamedMethod(Method):
 
 def method_by_name(table: dict[str, Any]) -> Method:
     """A method from its table; of a user-defined one that is not allowed a class with its name, which does not run."""
-    kind = table.get("kind")
+    kind = str(table.get("kind"))
     if plugins.is_named(kind) and not plugins.is_allowed(kind):
-        return type(kind.partition(":")[2], (NamedMethod,), {})()
+        named: type[Method] = type(kind.partition(":")[2], (NamedMethod,), {})
+        return named()
     return method_of(table)
 
 
