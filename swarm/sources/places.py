@@ -182,8 +182,8 @@ class PointBatches:
             if tried >= next_report and count < n:
                 next_report = 2 * tried
                 _LOG.warning(
-                    "%s: still looking for places of births, %d of %d found after %d points tried on its wall or in its "
-                    "volume, of which few are in the source",
+                    "%s: still looking for places of births, %d of %d found after %d points tried on its wall or in "
+                    "its volume, of which few are in the source",
                     self._name, count, n, tried,
                 )  # fmt: skip
         points, normals = np.concatenate(found, axis=1).reshape(2, 3, n)
