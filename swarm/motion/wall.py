@@ -47,7 +47,7 @@ class Path(Given):
         positions: for each time three numbers, the displacement from where the wall is given [m].
 
     The second derivative is 0 at both ends (the natural spline). The times must cover the run. Where a wall comes to
-    rest the spline overshoots, less so with a second time close by: by 4e-5 of the way with 0, 0.99, 1, 2, 2.01, 3 s
+    rest the spline overshoots, less so with a second time close by: by 2e-3 of the way with 0, 0.99, 1, 2, 2.01, 3 s
     for three equal positions and three others, by an eighth with 0, 1, 2, 3 s for two and two.
 
     Raises:

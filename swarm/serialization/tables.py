@@ -89,6 +89,11 @@ def method_of(table: Any) -> Method:
 class NamedMethod(Method):
     """A user-defined method of which a file has the name: what was run by it is read without its code."""
 
+    def numbers(self, scene: Scene) -> Any:
+        """Raise a `SceneError`: it does not run."""
+        name = type(self).__name__
+        raise SceneError(f"method must be made by its class to run, got the name of a user-defined one, {name}")
+
 
 def method_by_name(table: dict[str, Any]) -> Method:
     """A method from its table; of a user-defined one that is not allowed a class with its name, which does not run."""
