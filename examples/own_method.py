@@ -3,7 +3,8 @@
     python examples/own_method.py
 
 It is `swarm.Impact` without its care: nothing restores the energy from round-off, walls are elastic, and a particle
-that grazes its wall takes as many impacts as that takes. `from swarm.methods import contract; help(contract)` says what it may have.
+that grazes its wall takes as many impacts as that takes. `from swarm.methods import contract; help(contract)` says what
+it may have.
 Numbers of a method are annotated fields of its record, as of `WallLaw`; losses are for laws of walls, which are booked.
 """
 
