@@ -94,7 +94,7 @@ def prove(walls, gravity, course, lane, r, v, remaining):
 
 
 def is_open(course, lane, remaining):
-    """Whether a lane is not at its first hit, nor is there none."""
+    """Whether it is not proven yet where the first hit of a lane is, or that the lane meets no wall."""
     closed = course[CLOSED, lane]
     return (course[MET, lane] < 0.0) & (course[TIME, lane] < select(closed < remaining, closed, remaining))
 
