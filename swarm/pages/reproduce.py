@@ -10,6 +10,7 @@ import tomli_w
 
 from ..errors import SceneError
 from ..files.storage import Storage
+from ..serialization.tables import NamedMethod
 
 # User code in a scene file, and the keys of files.
 _CODE, _FILES = re.compile(r"([A-Za-z_][\w.]*):[A-Za-z_]\w*"), ("from", "file")
@@ -59,6 +60,12 @@ def of_trajectory(trajectory: Any) -> Again:
     if text is None:
         notes.append("Its scene has long arrays, which are in the file too, and no scene file describes them.")
         return Again([*notes, _SAME], python=python)
+    method = trajectory.method
+    if isinstance(method, NamedMethod):
+        notes.append(f"The method, {method}, is code, which no file holds.")
+        if type(method).__module__ == "__main__":
+            notes.append("Run these lines in the script that defines it.")
+            return Again([*notes, _SAME], python=python)
     command = f"swarm run again.toml -o again.h5{plugins_of(tomllib.loads(text))}"
     file_name = f"again.toml, a scene file made of what {name} holds; it must be beside {name}"
     return Again([*notes, _SAME], command, text, file_name, python)
@@ -108,13 +115,16 @@ def _hindrance(trajectory: Any) -> str:
     if kept.frames == "none":
         return f"{cannot}it was run in Python, and the file keeps no particles; keep the script that made it."
     if kept.frames != "all":
-        return f"{cannot}it was run in Python, and the file keeps every {kept.frames}th particle only; keep the script."
+        return f"{cannot}it was run in Python, and the file keeps one particle in {kept.frames}; keep the script."
     if trajectory.has_births():
         return f"{cannot}it was run in Python, and the file does not keep its sources; keep the script that made it."
     if trajectory.body is not None and _is_rounded(trajectory):
         return f"{cannot}it was run in Python, and the file keeps its bodies in float32; keep the script that made it."
-    if any(table.get("kind") == "own" for table in _tables_of(tomllib.loads(trajectory.descriptions["scene"]))):
+    tables = list(_tables_of(tomllib.loads(trajectory.descriptions["scene"])))
+    if any(table.get("kind") == "own" for table in tables):
         return f"{cannot}it has a user-defined surface, which no file holds; keep the script that made it."
+    if laws := [law for table in tables for law in table.get("laws", []) if isinstance(law, str)]:
+        return f"{cannot}the law {laws[0]} is code, which no file holds; keep the script that made it."
     return ""
 
 
@@ -168,13 +178,16 @@ def _python(trajectory: Any) -> str:
     more = [f"{name}={value!r}" for name, value in _span(trajectory).items()]
     more += [f"seed={trajectory.seed}"] * bool(trajectory.seed) + ["counters=run.counters"] * bool(counters)
     more += ["member_impacts=True"] * bool(_members(trajectory))
-    name = trajectory.path.name
+    name, method, home = trajectory.path.name, trajectory.method, type(trajectory.method).__module__
+    named = isinstance(method, NamedMethod)
+    given = f"{method if named else 'run.method'}, {', '.join(more)}"
     return "\n".join([
         "import swarm",
+        *[f"from {home} import {type(method).__name__}"] * (named and home != "__main__"),
         "",
         f"with swarm.load({name!r}) as run:",
         f"    start = run.{'bodies' if bodies else 'frame'}(0)",
-        f"    again = swarm.simulate(run.scene, start, run.method, {', '.join(more)}, trajectory='again.h5')",
+        f"    again = swarm.simulate(run.scene, start, {given}, trajectory='again.h5')",
     ])  # fmt: skip
 
 

@@ -87,7 +87,7 @@ def method_of(table: Any) -> Method:
 
 
 class NamedMethod(Method):
-    """A user-defined method of which a file has the name: what was run by it is read without its code."""
+    """A user-defined method of which a file has the name and the numbers: its runs are read without its code."""
 
     def numbers(self, scene: Scene) -> Any:
         """Raise a `SceneError`: it does not run."""
@@ -96,12 +96,17 @@ class NamedMethod(Method):
 
 
 def method_by_name(table: dict[str, Any]) -> Method:
-    """A method from its table; of a user-defined one that is not allowed a class with its name, which does not run."""
-    kind = str(table.get("kind"))
-    if plugins.is_named(kind) and not plugins.is_allowed(kind):
-        named: type[Method] = type(kind.partition(":")[2], (NamedMethod,), {})
-        return named()
-    return method_of(table)
+    """A method from its table; of a user-defined one that is not allowed a `NamedMethod`, which does not run."""
+    module, colon, name = str(table.get("kind")).partition(":")
+    if not colon or plugins.is_allowed(module):
+        return method_of(table)
+    given = {key: value for key, value in table.items() if key != "kind"}
+    # Of a class that a function defines, the name is `function.<locals>.Name`.
+    named = dataclasses.make_dataclass(
+        name.rpartition(".")[2], given, bases=(NamedMethod,), namespace={"__module__": module}, frozen=True
+    )
+    made: Method = named(**given)
+    return made
 
 
 def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from ..ball_numbers import balls_volume
 from ..bodies.body import Body
 from ..common.catalog import OBSERVABLES
 from ..files.sources import DamagedError
-from ..methods import Method
+from ..methods import ALL_METHODS, Method
 from ..scene import Scene
 from ..surfaces.union import part_at
 from . import nouns, titles
@@ -213,10 +213,11 @@ def of_counters(counters: Sequence[Any], crossings: Any) -> list[Statement]:
 
 def of_method(method: Method) -> Statement:
     """A method, its step and its other numbers by their names."""
-    shown = {"penalty", "exponent", "tolerance", "max_sweeps", "sliding_tolerance", "shortest_flight", "contact_step"}
+    known = {"penalty", "exponent", "tolerance", "max_sweeps", "sliding_tolerance", "shortest_flight", "contact_step"}
+    of_user = ALL_METHODS.kind_of(type(method)) is None
     numbers = [
         f"{name.replace('_', ' ')} {plain(value)}" for name, value in vars(method).items()
-        if name in shown and isinstance(value, (int, float)) and value
+        if (name in known or (of_user and name != "dt")) and isinstance(value, (int, float)) and value
     ] + ["contact start centred"] * (getattr(method, "contact_start", "") == "centred")  # fmt: skip
     return Statement("method", ", ".join([titles.of_method(method), *numbers]))
 

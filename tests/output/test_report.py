@@ -1,7 +1,8 @@
 """Reports of runs: what a page says, that it needs nothing besides itself, and that runs can be reproduced by it."""
 
+import contextlib
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import filelock
 import h5py
@@ -12,11 +13,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pages import Read
 
 import swarm
+from examples.own_law import Viscoelastic
+from examples.own_method import Mirror
 from swarm.commands import summary
 from swarm.files import paths
 from swarm.pages import html, of_run, pictures
 from swarm.pictures import drawing, style
 from swarm.triangles.shapes import shapes_of
+from swarm.words.facts import of_trajectory
 from swarm.words.statements import Statement
 
 SCENE = """
@@ -47,12 +51,10 @@ def folder(tmp_path_factory):
     return folder
 
 
-def run(path, until=1.0, **options):
-    scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=(0.0, 0.0, -9.81))
+def run(path, until=1.0, method=None, laws=(), **options):
+    scene = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5, laws=laws)], gravity=(0.0, 0.0, -9.81))
     start = swarm.fill(scene, 20, speed=1.0, seed=3)
-    return swarm.simulate(
-        scene, start, swarm.Impact(), until=until, every=0.25, trajectory=path, compile="never", **options
-    )
+    return swarm.simulate(scene, start, method, until=until, every=0.25, trajectory=path, compile="never", **options)
 
 
 @pytest.fixture(scope="module")
@@ -200,11 +202,41 @@ def test_a_run_of_python_gets_a_scene_file(tmp_path, words):
     assert (last(tmp_path / "again.h5") == last(tmp_path / "run.h5")).all()
 
 
+@dataclass(frozen=True)
+class Weaker(Mirror):
+    """A user-defined method with a number."""
+
+    share: float = 1.0
+
+
+def test_a_run_by_a_method_of_the_user_is_repeated_where_that_is_defined(tmp_path, words):
+    run(tmp_path / "run.h5", method=Weaker(0.5))
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        assert repr(trajectory.method) == "Weaker(share=0.5)"
+        assert of_trajectory(trajectory)["method"] == "Weaker, share 0.5"
+    section = reproduce(swarm.report(tmp_path / "run.h5"), tmp_path)
+    lines = section.split("In Python")[1]
+    assert f"from {__name__} import Weaker" in lines
+    with contextlib.chdir(tmp_path):
+        exec(lines, {})
+    assert (last(tmp_path / "again.h5") == last(tmp_path / "run.h5")).all()
+
+
+def test_a_method_of_a_script_has_no_command(tmp_path, words, monkeypatch):
+    monkeypatch.setattr(Weaker, "__module__", "__main__")
+    run(tmp_path / "run.h5", method=Weaker(0.5))
+    section = reproduce(swarm.report(tmp_path / "run.h5"), tmp_path)
+    assert "the script that defines it" in section
+    assert "swarm run" not in section
+    assert "start, Weaker(share=0.5), until" in section
+
+
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
+        ({"laws": [Viscoelastic(0.1)]}, "Viscoelastic(slow=0.1) is code"),
         ({"frames": "none"}, "keeps no particles"),
-        ({"frames": 3}, "every 3th particle only"),
+        ({"frames": 3}, "one particle in 3"),
         ({"precision": "float32"}, "in float32"),
     ],
     ids=str,
