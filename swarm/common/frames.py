@@ -24,6 +24,10 @@ _SAME_TIME = 1e-9
 _MOST = 1e300
 # Bytes of a frame's observables: numbers in a file, Python objects in memory; and what each surface adds.
 _NUMBERS, _OBJECTS, _SURFACE = 200, 3000, 16
+# Bytes in a file besides: its groups and the heads of its datasets, and the checksums of a frame.
+_GROUPS, _CHECKSUMS = 55_000, 112
+# The frames for which a dataset of observables makes room at a time.
+ROWS = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +168,9 @@ class FrameTimes(Validated):
         yield self.count - 1, before, self.until
 
     def on_disk(self, surfaces: int, more: int = 0) -> int:
-        """Bytes of the observables of all frames in a file, with `more` in each."""
-        return self.count * (_NUMBERS + _SURFACE * surfaces + more)
+        """Bytes of a file without its particles: groups and the observables of all frames, with `more` in each."""
+        rows = -(-self.count // ROWS) * ROWS
+        return _GROUPS + _CHECKSUMS * self.count + rows * (_NUMBERS + _SURFACE * surfaces + more)
 
     def in_memory(self, surfaces: int, more: int = 0) -> int:
         """Bytes of the observables of all frames in memory."""

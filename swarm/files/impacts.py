@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.frames import ROWS
 from ..compiled_scene import CompiledScene
 from ..methods import Method
 from . import checksums
@@ -97,7 +98,7 @@ class ImpactWriter(AppendedFile):
                 chunks=(chunk, *column.shape[1:]), fill_time="never",
             )  # fmt: skip
         for name, dtype in (("time", np.float64), ("rows", np.int64)):
-            file.create_dataset(f"frames/{name}", (0,), dtype, maxshape=(None,), chunks=(1024,))
+            file.create_dataset(f"frames/{name}", (0,), dtype, maxshape=(None,), chunks=(ROWS,))
         file["frames/complete"] = _counted(0)
         names = [*(f"impacts/{name}" for name in self._columns), "frames/time", "frames/rows"]
         checksums.RowSums.create(file, dict.fromkeys(names, (1, 0)), ["frames/complete"])

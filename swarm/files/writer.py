@@ -9,6 +9,7 @@ import numpy as np
 import tomli_w
 from numpy.typing import DTypeLike, NDArray
 
+from ..common.frames import ROWS
 from ..methods import Method
 from ..particles import Particles, TiedParticles
 from ..scene import Scene
@@ -41,8 +42,8 @@ _CHUNK = (10, 1000)
 # The chunk cache of positions holds the chunks of one frame, up to this many bytes; that of an observable its last
 # chunks.
 _LARGEST_CACHE = 1 << 28
-# Entries of a chunk of an observable, and its most bytes: a shard has one that is as long as it has chunks.
-_ENTRIES, _MOST_BYTES = 1024, 1 << 20
+# The most bytes of a chunk of an observable: a shard has one that is as long as it has chunks.
+_MOST_BYTES = 1 << 20
 _PACKED: dict[str, dict[str, Any]] = {
     "none": {},
     "gzip": {"compression": "gzip", "compression_opts": 1, "shuffle": True},
@@ -143,12 +144,12 @@ class TrajectoryWriter(AppendedFile):
             parameters[name] = value
         self._describe(parameters)
         self._step, self._time = (
-            parameters.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(1024,))
+            parameters.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(ROWS,))
             for name, kind in (("frame", np.int64), ("time", np.float64))
         )
         if self.course is not None:
             parameters["until"], parameters["threads"] = self.course.until, self.course.threads
-            self._wall_time = parameters.create_dataset("wall_time", (0,), np.float64, maxshape=(None,), chunks=(1024,))
+            self._wall_time = parameters.create_dataset("wall_time", (0,), np.float64, maxshape=(None,), chunks=(ROWS,))
         self._values: dict[str, Any] = {}
         self._observables: dict[str, Any] = {}
         n = len(self._mass)
@@ -160,7 +161,7 @@ class TrajectoryWriter(AppendedFile):
         box.attrs["dimension"] = 3
         box.attrs["boundary"] = ["periodic" if length else "none" for length in repeats or (None,) * 3]
         if repeats is not None:
-            self._edges = self._element("particles/all/box/edges", (3,), np.float64, (1024, 3))
+            self._edges = self._element("particles/all/box/edges", (3,), np.float64, (ROWS, 3))
         everything["mass"] = self._mass
         everything["mass"].attrs[UNIT], self._time.attrs[UNIT] = UNITS["mass"], UNITS["time"]
         everything["id"] = np.arange(self._count)[self._kept]
@@ -233,7 +234,7 @@ class TrajectoryWriter(AppendedFile):
         """Make room for the observables, which are known with the first frame, and for checksums of all, and begin."""
         for name in (name for name in seen if name != "time"):
             entry = np.asarray(seen[name])
-            chunk = max(1, min(_ENTRIES, _MOST_BYTES // max(1, entry.nbytes))), *entry.shape
+            chunk = max(1, min(ROWS, _MOST_BYTES // max(1, entry.nbytes))), *entry.shape
             self._observables[name] = self._element(f"observables/{name}", entry.shape, entry.dtype, chunk)
         self._sums = checksums.RowSums.create(self._file, self._growing())
         self._begin()

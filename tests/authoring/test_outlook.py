@@ -127,6 +127,8 @@ def test_the_particles_of_the_file_have_the_size(text, tmp_path):
         there = file["particles/all"]
         held = [there[f"{name}/value"] for name in there if name != "box" and f"{name}/value" in there]
         assert size == sum(one.id.get_storage_size() for one in [*held, there["mass"], there["id"]])
+    expected = size + job.run.times.on_disk(len(job.scene.surfaces))
+    assert abs((tmp_path / "scene.h5").stat().st_size / expected - 1.0) < 0.2
     assert "scene.h5 exists; choose another name, or overwrite it" in looked(tmp_path, text)["files"]
 
 
