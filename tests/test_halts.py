@@ -5,18 +5,22 @@ compiled ones a kernel is. So they stay without end when scenes that were are me
 """
 
 import itertools
+import re
+import signal
 import time
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from children import python
 
 import swarm
+from examples.own_method import Mirror, MirrorNumbers
 from swarm.contact.events import CAREFUL, EVENT
 from swarm.events.reacting import queue
 from swarm.lanes import block, careful, contact_events, slide
 from swarm.lanes.table import LANES
-from swarm.run import base, turns
+from swarm.run import base, machine, progress, turns
 from swarm.run.engine import Run
 from swarm.run.machine import run_of
 from swarm.run.options import RunOptions
@@ -90,6 +94,41 @@ def test_a_slide_that_gets_nowhere_is_bounded(monkeypatch):
     with pytest.raises(swarm.RunError, match=rf"failed at particle 1: .*{NOWHERE}; it is at \(0\.2, 0, 0\) m"):
         run_in_plain_python(FLOOR, TWO)
     assert len(passes) <= 2 * slide.LOOK
+
+
+@dataclass(frozen=True)
+class Lossy(Mirror):
+    """A user-defined method that halves the normal velocity at each impact, and lets no particle rest."""
+
+    def numbers(self, scene):
+        return LossyNumbers()
+
+
+class LossyNumbers(MirrorNumbers):
+    def contact(self, walls, gravity, lane, wall, solution):
+        after = super().contact(walls, gravity, lane, wall, solution)
+        return after._replace(v=lane.v + 0.75 * (after.v - lane.v), impulse=0.75 * after.impulse)
+
+
+def test_a_frame_that_hardly_goes_on_is_a_warning(monkeypatch, caplog):
+    """A particle that begins on the wall meets it without end. The warning ends the run here, as Ctrl-C does."""
+    monkeypatch.setattr(progress, "LOOK", 0.1)
+    monkeypatch.setattr(machine, "LOOK", 0.1)
+
+    def ends(record):
+        if "hardly" in record.getMessage():
+            signal.raise_signal(signal.SIGINT)
+        return True
+
+    caplog.handler.addFilter(ends)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            swarm.simulate(FLOOR, TWO, Lossy(), until=10.0, compile="never", threads=1)
+    finally:
+        caplog.handler.removeFilter(ends)
+    message = caplog.messages[-1]
+    assert re.match(r"frame 1 hardly goes on: .* the last one is particle 1, at \(0\.2, 0, 0\) m", message)
+    assert "let slow particles rest" in message
 
 
 def test_impacts_without_time_between_them_are_no_standstill():

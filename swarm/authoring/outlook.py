@@ -138,7 +138,8 @@ def _of_all(plan: Plan, path: Path, plugins: Iterable[str], threads: int | None)
             seconds += (_in_python if options.compile == "never" else _seconds)(task) - _BEGINNING + _NEXT
     share = len(plan.variants) / len(some)
     most = "at most " * (task.options.storage.compression != "none")
-    return f"trajectories {most}{in_bytes(size * share)}, about {_about(seconds * share)} one after the other"
+    every = f"about {_about(seconds * share)} one after the other, besides {_BEGINNING:g} s to begin"
+    return f"trajectories {most}{in_bytes(size * share)}, {every}"
 
 
 def _content(task: Task, start: Any, name: str) -> Content:

@@ -174,6 +174,10 @@ class Halted(Record):
         """The time left of the frame of each."""
         return self.rows[Flying.remaining.row]
 
+    def places(self):
+        """Where they are, (3, particles) [m]."""
+        return self.rows[Flying.r.row : Flying.r.row + 3]
+
 
 def empty(walls: int, given: int, period: Any = None, rows: int = Flying.ALL) -> Lanes:
     """Lanes for one block, with so many rows of what walls give, and `rows` of a particle."""

@@ -190,18 +190,23 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
             f"in the step from {now:.9g} s (step {round(now / self.dt) + 1} of dt): {sweeps} sweeps left V = "
             f"{stored:.3g} J, above tolerance = {self.tolerance:g} J. "
         )
+        stiffness = self.penalty * self.dt * self.dt / mass
+        larger = _GOOD / stiffness * self.penalty
+        otherwise = (
+            'on_unconverged="count", which accepts such a step with its error of the energy, or "impact", which '
+            "replaces it by the exact impact"
+        )
         if not self.adaptive or self.exponent != 1.0:
+            slow = f", and a penalty of 4 m/dt^2 = {larger:.2g} or more" if stiffness < _GOOD else ""
             return message + (
                 "The loop converges for exponent = 1 from the surface: use exponent = 1 and adaptive=True "
-                '(which needs gravity=None), or on_unconverged="count" or "impact"'
+                f"(which needs gravity=None){slow}, or {otherwise}"
             )
-        stiffness = self.penalty * self.dt * self.dt / mass
         message += (
             "A sweep divides the gap by about 1 + alpha h^2/(4 m), with alpha = penalty and h = dt, and alpha h^2/m = "
             f"{stiffness:.3g} here: use "
         )
         if stiffness < _GOOD:
             quicker = "" if self.acceleration == "reflection" else 'acceleration="reflection", '
-            larger = _GOOD / stiffness * self.penalty
             message += f"{quicker}a penalty that grows as 1/dt^2 ({larger:.2g} makes alpha h^2/m = {_GOOD:g}), "
-        return message + 'more max_sweeps, or on_unconverged="count" or "impact"'
+        return message + f"more max_sweeps, or {otherwise}"

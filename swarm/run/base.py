@@ -142,6 +142,10 @@ class BaseRun:
         """The share that is done of a frame, or of a piece of it."""
         raise NotImplementedError
 
+    def furthest_behind(self) -> tuple[int, list[float]] | None:
+        """The particle of a frame that was cut short with the most time left, and where it is [m]; None: not known."""
+        return None
+
     def _arrays(self) -> Arrays:
         """The arrays of `arrays` that only this engine has."""
         raise NotImplementedError

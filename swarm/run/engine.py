@@ -209,6 +209,13 @@ class Run(BaseRun):
             remaining = np.append(remaining, self.state.contacts.remaining[self.state.contacts.remaining > 0.0])
         return float((self._phase == ARRIVED).sum() + (1.0 - remaining / span).sum()) / len(self._phase)
 
+    def furthest_behind(self) -> tuple[int, list[float]] | None:
+        remaining = self._halted.time_left()
+        if not remaining.size:
+            return None
+        last = int(np.argmax(remaining))
+        return self._first + int(self._halted.particle[last]), self._halted.places()[:, last].tolist()
+
     def _hands(self, span: float, writing: float) -> tuple[int, bool]:
         """The number of threads of the pool that advance a frame, and whether the caller's thread does too."""
         work = self._pace * span if span > 0.0 else 0.0

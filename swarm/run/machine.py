@@ -27,7 +27,7 @@ from .options import Task
 from .outputs import recorder_of, writer_of
 from .preflight import hints
 from .preflight.user_code import explained
-from .progress import Display, display
+from .progress import LOOK, Display, Standstill, display
 from .session import Session
 from .tally import Watched, tally_of
 
@@ -86,7 +86,7 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
         warn_open()
     if not task.is_shard:
         hints.give(task)
-    until, span_of, kept = task.options.until, task.method.span, Columns()
+    until, span_of, kept, still = task.options.until, task.method.span, Columns(), Standstill()
     with explained(task), _begun(task, session) as (run, writer, show, (log, tally, _counters), measures):
         with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
             for number, before, moment in session.frames(task.options.times):
@@ -97,7 +97,9 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
                     if log is not None:
                         log.begin = before
                     while not run.advance(span, moment, *_meanwhile(session, writer, show)):
-                        show.within(before + run.share_done(span) * (moment - before), until)
+                        share = run.share_done(span)
+                        still.look(number, share, run.furthest_behind())
+                        show.within(before + share * (moment - before), until)
                         session.look(run, writer, number - 1, before, moment)
                 seen = {
                     "time": moment,
@@ -222,7 +224,7 @@ def warn_open() -> None:
 
 def _meanwhile(session: Session, writer: "Background | None", show: Display) -> tuple[float, float]:
     """For `Run.advance`: the time to write a frame [s], and when to return at the latest."""
-    return writer.seconds if writer else 0.0, min(session.latest(writer), time.monotonic() + show.every)
+    return writer.seconds if writer else 0.0, min(session.latest(writer), time.monotonic() + min(show.every, LOOK))
 
 
 def _require_room(task: Task, session: Session, more: int) -> None:

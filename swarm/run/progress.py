@@ -1,6 +1,7 @@
 """The progress display of a run, or of a sweep: a bar on a terminal, else a line a minute."""
 
 import contextlib
+import logging
 import math
 import sys
 import time
@@ -11,6 +12,9 @@ from typing import Any, NamedTuple
 
 # ETA and speed come from the last seconds only: compile time would spoil an average from the start.
 _WINDOW = 10.0
+# Seconds from one look at a frame to the next, and how many seconds a frame takes that hardly goes on: a month.
+LOOK, _A_MONTH = 10.0, 30 * 86400.0
+_LOG = logging.getLogger("swarm")
 # Seconds from one plain line to the next, and from one change of the bar to the next within a long frame.
 _A_MINUTE, _A_MOMENT = 60.0, 1.0
 
@@ -139,6 +143,36 @@ class _Recent:
         elapsed, impacts = self._impacts.lately()
         speed = f"  {impacts / elapsed:.3g} impacts/s" if elapsed > 0.0 else ""
         return f"{moment:.4g}/{until:.4g} s{self._moments.eta(until)}{speed}{self._energy}"
+
+
+class Standstill:
+    """Warns once of a run with a frame that hardly goes on."""
+
+    def __init__(self) -> None:
+        self._shares, self._number, self._has_warned, self._is_slow = Pace(LOOK), 0, False, False
+
+    def look(self, number: int, share: float, behind: tuple[int, list[float]] | None) -> None:
+        """Look at a frame, of which this share is done: `behind` is the last particle, and where it is [m]."""
+        if number != self._number:
+            self._shares, self._number, self._is_slow = Pace(LOOK), number, False
+        self._shares.note(share)
+        elapsed, advanced = self._shares.lately()
+        if self._has_warned or elapsed < LOOK:
+            return
+        # Twice in a row: in between a kernel may have been compiled.
+        was_slow, self._is_slow = self._is_slow, advanced * _A_MONTH < (1.0 - share) * elapsed
+        if not (was_slow and self._is_slow):
+            return
+        self._has_warned = True
+        last = ""
+        if behind is not None:
+            last = f"; the last one is particle {behind[0]}, at ({', '.join(f'{x:.6g}' for x in behind[1])}) m"
+        _LOG.warning(
+            "frame %d hardly goes on: in %.0f s particles have done %.2g of it%s. A particle meets its walls almost "
+            "without time between where walls touch but do not overlap, as boxes in a row, or where a user-defined "
+            "method or law takes energy at each impact and lets no particle rest: let such walls overlap, or let slow "
+            "particles rest. The run goes on; end it with Ctrl-C", number, elapsed, advanced, last,
+        )  # fmt: skip
 
 
 class Pace:
