@@ -182,6 +182,12 @@ def test_the_method_runs_in_every_scene(mirror, name, case):
     assert ends[0].observables["impulse"][-1] == pytest.approx(ends[1].observables["impulse"][-1], abs=1e-9)
 
 
+def test_losses_of_walls_are_not_left_out_silently(mirror):
+    scene = swarm.Scene([swarm.Sphere(0.5, restitution=0.5)])
+    with pytest.raises(swarm.SceneError, match=r"must apply the restitution, .* got Mirror, whose numbers have no"):
+        swarm.simulate(scene, swarm.fill(scene, 5, speed=1.0), mirror, until=1.0)
+
+
 def test_what_a_surface_lacks_for_the_method_is_one_sentence(mirror):
     class Numbers(contract.Smooth):
         side: float

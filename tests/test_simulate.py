@@ -50,7 +50,8 @@ def _run(n=50, scene=SPHERE, method=None, until=2.0, **keywords):
 )
 def test_frames_are_the_start_every_and_the_end(until, every, times):
     """The last frame is `until` exactly; decimal times that miss it by round-off add no frame."""
-    assert _run(until=until, every=every).observables["time"].tolist() == times
+    result = _run(until=until, every=every)
+    assert result.times.tolist() == result.observables["time"].tolist() == times
 
 
 def test_simulate_does_not_change_its_argument():

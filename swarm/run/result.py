@@ -124,6 +124,12 @@ class Result:
         return frame_of(self.observables)
 
     @property
+    def times(self) -> NDArray[np.float64]:
+        """When each frame is [s], as `Trajectory.times`: the observable "time"."""
+        times: NDArray[np.float64] = self.observables["time"]
+        return times
+
+    @property
     def member_impacts(self) -> list[NDArray[np.int64]] | None:
         """With member_impacts=True how many impacts each surface has had since 0 s, in all sessions, else None.
 

@@ -2,8 +2,11 @@
 
 import numpy as np
 
+from ...compiled_scene import CompiledScene
+from ...contact.laws import NONE
 from ...errors import SceneError
 from ...files.origin import require_near
+from ...methods import ALL_METHODS
 from ...methods.base import Method, check_surfaces
 from ...motion import Path, parts_of
 from ...motion.given import require_angles
@@ -58,6 +61,7 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
     balls = _balls(scene, start, method, options)
     radius = None if balls is None else balls.radius
     compiled = scene.compiled(None if radius is None else float(radius.max()), method.apart())
+    _require_laws_applied(compiled, method)
     require_compiled(scene, options)
     _require_motions(scene, times.until)
     if balls is None:
@@ -88,6 +92,20 @@ def _balls(scene: Scene, start: Particles | None, method: Method, options: RunOp
     balls = with_births(scene, start, options.sources, options.seed, options.until)
     engines.wing("events.balls").require_balls(scene, balls, method)
     return balls
+
+
+def _require_laws_applied(compiled: CompiledScene, method: Method) -> None:
+    """Raise a `SceneError` where walls have losses or laws that a user-defined method does not apply."""
+    laws, name = compiled.laws, type(method).__name__
+    if ALL_METHODS.kind_of(type(method)) is not None or laws is None or not (laws.loses or laws.send_off):
+        return
+    numbers = method.numbers(compiled.scene)
+    if numbers.laws is NONE and numbers.laws_at_ends is None:
+        raise SceneError(
+            f"method must apply the restitution, friction, temperature and laws of walls, got {name}, whose numbers "
+            "have no `laws`; leave those of the walls out, use Impact, or give the numbers `laws` and apply them in "
+            "`contact`, see help(swarm.methods.contract)"
+        )
 
 
 def _require_place(scene: Scene, start: Particles, method: Method) -> None:
