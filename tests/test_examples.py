@@ -184,7 +184,7 @@ def test_the_method_runs_in_every_scene(mirror, name, case):
 
 def test_losses_of_walls_are_not_left_out_silently(mirror):
     scene = swarm.Scene([swarm.Sphere(0.5, restitution=0.5)])
-    with pytest.raises(swarm.SceneError, match=r"must apply the restitution, .* got Mirror, whose numbers have no"):
+    with pytest.raises(swarm.SceneError, match=r"must apply the restitution, .* got Mirror; its numbers have no"):
         swarm.simulate(scene, swarm.fill(scene, 5, speed=1.0), mirror, until=1.0)
 
 

@@ -61,6 +61,9 @@ FACTS = {
         (a["seen"]["passed"][[0, 1]] == 0).all() and a["seen"]["passed"][2] > 0 and len({*a["seen"]["passed"][3:]}) == 1
     ),
     "A drum that turns, a floor that shakes": lambda a: a["seen"]["wall_work"][-1, 0] > 0.0,
+    "A second run from the pose that a wall has": lambda a: (
+        a["settled"].observables["sliding"][-1] == 100 and a["settled"].observables["max_penetration"].max() < 1e-15
+    ),
     "A wall law of my own": lambda a: a["result"].observables["energy_error"].max() < 1e-12,
     "A gas that comes in, and leaves": lambda a: (
         close((a["seen"]["born"][:, 0] - a["seen"]["escaped"])[5:].mean(), 230, 0.15)
@@ -80,6 +83,9 @@ FACTS = {
     "What passes a plane or a hole": lambda a: close(a["out"] / (np.pi * 0.09), 1000 * np.sqrt(8 / np.pi) / 4, 0.2),
     "Losses at walls as weights": lambda a: 0.9 < a["weight"].mean() < 0.97 and (a["weight"] <= 1.0).all(),
     "The Lyapunov exponent of a planar billiard": lambda a: close(a["exponent"], 0.427, 0.1),
+    "The Birkhoff coordinates of a planar billiard": lambda a: (
+        close(a["steps"].sum(), 9.688448, 1e-6) and 0.9 < np.abs(a["along"]).max() <= 1.0 + 1e-12
+    ),
     "An observable of my own": lambda a: a["result"].observables["layers"].sum(axis=1).tolist() == [300.0] * 5,
     "Which method": lambda a: a["errors"]["Impact"] < 1e-15 < 1e-4 < a["errors"]["Verlet"],
     "Is my result converged": lambda a: close(a["by_wall"][0] / a["by_wall"][2], 10.0, 0.2),

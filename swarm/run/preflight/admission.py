@@ -102,7 +102,7 @@ def _require_laws_applied(compiled: CompiledScene, method: Method) -> None:
     numbers = method.numbers(compiled.scene)
     if numbers.laws is NONE and numbers.laws_at_ends is None:
         raise SceneError(
-            f"method must apply the restitution, friction, temperature and laws of walls, got {name}, whose numbers "
+            f"method must apply the restitution, friction, temperature and laws of walls, got {name}; its numbers "
             "have no `laws`; leave those of the walls out, use Impact, or give the numbers `laws` and apply them in "
             "`contact`, see help(swarm.methods.contract)"
         )
