@@ -111,3 +111,23 @@ def test_a_polygon_that_holds_particles_keeps_none_out():
     table = swarm.Polygon([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
     message, _particle = started([table], [[1.5], [0.5], [0.0]])
     assert "0.5 m outside surfaces[0] (Polygon): admissible is its inside, where phi is 0 or less" in message
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -9.81)])
+@pytest.mark.parametrize("surface", [swarm.Sphere(0.5), swarm.Box((0.5, 0.5, 0.5))], ids=["sphere", "box"])
+def test_a_run_ends_where_another_begins_with_soft_walls_too(surface, gravity):
+    """Two runs are one, to round-off, also where particles press on walls between them."""
+    scene, soft = swarm.Scene([surface], gravity), swarm.Penalty(dt=5e-4, penalty=1e3)
+    start = swarm.fill(scene, 20, speed=1.0, seed=1)
+    whole = swarm.simulate(scene, start, soft, until=0.75)
+    half = swarm.simulate(scene, start, soft, until=0.5)
+    assert half.observables["contact_energy"][-1] > 1e-3
+    again = swarm.simulate(scene, half.particles, soft, until=0.25)
+    assert again.particles.position == pytest.approx(whole.particles.position, abs=1e-12)
+    assert again.observables["energy_error"].max() < 1e-14
+
+
+def test_a_start_deeper_than_any_contact_is_an_error_with_soft_walls_too():
+    scene, soft = swarm.Scene([swarm.Sphere(0.5)]), swarm.Penalty(dt=1e-4, penalty=1e6)
+    with pytest.raises(swarm.SceneError, match=r"0\.01 m outside"):
+        swarm.simulate(scene, swarm.Particles((0.51, 0.0, 0.0), (1.0, 0.0, 0.0)), soft, until=0.1)

@@ -22,6 +22,7 @@ from ..options import RunOptions, Task
 from . import workload
 from .counting import require_compiled, require_counters
 from .knows import Asked, require_known
+from .softness import depths_at_start
 from .starts import require_inside
 
 # Of the size of a scene, a place ahead that tells on which side of a wall a flight begins, and of that way, how far
@@ -113,7 +114,7 @@ def _require_place(scene: Scene, start: Particles, method: Method) -> None:
     if start.radius is not None:
         engines.wing("events.balls").require_apart(scene, start, method)
         return
-    require_inside(scene, start)
+    require_inside(scene, start, depths_at_start(scene, start, method))
     _require_normals(scene, start)
 
 

@@ -93,6 +93,18 @@ def _speeds(scene: Scene, particles: Particles) -> Floats:
     return np.asarray(own + max((_pace(surface) for surface in scene.surfaces), default=0.0))
 
 
+def depths_at_start(scene: Scene, particles: Particles, method: Method) -> Floats | None:
+    """The largest gaps of soft walls at which particles may start, (N,); None where walls are rigid.
+
+    A particle at the end of a run may be in a contact: as deep as one that begins at twice the fastest speed.
+    """
+    if method.law() is None or method.is_rigid() or method.has_multipliers() or not len(particles):
+        return None
+    with np.errstate(all="ignore"):
+        fastest = 2.0 * float(_speeds(scene, particles).max())
+        return depths_of(method, particles.mass, np.full(len(particles), fastest))
+
+
 # --- What is said ----------------------------------------------------------------------------------------
 
 

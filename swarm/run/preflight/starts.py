@@ -23,11 +23,16 @@ _LOOKED_AT = 1000
 Places = NDArray[np.float64]
 
 
-def require_inside(scene: Scene, particles: Particles) -> None:
-    """Raise a `SceneError` where a particle is outside of a wall by more than round-off."""
+def require_inside(scene: Scene, particles: Particles, depths: Places | None = None) -> None:
+    """Raise a `SceneError` where a particle is outside of a wall by more than round-off, or of a soft one by `depths`.
+
+    `depths` are the largest gaps, (N,).
+    """
     # Their magnitude sets the round-off of a position on a wall.
     magnitude = max(float(particles.position.max()), -float(particles.position.min()), scene.finite_size())
     outside = scene.outside(particles.position, START_ON_WALL * magnitude)
+    if outside.size and depths is not None:
+        outside = outside[~(scene.gaps(particles.position[:, outside]) <= depths[outside]).all(axis=0)]
     if outside.size:
         raise error_of(scene, particles, outside, scene.distances_outside(particles.position[:, outside]))
 
