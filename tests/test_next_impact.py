@@ -54,6 +54,12 @@ def test_a_walk_keeps_the_energy_and_the_angular_momentum():
         (SPHERE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "velocity must lead to a surface, got .* which never does"),
         (SPHERE, (0.0, 0.0, 0.9), (1.0, 0.0, 0.0), r"0.4 m outside surfaces\[0\]"),
         (SPHERE, np.zeros((3, 2)), np.ones((3, 2)), r"position must be three numbers, got shape \(3, 2\)"),
+        (
+            SPHERE,
+            (0.0, 0.0, -0.5),
+            (1.0, 0.0, 0.0),
+            r"goes along surfaces\[0\] at \(0.0, 0.0, -0.5\): the point slides",
+        ),
         ("cavity", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "scene must be a swarm.Scene, got 'cavity'"),
         (
             swarm.Scene([swarm.Sphere(0.5, motion=swarm.Translation((1.0, 0.0, 0.0)))]),

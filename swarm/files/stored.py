@@ -184,7 +184,10 @@ def _opened(path: Path) -> h5py.File:
         return driver.open_by(path, "r", **options)
     except DAMAGE as error:
         if "signature not found" in str(error):
-            raise DamagedError(f"{path} is not an HDF5 file, or its beginning is damaged") from error
+            raise DamagedError(
+                f"{path} is not an HDF5 file, or its beginning is damaged; expected a trajectory or a log of impacts, "
+                "which are .h5 files"
+            ) from error
         if getattr(error, "errno", None):
             raise SceneError(f"cannot read {path}: {reason(error)}") from error
         raise DamagedError(f"{path} is damaged: {reason(error)}") from error

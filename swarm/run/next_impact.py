@@ -61,7 +61,7 @@ def bounce(scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float =
         A `NextImpact`.
 
     Raises:
-        SceneError: a bad argument, or the flight meets no wall.
+        SceneError: a bad argument, or the flight meets no wall, or goes along one.
         RunError: a law of the user gives a velocity that is not finite.
 
     Conserves: the energy ½mv² − mG·r to round-off, but for what the wall takes or gives.
@@ -103,6 +103,12 @@ def bounce(scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float =
                 if not np.isfinite(after).all():
                     raise RunError(f"the law of the wall gives {tuple(after.tolist())} m/s, which is not finite")
                 surface = int(compiled.numbering.members[0, int(wall)])
+                if flown == 0.0 and after.tolist() == [*v]:
+                    raise SceneError(
+                        f"velocity must lead off the wall, got {tuple(after.tolist())}, which goes along "
+                        f"surfaces[{surface}] at {tuple(map(float, r))}: the point slides there, and has "
+                        "no next impact; simulate lets it slide"
+                    )
                 return NextImpact(flown, np.array([*r], np.float64), after, np.array([*v], np.float64), surface)
     came = tuple(particle.velocity[:, 0].tolist())
     raise SceneError(f"velocity must lead to a surface, got {came}, which never does")
