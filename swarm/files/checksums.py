@@ -202,6 +202,7 @@ class Checked:
             self._places[name] = slice(first, first + count), block
             first += count
         self._parts: dict[str, Checked] = {}
+        self._datasets = dict[str, tuple[Any, bool]]()
 
     def close(self) -> None:
         """Close the files of shards."""
@@ -225,9 +226,10 @@ class Checked:
 
     def rows(self, name: str, first: int, last: int) -> Any:
         """Rows of a dataset that grows."""
-        if self._file[name].is_virtual:
-            return self._joined(name, first, last)
-        values = self._file[name][first:last]
+        data, is_virtual = self._dataset(name)
+        if is_virtual:
+            return self._joined(data, first, last)
+        values = data[first:last]
         if name in self._places:
             where, block = self._places[name]
             self._compare(name, first, row_sums(values, block), self._sums[first:last, where])
@@ -235,8 +237,8 @@ class Checked:
 
     def path(self, name: str, i: int, frames: int) -> Any:
         """Entry i of the first rows of a dataset, (rows, ...)."""
-        data = self._file[name]
-        if data.is_virtual:
+        data, is_virtual = self._dataset(name)
+        if is_virtual:
             for one in data.virtual_sources():
                 (_, to, *_), (_, end, *_) = one.vspace.get_select_bounds()
                 if to <= i <= end:
@@ -290,6 +292,13 @@ class Checked:
             for first in range(0, frames, each):
                 self.rows(name, first, min(frames, first + each))
 
+    def _dataset(self, name: str) -> tuple[Any, bool]:
+        """A dataset that grows, and whether it is virtual. To open it and to ask takes as long as to read a frame."""
+        if name not in self._datasets:
+            data = self._file[name]
+            self._datasets[name] = data, data.is_virtual
+        return self._datasets[name]
+
     def _compare(self, name: str, first: int, found: Sums, known: Sums) -> None:
         wrong = ((found != known) & (known != 0)).any(axis=1)
         if len(known) < len(found):
@@ -305,9 +314,8 @@ class Checked:
             self._parts[name] = Checked(self._opened(path), path, self._opened)
         return self._parts[name]
 
-    def _joined(self, name: str, first: int, last: int) -> Any:
-        """Rows that are in the files of shards."""
-        data = self._file[name]
+    def _joined(self, data: Any, first: int, last: int) -> Any:
+        """Rows of a virtual dataset, which are in the files of shards."""
         out, read = np.zeros((last - first, *data.shape[1:]), data.dtype), dict[str, Any]()
         for one in data.virtual_sources():
             (_, to, *_), (_, end, *_) = one.vspace.get_select_bounds()
