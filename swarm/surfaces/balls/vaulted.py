@@ -157,15 +157,15 @@ def hidden(part, place, n):
     A flat face has the normal n: what is behind a wall along it stays so.
     """
     depth = part.own[0].distance(place)
-    for wall in part.own:
+    for wall in part.own[1:]:
         depth = max(depth, wall.distance(place))
     for room in part.others:
         gap = -math.inf
         for wall in room:
             away = wall.distance(place)
-            if isinstance(wall, FLAT):
+            if isinstance(wall, FLAT) and away < 0.0:
                 turn = dot(n, outward(wall, place))
-                away = select((away < 0.0) & (turn * turn > _ALIGNED), -math.inf, away)
+                away = select(turn * turn > _ALIGNED, -math.inf, away)
             gap = max(gap, away)
         depth = max(depth, -gap)
     return depth

@@ -91,13 +91,16 @@ class Along(Record):
 
     def scaled(self, k):
         """It times a number."""
-        return Vec(*(k if i == self.axis else 0.0 for i in range(3)))
+        raise NotImplementedError
 
 
 class AlongX(Along):
     """The x axis."""
 
     x: float
+
+    def scaled(self, k):
+        return Vec(k, 0.0, 0.0)
 
 
 class AlongY(Along):
@@ -106,12 +109,18 @@ class AlongY(Along):
     y: float
     axis = 1
 
+    def scaled(self, k):
+        return Vec(0.0, k, 0.0)
+
 
 class AlongZ(Along):
     """The z axis."""
 
     z: float
     axis = 2
+
+    def scaled(self, k):
+        return Vec(0.0, 0.0, k)
 
 
 AXES: tuple[Any, ...] = (AlongX, AlongY, AlongZ)
