@@ -6,24 +6,23 @@ cell with facets look at these. One lane after the other would wait for each num
 
 import numpy as np
 
-from ..kernel.arrays import index, unwritten
+from ..kernel.arrays import fetch, index, unwritten
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.grid import cell_of, entries_of, until_next, until_out
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
-from ..surfaces.facets.facet_cells import here_in, passes
-from ..surfaces.facets.free_room import FULL, KIND, all_away, room_of
+from ..surfaces.facets.facet_cells import BLOCK, from_middle, here_in, passes
+from ..surfaces.facets.free_room import Cone, cone_of, room_of
 from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact import flights
-from .table import STRIDE
+from .table import STRIDE, marked_lanes
 
 # The hit of a lane, in rows of `course`.
 _TIME, _WALL = 0, 1
-# So many facets are looked at together; the column of one in the second line of the cache.
-_ROOM, _SECOND = 1024, 8
-# Entries of a cell in a line of the cache, and lines of a cell that are looked up together.
-_PER_LINE, _LINES = 4, 4
+# So many blocks of entries are looked at together; so many a lane has usually.
+_BLOCKS, _USUAL = 256, 2
+_ROOM = _BLOCKS * BLOCK
 # Steps of a lane after which its flight is said to be free so far.
 _MOST = 4000
 
@@ -31,7 +30,7 @@ _MOST = 4000
 class Under(Record):
     """The lanes that are under way, closed up."""
 
-    rows: Array  # position and velocity at the start, and where it is now
+    rows: Array  # position and velocity at the start, where it is now, and what is known of its cell
     time: Array  # how far it has come
     until: Array  # how far it comes in this step, up to its hit
     wall: Array  # the facet of that hit, or -1
@@ -39,8 +38,6 @@ class Under(Record):
     inside: Array  # bool, whether it is in the grid
     owner: Array  # int64, the lane
     last: Array  # the time after which no hit counts
-    first: Array  # int64, the first entry of its cell
-    count: Array  # int64, how many it has
 
     def move(self, source, target):
         """One lane into the place of another one."""
@@ -64,11 +61,30 @@ class Maybe(Record):
     lane: Array  # int64
     entry: Array  # int64
     facet: Array  # int64
-    seen: Array  # what was looked up
+
+
+class Looks(Record):
+    """Blocks of entries, each of which a lane looks at."""
+
+    lane: Array  # int64
+    block: Array  # int64
+
+    def take(self, planes, j, lane, block):
+        """A look, of which the block is on its way from memory then."""
+        self.lane[j], self.block[j] = lane, block
+        ask_for(planes, block, planes.shape[1] * planes.shape[2])
+
+
+def ask_for(table, row, size):
+    """Ask for both lines of the cache that a row of a table, of so many numbers, is in."""
+    fetch(table, row * size)
+    fetch(table, row * size + size // 2)
 
 
 # Of its rows
-_START, _SPEED, _PLACE, _BACK, _AHEAD, _PLACES = 0, 3, 6, 9, 12, 15
+_START, _SPEED, _PLACE, _BACK, _AHEAD, _AXIS, _SINE, _PLACES = 0, 3, 6, 9, 12, 15, 18, 19
+# Where it is from the middle of its cell, when what is behind it is not asked for any more
+_MIDDLE = _BACK
 
 
 @outlined
@@ -79,11 +95,9 @@ def go_through(gravity, facets, before, lanes, live):
         unwritten((_PLACES, STRIDE), np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
         unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64),
         unwritten(STRIDE, np.bool_), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
-        unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64),
     )  # fmt: skip
-    maybe = Maybe(
-        unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64), unwritten(_ROOM, np.float64)
-    )
+    looks = Looks(unwritten(_BLOCKS, np.int64), unwritten(_BLOCKS, np.int64))
+    maybe = Maybe(unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64))
     for i in range(index(live)):
         lane = lanes.lane(i)
         found, remaining = course[_TIME, i], lane.remaining
@@ -93,8 +107,8 @@ def go_through(gravity, facets, before, lanes, live):
         under.last[i] = select(remaining < found, remaining, found)
     n = int(live)
     for _step in range(_MOST):
-        _find_cells(gravity, facets.grid, under, n)
-        _look(gravity, facets, under, maybe, n)
+        _find_cells(gravity, facets.grid, under, lanes, n)
+        _look(gravity, facets, under, (looks, maybe), lanes.order, marked_lanes(lanes, n))
         n = _go_on(gravity, facets.grid, before, course, under, n)
         if n == 0:
             return
@@ -102,8 +116,8 @@ def go_through(gravity, facets, before, lanes, live):
         _keep(course, under, i, under.time[i], -1.0)
 
 
-def _find_cells(gravity, cells, under, n):
-    """The cell that every lane is in, and how far it comes from there."""
+def _find_cells(gravity, cells, under, lanes, n):
+    """The cell that every lane is in, how far it comes from there, and whether it may meet a facet on this way."""
     for i in range(index(n)):
         place, _pace = under.now(gravity, i)
         cell = cell_of(cells, place)
@@ -112,70 +126,85 @@ def _find_cells(gravity, cells, under, n):
     # What is outside of the grid is in the cell after its last, which holds nothing.
     for i in range(index(n)):
         cell = index(under.cell[i])
-        room = room_of(cells.known.room, cell)
+        room, cone = room_of(cells.known.room, cell), cone_of(cells.known.room, cell)
         put(under.rows, _BACK, i, room.back)
         put(under.rows, _AHEAD, i, room.ahead)
+        put(under.rows, _AXIS, i, cone.axis)
+        under.rows[_SINE, i] = cone.sine
     for i in range(index(n)):
         place, pace = under.now(gravity, i)
         at, back, ahead = (column(under.rows, row, i) for row in (_PLACE, _BACK, _AHEAD))
         out = until_out(gravity, cells, at - back, at + ahead, place, pace)
         under.until[i], under.wall[i] = under.time[i] + out, -1.0
+        put(under.rows, _MIDDLE, i, from_middle(cells, at, place))
     for i in range(index(n)):
-        cell = index(under.cell[i])
-        under.count[i] = 0
-        if cells.known.room[cell, KIND] == FULL and _may_meet(gravity, cells, under, cell, i):
-            first, stop = entries_of(cells, cell)
-            under.first[i], under.count[i] = first, stop - first
+        lanes.marked[i] = _may_meet(gravity, under, i)
 
 
-def _may_meet(gravity, cells, under, cell, i):
+def _may_meet(gravity, under, i):
     """Whether a lane may move towards a facet of its cell, at the start of its way through it or at the end."""
-    v = column(under.rows, _SPEED, i)
+    v, cone = column(under.rows, _SPEED, i), Cone(column(under.rows, _AXIS, i), under.rows[_SINE, i])
     if gravity is None:
-        return not all_away(cells.known.room, cell, v)
+        return not cone.is_left(v)
     now, then = accelerated(gravity, v, under.time[i]), accelerated(gravity, v, under.until[i])
-    return not (all_away(cells.known.room, cell, now) and all_away(cells.known.room, cell, then))
+    return not (cone.is_left(now) & cone.is_left(then))
 
 
-def _look(gravity, facets, under, maybe, n):
-    """Every lane at the facets in its cell, by their planes first."""
-    cells, some = facets.grid, 0
-    for line in range(_LINES):
-        for i in range(index(n)):
-            ahead = line * _PER_LINE
-            if under.count[i] > ahead:
-                maybe.seen[i] = float(cells.known.planes[index(under.first[i] + ahead), 0])
-    for i in range(index(n)):
-        if under.count[i] > 0:
-            place, pace = under.now(gravity, i)
-            span = under.until[i] - under.time[i]
-            here = here_in(gravity, cells, column(under.rows, _PLACE, i), place, pace, span)
-            for k in range(under.first[i], under.first[i] + under.count[i]):
-                if passes(cells, index(k), here):
-                    maybe.lane[some], maybe.entry[some] = i, k
-                    some += 1
-                    if some == _ROOM:
-                        _look_at(gravity, facets, under, maybe, some)
-                        some = 0
-    _look_at(gravity, facets, under, maybe, some)
+def _look(gravity, facets, under, found, order, n):
+    """So many lanes at the facets in their cells, by their planes first."""
+    planes, (looks, _maybe), blocks = facets.grid.known.planes, found, index(0)
+    for j in range(n):
+        i = order[j]
+        first, stop = entries_of(facets.grid, under.cell[i])
+        begin, end = first // BLOCK, (stop + BLOCK - 1) // BLOCK
+        if blocks > _BLOCKS - _USUAL:
+            _look_into(gravity, facets, under, found, blocks)
+            blocks = index(0)
+        # Those that are not its own the next lane writes over: how many there are no processor foresees.
+        for k in range(_USUAL):
+            looks.take(planes, blocks + index(k), i, begin + k)
+        blocks += index(select(end - begin < _USUAL, end - begin, _USUAL))
+        for block in range(begin + _USUAL, end):
+            if blocks == _BLOCKS:
+                _look_into(gravity, facets, under, found, blocks)
+                blocks = index(0)
+            looks.take(planes, blocks, i, block)
+            blocks += index(1)
+    _look_into(gravity, facets, under, found, blocks)
 
 
 @outlined
+def _look_into(gravity, facets, under, found, blocks):
+    """Lanes each at a block of entries in their cells, then at the facets of which they may pass the planes."""
+    (looks, maybe), cells, some = found, facets.grid, index(0)
+    marked = unwritten((_BLOCKS, BLOCK), np.bool_)
+    for j in range(blocks):
+        i, block, time = index(looks.lane[j]), looks.block[j], under.time[index(looks.lane[j])]
+        v, at = accelerated(gravity, column(under.rows, _SPEED, i), time), column(under.rows, _MIDDLE, i)
+        here, (first, stop) = here_in(gravity, cells, at, v, under.until[i] - time), entries_of(cells, under.cell[i])
+        for k in range(BLOCK):
+            is_own = (block * BLOCK + k >= first) & (block * BLOCK + k < stop)
+            marked[j, k] = is_own & passes(cells, index(block), index(k), here)
+    for j in range(blocks):
+        for k in range(BLOCK):
+            maybe.entry[some] = looks.block[j] * BLOCK + k
+            maybe.lane[some] = looks.lane[j]
+            some += index(marked[j, k])
+    _look_at(gravity, facets, under, maybe, some)
+
+
 def _look_at(gravity, facets, under, maybe, some):
     """So many lanes each at a facet."""
-    table = facets.table
-    for j in range(index(some)):
-        maybe.facet[j] = facets.grid.entries[index(maybe.entry[j])]
-    for j in range(index(some)):
-        # Both lines of the cache that it is in
-        m = index(maybe.facet[j])
-        maybe.seen[j] = table[m, 0] + table[m, _SECOND]
-    for j in range(index(some)):
-        i, m = index(maybe.lane[j]), index(maybe.facet[j])
+    for n in range(some):
+        maybe.facet[n] = facets.grid.entries[index(maybe.entry[n])]
+        ask_for(facets.table, maybe.facet[n], facets.table.shape[1])
+    for n in range(some):
+        i, m = index(maybe.lane[n]), index(maybe.facet[n])
         r, v = column(under.rows, _START, i), column(under.rows, _SPEED, i)
         time, _hits = flights.hit(gravity, member(facets, m), r, v)
-        if time < under.until[i]:
-            under.until[i], under.wall[i] = time, float(maybe.facet[j])
+        sooner = time < under.until[i]
+        under.until[i] = select(sooner, time, under.until[i])
+        under.wall[i] = select(sooner, float(maybe.facet[n]), under.wall[i])
 
 
 def _go_on(gravity, cells, before, course, under, n):

@@ -23,13 +23,13 @@ from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact.course import rise_time
 from ..surfaces.time_of_impact.flights import Hit
 from ..surfaces.time_of_impact.rising import InWallFrame, flight_of
-from .from_cell_to_cell import Maybe
+from .from_cell_to_cell import Maybe, ask_for
 from .table import STRIDE
 
 # The hit of a lane, in rows of `course`.
 _TIME, _WALL = 0, 1
-# So many facets are looked at together; the column of one in the second line of the cache.
-_ROOM, _SECOND = 1024, 8
+# So many facets are looked at together.
+_ROOM = 1024
 # Steps of a lane after which its flight is said to be free so far, and safe steps to one facet.
 _MOST, _STEPS = 4000, 100
 # The bounds of a flight hold for so many times as long as it would be among its cells if it went straight on.
@@ -93,9 +93,7 @@ def go_through_moving(gravity, mesh, before, lanes, live):
         unwritten(STRIDE, np.bool_), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
         unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64),
     )  # fmt: skip
-    maybe = Maybe(
-        unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64), unwritten(_ROOM, np.float64)
-    )
+    maybe = Maybe(unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64))
     for i in range(index(live)):
         lane = lanes.lane(i)
         found, remaining = course[_TIME, i], lane.remaining
@@ -176,10 +174,7 @@ def _look_at(gravity, mesh, leaps, maybe, some):
     facets = mesh.body
     for j in range(index(some)):
         maybe.facet[j] = facets.grid.entries[index(maybe.entry[j])]
-    for j in range(index(some)):
-        # Both lines of the cache that it is in
-        m = index(maybe.facet[j])
-        maybe.seen[j] = facets.table[m, 0] + facets.table[m, _SECOND]
+        ask_for(facets.table, maybe.facet[j], facets.table.shape[1])
     for j in range(index(some)):
         i, m = index(maybe.lane[j]), maybe.facet[j]
         met = _met(gravity, mesh, leaps, i, m)

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel import cache
-from ...kernel.gravity import as_vector, displacement
+from ...kernel.arrays import aligned_copy
+from ...kernel.gravity import as_vector
 from ...kernel.grid import MARGIN, Floats, Grid, filled_grid
 from ...kernel.jit import Array, select
 from ...kernel.record import Record
@@ -30,6 +31,9 @@ _LEAST_CELLS = 64
 _FULL, _OFF, _OFF_SPEED, _TOGETHER = 32767.0, 6e-5, 6e-5, 1_000_000
 # A ball around a facet is known where its middle and its radius are within so many diagonals.
 _REACH = 2.0
+# The first of these parts in the unit of the balls, and times the length of whole normals.
+_NEAR_PLACE = _OFF * _FULL / _REACH
+_NEAR = _NEAR_PLACE * _FULL
 # How far beside the true place a flight may seem to come through a plane, by a distance and a speed that may be none.
 _BESIDE = 4.0 / _OFF_SPEED
 # A flight to a mesh that turns or swings is known to be in a cell until shortly before its end: it ends so much
@@ -37,12 +41,15 @@ _BESIDE = 4.0 / _OFF_SPEED
 MOVING_MARGIN = 0.02
 # So few facets are entered in plain Python.
 _SOME = 60
+# So many entries are looked at together, by the same instructions: what is known of them is side by side. A loop over
+# four LLVM writes out, and makes no vectors of it.
+BLOCK = 8
 
 
 class FacetCells(Record):
     """What is known of the cells of facets: `Grid.known`."""
 
-    planes: Array  # (entries, 8) int16, of each the normal, and from the middle of the cell: see `passes`
+    planes: Array  # (entries / BLOCK, 8, BLOCK) int16, of each the normal, and from the middle of the cell: `passes`
     room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
 
 
@@ -87,11 +94,11 @@ def _planes(grid: Grid, table: Floats, corners: Floats, cells: NDArray[np.int64]
     """The planes and the balls of all entries, each in the cell with this number."""
     width = np.array(grid.width)
     diagonal = float(np.linalg.norm(width))
-    made = np.empty((len(cells), 8), np.int16)
+    made = np.zeros((-(-len(cells) // BLOCK) * BLOCK, 8), np.int16)
     middles = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
     radii = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
     for first in range(0, len(cells), _TOGETHER):
-        some = slice(first, first + _TOGETHER)
+        some = slice(first, min(first + _TOGETHER, len(cells)))
         places = np.stack(np.unravel_index(cells[some], tuple(int(n) for n in grid.shape)), axis=1)
         normal, offset = table[grid.entries[some], :3], table[grid.entries[some], 3]
         middle = np.array(grid.low) + (places + 0.5) * width
@@ -101,71 +108,68 @@ def _planes(grid: Grid, table: Floats, corners: Floats, cells: NDArray[np.int64]
         near = (np.abs(away).max(axis=1) < _REACH * diagonal) & (radius < 0.9 * _REACH * diagonal)
         made[some, 4:7] = np.where(near[:, None], np.rint(away * (_FULL / (_REACH * diagonal))), 0.0)
         made[some, 7] = np.where(near, np.ceil(radius * (_FULL / (_REACH * diagonal))) + 2.0, _FULL)
-    return made
+    return aligned_copy(made.reshape(-1, BLOCK, 8).swapaxes(1, 2))
 
 
 # --- Which planes a flight passes ------------------------------------------------------------------------
 
 
 class FlightInCell(Record):
-    """A flight in a cell: from the middle of it, its speed, half of gravity or None, and how long it is there."""
+    """A flight through a cell: lengths are in the unit of the balls, times in the time that it takes."""
 
-    from_middle: Vec
-    v: Vec
-    half_pull: Any
-    span: float
-    near: float  # a distance, a speed and half an acceleration that may be none
-    slow: float
+    at: Vec  # from the middle of the cell
+    way: Vec  # by its velocity, and by gravity, or None
+    bent: Any
+    slow: float  # a way by a velocity and by an acceleration that may be none, along whole normals
     weak: float
 
-    def pull(self):
-        """Gravity, or None."""
-        return None if self.half_pull is None else 2.0 * self.half_pull
 
-
-def here_in(gravity, cells, place, r, v, span):
-    """A flight that is at r in the cell at this place."""
+def from_middle(cells, place, r):
+    """Where a place is from the middle of the cell at this place."""
     w = cells.width
-    middle = cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z)
-    pull = None if gravity is None else 0.5 * as_vector(gravity)
-    weak = 0.0 if pull is None else _OFF_SPEED * total(absolute(pull))
-    slow = _OFF_SPEED * total(absolute(v)) + 2.0 * span * weak
-    return FlightInCell(r - middle, v, pull, span, _OFF * math.sqrt(square(w)), slow, weak)
+    return r - (cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z))
 
 
-def passes(cells, k, here):
+def here_in(gravity, cells, at, v, span):
+    """A flight that is in a cell for so long, from this place on from its middle."""
+    unit = (_FULL / _REACH) / math.sqrt(square(cells.width))
+    way, bent, weak = (unit * span) * v, None, 0.0
+    if gravity is not None:
+        bent = (0.5 * unit * span * span) * as_vector(gravity)
+        weak = _FULL * _OFF_SPEED * total(absolute(bent))
+    return FlightInCell(unit * at, way, bent, _FULL * _OFF_SPEED * total(absolute(way)) + 2.0 * weak, weak)
+
+
+def passes(cells, block, k, here):
     """Whether a flight may come through the plane of an entry in its cell, and there through a ball around the facet.
 
-    Most do not, and no facet is looked up. What is known of the entry is round-off of whole numbers.
+    Most do not, and no facet is looked up. What is known of the entry is round-off of whole numbers, and so long is its
+    normal. Without a branch: which entries a flight passes no processor foresees.
     """
-    normal = _row(cells.known.planes, k, 0, 1.0 / _FULL)
-    depth = dot(normal, here.from_middle) - float(cells.known.planes[k, 3]) * (here.near * (1.0 / (_FULL * _OFF)))
-    rate, bend = dot(normal, here.v), 0.0 if here.half_pull is None else dot(normal, here.half_pull)
-    faster = rate + here.slow
-    rises, is_inside = select(faster > 0.0, faster, 0.0) * here.span, depth <= here.near
-    if here.half_pull is not None:
-        more = select(bend > 0.0, bend, 0.0)
-        is_inside = is_inside | ((bend > -here.weak) & (faster < 2.0 * here.slow))
-        faster, rises = faster + 2.0 * more * here.span, rises + (more + here.weak) * here.span * here.span
-    if not ((faster > 0.0) & is_inside & (depth + rises >= -here.near)):
-        return False
-    radius, scale = float(cells.known.planes[k, 7]), here.near * (_REACH / (_FULL * _OFF))
-    if here.half_pull is None:
+    rows = cells.known.planes
+    normal = _row(rows, block, 0, k)
+    depth, rate = dot(normal, here.at) - float(rows[block, 3, k]) * (_FULL / _REACH), dot(normal, here.way)
+    center, radius, beyond = _row(rows, block, 4, k), float(rows[block, 7, k]), rate + here.slow
+    if here.bent is None:
+        meets = (beyond > 0.0) & (depth <= _NEAR) & (depth + beyond >= -_NEAR)
         # All lengths times the speed along the normal, so that nothing is divided: a third of such tests.
-        if radius == _FULL or rate <= 2.0 * here.slow:
-            return True
-        away = rate * (here.from_middle - _row(cells.known.planes, k, 4, scale)) - depth * here.v
-        beside = radius * scale * rate + 2.0 * _BESIDE * here.near * here.slow
-        return not square(away) > beside * beside
+        away = rate * (here.at - center) - depth * here.way
+        beside = radius * rate + 2.0 * _BESIDE * _NEAR_PLACE * here.slow
+        return meets & (not ((rate > 2.0 * here.slow) & (square(away) > beside * beside)))
+    bend = dot(normal, here.bent)
+    rises = select(bend > 0.0, bend, 0.0)
+    is_inside = (depth <= _NEAR) | ((bend > -here.weak) & (beyond < 2.0 * here.slow))
+    reach = depth + select(beyond > 0.0, beyond, 0.0) + rises + here.weak
+    meets = (beyond + 2.0 * rises > 0.0) & is_inside & (reach >= -_NEAR)
     # Where it comes through the plane, at the speed 2 root along the normal
     b = 0.5 * rate
     below = b * b - bend * depth
-    root = math.sqrt(select(below > 0.0, below, 0.0))
-    if radius == _FULL or b <= here.slow or below <= here.slow * here.slow:
-        return True
-    away = here.from_middle + displacement(here.pull(), here.v, -depth / (b + root))
-    beside = radius * scale + _BESIDE * here.near * here.slow / root
-    return not square(away - _row(cells.known.planes, k, 4, scale)) > beside * beside
+    root = np.sqrt(select(below > 0.0, below, 0.0))
+    is_known = (b > here.slow) & (below > here.slow * here.slow)
+    part = -depth / select(is_known, b + root, 1.0)
+    away = here.at + part * (here.way + part * here.bent) - center
+    beside = radius + _BESIDE * _NEAR_PLACE * here.slow / select(is_known, root, 1.0)
+    return meets & (not (is_known & (square(away) > beside * beside)))
 
 
 class WayInCell(Record):
@@ -185,11 +189,10 @@ class WayInCell(Record):
 
 def way_in(cells, place, seen, span):
     """A flight in the cell at this place for some time, as the frame of the cells sees it."""
-    w, v, bounds = cells.width, seen.v, seen.bounds(span)
-    middle = cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z)
-    near, half = _OFF * math.sqrt(square(w)), 0.5 * seen.a
+    v, bounds = seen.v, seen.bounds(span)
+    near, half = _OFF * math.sqrt(square(cells.width)), 0.5 * seen.a
     slow = _OFF_SPEED * (total(absolute(v)) + span * total(absolute(half)))
-    here, ahead = seen.r - middle, (0.5 * span) * v
+    here, ahead = from_middle(cells, place, seen.r), (0.5 * span) * v
     curved = 0.5 * bounds.acceleration * span * span
     straight = math.sqrt(square(ahead))
     beside, way = straight + curved + near, 2.0 * straight + 4.0 * curved
@@ -199,17 +202,18 @@ def way_in(cells, place, seen, span):
 
 def may_pass(cells, k, way):
     """As `passes` of such a flight."""
-    normal = _row(cells.known.planes, k, 0, 1.0 / _FULL)
-    depth = dot(normal, way.from_middle) - float(cells.known.planes[k, 3]) * (way.near * (1.0 / (_FULL * _OFF)))
+    rows, block, k = cells.known.planes, k // BLOCK, k % BLOCK
+    normal = (1.0 / _FULL) * _row(rows, block, 0, k)
+    depth = dot(normal, way.from_middle) - float(rows[block, 3, k]) * (way.near * (1.0 / (_FULL * _OFF)))
     rate, bend = dot(normal, way.v) * way.span, dot(normal, way.half_pull) * way.span * way.span
     rises, falls = rate + select(bend > 0.0, bend, 0.0), select(bend < 0.0, -bend, 0.0) - rate
     more = way.slow * way.span + way.bent + way.near
     # What is behind the plane comes back first.
     meets = (depth + select(rises > 0.0, rises, 0.0) >= -more) & (depth - select(falls > 0.0, falls, 0.0) <= more)
-    radius, scale = float(cells.known.planes[k, 7]), way.near * (_REACH / (_FULL * _OFF))
+    radius, scale = float(rows[block, 7, k]), way.near * (_REACH / (_FULL * _OFF))
     if not meets or radius == _FULL:
         return meets
-    center, reach = _row(cells.known.planes, k, 4, scale), radius * scale + way.beside
+    center, reach = scale * _row(rows, block, 4, k), radius * scale + way.beside
     if square(way.halfway - center) > reach * reach:
         return False
     # Where it comes through the plane: the level is depth + rate s + bend s^2 give or take `more`, at the part s of its
@@ -226,5 +230,5 @@ def may_pass(cells, k, way):
     return square(place - center) <= reach * reach
 
 
-def _row(rows, k, first, scale):
-    return Vec(float(rows[k, first]), float(rows[k, first + 1]), float(rows[k, first + 2])) * scale
+def _row(rows, block, first, k):
+    return Vec(float(rows[block, first, k]), float(rows[block, first + 1, k]), float(rows[block, first + 2, k]))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel.arrays import index
-from ...kernel.jit import kernel, outlined
+from ...kernel.jit import kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, dot, norm
 
@@ -29,6 +29,17 @@ class FreeCells(Record):
     ahead: Vec
 
 
+class Cone(Record):
+    """A cone of normals: its axis, and the sine of its half-angle, of which each is a part of `_FULL`."""
+
+    axis: Vec
+    sine: float
+
+    def is_left(self, v):
+        """Whether a flight surely moves away from all that have these normals."""
+        return dot(self.axis, v) < -self.sine * norm(v)
+
+
 def room_of(rows, cell):
     """The room around a cell, none around one with facets."""
     free = 1.0 if rows[cell, KIND] != FULL else 0.0
@@ -38,10 +49,11 @@ def room_of(rows, cell):
     )
 
 
-def all_away(rows, cell, v):
-    """Whether a flight surely moves away from all facets of a cell."""
+def cone_of(rows, cell):
+    """The cone of the normals of a cell; of one without facets it is one that every flight leaves."""
+    is_full = rows[cell, KIND] == FULL
     axis = Vec(float(rows[cell, 0]), float(rows[cell, 1]), float(rows[cell, 2]))
-    return dot(axis, v) < -float(rows[cell, SINE]) * norm(v)
+    return Cone(select(is_full, 1.0, 0.0) * axis, select(is_full, float(rows[cell, SINE]), -1.0))
 
 
 def all_away_for(rows, cell, v, change):

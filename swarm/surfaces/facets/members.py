@@ -12,7 +12,7 @@ from ..presence.patched import Patched
 from ..shapes.plane import PlaneNumbers
 from ..time_of_impact import flights
 from .facet import ROOM, Shared
-from .facet_cells import here_in, may_pass, passes, way_in
+from .facet_cells import BLOCK, from_middle, here_in, may_pass, passes, way_in
 from .free_room import FULL, KIND, room_of
 from .nearest import foot_on
 
@@ -108,8 +108,8 @@ def _first_hit(facets, gravity, r, v):
             room = room_of(cells.known.room, number)
             until = t + until_out(gravity, cells, cell.place - room.back, cell.place + room.ahead, place, pace)
             if cells.known.room[number, KIND] == FULL:
-                here = here_in(gravity, cells, cell.place, place, pace, until - t)
-                found = hit_in(facets, gravity, (r, v), (number, t), here)
+                here = here_in(gravity, cells, from_middle(cells, cell.place, place), pace, until - t)
+                found = hit_in(facets, gravity, (r, v), (number, until), here)
                 if found.wall >= 0.0:
                     return found
         else:
@@ -121,12 +121,12 @@ def _first_hit(facets, gravity, r, v):
 
 
 def hit_in(facets, gravity, flight, cell, here):
-    """The first hit in a cell with this number of a flight (r, v), which leaves it `here.span` after `cell[1]`."""
-    (r, v), (number, begin) = flight, cell
-    found, cells = flights.Hit(begin + here.span, -1.0), facets.grid
+    """The first hit in a cell (its number, when it is left) of a flight (r, v)."""
+    (r, v), (number, until) = flight, cell
+    found, cells = flights.Hit(until, -1.0), facets.grid
     first, stop = entries_of(cells, number)
     for k in range(first, stop):
-        if passes(cells, index(k), here):
+        if passes(cells, index(k // BLOCK), index(k % BLOCK), here):
             m = cells.entries[k]
             time, _hits = flights.hit(gravity, member(facets, index(m)), r, v)
             if time < found.time:
