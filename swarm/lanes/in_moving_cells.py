@@ -22,7 +22,8 @@ from ..surfaces.facets.free_room import FULL, KIND, all_away_for, room_of
 from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact.course import rise_time
 from ..surfaces.time_of_impact.flights import Hit
-from ..surfaces.time_of_impact.rising import InWallFrame, flight_of
+from ..surfaces.time_of_impact.march import lets_go
+from ..surfaces.time_of_impact.rising import InWallFrame, Level, ThirdDerivativeBound, flight_of
 from .from_cell_to_cell import Maybe, ask_for
 from .table import STRIDE
 
@@ -214,6 +215,8 @@ def _step_to(facet, seen, longest) -> Any:
     bounds = seen.bounds(ahead)
     sixth = bounds.jerk * (1.0 / 6.0)
     time = min(rise_time(depth, rate, bend + sixth * ahead), ahead)
+    if lets_go(depth, rate, time, room):
+        return Hit(_leaving(facet, seen, Level(min(depth, -room), rate, bend, 1.0, 0.0), ahead), _NEARER)
     if is_behind:
         return Hit(time, _BEHIND)
     # How deep a flight may be at the end of the step
@@ -224,6 +227,16 @@ def _step_to(facet, seen, longest) -> Any:
     if within < 0.0:
         return Hit(max(time, min(-within / whole.speed, longest)), _BEYOND)
     return Hit(time, 0.0 if time * bounds.speed <= room else _NEARER)
+
+
+@outlined
+def _leaving(facet, seen, level, longest):
+    """A time up to the longest in which a flight that leaves a plane, slowly, surely does not come back to it.
+
+    A particle that slides lets go where nothing pulls it to the wall, and not yet away. The bound of a long time ends
+    such a step after round-off, which would be a hit, and so would the next, without end.
+    """
+    return ThirdDerivativeBound(facet, seen, level).longest(longest)
 
 
 def _place(seen, t):

@@ -9,6 +9,7 @@ import swarm
 from swarm.contact import crossing, touching
 from swarm.contact.projection import Touch
 from swarm.kernel.vector import Vec, vec
+from swarm.lanes import flight
 from swarm.observables import drift
 from swarm.surfaces.in_motion import moving
 from swarm.surfaces.in_motion.drive import drive_of
@@ -343,3 +344,22 @@ def test_lanes_that_leap_through_cells_meet_what_safe_steps_one_by_one_meet(moti
     in_lanes = run(walls, particles, 1.0, gravity)
     monkeypatch.setattr(moving, "Leaping", moving.Marched)
     same(in_lanes, run(walls, particles, 1.0, gravity), impacts=6)
+
+
+@pytest.mark.parametrize("away", [3e-15, 1e-14, 1e-12])
+def test_a_particle_that_lets_go_of_a_facet_that_turns_flies_on(away, monkeypatch):
+    """Its velocity and its acceleration along the normal are 0: for long it is nearer to the facet than a bound tells.
+
+    It moves along the facet at -rate HALF/2, where the Coriolis and the centrifugal acceleration cancel; the third
+    derivative, 2 rate^3 y, takes it away.
+    """
+    rate, y, flights, found = 3.0, -0.1, [], flight.go_through_moving
+
+    def counted(*given):
+        flights.append(1)
+        assert len(flights) <= 4
+        found(*given)
+
+    monkeypatch.setattr(flight, "go_through_moving", counted)
+    particle = swarm.Particles([[HALF], [y], [0.01]], [[-rate * y - away], [0.5 * rate * HALF], [0.05]])
+    run([cube(motion=swarm.Rotation((0.0, 0.0, 1.0), rate))], particle, 0.3)
