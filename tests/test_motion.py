@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 import swarm
 from swarm.motion import led
@@ -48,6 +48,35 @@ def test_a_path_is_the_natural_cubic_spline_through_its_positions():
     path, spline = swarm.Path(times, positions), CubicSpline(times, positions, bc_type="natural")
     for t in np.linspace(0.0, 2.7, 28):
         assert path.displacement(t) == pytest.approx(spline(t), abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("times", "along"),
+    [
+        ((0.0, 1.0, 2.0), (0.0, 0.0, 1.0)),
+        ((0.0, 0.9, 1.0, 2.5, 3.0), (0.0, 0.0, 0.0, 1.0, 1.0)),
+        ((0.0, 0.5, 1.0, 2.0, 3.0, 4.5, 5.0), (0.3, 0.1, 1.0, 1.0, 0.4, 0.2, 0.2)),
+        ((0.0, 1.0), (1.0, 1.0)),
+    ],
+)
+def test_a_path_is_at_rest_between_two_equal_positions(times, along):
+    path = swarm.Path(times, [(x, 1.0, -2.0 * x) for x in along])
+    t = np.array(times)
+    for k in np.flatnonzero(np.diff(along) == 0.0):
+        for moment in np.linspace(t[k], t[k + 1], 9):
+            assert path.displacement(moment).tolist() == list(path.positions[k])
+    assert [path.displacement(moment)[2] for moment in times] == pytest.approx([-2.0 * x for x in along], abs=1e-14)
+    spline = PPoly(np.moveaxis(path.cubics[::-1], 1, 2), path.knots)
+    inner = path.knots[1:-1]
+    for order in range(3):
+        one = spline.derivative(order) if order else spline
+        assert one(inner - 1e-9) == pytest.approx(one(inner + 1e-9), abs=1e-6)
+
+
+def test_a_way_between_two_rests_stays_between_them():
+    path = swarm.Path((0.0, 1.0, 2.0, 3.0), [(x, 0.0, 0.0) for x in (0.0, 0.0, 1.0, 1.0)])
+    along = [path.displacement(moment)[0] for moment in np.linspace(0.0, 3.0, 301)]
+    assert (np.diff(along) >= -1e-15).all()
 
 
 def test_every_path_begins_at_its_start():

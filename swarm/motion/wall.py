@@ -46,15 +46,17 @@ class Path(Given):
         times: at least two, ascending [s].
         positions: for each time three numbers, the displacement from where the wall is given [m].
 
-    The second derivative is 0 at both ends (the natural spline). The times must cover the run. Where a wall comes to
-    rest the spline overshoots, less so with a second time close by: by 2e-3 of the way with 0, 0.99, 1, 2, 2.01, 3 s
-    for three equal positions and three others, by an eighth with 0, 1, 2, 3 s for two and two.
+    The second derivative is 0 at both ends (the natural spline). The times must cover the run. Between two equal
+    positions that follow one another the wall is at rest. It comes to rest with a velocity and an acceleration of 0;
+    so the way from or to a rest is two cubics, each for half of the time, and that between two rests three.
 
     Raises:
         SceneError: an argument is out of its range.
 
     >>> Path(times=(0.0, 1.0, 2.0), positions=((0, 0, 0), (0, 0, 1), (0, 0, 0))).displacement(0.5)
     array([0.    , 0.    , 0.6875])
+    >>> Path(times=(0.0, 1.0, 2.0), positions=((0, 0, 0), (0, 0, 0), (0, 0, 1))).displacement(0.5)
+    array([0., 0., 0.])
     """
 
     times: tuple[float, ...]
@@ -75,7 +77,7 @@ class Path(Given):
         with np.errstate(all="ignore"):
             large = ~(np.abs(self.cubics) <= checks.LARGEST).all(axis=(0, 1))
         if large.any():
-            k = int(large.argmax())
+            k = int(np.searchsorted(times, self.knots[int(large.argmax())], "right")) - 1
             raise SceneError(
                 f"times must be so far apart that the coefficients of the spline are at most {checks.LARGEST:g}, got "
                 f"{times[k]:g} s at {places[k]} and {times[k + 1]:g} s at {places[k + 1]}"
@@ -88,26 +90,60 @@ class Path(Given):
         return f"Path(times={self.times}, positions={self.positions})"
 
     @functools.cached_property
+    def knots(self) -> Floats:
+        """The times at which the cubics begin, and the end of the last: the given ones and those beside rests."""
+        return self._spline[0]
+
+    @functools.cached_property
     def cubics(self) -> Floats:
         """The coefficients (4, 3, pieces) of each piece in powers of the time since its start."""
+        t, x, bends = self._spline
+        h, slope = np.diff(t), np.diff(x) / np.diff(t)
+        first = slope - h * (2.0 * bends[:, :-1] + bends[:, 1:]) / 6.0
+        return np.array([x[:, :-1], first, 0.5 * bends[:, :-1], np.diff(bends) / (6.0 * h)])
+
+    @functools.cached_property
+    def _spline(self) -> tuple[Floats, Floats, Floats]:
+        """The knots, and the positions and second derivatives (3, knots) there."""
         t, x = np.array(self.times), np.array(self.positions).T
         h, slope = np.diff(t), np.diff(x) / np.diff(t)
+        is_rest = (np.diff(x) == 0.0).all(axis=0)
+        rests = np.append(is_rest, False) | np.append(False, is_rest)
+        begins, ends = rests[:-1] & ~is_rest, rests[1:] & ~is_rest  # of a way that begins, or ends, at a rest
+        # The way from a rest to t_k goes there with the speed 2 slope + h m_k/6, that of one cubic is
+        # slope + h (m_k-1 + 2 m_k)/6: the speed 0 at the rest is what the knot in its middle is for.
+        one = begins ^ ends
+        steep, wide = np.where(one, 2.0, 1.0) * slope, np.where(one, 1.0, 2.0) * h
         bends = np.zeros_like(x)  # second derivatives at the knots
         # h_k-1 m_k-1 + 2 (h_k-1 + h_k) m_k + h_k m_k+1 = 6 (slope_k - slope_k-1), a tridiagonal system
         upper, right = np.zeros(t.size), np.zeros_like(x)
         for k in range(1, t.size - 1):
-            pivot = 2.0 * (h[k - 1] + h[k]) - h[k - 1] * upper[k - 1]
+            if rests[k]:
+                continue
+            pivot = wide[k - 1] + wide[k] - h[k - 1] * upper[k - 1]
             upper[k] = h[k] / pivot
-            right[:, k] = (6.0 * (slope[:, k] - slope[:, k - 1]) - h[k - 1] * right[:, k - 1]) / pivot
+            right[:, k] = (6.0 * (steep[:, k] - steep[:, k - 1]) - h[k - 1] * right[:, k - 1]) / pivot
         for k in range(t.size - 2, 0, -1):
             bends[:, k] = right[:, k] - upper[k] * bends[:, k + 1]
-        first = slope - h * (2.0 * bends[:, :-1] + bends[:, 1:]) / 6.0
-        return np.array([x[:, :-1], first, 0.5 * bends[:, :-1], np.diff(bends) / (6.0 * h)])
+        # m = 4 slope/h - m_k/6 in the middle of such a way; 9 slope/h and -9 slope/h at the thirds of one between rests
+        part, rate = np.where(one, 0.5, 1.0 / 3.0) * h, np.where(one, 4.0, 9.0) * slope / h
+        after, before = rate - bends[:, 1:] / 6.0, -rate - bends[:, :-1] / 6.0
+        where = 1 + np.concatenate([np.flatnonzero(begins), np.flatnonzero(ends)])
+        made = (
+            (t, t[:-1] + part, t[1:] - part),
+            (x, x[:, :-1] + after * part**2 / 6.0, x[:, 1:] + before * part**2 / 6.0),
+            (bends, after, before),
+        )
+        knots, places, bends = (
+            np.insert(given, where, np.concatenate([from_rest[..., begins], to_rest[..., ends]], axis=-1), axis=-1)
+            for given, from_rest, to_rest in made
+        )
+        return knots, places, bends
 
     def displacement(self, time: float) -> Floats:
         """The displacement (3,) at a time [s]."""
-        k = min(max(int(np.searchsorted(self.times, time, "right")) - 1, 0), len(self.times) - 2)
-        s, (a, b, c, d) = time - self.times[k], self.cubics[:, :, k]
+        k = min(max(int(np.searchsorted(self.knots, time, "right")) - 1, 0), len(self.knots) - 2)
+        s, (a, b, c, d) = time - self.knots[k], self.cubics[:, :, k]
         return np.asarray(a + s * (b + s * (c + s * d)))
 
 

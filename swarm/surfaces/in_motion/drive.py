@@ -241,9 +241,9 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             jerks += np.abs(one.amplitude) * led.rate**3
         elif isinstance(one, motions.Path):
             cubics = one.cubics
-            track = Track(np.array(one.times), cubics, _vector(one.displacement(moment)), moment)
-            h = np.diff(one.times)
-            time_scale = min(time_scale, _SLOW * float(h.min()))
+            track = Track(one.knots, cubics, _vector(one.displacement(moment)), moment)
+            h, moves = np.diff(one.knots), cubics[1:].any(axis=(0, 1))
+            time_scale = min(time_scale, _SLOW * float(h[moves].min(initial=math.inf)))
             # The velocity of each half of a piece lies within the triangle of the control points of its Bezier form.
             first, last = cubics[1], cubics[1] + h * (2.0 * cubics[2] + 3.0 * h * cubics[3])
             between = cubics[1] + h * cubics[2]
