@@ -201,10 +201,11 @@ def _settled(walls, wall, touch, r, near):
         if holds or (touch.touched[i] and touch.depth[i] > 0.0):
             r = walls.project(touch.number[i], r)
     if touch.frame is not None:
-        # A wall that moves is left by more than round-off; where another one ends it is met on that one only.
+        # A wall that moves is left by more than round-off; where another one ends it is met on that one only. One that was
+        # farther away, and is not touched, has gained on the particle by what it accelerates: no straight way shows that.
         _depths(walls, touch.number, r, touch.depth)
         for i in range(touch.touched.size):
-            if touch.touched[i] and touch.depth[i] > near:
+            if touch.depth[i] > near:
                 r = walls.project(touch.number[i], r)
     return r
 

@@ -7,7 +7,7 @@ import pytest
 from conftest import EPSILON, SURFACES, call, wall_point
 
 import swarm
-from swarm.contact import projection
+from swarm.contact import projection, touching
 from swarm.kernel.vector import vec
 from swarm.surfaces.walls import all_walls
 
@@ -99,3 +99,15 @@ def test_a_sliding_step_keeps_the_energy(name):
             u = np.array(call(projection.velocity_along, walls, touch, point, w, h))
             assert np.linalg.norm(2.0 * u - w) == pytest.approx(np.linalg.norm(w), rel=16 * EPSILON)
             assert (touch.active >= 0.0).all()
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_a_step_among_walls_that_move_ends_on_one_that_has_come_nearer(moves):
+    """The straight way of a step meets none that gains on the particle by its acceleration alone."""
+    near, r = 5e-12, vec([2e-11, 0.1, 0.0])
+    walls = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0)), swarm.Plane((1.0, 0.0, 0.0))]).compiled().walls().at(0.0)
+    number, touched, depth = walls.numbers_near(r), np.array([True, False]), np.zeros(2)
+    frame = vec([0.0, 0.0, 0.0]) if moves else None
+    touch = projection.Touch(number, touched, np.zeros((3, 2)), np.ones(2), depth, frame)
+    end = touching._settled(walls, 0.0, touch, r, near)
+    assert tuple(end) == (0.0 if moves else 2e-11, 0.1, 0.0)
