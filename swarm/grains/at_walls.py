@@ -10,7 +10,7 @@ from ..surfaces.walls import Field
 from .contacts import (
     Closing,
     begin_solve,
-    change_row,
+    change_of,
     damper,
     improved,
     lasting,
@@ -41,6 +41,7 @@ from .grain_arrays import (
     ROLL,
     SIZE,
     START,
+    OfWall,
     X,
     set_vector,
     vector_at,
@@ -98,7 +99,7 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
                 rows[c, DAMPING] = law.damping / math.sqrt(place[i, LIGHTNESS]) / matter.h
             way = rising(own, r0, q0, move)
             first = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
-            begin_solve(rows, c, first, half * place[i, LIGHTNESS] * square(way.along))
+            rows[c, PUSH], rows[c, GAIN] = begin_solve(first, half * place[i, LIGHTNESS] * square(way.along))
             set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
             if near.wall_drag is not None:
                 rows[c, LISTED] = k
@@ -123,7 +124,7 @@ def press_at_wall(matter, law, own, grains, rows, at, share):
     way = rising(own, vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * v)
     wanted, _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
     rows[c, PUSH] = improved(rows[c, PUSH], wanted, rows[c, GAIN])
-    more, part = change_row(rows, c, IMPULSE, rows[c, PUSH] * way.along, share)
+    more, part = change_of(OfWall(rows, c), IMPULSE, rows[c, PUSH] * way.along, share)
     off = weight_of(law) * relative(matter, more, rows[c, PUSH], size_of(v), rows[c, EASE])
     return way, v + part * rows[c, EASE], off
 

@@ -2,12 +2,34 @@
 
 from typing import Any, NamedTuple
 
-from ..kernel.arrays import index
+import numpy as np
+
+from ..kernel.arrays import index, unwritten
 from ..kernel.jit import Array, outlined
 from ..kernel.vector import dot, norm
 from .at_walls import rising
-from .contacts import closing
-from .grain_arrays import AFTER, COAST, GAP, IMPULSE, PUSH, RADIUS, SIZE, START, vector_at
+from .contacts import closing, worse
+from .friction import turning
+from .grain_arrays import (
+    AFTER,
+    BEFORE,
+    COAST,
+    DRAG,
+    GAP,
+    IMPULSE,
+    LANES,
+    LISTED,
+    PUSH,
+    RADIUS,
+    RUBBED,
+    SIZE,
+    START,
+    set_vector,
+    set_vector_in,
+    vector_at,
+    vector_in,
+)
+from .groups import balls_of, move_in, of_group, twist_in
 from .vessel import met, met_member, moves
 
 
@@ -45,27 +67,69 @@ def _lost(matter, work, gap, change):
     return -work / matter.h - force * change
 
 
+# Rows of what is read of the balls of a group, v_i - v_j at the end of the step and R_i w_i + R_j w_j at both together;
+# and of what is booked: the part of the virial, the gap at the end, and what is lost.
+_DIFFERENCE, _TURNED, _READ = 0, 3, 6
+_VIRIAL, _END, _LOST, _BOOKED = 0, 1, 2, 3
+
+
+def _read(matter, grains, lane, balls, read):
+    """Read what balls have for what is booked of their contact."""
+    (i, j), speed = balls, grains.speed
+    set_vector_in(read, _DIFFERENCE, lane, vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
+    if matter.pairs.friction is not None:
+        set_vector_in(read, _TURNED, lane, turning(grains, i, j, BEFORE) + turning(grains, i, j, AFTER))
+
+
+def _weigh(matter, rows, q, lane, read, booked):
+    """Compute what is booked of a contact."""
+    s0, impulse = vector_in(rows, q + START, lane), vector_in(rows, q + IMPULSE, lane)
+    move = move_in(matter, rows, q, lane, vector_in(read, _DIFFERENCE, lane))
+    gap, way, lost = rows[q + GAP, lane], closing(s0, rows[q + SIZE, lane], move), 0.0
+    booked[_VIRIAL, lane], booked[_END, lane] = dot(s0 + 0.5 * move, impulse), gap + way.change
+    if matter.pairs.damping is not None:
+        lost = _lost(matter, dot(impulse, move), gap, way.change)
+    if matter.pairs.friction is not None:
+        gained = dot(vector_in(rows, q + DRAG, lane), move) / matter.h
+        gained = gained - 0.5 * dot(twist_in(rows, q, lane, move), vector_in(read, _TURNED, lane))
+        rows[q + RUBBED, lane] = -gained
+        lost = lost - gained
+    booked[_LOST, lane] = 0.5 * lost
+
+
+def _enter(matter, books, rows, q, lane, numbers, booked):
+    """Book a contact of the particles with these numbers."""
+    one, other = numbers
+    if (rows[q + GAP, lane] <= 0.0) & (booked[_END, lane] > 0.0):
+        books.collisions[one] += 1
+        books.collisions[other] += 1
+    if matter.pairs.damping is not None or matter.pairs.friction is not None:
+        books.dissipated[one] += booked[_LOST, lane]
+        books.dissipated[other] += booked[_LOST, lane]
+
+
 @outlined
-def book_pairs(matter, grains, touches, books):
-    """Book the contacts of pairs; their largest overlap [m]."""
-    rows, speed, half, deepest = touches.rows, grains.speed, 0.5 * matter.h, 0.0
-    for k in range(touches.used[0]):
-        c = index(k)
-        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        one, other = index(grains.number[i]), index(grains.number[j])
-        s0, impulse = vector_at(rows, c, START), vector_at(rows, c, IMPULSE)
-        move = vector_at(rows, c, COAST) + half * (vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
-        way = closing(s0, rows[c, SIZE], move)
-        books.virial[0] += dot(s0 + 0.5 * move, impulse)
-        end = rows[c, GAP] + way.change
-        deepest = max(deepest, max(rows[c, GAP], end))
-        begins = (rows[c, GAP] <= 0.0) & (end > 0.0)
-        books.collisions[one] += begins
-        books.collisions[other] += begins
-        if matter.pairs.damping is not None:
-            lost = 0.5 * _lost(matter, dot(impulse, move), rows[c, GAP], way.change)
-            books.dissipated[one] += lost
-            books.dissipated[other] += lost
+def book_pairs(matter, grains, near, touches, books):
+    """Book the contacts of pairs, and keep their friction for the next step; their largest overlap [m]."""
+    number, deepest, virial = grains.number, 0.0, 0.0
+    read, booked = unwritten((_READ, LANES), np.float64), unwritten((_BOOKED, LANES), np.float64)
+    for g in range(touches.used[1]):
+        rows, q, ends, e = of_group(touches, g)
+        lanes = touches.lanes[index(g)]
+        for k in range(lanes):
+            _read(matter, grains, index(k), balls_of(ends, e, index(k)), read)
+        for k in range(lanes):
+            _weigh(matter, rows, q, index(k), read, booked)
+        for k in range(lanes):
+            lane = index(k)
+            i, j = balls_of(ends, e, lane)
+            virial += booked[_VIRIAL, lane]
+            deepest = worse(booked[_END, lane], worse(rows[q + GAP, lane], deepest))
+            _enter(matter, books, rows, q, lane, (index(number[i]), index(number[j])), booked)
+            if matter.pairs.friction is not None:
+                listed = index(int(rows[q + LISTED, lane]))
+                set_vector(near.drag, listed, 0, vector_in(rows, q + DRAG, lane))
+    books.virial[0] += virial
     return deepest
 
 

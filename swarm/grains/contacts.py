@@ -19,30 +19,23 @@ from .cell import nearest
 from .grain_arrays import (
     AFTER,
     BEFORE,
-    COAST,
     DAMPING,
-    DRAG,
-    EASE,
-    GAIN,
-    GAP,
-    IMPULSE,
-    KEPT_ROLL,
     LIGHTNESS,
-    LISTED,
     LOST,
-    PUSH,
+    ONE,
+    OTHER,
+    PLACE,
     RADIUS,
-    ROLL,
-    SIZE,
-    START,
     X,
-    set_vector,
     vector_at,
 )
 
 _TINY = 1e-300
 # Where a damper acts, a change of an impulse counts so much less: what it takes is booked by what it did.
 _DAMPED = 1e-6
+# The margin is so many times what the step before would have needed, and is relied on up to that part of it: round-off
+# decides nothing. It is for speed alone.
+_WIDER, _SURE = 8.0, 0.5
 
 
 class Losses(Record):
@@ -126,11 +119,10 @@ def improved(push, wanted, gain):
     return select(new > 0.0, new, 0.0)
 
 
-def begin_solve(rows, c, pressed_first, ease):
+def begin_solve(pressed_first, ease):
     """The first size of an impulse, and the gain of all Newton steps."""
     push, slope = pressed_first
-    rows[c, PUSH] = push
-    rows[c, GAIN] = 1.0 / (1.0 + select(slope > 0.0, ease * slope, 0.0))
+    return push, 1.0 / (1.0 + select(slope > 0.0, ease * slope, 0.0))
 
 
 def relative(matter, more, push, speeds, ease):
@@ -145,11 +137,11 @@ def changed(old, new, share):
     return more, share * more
 
 
-def change_row(rows, c, k, new, share):
-    """The same of an impulse in three columns of a row, which it changes."""
-    old = vector_at(rows, c, k)
+def change_of(contact, k, new, share):
+    """The same of an impulse in three columns of a contact, which it changes."""
+    old = contact.vector(k)
     more, part = changed(old, new, share)
-    set_vector(rows, c, k, old + part)
+    contact.set_vector(k, old + part)
     return more, part
 
 
@@ -183,60 +175,85 @@ def apart(matter, place, i, j):
     return s + (vector_at(place, i, LOST) - vector_at(place, j, LOST))
 
 
+def _approach(matter, grains, ball, j):
+    """The square of how near two balls are at an end of the step, at least, and R_i + R_j.
+
+    `ball` is the first one, and the sum of its velocities at both ends.
+    """
+    (i, here), place, speed = ball, grains.place, grains.speed
+    s0 = apart(matter, place, i, j)
+    move = 0.5 * matter.h * (here - (vector_at(speed, j, BEFORE) + vector_at(speed, j, AFTER)))
+    q0, q1, reach = square(s0), square(s0 + move), place[i, RADIUS] + place[j, RADIUS]
+    nearest_one = select(q1 < q0, q1, q0)
+    if matter.holds is None:
+        return nearest_one, reach
+    # Where walls hold both they do not meet.
+    return select(place[i, LIGHTNESS] + place[j, LIGHTNESS] > 0.0, nearest_one, math.inf), reach
+
+
+def _note(rows, c, a, b, k):
+    rows[c, ONE], rows[c, OTHER], rows[c, PLACE] = a, b, k
+
+
 @outlined
-def gather_pairs(matter, grains, near, touches):
-    """Add the pairs that are in contact at an end of the step to its contacts; how many are new."""
-    place, speed, half = grains.place, grains.speed, 0.5 * matter.h
-    rows, count = touches.rows, touches.used[0]
-    known = count
+def find_pairs(matter, grains, near, touches):
+    """Find the pairs that are in contact at an end of the step, and those that miss one another by the margin or less.
+
+    How many contacts are new.
+    """
+    place, speed, found, missed = grains.place, grains.speed, touches.found, touches.missed
+    known, count, passed, margin = touches.used[0], touches.used[0], 0, touches.margin[0]
     for a in range(place.shape[0]):
         i = index(a)
-        here, radius = vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER), place[i, RADIUS]
+        ball = i, vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)
         for k in range(near.first[i], near.first[i + 1]):
-            if near.is_on[index(k)]:
-                continue
-            b = near.mate[index(k)]
-            j = index(b)
-            s0 = apart(matter, place, i, j)
-            move = half * (here - (vector_at(speed, j, BEFORE) + vector_at(speed, j, AFTER)))
-            reach, q0 = radius + place[j, RADIUS], square(s0)
-            is_in = min(q0, square(s0 + move)) < reach * reach
-            if matter.holds is not None:
-                is_in = is_in & (place[i, LIGHTNESS] + place[j, LIGHTNESS] > 0.0)
-            if is_in:
-                near.is_on[index(k)] = True
-                c, size = index(count), math.sqrt(q0)
-                touches.ends[c, 0], touches.ends[c, 1] = a, b
-                set_vector(rows, c, START, s0)
-                rows[c, SIZE], rows[c, GAP] = size, reach - size
-                set_vector(rows, c, COAST, half * (vector_at(speed, i, BEFORE) - vector_at(speed, j, BEFORE)))
-                ease = place[i, LIGHTNESS] + place[j, LIGHTNESS]
-                rows[c, EASE] = ease
-                if matter.pairs.damping is not None:
-                    rows[c, DAMPING] = matter.pairs.damping / math.sqrt(ease) / matter.h
-                way = closing(s0, size, move)
-                first = pressed(matter, damper(matter.pairs.damping, rows, c), rows[c, GAP], way.change)
-                begin_solve(rows, c, first, half * ease)
-                set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
-                if near.drag is not None:
-                    rows[c, LISTED] = k
-                if matter.pairs.friction is not None:
-                    set_vector(rows, c, DRAG, vector_at(near.drag, index(k), 0) * lasting(rows[c, GAP]))
-                if matter.pairs.rolling is not None:
-                    set_vector(rows, c, ROLL, vector_at(near.drag, index(k), KEPT_ROLL) * lasting(rows[c, GAP]))
-                count += 1
+            b, was_on = near.mate[index(k)], near.is_on[index(k)]
+            q, reach = _approach(matter, grains, ball, index(b))
+            # Without a branch, which would go either way: a row that does not count is written over.
+            is_on = was_on | (q < reach * reach)
+            near.is_on[index(k)] = is_on
+            _note(found, index(count), a, b, k)
+            count += is_on & (not was_on)
+            wide = reach + margin
+            _note(missed, index(passed), a, b, k)
+            passed += (q < wide * wide) & (not is_on)
+    touches.used[0], touches.passed[0] = count, passed
+    return count - known
+
+
+@outlined
+def _find_missed(matter, grains, near, touches):
+    """The same among those that have missed one another by the margin or less."""
+    speed, found, missed, count = grains.speed, touches.found, touches.missed, touches.used[0]
+    known = count
+    for m in range(touches.passed[0]):
+        a, b, k = missed[index(m), ONE], missed[index(m), OTHER], missed[index(m), PLACE]
+        i = index(a)
+        ball = i, vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)
+        q, reach = _approach(matter, grains, ball, index(b))
+        if (q < reach * reach) & (not near.is_on[index(k)]):
+            near.is_on[index(k)] = True
+            _note(found, index(count), a, b, k)
+            count += 1
     touches.used[0] = count
     return count - known
 
 
 @outlined
-def push_pairs(matter, grains, touches):
-    """Add the impulses of the pairs to the velocities at the end of the step."""
-    rows, place, speed = touches.rows, grains.place, grains.speed
-    for k in range(touches.used[0]):
-        c = index(k)
-        i, j, impulse = index(touches.ends[c, 0]), index(touches.ends[c, 1]), vector_at(rows, c, IMPULSE)
-        if matter.pairs.friction is not None:
-            impulse = impulse + vector_at(rows, c, DRAG)
-        set_vector(speed, i, AFTER, vector_at(speed, i, AFTER) + impulse * place[i, LIGHTNESS])
-        set_vector(speed, j, AFTER, vector_at(speed, j, AFTER) - impulse * place[j, LIGHTNESS])
+def _off_course(matter, grains):
+    """How far a ball is at the end of the step from where it was to be with the last step's change, at most [m]."""
+    speed, most = grains.speed, 0.0
+    for k in range(speed.shape[0]):
+        i = index(k)
+        foreseen = vector_at(speed, i, BEFORE) + vector_at(grains.change, i, 0)
+        most = worse(square(vector_at(speed, i, AFTER) - foreseen), most)
+    return 0.5 * matter.h * math.sqrt(most)
+
+
+def find_more_pairs(matter, grains, near, touches):
+    """Find the pairs that are in contact by what has been solved, and were not before; how many."""
+    # Two balls are nearer than foreseen by no more than this.
+    off = 2.0 * _off_course(matter, grains)
+    is_known = off <= _SURE * touches.margin[0]
+    touches.margin[0] = off * _WIDER
+    return _find_missed(matter, grains, near, touches) if is_known else find_pairs(matter, grains, near, touches)

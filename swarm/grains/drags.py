@@ -48,7 +48,10 @@ def kept_drags(world: Any) -> Drags | None:
     if near.drag is None:
         return None
     key, sign = _pairs(world)
-    return Drags(*_sorted(key, _turned(near.drag[: key.size], sign)), *_sorted(_at_walls(world), near.wall_drag))
+    at = _in_order(key, near.drag)
+    at_wall = _at_walls(world)
+    here = _in_order(at_wall, near.wall_drag)
+    return Drags(key[at], _turned(near.drag[at], sign[at]), at_wall[here], near.wall_drag[here])
 
 
 def _turned(drag: NDArray[np.float64], sign: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -56,11 +59,10 @@ def _turned(drag: NDArray[np.float64], sign: NDArray[np.float64]) -> NDArray[np.
     return np.concatenate([drag[:, :_TURNS] * sign[:, None], drag[:, _TURNS:]], axis=1)
 
 
-def _sorted(key: NDArray[np.int64], drag: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Those that are not 0 in the order of their keys."""
-    acts = np.flatnonzero(drag[: key.size].any(axis=1))
-    order = acts[np.argsort(key[acts])]
-    return key[order], drag[order]
+def _in_order(key: NDArray[np.int64], drag: NDArray[np.float64]) -> NDArray[np.int64]:
+    """The places of those that are not 0 in the order of their keys."""
+    acts = np.flatnonzero((drag[: key.size] != 0.0).any(axis=1))
+    return np.asarray(acts[np.argsort(key[acts])])
 
 
 def set_drags(world: Any, kept: Drags | None) -> None:
@@ -69,13 +71,19 @@ def set_drags(world: Any, kept: Drags | None) -> None:
         return
     near = world.near
     key, sign = _pairs(world)
-    near.drag[: key.size] = _turned(_found(key, kept.pair, kept.drag), sign)
-    at = _at_walls(world)
-    near.wall_drag[: at.size] = _found(at, kept.at_wall, kept.wall_drag)
+    at, old = _found(key, kept.pair)
+    near.drag[: key.size] = 0.0
+    near.drag[at] = _turned(kept.drag[old], sign[at])
+    key = _at_walls(world)
+    at, old = _found(key, kept.at_wall)
+    near.wall_drag[: key.size] = 0.0
+    near.wall_drag[at] = kept.wall_drag[old]
 
 
-def _found(key: NDArray[np.int64], known: NDArray[np.int64], drag: NDArray[np.float64]) -> NDArray[np.float64]:
+def _found(key: NDArray[np.int64], known: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The places of the keys that are known, and those of the same keys among the known ones, in ascending order."""
     if not known.size:
-        return np.zeros((key.size, drag.shape[1]))
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
     place = np.minimum(np.searchsorted(known, key), known.size - 1)
-    return np.where((known[place] == key)[:, None], drag[place], 0.0)
+    at = np.flatnonzero(known[place] == key)
+    return at, place[at]

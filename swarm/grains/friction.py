@@ -18,28 +18,27 @@ from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, cross, dot, square
 from ..surfaces.in_motion.posed import Posed
 from .at_walls import press_at_wall, rising
-from .contacts import change_row, relative, size_of, worse
+from .contacts import change_of, relative, size_of, worse
 from .grain_arrays import (
     AFTER,
+    ARM,
     BEFORE,
     COAST,
     DRAG,
     EASE,
-    IMPULSE,
-    LIGHTNESS,
     LISTED,
     PUSH,
     RADIUS,
+    ROUNDNESS,
     RUBBED,
     SIZE,
     START,
+    OfWall,
     set_vector,
     vector_at,
 )
 from .vessel import met, moves
 
-# 1/(2/5), of the moment of inertia of a ball.
-ROUNDNESS = 2.5
 _TINY = 1e-300
 
 
@@ -58,36 +57,16 @@ def rubbed(drag, slip, ease, limit):
 # --- Of pairs --------------------------------------------------------------------------------------------
 
 
-def _turning(grains, i, j, column):
+def turning(grains, i, j, column):
     """R_i w_i + R_j w_j"""
-    place, spin = grains.place, grains.spin
-    return vector_at(spin, i, column) * place[i, RADIUS] + vector_at(spin, j, column) * place[j, RADIUS]
+    spin = grains.spin
+    return vector_at(spin, i, column) * spin[i, ARM] + vector_at(spin, j, column) * spin[j, ARM]
 
 
 def arm_of(way, size, change, reach):
     """s/R of two balls, from their `Closing`, |s0| and the change of the gap."""
     # s0 + s1 is `along` times |s0| + |s1|
     return way.along * (0.5 * (2.0 * size - change) / reach)
-
-
-@outlined
-def twist_pairs(matter, grains, touches):
-    """Add the twists of all pairs to the spins at the end of the step; the velocities there are final."""
-    rows, place, speed, spin, half = touches.rows, grains.place, grains.speed, grains.spin, 0.5 * matter.h
-    for k in range(touches.used[0]):
-        c = index(k)
-        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        move = vector_at(rows, c, COAST) + half * (vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
-        twist = twist_of(rows, c, move, place[i, RADIUS] + place[j, RADIUS])
-        one, two = place[i, LIGHTNESS] / place[i, RADIUS], place[j, LIGHTNESS] / place[j, RADIUS]
-        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * (ROUNDNESS * one))
-        set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * (ROUNDNESS * two))
-
-
-def twist_of(rows, c, move, reach):
-    """s x J/R of a pair; its s changes by `move`: with all of J, so that no angular momentum is lost at all."""
-    s = vector_at(rows, c, START) + 0.5 * move
-    return cross(s * (1.0 / reach), vector_at(rows, c, IMPULSE) + vector_at(rows, c, DRAG))
 
 
 # --- Of walls --------------------------------------------------------------------------------------------
@@ -131,7 +110,7 @@ def rub_wall(matter, law, wall, grains, touches, number, share):
         slip = across(v - last - radius * cross(w, n), n)
         before = across(vector_at(rows, c, DRAG), n)
         new = rubbed(before, slip, ease * (1.0 + ROUNDNESS), law.friction * rows[c, PUSH])
-        more, part = change_row(rows, c, DRAG, new, share)
+        more, part = change_of(OfWall(rows, c), DRAG, new, share)
         set_vector(speed, i, AFTER, v + part * ease)
         set_vector(spin, i, AFTER, w - cross(n, part) * (ROUNDNESS * ease / radius))
         worst = worse(relative(matter, more, rows[c, PUSH], size_of(v), ease), worse(off, worst))
@@ -171,21 +150,3 @@ def book_rubbing(matter, wall, grains, near, touches, books, number):
         books.dissipated[one] += given - gained
         if moves(wall):
             books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given
-
-
-@outlined
-def book_rubbing_pairs(matter, grains, near, touches, books):
-    """Book what friction takes of pairs, and keep its impulses for the next step."""
-    rows, speed, half, place = touches.rows, grains.speed, 0.5 * matter.h, grains.place
-    for k in range(touches.used[0]):
-        c = index(k)
-        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        move = vector_at(rows, c, COAST) + half * (vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
-        twist = twist_of(rows, c, move, place[i, RADIUS] + place[j, RADIUS])
-        turned = _turning(grains, i, j, BEFORE) + _turning(grains, i, j, AFTER)
-        drag = vector_at(rows, c, DRAG)
-        set_vector(near.drag, index(int(rows[c, LISTED])), 0, drag)
-        gained = dot(drag, move) / matter.h - 0.5 * dot(twist, turned)
-        rows[c, RUBBED] = -gained
-        books.dissipated[index(grains.number[i])] -= 0.5 * gained
-        books.dissipated[index(grains.number[j])] -= 0.5 * gained

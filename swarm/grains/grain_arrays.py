@@ -10,17 +10,19 @@ import numpy as np
 
 from ..kernel.arrays import aligned, spaced
 from ..kernel.jit import Array
+from ..kernel.record import Record
 from ..kernel.vector import Vec
 
 # Columns of `Grains.place`: the centre, what round-off has taken of it, the radius, 1/mass.
 X, LOST, RADIUS, LIGHTNESS = 0, 3, 6, 7
-# Columns of `Grains.speed`: at the start of a step, and at its end.
-BEFORE, AFTER = 0, 3
-# Columns of `Touches.rows`: s0, from one centre to the other at the start of a step, or the centre; |s0|, or the inner
+# Columns of `Grains.speed`: at the start of a step, and at its end. Of `Grains.spin` also the radius again, and what
+# turns the ball, m R/I: what friction reads of a ball is then in two lines.
+BEFORE, AFTER, ARM, LEVER = 0, 3, 6, 7
+# Columns of a contact: s0, from one centre to the other at the start of a step, or the centre; |s0|, or the inner
 # function of the wall; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
 # inverse of the mass that moves; the damping; the gain of a Newton step; and where there is friction its
 # impulse, the place in the lists, the angular impulse of the resistance to rolling, and what both take.
-START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED, ROLL, RUBBED = (
+START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, DRAG, LISTED, ROLL, RUBBED = (
     0,
     3,
     4,
@@ -30,15 +32,18 @@ START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, SCALE, DRAG, LISTED
     12,
     13,
     14,
-    15,
     16,
     19,
     20,
     23,
 )
 COLUMNS, COLUMNS_OF_FRICTION = 16, 24
-# How many contacts of pairs are improved at once, and the columns of theirs, see lanes_of_pairs.py.
-LANES, COLUMNS_OF_LANES = 8, 24
+# And of one of a pair, in a lane: R_i + R_j, and of both balls 1/m and what turns them.
+REACH, EASES, LEVERS, COLUMNS_OF_LANES = 24, 25, 27, 29
+# How many contacts of pairs are improved at once, see lanes_of_pairs.py.
+LANES = 8
+# Columns of `Touches.found`: both balls, and the place in the lists. Rows of `Tile.ends`: both balls.
+ONE, OTHER, PLACE, FOUND, ENDS = 0, 1, 2, 3, 2
 # Columns of `Neighbours.drag`: where the angular impulse of the resistance to rolling is kept; and in a run with a log
 # of contacts when each has begun, the sum of its normal impulses, the largest force, what friction has taken, and the
 # velocity, of a pair that of the particle with the smaller number, and the slip at its start.
@@ -49,6 +54,10 @@ BEGIN, END, FACE = 0, 1, 2
 # Of a clock: the steps of the frame that are done, those since pairs were listed, and those since the run was halted
 # last; the skin of the lists [m].
 DONE, SINCE, TAKEN, SKIN, CLOCK = 0, 1, 2, 3, 4
+
+
+# 1/(2/5), of the moment of inertia of a ball.
+ROUNDNESS = 2.5
 
 
 class Grains(NamedTuple):
@@ -87,6 +96,7 @@ class Tile(NamedTuple):
     """The contacts of pairs in groups, a row of each group for each column."""
 
     rows: Array  # (groups * COLUMNS_OF_LANES, LANES)
+    ends: Array  # (groups * ENDS, LANES) int32
 
 
 with_lanes = spaced(LANES)
@@ -95,17 +105,59 @@ with_lanes = spaced(LANES)
 class Touches(NamedTuple):
     """The contacts of a step: of pairs, and of walls."""
 
-    rows: Array  # (room, COLUMNS)
-    ends: Array  # (room, 2) int32, the two balls
-    wall_rows: Array
+    tile: Tile  # those of pairs
+    lanes: Array  # (groups,) int64, how many contacts each group has
+    splits: Array  # (groups,) int64, the lanes, as bits, where a part begins: no ball is twice in a part of a group
+    marks: Array  # (N,) int64, of each ball the last part that it is in
+    used: Array  # (2,) how many contacts of pairs there are, and how many groups
+    found: Array  # (room + 1, FOUND) int32, the contacts of pairs as they were found
+    missed: Array  # (room + 1, FOUND) int32, the pairs that have missed one another by no more than the margin
+    passed: Array  # (1,) how many of these there are
+    margin: Array  # (1,) [m]
+    wall_rows: Array  # (room of walls, COLUMNS)
     wall_ends: Array  # (room of walls,) int32, the ball
     wall_spans: Array  # (2, walls) where those of each wall begin in `wall_rows`, and how many there are
-    used: Array  # (1,) how many rows are of pairs
-    tile: Tile  # the rows of pairs in groups
-    shares: Array  # (groups,) bool, whether two of a group have the same ball
-    marks: Array  # (N,) of each ball the last group that it is in
     spans: Any = None  # (room of walls, 3) int32, of fields, as in `Neighbours`; and the same members
     listed: Any = None
+
+
+class OfWall(Record):
+    """A contact with a wall."""
+
+    rows: Any
+    c: Any
+
+    def number(self, k):
+        """What is in a column."""
+        return self.rows[self.c, k]
+
+    def vector(self, k):
+        """The vector in three columns."""
+        return vector_at(self.rows, self.c, k)
+
+    def set_vector(self, k, a):
+        """Store a vector into three columns."""
+        set_vector(self.rows, self.c, k, a)
+
+
+class OfPair(Record):
+    """A contact of a pair: the first row of its group, and its lane."""
+
+    rows: Any
+    q: Any
+    lane: Any
+
+    def number(self, k):
+        """What is in a column."""
+        return self.rows[self.q + k, self.lane]
+
+    def vector(self, k):
+        """The vector in three columns."""
+        return vector_in(self.rows, self.q + k, self.lane)
+
+    def set_vector(self, k, a):
+        """Store a vector into three columns."""
+        set_vector_in(self.rows, self.q + k, self.lane, a)
 
 
 def vector_at(rows: Any, c: Any, k: Any) -> Vec:
@@ -118,6 +170,16 @@ def set_vector(rows: Any, c: Any, k: Any, a: Vec) -> None:
     rows[c, k], rows[c, k + 1], rows[c, k + 2] = a.x, a.y, a.z
 
 
+def vector_in(rows: Any, k: Any, lane: Any) -> Vec:
+    """The vector in three rows of a lane."""
+    return Vec(rows[k, lane], rows[k + 1, lane], rows[k + 2, lane])
+
+
+def set_vector_in(rows: Any, k: Any, lane: Any, a: Vec) -> None:
+    """Store a vector into three rows of a lane."""
+    rows[k, lane], rows[k + 1, lane], rows[k + 2, lane] = a.x, a.y, a.z
+
+
 def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = None) -> Grains:
     """The rows of balls, in the order of their numbers."""
     n = len(mass)
@@ -127,6 +189,7 @@ def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = 
     turning = None if spin is None else np.zeros((n, 8))
     if turning is not None:
         turning[:, BEFORE : BEFORE + 3] = spin.T
+        turning[:, ARM], turning[:, LEVER] = radius, ROUNDNESS / radius
     return Grains(np.arange(n), place, speed, np.zeros((n, 4)), np.zeros((n, 4)), turning)
 
 
@@ -158,11 +221,15 @@ def near_of(
 
 def touches_of(n: int, walls: int, pairs: int, touching: int, is_kept: bool = False, listed: Any = None) -> Touches:
     """Room for the contacts of so many pairs and of so many balls at walls; `Neighbours` has the members of fields."""
-    columns, groups = COLUMNS_OF_FRICTION if is_kept else COLUMNS, -(-pairs // LANES)
+    columns = COLUMNS_OF_FRICTION if is_kept else COLUMNS
+    # One more for those that are found by a step that has been solved without them.
+    groups = -(-pairs // LANES) + 1
+    tile = Tile(
+        aligned(groups * COLUMNS_OF_LANES * LANES).reshape(-1, LANES), np.zeros((groups * ENDS, LANES), np.int32)
+    )  # fmt: skip
     return Touches(
-        np.zeros((pairs, columns)), np.zeros((pairs, 2), np.int32), np.zeros((touching, columns)),
-        np.zeros(touching, np.int32), np.zeros((2, walls), np.int64), np.zeros(1, np.int64),
-        Tile(aligned(groups * COLUMNS_OF_LANES * LANES).reshape(-1, LANES)), np.zeros(groups, np.bool_),
-        np.zeros(n, np.int64),
+        tile, np.zeros(groups, np.int64), np.zeros(groups, np.int64), np.zeros(n, np.int64), np.zeros(2, np.int64),
+        np.zeros((pairs + 1, FOUND), np.int32), np.zeros((pairs + 1, FOUND), np.int32), np.zeros(1, np.int64),
+        np.zeros(1), np.zeros((touching, columns)), np.zeros(touching, np.int32), np.zeros((2, walls), np.int64),
         None if listed is None else np.zeros((touching, 3), np.int32), listed,
     )  # fmt: skip

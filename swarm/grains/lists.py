@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernel.arrays import index
+from ..kernel.arrays import index, scratch
 from ..kernel.grid import wrapped
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
@@ -48,16 +48,14 @@ def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[C
     return CellOrder(key[order], counts, strides, wraps), order
 
 
-def _first_from(key, wanted):
-    """The first place in ascending numbers where one is no less than what is wanted."""
-    low, high = 0, key.size
-    while low < high:
-        middle = (low + high) // 2
-        if key[index(middle)] < wanted:
-            low = middle + 1
-        else:
-            high = middle
-    return low
+def _first_from(key, wanted, guess):
+    """The first place in ascending numbers where one is no less than what is wanted, from a guess on step by step."""
+    at = guess
+    while at > 0 and key[index(at - 1)] >= wanted:
+        at -= 1
+    while at < key.size and key[index(at)] < wanted:
+        at += 1
+    return at
 
 
 def _beside(cells, k, here, step):
@@ -89,10 +87,10 @@ def _list_between(period, grains, near, span, i, found):
 @long_kernel
 def list_pairs(period, grains, near, cells, skin):
     """List all pairs that are nearer than the sum of their radii and the skin; how many there are, listed or not."""
-    key, strides, found = cells.key, cells.strides, 0
+    key, strides, found, ways = cells.key, cells.strides, 0, scratch((3, 3, 3), np.int64)
     for a in range(key.size):
         i = index(a)
-        near.first[i], given = found, (cells, skin, a)
+        near.first[i], given = found, (cells, skin, a, ways)
         z = key[i] // strides[2]
         y = (key[i] - z * strides[2]) // strides[1]
         x = key[i] - z * strides[2] - y * strides[1]
@@ -104,20 +102,26 @@ def list_pairs(period, grains, near, cells, skin):
                 if cells.wraps[0]:
                     for along in range(-1, 2):
                         if not _is_again(cells, 0, along):
-                            found = _list_cells(
-                                    period, grains, near, given, row + _beside(cells, 0, x, along), 0, found
-                                )  # fmt: skip
+                            some, way = (row + _beside(cells, 0, x, along), 0), (up + 1, aside + 1, along + 1)
+                            found = _list_cells(period, grains, near, given, some, way, found)
                 elif row + x + 1 >= key[i]:
-                    found = _list_cells(period, grains, near, given, row + x, 1, found)
+                    found = _list_cells(period, grains, near, given, (row + x, 1), (up + 1, aside + 1, 0), found)
     near.first[index(key.size)] = found
     return found
 
 
-def _list_cells(period, grains, near, given, middle, around, found):
-    """List the pairs of a ball with those after it in some cells of a row; how many are listed then."""
-    cells, skin, a = given
-    begin = max(_first_from(cells.key, middle - around), a + 1)
-    end = _first_from(cells.key, middle + around + 1)
+def _list_cells(period, grains, near, given, some, way, found):
+    """List the pairs of a ball with those after it in some cells of a row; how many are listed then.
+
+    `some` are the middle one, and how many there are on each side; `way` is that from the ball's cell to them.
+    """
+    (cells, skin, a, ways), (middle, around), (up, aside, along) = given, some, way
+    # Where those of the ball before began, which was in the same cell or in one not far before: from there it is a
+    # step or two, where a search through all of them takes longer than the distances of the pairs.
+    first = _first_from(cells.key, middle - around, ways[index(up), index(aside), index(along)])
+    ways[index(up), index(aside), index(along)] = first
+    begin = max(first, a + 1)
+    end = _first_from(cells.key, middle + around + 1, begin)
     return _list_between(period, grains, near, (begin, end, skin), index(a), found)
 
 

@@ -32,10 +32,12 @@ from .grain_arrays import (
     SLIP,
     START,
     TAKEN_OFF,
+    OfWall,
     X,
     set_vector,
     vector_at,
 )
+from .groups import move_in, pair_at
 from .held import velocity_of
 from .vessel import met, met_member
 
@@ -49,32 +51,31 @@ class Noting(NamedTuple):
     image: Any  # (3, N) where the cells are in which the lists were made, or None
 
 
-def _note(matter, rubs, rows, c, kept, time):
+def _note(matter, rubs, contact, kept, time):
     """Add a step that ends at a time [s] to what is noted of a contact; whether that begins in it."""
-    gap, k = rows[c, GAP], index(int(rows[c, LISTED]))
+    gap, k = contact.number(GAP), index(int(contact.number(LISTED)))
     # The second one at the start of the run.
     begins = (gap <= 0.0) | (kept[k, PRESSED] == 0.0)
     if begins:
         kept[k, BEGAN] = time - matter.h
         kept[k, PRESSED] = kept[k, FORCE] = kept[k, TAKEN_OFF] = 0.0
-    impulse = norm(vector_at(rows, c, IMPULSE))
+    impulse = norm(contact.vector(IMPULSE))
     kept[k, PRESSED] += impulse
     kept[k, FORCE] = max(kept[k, FORCE], impulse / matter.h)
     if rubs:
-        kept[k, TAKEN_OFF] += rows[c, RUBBED]
+        kept[k, TAKEN_OFF] += contact.number(RUBBED)
     return begins
 
 
 @outlined
 def note_pairs(matter, grains, near, touches, time):
     """Add a step that ends at a time [s] to what is noted of the contacts of pairs."""
-    rows, speed = touches.rows, grains.speed
-    for k in range(touches.used[0]):
-        c = index(k)
-        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        if _note(matter, matter.pairs.friction is not None, rows, c, near.drag, time):
-            first = i if grains.number[i] < grains.number[j] else j
-            set_vector(near.drag, index(int(rows[c, LISTED])), ARRIVED, vector_at(speed, first, BEFORE))
+    for g in range(touches.used[1]):
+        for k in range(touches.lanes[index(g)]):
+            contact, (i, j) = pair_at(touches, g, index(k))
+            if _note(matter, matter.pairs.friction is not None, contact, near.drag, time):
+                first, place = i if grains.number[i] < grains.number[j] else j, index(int(contact.number(LISTED)))
+                set_vector(near.drag, place, ARRIVED, vector_at(grains.speed, first, BEFORE))
 
 
 @outlined
@@ -85,7 +86,7 @@ def note_wall(matter, law, wall, grains, near, touches, noting, given):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        if _note(matter, law.friction is not None, rows, c, near.wall_drag, time):
+        if _note(matter, law.friction is not None, OfWall(rows, c), near.wall_drag, time):
             place, v = index(int(rows[c, LISTED])), vector_at(speed, i, BEFORE)
             set_vector(near.wall_drag, place, ARRIVED, v)
             if noting.log.slip is not None:
@@ -108,18 +109,19 @@ def _row(noting, at, kept, k, time, slip):
 def log_pairs(matter, world, time):
     """The rows of the contacts of pairs that have ended in the step, which is done, at a time [s]."""
     grains, near, touches, noting = world.grains, world.near, world.touches, world.noting
-    rows, speed, half = touches.rows, grains.speed, 0.5 * matter.h
-    for k in range(touches.used[0]):
-        c = index(k)
-        if rows[c, GAP] > 0.0:
-            i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-            move = vector_at(rows, c, COAST) + half * (vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
-            if rows[c, GAP] + closing(vector_at(rows, c, START), rows[c, SIZE], move).change <= 0.0:
+    speed = grains.speed
+    for g in range(touches.used[1]):
+        for k in range(touches.lanes[index(g)]):
+            contact, (i, j) = pair_at(touches, g, index(k))
+            gap, difference = contact.number(GAP), vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER)
+            move = move_in(matter, contact.rows, contact.q, contact.lane, difference)
+            way = closing(contact.vector(START), contact.number(SIZE), move)
+            if (gap > 0.0) & (gap + way.change <= 0.0):
                 if grains.number[i] > grains.number[j]:
                     i, j = j, i
                 r, v = vector_at(grains.place, i, X), velocity_of(world.held, grains, i)
                 at = Struck(grains.number[i], -1.0, time, r, v, v, 0.0, partner=grains.number[j])
-                _row(noting, at, near.drag, index(int(rows[c, LISTED])), time, ZERO)
+                _row(noting, at, near.drag, index(int(contact.number(LISTED))), time, ZERO)
 
 
 @outlined

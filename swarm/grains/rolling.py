@@ -11,8 +11,8 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, dot, square
 from ..surfaces.in_motion.posed import Posed
-from .contacts import change_row, relative, size_of, worse
-from .friction import ROUNDNESS, across, rubbed
+from .contacts import change_of, relative, size_of, worse
+from .friction import across, rubbed
 from .grain_arrays import (
     AFTER,
     BEFORE,
@@ -24,10 +24,13 @@ from .grain_arrays import (
     PUSH,
     RADIUS,
     ROLL,
+    ROUNDNESS,
     RUBBED,
+    OfWall,
     set_vector,
     vector_at,
 )
+from .groups import pair_at
 from .vessel import met, moves
 
 
@@ -36,19 +39,19 @@ def _ease(place, i):
     return ROUNDNESS * place[i, LIGHTNESS] / (place[i, RADIUS] * place[i, RADIUS])
 
 
-def _resist(matter, rows, c, rolling, sizes, share):
+def _resist(matter, contact, rolling, sizes, share):
     """The change of the angular impulse of a contact, and the error: of the rolling at the end of the step.
 
     `sizes` are the radius R, 1/I, and the sum of the speeds of what touches.
     """
-    (radius, ease, speeds), n = sizes, vector_at(rows, c, IMPULSE)
+    (radius, ease, speeds), n, roll = sizes, contact.vector(IMPULSE), contact.vector(ROLL)
     if not square(n) > 0.0:
-        n = vector_at(rows, c, ROLL)
-        set_vector(rows, c, ROLL, ZERO)
-        return -1.0 * n, 0.0
-    new = rubbed(across(vector_at(rows, c, ROLL), n), across(rolling[0], n), ease, rolling[1] * radius * rows[c, PUSH])
-    more, part = change_row(rows, c, ROLL, new, share)
-    return part, relative(matter, more * (1.0 / radius), rows[c, PUSH], speeds, rows[c, EASE])
+        contact.set_vector(ROLL, ZERO)
+        return -1.0 * roll, 0.0
+    push = contact.number(PUSH)
+    new = rubbed(across(roll, n), across(rolling[0], n), ease, rolling[1] * radius * push)
+    more, part = change_of(contact, ROLL, new, share)
+    return part, relative(matter, more * (1.0 / radius), push, speeds, contact.number(EASE))
 
 
 # --- Of pairs --------------------------------------------------------------------------------------------
@@ -57,46 +60,48 @@ def _resist(matter, rows, c, rolling, sizes, share):
 @outlined
 def roll_pairs(matter, grains, touches, share):
     """Improve the angular impulse of each pair in turn; the largest change, relative to what moves there."""
-    rows, place, speed, spin, worst = touches.rows, grains.place, grains.speed, grains.spin, 0.0
-    for k in range(touches.used[0]):
-        c = index(k)
-        i, j = index(touches.ends[c, 0]), index(touches.ends[c, 1])
-        w, u, one, two = vector_at(spin, i, AFTER), vector_at(spin, j, AFTER), _ease(place, i), _ease(place, j)
-        radius = place[i, RADIUS] * place[j, RADIUS] / (place[i, RADIUS] + place[j, RADIUS])
-        speeds = size_of(vector_at(speed, i, AFTER)) + size_of(vector_at(speed, j, AFTER))
-        rolling = w - u, matter.pairs.rolling
-        part, off = _resist(matter, rows, c, rolling, (radius, one + two, speeds), share)
-        set_vector(spin, i, AFTER, w + part * one)
-        set_vector(spin, j, AFTER, u - part * two)
-        worst = worse(off, worst)
+    place, speed, spin, worst = grains.place, grains.speed, grains.spin, 0.0
+    for g in range(touches.used[1]):
+        for k in range(touches.lanes[index(g)]):
+            contact, (i, j) = pair_at(touches, g, index(k))
+            w, u, one, two = vector_at(spin, i, AFTER), vector_at(spin, j, AFTER), _ease(place, i), _ease(place, j)
+            radius = place[i, RADIUS] * place[j, RADIUS] / (place[i, RADIUS] + place[j, RADIUS])
+            speeds = size_of(vector_at(speed, i, AFTER)) + size_of(vector_at(speed, j, AFTER))
+            rolling = w - u, matter.pairs.rolling
+            part, off = _resist(matter, contact, rolling, (radius, one + two, speeds), share)
+            set_vector(spin, i, AFTER, w + part * one)
+            set_vector(spin, j, AFTER, u - part * two)
+            worst = worse(off, worst)
     return worst
 
 
 @outlined
 def turn_pairs(grains, touches):
     """Add the angular impulses of all pairs to the spins at the end of the step."""
-    rows, place, spin = touches.rows, grains.place, grains.spin
-    for k in range(touches.used[0]):
-        c = index(k)
-        i, j, roll = index(touches.ends[c, 0]), index(touches.ends[c, 1]), vector_at(rows, c, ROLL)
-        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) + roll * _ease(place, i))
-        set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - roll * _ease(place, j))
+    place, spin = grains.place, grains.spin
+    for g in range(touches.used[1]):
+        for k in range(touches.lanes[index(g)]):
+            contact, (i, j) = pair_at(touches, g, index(k))
+            roll = contact.vector(ROLL)
+            set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) + roll * _ease(place, i))
+            set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - roll * _ease(place, j))
 
 
 @outlined
 def book_rolling_pairs(grains, near, touches, books):
     """Book what the resistance takes of pairs, and keep its angular impulses for the next step."""
-    rows, spin = touches.rows, grains.spin
-    for k in range(touches.used[0]):
-        c = index(k)
-        i, j, roll = index(touches.ends[c, 0]), index(touches.ends[c, 1]), vector_at(rows, c, ROLL)
-        set_vector(near.drag, index(int(rows[c, LISTED])), KEPT_ROLL, roll)
-        turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
-        turned = turned - (vector_at(spin, j, BEFORE) + vector_at(spin, j, AFTER))
-        lost = -0.25 * dot(roll, turned)
-        rows[c, RUBBED] += 2.0 * lost
-        books.dissipated[index(grains.number[i])] += lost
-        books.dissipated[index(grains.number[j])] += lost
+    spin = grains.spin
+    for g in range(touches.used[1]):
+        for k in range(touches.lanes[index(g)]):
+            contact, (i, j) = pair_at(touches, g, index(k))
+            roll = contact.vector(ROLL)
+            set_vector(near.drag, index(int(contact.number(LISTED))), KEPT_ROLL, roll)
+            turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
+            turned = turned - (vector_at(spin, j, BEFORE) + vector_at(spin, j, AFTER))
+            lost = -0.25 * dot(roll, turned)
+            contact.rows[contact.q + RUBBED, contact.lane] += 2.0 * lost
+            books.dissipated[index(grains.number[i])] += lost
+            books.dissipated[index(grains.number[j])] += lost
 
 
 # --- Of walls --------------------------------------------------------------------------------------------
@@ -117,7 +122,7 @@ def roll_wall(matter, law, wall, grains, touches, number, share):
         i = index(touches.wall_ends[c])
         w, ease, speeds = vector_at(spin, i, AFTER), _ease(place, i), size_of(vector_at(grains.speed, i, AFTER))
         rolling = w - _spin_of(wall, grains, touches, c, i), law.rolling
-        part, off = _resist(matter, rows, c, rolling, (place[i, RADIUS], ease, speeds), share)
+        part, off = _resist(matter, OfWall(rows, c), rolling, (place[i, RADIUS], ease, speeds), share)
         set_vector(spin, i, AFTER, w + part * ease)
         worst = worse(off, worst)
     return worst

@@ -16,12 +16,13 @@ from ..kernel.vector import square
 from ..lanes.watching.log import is_full
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall, count_members
-from .contacts import gather_pairs, push_pairs, worse
+from .contacts import find_more_pairs, find_pairs, worse
 from .exits import let_out, open_wall
-from .friction import book_rubbing, book_rubbing_pairs, rub_wall, twist_pairs, twist_wall
+from .friction import book_rubbing, rub_wall, twist_wall
 from .grain_arrays import AFTER, BEFORE, DONE, LIGHTNESS, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
+from .groups import group_pairs, push_pairs, twist_pairs
 from .held import let_go
-from .lanes_of_pairs import group_pairs, return_pairs, rub_pairs, sweep_pairs
+from .lanes_of_pairs import rub_pairs, sweep_pairs
 from .logged import log_pairs, log_wall, note_pairs, note_wall
 from .overlaps import look_at_pairs, look_at_wall
 from .passing import count_moves
@@ -95,10 +96,13 @@ def _fly(matter, grains):
         set_vector(speed, i, AFTER, v)
 
 
-def _gather(matter, walls, world):
-    """Add the contacts; return how many are new."""
+def _gather(matter, walls, world, is_first):
+    """Add the contacts, first by where balls are to be, then by where they come; how many are new."""
     grains, near, touches = world.grains, world.near, world.touches
-    new = gather_pairs(matter, grains, near, touches)
+    known = touches.used[0]
+    new = find_pairs(matter, grains, near, touches) if is_first else find_more_pairs(matter, grains, near, touches)
+    if new > 0:
+        group_pairs(matter, grains, near, touches, known)
     for k, wall in enumerate(walls.each):
         found = gather_at_wall(matter, matter.walls[k], wall, grains, near, touches, (k, near.wall_first[k]))
         new += found
@@ -140,7 +144,6 @@ def _rub(matter, walls, world, share):
     rub_or_sweep = sweep_pairs if matter.pairs.friction is None else rub_pairs
     worst = rub_or_sweep(matter, grains, touches, share)
     if matter.pairs.rolling is not None:
-        return_pairs(matter, touches)
         worst = worse(roll_pairs(matter, grains, touches, share), worst)
     for k, wall in enumerate(walls.each):
         rub_or_sweep_wall = sweep_wall if matter.walls[k].friction is None else rub_wall
@@ -178,7 +181,6 @@ def _solve_friction(matter, walls, world):
 def _solve(matter, walls, world):
     """Sweep until the impulses solve the step; whether they do."""
     books, lags = world.books, 0
-    group_pairs(matter, world.grains, world.touches)
     # Friction first, to fewer digits: then it is given, and what is to be exact depends on the others alone.
     if matter.rubs and not _solve_friction(matter, walls, world):
         lags = 1
@@ -199,14 +201,13 @@ def _solve(matter, walls, world):
     if worst > _NEARLY:
         lags = 1
     books.lagging[0] += lags
-    return_pairs(matter, world.touches)
     return worst <= _LAGGING
 
 
 def _forget(walls, world):
     """No contacts yet."""
     near, touches = world.near, world.touches
-    touches.used[0] = 0
+    touches.used[0] = touches.used[1] = 0
     near.is_on[:] = False
     near.wall_is_on[:] = False
     for k in range(len(walls.each)):
@@ -262,9 +263,7 @@ def _log(matter, walls, world, time):
 def _book(matter, walls, world):
     """Book what the contacts of the step did; the largest overlap [m]."""
     grains, near, touches, books = world.grains, world.near, world.touches, world.books
-    deepest = book_pairs(matter, grains, touches, books)
-    if matter.pairs.friction is not None:
-        book_rubbing_pairs(matter, grains, near, touches, books)
+    deepest = book_pairs(matter, grains, near, touches, books)
     if matter.pairs.rolling is not None:
         book_rolling_pairs(grains, near, touches, books)
     for k, wall in enumerate(walls.each):
@@ -346,14 +345,14 @@ def _step(matter, walls, listed, world, skin):
     if matter.openings is not None:
         _open(matter, walls, world)
     _forget(walls, world)
-    _gather(matter, walls, world)
+    _gather(matter, walls, world, True)
     more = 1
     while more > 0:
         _push(matter, walls, world)
         if not _solve(matter, walls, world):
             return Status.UNSOLVED.value
         _push(matter, walls, world)
-        more = _gather(matter, walls, world)
+        more = _gather(matter, walls, world, False)
     farthest, longest = _moved(matter, grains)
     sweep = _swept(matter, walls, listed, grains, skin)
     farthest, longest = worse(sweep.farthest, farthest), worse(sweep.longest, longest)

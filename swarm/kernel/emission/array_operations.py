@@ -4,7 +4,6 @@ import functools
 import math
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from llvmlite.ir import Constant
 from llvmlite.ir.instructions import InsertValue
@@ -23,9 +22,10 @@ def emit_spaced(known: Any, stride: int) -> None:
     @operation(known, lambda tables: tables, types.BaseNamedTuple)
     def _emit_tables(context, builder, signature, args):
         (tables,) = args
-        columns, item = (context.get_constant(types.intp, k) for k in (stride, np.dtype(float).itemsize))
+        columns = context.get_constant(types.intp, stride)
         for k, kind in enumerate(signature.args[0]):
             if isinstance(kind, types.Array) and kind.ndim == 2:
+                item = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
                 table = context.make_array(kind)(context, builder, builder.extract_value(tables, k))
                 table.shape = cgutils.pack_array(builder, [builder.extract_value(table.shape, 0), columns])
                 table.strides = cgutils.pack_array(builder, [builder.mul(columns, item), item])
