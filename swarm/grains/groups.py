@@ -120,7 +120,7 @@ def _begin_group(matter, grains, near, touches, group):
         set_vector_in(rows, q + COAST, lane, half * vector_in(rows, q + COAST, lane))
         damping = None
         if matter.pairs.damping is not None:
-            damping = (matter.pairs.damping / matter.h) / math.sqrt(ease)
+            damping = matter.pairs.damping / math.sqrt(ease) / matter.h
             rows[q + DAMPING, lane] = damping
         way = closing(s0, size, move)
         push, gain = begin_solve(pressed(matter, damping, gap, way.change), half * ease)
