@@ -127,8 +127,13 @@ def begin_solve(pressed_first, ease):
 
 def relative(matter, more, push, speeds, ease):
     """A change of an impulse, relative to what moves there, and to what weight does in a step."""
+    return size_of(more) * scale_of(matter, push, speeds, ease)
+
+
+def scale_of(matter, push, speeds, ease):
+    """What the magnitude of such a change is multiplied by."""
     fall = 0.0 if matter.pull is None else matter.h * size_of(matter.pull)
-    return size_of(more) * ease / (push * ease + (speeds + fall) + _TINY)
+    return ease / (push * ease + (speeds + fall) + _TINY)
 
 
 def changed(old, new, share):

@@ -63,10 +63,10 @@ def turning(grains, i, j, column):
     return vector_at(spin, i, column) * spin[i, ARM] + vector_at(spin, j, column) * spin[j, ARM]
 
 
-def arm_of(way, size, change, reach):
-    """s/R of two balls, from their `Closing`, |s0| and the change of the gap."""
+def arm_of(way, size, change, nearness):
+    """s/R of two balls, from their `Closing`, |s0|, the change of the gap, and 1/R."""
     # s0 + s1 is `along` times |s0| + |s1|
-    return way.along * (0.5 * (2.0 * size - change) / reach)
+    return way.along * (0.5 * (2.0 * size - change) * nearness)
 
 
 # --- Of walls --------------------------------------------------------------------------------------------

@@ -38,8 +38,9 @@ START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, DRAG, LISTED, ROLL,
     23,
 )
 COLUMNS, COLUMNS_OF_FRICTION = 16, 24
-# And of one of a pair, in a lane: R_i + R_j, and of both balls 1/m and what turns them.
-REACH, EASES, LEVERS, COLUMNS_OF_LANES = 24, 25, 27, 29
+# And of one of a pair, in a lane: what makes its changes relative ones, 1/(R_i + R_j), and of both balls 1/m and what
+# turns them.
+SCALE, NEARNESS, EASES, LEVERS, COLUMNS_OF_LANES = 15, 24, 25, 27, 29
 # How many contacts of pairs are improved at once, see lanes_of_pairs.py.
 LANES = 8
 # Columns of `Touches.found`: both balls, and the place in the lists. Rows of `Tile.ends`: both balls.

@@ -12,7 +12,7 @@ import numpy as np
 from ..kernel.arrays import fetch, index, unwritten
 from ..kernel.jit import outlined
 from ..kernel.vector import cross
-from .contacts import apart, begin_solve, closing, lasting, pressed
+from .contacts import apart, begin_solve, closing, lasting, pressed, scale_of, size_of
 from .grain_arrays import (
     AFTER,
     BEFORE,
@@ -32,13 +32,14 @@ from .grain_arrays import (
     LEVERS,
     LIGHTNESS,
     LISTED,
+    NEARNESS,
     ONE,
     OTHER,
     PLACE,
     PUSH,
     RADIUS,
-    REACH,
     ROLL,
+    SCALE,
     SIZE,
     START,
     OfPair,
@@ -78,8 +79,9 @@ def move_in(matter, rows, q, lane, difference):
 # The balls of contacts so much later are asked for. A loop that asks is not one of vectors either: LLVM would make
 # gathers of its loads, which take AMD processors longer.
 _LATER = 32
-# Rows of what the contacts of a group begin with: v_i - v_j, of both ends of the step together.
-_BOTH, _READ = 0, 3
+# Rows of what the contacts of a group begin with: v_i - v_j, of both ends of the step together, R_i + R_j, and the sum
+# of the magnitudes of the velocities that are foreseen.
+_BOTH, _REACH, _SPEEDS, _READ = 0, 3, 4, 5
 
 
 def _lay(touches, g, lane, c):
@@ -100,8 +102,10 @@ def _begin_group(matter, grains, near, touches, group):
         v, u = vector_at(speed, i, BEFORE), vector_at(speed, j, BEFORE)
         set_vector_in(rows, q + START, lane, apart(matter, place, i, j))
         set_vector_in(rows, q + COAST, lane, v - u)
-        set_vector_in(read, _BOTH, lane, (v + vector_at(speed, i, AFTER)) - (u + vector_at(speed, j, AFTER)))
-        rows[q + REACH, lane] = place[i, RADIUS] + place[j, RADIUS]
+        v1, u1 = vector_at(speed, i, AFTER), vector_at(speed, j, AFTER)
+        set_vector_in(read, _BOTH, lane, (v + v1) - (u + u1))
+        read[_SPEEDS, lane] = size_of(v1) + size_of(u1)
+        read[_REACH, lane] = place[i, RADIUS] + place[j, RADIUS]
         one, two = place[i, LIGHTNESS], place[j, LIGHTNESS]
         rows[q + EASES, lane], rows[q + EASES + 1, lane] = one, two
         if near.drag is not None:
@@ -115,7 +119,7 @@ def _begin_group(matter, grains, near, touches, group):
         lane = index(k)
         s0, move = vector_in(rows, q + START, lane), half * vector_in(read, _BOTH, lane)
         size = math.sqrt(s0.x * s0.x + s0.y * s0.y + s0.z * s0.z)
-        gap, ease = rows[q + REACH, lane] - size, rows[q + EASES, lane] + rows[q + EASES + 1, lane]
+        gap, ease = read[_REACH, lane] - size, rows[q + EASES, lane] + rows[q + EASES + 1, lane]
         rows[q + SIZE, lane], rows[q + GAP, lane], rows[q + EASE, lane] = size, gap, ease
         set_vector_in(rows, q + COAST, lane, half * vector_in(rows, q + COAST, lane))
         damping = None
@@ -125,8 +129,10 @@ def _begin_group(matter, grains, near, touches, group):
         way = closing(s0, size, move)
         push, gain = begin_solve(pressed(matter, damping, gap, way.change), half * ease)
         rows[q + PUSH, lane], rows[q + GAIN, lane] = push, gain
+        rows[q + SCALE, lane] = scale_of(matter, push, read[_SPEEDS, lane], ease)
         set_vector_in(rows, q + IMPULSE, lane, push * way.along)
         if matter.pairs.friction is not None:
+            rows[q + NEARNESS, lane] = 1.0 / read[_REACH, lane]
             set_vector_in(rows, q + DRAG, lane, vector_in(rows, q + DRAG, lane) * lasting(gap))
         if matter.pairs.rolling is not None:
             set_vector_in(rows, q + ROLL, lane, vector_in(rows, q + ROLL, lane) * lasting(gap))
@@ -223,4 +229,4 @@ def twist_in(rows, q, lane, move):
     """s x J/R of a pair; its s changes by `move`: with all of J, so that no angular momentum is lost at all."""
     s = vector_in(rows, q + START, lane) + 0.5 * move
     impulse = vector_in(rows, q + IMPULSE, lane) + vector_in(rows, q + DRAG, lane)
-    return cross(s * (1.0 / rows[q + REACH, lane]), impulse)
+    return cross(s * rows[q + NEARNESS, lane], impulse)

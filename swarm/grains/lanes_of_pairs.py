@@ -5,10 +5,10 @@ Where two of a group share a ball it goes in parts: so each contact begins with 
 
 import numpy as np
 
-from ..kernel.arrays import index, unwritten
+from ..kernel.arrays import index, kept, unwritten
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, square
-from .contacts import changed, closing, improved, pressed, relative, size_of, weight_of, worse
+from .contacts import changed, closing, improved, pressed, size_of, weight_of, worse
 from .friction import arm_of, rubbed, turning
 from .grain_arrays import (
     AFTER,
@@ -19,9 +19,10 @@ from .grain_arrays import (
     GAP,
     IMPULSE,
     LANES,
+    NEARNESS,
     PUSH,
-    REACH,
     ROUNDNESS,
+    SCALE,
     SIZE,
     START,
     set_vector_in,
@@ -30,10 +31,10 @@ from .grain_arrays import (
 )
 from .groups import balls_of, move_in, of_group, push_ends, twist_ends
 
-# Rows of what a group begins with: v_i - v_j, the sum of the magnitudes of both, and R_i w_i + R_j w_j; and of what it
-# gives: the change of the impulse, the error, and the twist.
-_SLIP, _SPEEDS, _TURNING, _BEGUN = 0, 3, 4, 7
-_PART, _OFF, _TWIST, _GIVEN = 0, 3, 4, 7
+# Rows of what a group begins with: v_i - v_j, and R_i w_i + R_j w_j; and of what it gives: the change of the impulse,
+# the twist, and the largest error of the sweep in each lane.
+_SLIP, _TURNING, _BEGUN = 0, 3, 6
+_PART, _TWIST, _WORST, _GIVEN = 0, 3, 6, 7
 
 
 # --- A group ---------------------------------------------------------------------------------------------
@@ -50,8 +51,8 @@ def _press(matter, rows, q, lane, begun, given, share):
     more, part = changed(old, push * way.along, share)
     rows[q + PUSH, lane] = push
     set_vector_in(rows, q + IMPULSE, lane, old + part)
-    off = relative(matter, more, push, begun[_SPEEDS, lane], rows[q + EASE, lane])
-    given[_OFF, lane] = weight_of(matter.pairs) * off
+    off = weight_of(matter.pairs) * (size_of(more) * rows[q + SCALE, lane])
+    given[_WORST, lane] = worse(off, kept(given[_WORST, lane]))
     return way, part
 
 
@@ -59,7 +60,7 @@ def _rub(matter, rows, q, lane, begun, given, share):
     """Improve the impulse and the friction of a contact of a group."""
     way, part = _press(matter, rows, q, lane, begun, given, share)
     ease, push, over = rows[q + EASE, lane], rows[q + PUSH, lane], 1.0 / square(way.along)
-    arm = arm_of(way, rows[q + SIZE, lane], way.change, rows[q + REACH, lane])
+    arm = arm_of(way, rows[q + SIZE, lane], way.change, rows[q + NEARNESS, lane])
     slip = vector_in(begun, _SLIP, lane) + ease * part - cross(vector_in(begun, _TURNING, lane), arm)
     slip = slip - (dot(slip, way.along) * over) * way.along
     old = vector_in(rows, q + DRAG, lane)
@@ -69,67 +70,61 @@ def _rub(matter, rows, q, lane, begun, given, share):
     set_vector_in(rows, q + DRAG, lane, old + rub)
     set_vector_in(given, _PART, lane, part + rub)
     set_vector_in(given, _TWIST, lane, cross(arm, rub))
-    given[_OFF, lane] = worse(relative(matter, more, push, begun[_SPEEDS, lane], ease), given[_OFF, lane])
+    given[_WORST, lane] = worse(size_of(more) * rows[q + SCALE, lane], kept(given[_WORST, lane]))
 
 
-def _begin(grains, rows, q, ends, e, lane, begun):
+def _begin(grains, ends, e, lane, begun):
     """Read what the improvement of a contact begins with; its balls."""
     i, j = balls_of(ends, e, lane)
-    v, u = vector_at(grains.speed, i, AFTER), vector_at(grains.speed, j, AFTER)
-    set_vector_in(begun, _SLIP, lane, v - u)
-    begun[_SPEEDS, lane] = size_of(v) + size_of(u)
+    set_vector_in(begun, _SLIP, lane, vector_at(grains.speed, i, AFTER) - vector_at(grains.speed, j, AFTER))
     return i, j
 
 
-@outlined
-def _sweep_group(matter, grains, touches, group, share):
-    """Improve the impulses of a group from one lane to another; the largest change."""
-    (g, begin, end), speed, worst = group, grains.speed, 0.0
-    begun, given = unwritten((_BEGUN, LANES), np.float64), unwritten((_GIVEN, LANES), np.float64)
+def _sweep_group(matter, grains, touches, group, arrays, share):
+    """Improve the impulses of a group from one lane to another."""
+    (g, begin, end), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
     for k in range(begin, end):
-        _begin(grains, rows, q, ends, e, index(k), begun)
+        _begin(grains, ends, e, index(k), begun)
     for k in range(begin, end):
         _way, part = _press(matter, rows, q, index(k), begun, given, share)
         set_vector_in(given, _PART, index(k), part)
     for k in range(begin, end):
-        push_ends(speed, rows, q, ends, e, index(k), vector_in(given, _PART, index(k)))
-        worst = worse(given[_OFF, index(k)], worst)
-    return worst
+        push_ends(grains.speed, rows, q, ends, e, index(k), vector_in(given, _PART, index(k)))
 
 
-@outlined
-def _rub_group(matter, grains, touches, group, share):
+def _rub_group(matter, grains, touches, group, arrays, share):
     """Improve the impulses of a group with those of friction, as `_sweep_group`."""
-    (g, begin, end), speed, spin, worst = group, grains.speed, grains.spin, 0.0
-    begun, given = unwritten((_BEGUN, LANES), np.float64), unwritten((_GIVEN, LANES), np.float64)
+    (g, begin, end), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
     for k in range(begin, end):
-        i, j = _begin(grains, rows, q, ends, e, index(k), begun)
+        i, j = _begin(grains, ends, e, index(k), begun)
         set_vector_in(begun, _TURNING, index(k), turning(grains, i, j, AFTER))
     for k in range(begin, end):
         _rub(matter, rows, q, index(k), begun, given, share)
     for k in range(begin, end):
-        push_ends(speed, rows, q, ends, e, index(k), vector_in(given, _PART, index(k)))
-        twist_ends(spin, rows, q, ends, e, index(k), vector_in(given, _TWIST, index(k)))
-        worst = worse(given[_OFF, index(k)], worst)
-    return worst
+        push_ends(grains.speed, rows, q, ends, e, index(k), vector_in(given, _PART, index(k)))
+        twist_ends(grains.spin, rows, q, ends, e, index(k), vector_in(given, _TWIST, index(k)))
 
 
 # --- All -------------------------------------------------------------------------------------------------
 
 
 def _over_groups(one, matter, grains, touches, share):
-    worst = 0.0
+    begun, given = unwritten((_BEGUN, LANES), np.float64), unwritten((_GIVEN, LANES), np.float64)
+    for lane in range(LANES):
+        given[_WORST, index(lane)] = 0.0
     for g in range(touches.used[1]):
         lanes, splits, begin = touches.lanes[index(g)], touches.splits[index(g)], 0
         while begin < lanes:
             end = begin + 1
             while end < lanes and (splits >> end) & 1 == 0:
                 end += 1
-            group = g, begin, end
-            worst = worse(one(matter, grains, touches, group, share), worst)
+            one(matter, grains, touches, (g, begin, end), (begun, given), share)
             begin = end
+    worst = 0.0
+    for lane in range(LANES):
+        worst = worse(given[_WORST, index(lane)], worst)
     return worst
 
 
