@@ -15,7 +15,7 @@ from .contacts import (
     improved,
     lasting,
     pressed,
-    relative,
+    scale_of,
     size_of,
     weight_of,
     worse,
@@ -39,6 +39,7 @@ from .grain_arrays import (
     PUSH,
     RADIUS,
     ROLL,
+    SCALE,
     SIZE,
     START,
     OfWall,
@@ -98,8 +99,10 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             if law.damping is not None:
                 rows[c, DAMPING] = law.damping / math.sqrt(place[i, LIGHTNESS]) / matter.h
             way = rising(own, r0, q0, move)
+            speeds = size_of(vector_at(speed, i, AFTER))
             first = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
             rows[c, PUSH], rows[c, GAIN] = begin_solve(first, half * place[i, LIGHTNESS] * square(way.along))
+            rows[c, SCALE] = scale_of(matter, rows[c, PUSH], speeds, place[i, LIGHTNESS])
             set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
             if near.wall_drag is not None:
                 rows[c, LISTED] = k
@@ -125,7 +128,7 @@ def press_at_wall(matter, law, own, grains, rows, at, share):
     wanted, _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
     rows[c, PUSH] = improved(rows[c, PUSH], wanted, rows[c, GAIN])
     more, part = change_of(OfWall(rows, c), IMPULSE, rows[c, PUSH] * way.along, share)
-    off = weight_of(law) * relative(matter, more, rows[c, PUSH], size_of(v), rows[c, EASE])
+    off = weight_of(law) * (size_of(more) * rows[c, SCALE])
     return way, v + part * rows[c, EASE], off
 
 

@@ -125,13 +125,11 @@ def begin_solve(pressed_first, ease):
     return push, 1.0 / (1.0 + select(slope > 0.0, ease * slope, 0.0))
 
 
-def relative(matter, more, push, speeds, ease):
-    """A change of an impulse, relative to what moves there, and to what weight does in a step."""
-    return size_of(more) * scale_of(matter, push, speeds, ease)
-
-
 def scale_of(matter, push, speeds, ease):
-    """What the magnitude of such a change is multiplied by."""
+    """What makes the magnitude of a change of an impulse one relative to what moves there, and what weight does.
+
+    `push` and `speeds`, the sum of the magnitudes of the velocities, are those with which the solution begins.
+    """
     fall = 0.0 if matter.pull is None else matter.h * size_of(matter.pull)
     return ease / (push * ease + (speeds + fall) + _TINY)
 

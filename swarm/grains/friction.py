@@ -18,7 +18,7 @@ from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, cross, dot, square
 from ..surfaces.in_motion.posed import Posed
 from .at_walls import press_at_wall, rising
-from .contacts import change_of, relative, size_of, worse
+from .contacts import change_of, size_of, worse
 from .grain_arrays import (
     AFTER,
     ARM,
@@ -31,6 +31,7 @@ from .grain_arrays import (
     RADIUS,
     ROUNDNESS,
     RUBBED,
+    SCALE,
     SIZE,
     START,
     OfWall,
@@ -113,7 +114,7 @@ def rub_wall(matter, law, wall, grains, touches, number, share):
         more, part = change_of(OfWall(rows, c), DRAG, new, share)
         set_vector(speed, i, AFTER, v + part * ease)
         set_vector(spin, i, AFTER, w - cross(n, part) * (ROUNDNESS * ease / radius))
-        worst = worse(relative(matter, more, rows[c, PUSH], size_of(v), ease), worse(off, worst))
+        worst = worse(size_of(more) * rows[c, SCALE], worse(off, worst))
     return worst
 
 

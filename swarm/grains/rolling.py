@@ -11,12 +11,11 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, dot, square
 from ..surfaces.in_motion.posed import Posed
-from .contacts import change_of, relative, size_of, worse
+from .contacts import change_of, size_of, worse
 from .friction import across, rubbed
 from .grain_arrays import (
     AFTER,
     BEFORE,
-    EASE,
     IMPULSE,
     KEPT_ROLL,
     LIGHTNESS,
@@ -26,6 +25,7 @@ from .grain_arrays import (
     ROLL,
     ROUNDNESS,
     RUBBED,
+    SCALE,
     OfWall,
     set_vector,
     vector_at,
@@ -39,19 +39,19 @@ def _ease(place, i):
     return ROUNDNESS * place[i, LIGHTNESS] / (place[i, RADIUS] * place[i, RADIUS])
 
 
-def _resist(matter, contact, rolling, sizes, share):
+def _resist(contact, rolling, sizes, share):
     """The change of the angular impulse of a contact, and the error: of the rolling at the end of the step.
 
-    `sizes` are the radius R, 1/I, and the sum of the speeds of what touches.
+    `sizes` are the radius R and 1/I.
     """
-    (radius, ease, speeds), n, roll = sizes, contact.vector(IMPULSE), contact.vector(ROLL)
+    (radius, ease), n, roll = sizes, contact.vector(IMPULSE), contact.vector(ROLL)
     if not square(n) > 0.0:
         contact.set_vector(ROLL, ZERO)
         return -1.0 * roll, 0.0
-    push = contact.number(PUSH)
-    new = rubbed(across(roll, n), across(rolling[0], n), ease, rolling[1] * radius * push)
+    limit = rolling[1] * radius * contact.number(PUSH)
+    new = rubbed(across(roll, n), across(rolling[0], n), ease, limit)
     more, part = change_of(contact, ROLL, new, share)
-    return part, relative(matter, more * (1.0 / radius), push, speeds, contact.number(EASE))
+    return part, size_of(more * (1.0 / radius)) * contact.number(SCALE)
 
 
 # --- Of pairs --------------------------------------------------------------------------------------------
@@ -60,15 +60,14 @@ def _resist(matter, contact, rolling, sizes, share):
 @outlined
 def roll_pairs(matter, grains, touches, share):
     """Improve the angular impulse of each pair in turn; the largest change, relative to what moves there."""
-    place, speed, spin, worst = grains.place, grains.speed, grains.spin, 0.0
+    place, spin, worst = grains.place, grains.spin, 0.0
     for g in range(touches.used[1]):
         for k in range(touches.lanes[index(g)]):
             contact, (i, j) = pair_at(touches, g, index(k))
             w, u, one, two = vector_at(spin, i, AFTER), vector_at(spin, j, AFTER), _ease(place, i), _ease(place, j)
             radius = place[i, RADIUS] * place[j, RADIUS] / (place[i, RADIUS] + place[j, RADIUS])
-            speeds = size_of(vector_at(speed, i, AFTER)) + size_of(vector_at(speed, j, AFTER))
             rolling = w - u, matter.pairs.rolling
-            part, off = _resist(matter, contact, rolling, (radius, one + two, speeds), share)
+            part, off = _resist(contact, rolling, (radius, one + two), share)
             set_vector(spin, i, AFTER, w + part * one)
             set_vector(spin, j, AFTER, u - part * two)
             worst = worse(off, worst)
@@ -120,9 +119,9 @@ def roll_wall(matter, law, wall, grains, touches, number, share):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        w, ease, speeds = vector_at(spin, i, AFTER), _ease(place, i), size_of(vector_at(grains.speed, i, AFTER))
+        w, ease = vector_at(spin, i, AFTER), _ease(place, i)
         rolling = w - _spin_of(wall, grains, touches, c, i), law.rolling
-        part, off = _resist(matter, OfWall(rows, c), rolling, (place[i, RADIUS], ease, speeds), share)
+        part, off = _resist(OfWall(rows, c), rolling, (place[i, RADIUS], ease), share)
         set_vector(spin, i, AFTER, w + part * ease)
         worst = worse(off, worst)
     return worst
