@@ -25,6 +25,8 @@ were improved eight at once, from the last step's change: 1.4e-10 at their ends,
 One cell of `AugmentedLagrangian` in an intersection that swings was written again when safe steps in a convex cavity
 took the steepest place of its wall for a bound of |grad q|: 4e-12 at its end. One of samples beside a
 wall that moves was written again when first hits were guessed and proven, aim.py: 2e-16 at its end.
+Five cells of grains were written again when a contact's changes became relative to what moved there as its step began,
+and 1/(R_i + R_j) a number of the contact: 1e-12 at their ends, for sweeps end one earlier or later.
 Twelve cells of a user-defined surface were written again when straight flights to it looked from both sides: hits to
 round-off.
 
