@@ -201,8 +201,8 @@ def _settled(walls, wall, touch, r, near):
         if holds or (touch.touched[i] and touch.depth[i] > 0.0):
             r = walls.project(touch.number[i], r)
     if touch.frame is not None:
-        # A wall that moves is left by more than round-off; where another one ends it is met on that one only. One that was
-        # farther away, and is not touched, has gained on the particle by what it accelerates: no straight way shows that.
+        # A wall that moves is left by more than round-off; where another one ends it is met on that one only. One that
+        # is not touched may have gained on the particle by what it accelerates, which no straight way shows.
         _depths(walls, touch.number, r, touch.depth)
         for i in range(touch.touched.size):
             if touch.depth[i] > near:
