@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import swarm
+from swarm.kernel.vector import vec
 
 H, ALPHA, RATE = 0.01, 300.0, 2.0
 TURN = swarm.Rotation((0.3, 0.5, 1.0), RATE, (0.02, -0.01, 0.0))
@@ -17,6 +18,7 @@ WALLS = {
     "paddle": lambda motion: [
         swarm.Sphere(0.8), swarm.Ellipsoid((0.1, 0.3, 0.2), (0.3, 0.0, 0.0), side="outside", motion=motion),
     ],
+    "box": lambda motion: [swarm.Box((0.3, 0.25, 0.2), rotation=(1.0, 0.3, -0.2, 0.5), motion=motion)],
     "wedge": lambda motion: [swarm.Plane((s, 0.3, -1.0), 0.2, motion=motion) for s in (-1.0, 1.0)],
 }  # fmt: skip
 
@@ -33,6 +35,32 @@ def imbalance(result):
     kept = seen["total_energy"] - seen["wall_work"].sum(axis=1)
     kept = kept + seen["dissipated_energy"] if "dissipated_energy" in seen else kept
     return np.abs(kept - kept[0]).max() / np.abs(seen["total_energy"]).max()
+
+
+FLAT = {
+    "plane": swarm.Plane((0.2, 0.3, -1.0), 0.2, motion=TURN),
+    "slab": swarm.Slab((0.2, 0.3, -1.0), 0.3, motion=SWING + TURN),
+    "plate": swarm.Slab((1.0, 0.3, 0.4), 0.1, side="outside", motion=TURN),
+}
+
+
+@pytest.mark.parametrize("kappa", [1e-3, 0.03])
+@pytest.mark.parametrize("name", FLAT)
+def test_one_push_of_a_flat_wall_is_where_many_end(name, kappa):
+    walls = swarm.Scene([FLAT[name]]).compiled().walls(1.3)
+    # A long step: its angle is 0.4 rad.
+    wall = walls.during(0.5, 0.3).each[0]
+    kappa = wall.side * kappa
+    rng = np.random.default_rng(3)
+    for r, p in zip(rng.uniform(-0.5, 0.5, (10, 3)), rng.uniform(-0.1, 0.1, (10, 3)), strict=True):
+        r, p = vec(r), vec(p)
+        many = wall._step(r, p, kappa)
+        assert np.array(wall.push(r, p, kappa)) == pytest.approx(np.array(wall.end_out(many.end)), abs=1e-14)
+        rise, slope = wall.rise(r, p, kappa)
+        assert rise == pytest.approx(wall.end_inner(wall.push(r, p, kappa)) - wall.inner(r), abs=1e-14)
+        step = 1e-5
+        ahead, behind = (wall.rise(r, p, kappa + change)[0] for change in (step, -step))
+        assert slope == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6, abs=1e-8)
 
 
 # --- Work ------------------------------------------------------------------------------------------------
