@@ -406,6 +406,11 @@ class Surface(Validated):
         """Whether a rotation about the unit vector `axis` through a point leaves the surface where it is."""
         return False
 
+    def turning_center(self, axis: Vector) -> Vector | None:
+        """A point through which that is so, of one that another rotation about this axis carries along a circle."""
+        center: Vector | None = getattr(self, "center", None)
+        return center if center is not None and self.is_unturned_by(axis, center) else None
+
     def admits(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not."""
         return np.asarray(side_sign(getattr(self, "side", "inside")) * self.phi(points, 0.0) <= 0.0)

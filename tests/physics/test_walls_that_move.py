@@ -3,6 +3,7 @@
 import functools
 import math
 import re
+from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -283,6 +284,36 @@ def test_a_rotating_sphere_does_nothing_and_a_rotating_box_heats():
     seen = result.observables
     assert seen["total_energy"][-1] > 4.0 * seen["total_energy"][0]
     assert imbalance(result) <= 1e-14
+
+
+@pytest.mark.parametrize("name", ["sphere", "cylinder along the axis"])
+@pytest.mark.parametrize("motion", ["rotation", "sum"])
+def test_a_rotation_that_carries_a_round_surface_along_a_circle_is_a_swing(name, motion):
+    center = (0.2, -0.1, 0.3)
+    if name == "sphere":
+        surface = swarm.Sphere(0.5, center, motion=MOTIONS[motion])
+    else:
+        surface = swarm.Cylinder(0.4, axis=TURN.axis, length=0.9, center=center, motion=MOTIONS[motion])
+    moment, remaining = 2.3, 0.9
+    drive, at = drive_of(surface, moment), moment - remaining
+    assert drive.turn is None
+    points = np.random.default_rng(5).uniform(-1.0, 1.0, (3, 20))
+    now = swarm.Scene([surface]).compiled().walls(moment).at(remaining)
+    rest = swarm.Scene([replace(surface, motion=None)]).compiled().walls(moment)
+    placed, spin = pose(MOTIONS[motion], at), 1.3 * np.array(TURN.axis) / math.sqrt(14.0)
+    middle = np.array(TURN.center) + placed.shift
+    moving = [part for part in getattr(MOTIONS[motion], "parts", ()) if not isinstance(part, swarm.Rotation)]
+    steady = sum((part.harmonic((0.0, 0.0, 0.0)).velocity_at(at) for part in moving), np.zeros(3))
+    for r in points.T:
+        own = np.array(TURN.center) + placed.turn.T @ (r - middle)
+        for k in range(len(now.each)):
+            assert now.distance(float(k), vec(r)) == pytest.approx(rest.distance(float(k), vec(own)), abs=1e-15)
+            assert np.array(now.velocity(float(k), vec(r))) == pytest.approx(
+                steady + np.cross(spin, r - middle), abs=1e-15
+            )
+    # The circle is as far from the axis as the centre is, and its bounds are those of uniform motion along it.
+    arm = np.linalg.norm(np.cross(np.array(center) - TURN.center, TURN.axis)) / math.sqrt(14.0)
+    assert drive.swings[-1].amplitude() == pytest.approx(arm, rel=1e-14)
 
 
 def test_the_laws_act_on_the_relative_velocity():

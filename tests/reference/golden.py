@@ -27,6 +27,8 @@ took the steepest place of its wall for a bound of |grad q|: 4e-12 at its end. O
 wall that moves was written again when first hits were guessed and proven, aim.py: 2e-16 at its end.
 Five cells of grains were written again when a contact's changes became relative to what moved there as its step began,
 and 1/(R_i + R_j) a number of the contact: 1e-12 at their ends, for sweeps end one earlier or later.
+One cell of `AugmentedLagrangian` in a sphere that turns was written again when its centre swings along a circle
+instead: another step of second order, 2e-6 at its end.
 Twelve cells of a user-defined surface were written again when straight flights to it looked from both sides: hits to
 round-off.
 

@@ -10,6 +10,7 @@ import swarm
 from swarm.kernel.vector import dot, vec
 from swarm.surfaces.in_motion.moving import Aimed
 from swarm.surfaces.time_of_impact import aim, strides
+from swarm.surfaces.time_of_impact.flights import COURSE
 
 TURN = swarm.Rotation((1.0, 2.0, 3.0), rate=1.3, center=(0.1, 0.0, -0.05))
 MOTIONS = {
@@ -19,6 +20,10 @@ MOTIONS = {
     "turn": TURN,
     "sum": swarm.Translation((0.3, -0.2, 0.1)) + swarm.Oscillation((0.05, 0.03, 0.08), frequency=0.7) + TURN,
 }
+# More angles than a lane of one wall has rows for.
+MOTIONS["many swings"] = sum(
+    (swarm.Oscillation((0.03, 0.0, 0.02), frequency=frequency) for frequency in (0.3, 0.4)), MOTIONS["swing"]
+)
 CAVITIES = {
     "sphere": lambda motion: swarm.Sphere(0.5, (0.1, -0.05, 0.02), motion=motion),
     "box": lambda motion: swarm.Box((0.5, 0.4, 0.3), rotation=(1.0, 0.3, -0.2, 0.5), motion=motion),
@@ -29,7 +34,7 @@ START, SPAN, FLIGHTS = 0.6, 2.5, 24
 
 
 def course_of(walls):
-    return np.full((aim.WALLS + aim._OF_WALL * len(walls.each), 1), math.nan)
+    return np.full((aim.WALLS + COURSE * len(walls.each), 1), math.nan)
 
 
 def aimed_hit(walls, flight):
@@ -38,7 +43,9 @@ def aimed_hit(walls, flight):
     with np.errstate(all="ignore"):
         aim.start(walls, None, course, 0, *flight)
         for _round in range(aim.AIMS):
+            aim.put_waves(walls, course, 0, flight[2])
             aim.improve(walls, None, course, 0, *flight)
+        aim.put_waves(walls, course, 0, flight[2])
         aim.prove(walls, None, course, 0, *flight)
         return None if aim.is_open(course, 0, flight[2]) else strides.met(course, 0)
 
@@ -115,6 +122,44 @@ def test_roots_are_those_of_fifty_digits(motion):
             late = float(abs(root - hit.time) * slope)
         assert late <= 4.0 * np.finfo(float).eps * (sum(map(abs, r)) + math.hypot(*v) * hit.time + 1.0)
     assert found >= 5
+
+
+def test_a_sphere_that_goes_along_a_circle_is_met_as_in_fifty_digits():
+    """|r + v t - c(t)|^2 = R^2, which has no root before."""
+    center, radius = (0.1, -0.05, 0.02), 0.5
+    scene = swarm.Scene([swarm.Sphere(radius, center, motion=TURN)])
+    walls, found = scene.compiled().walls(START + SPAN), 0
+    assert isinstance(walls, Aimed)
+    for (r, v, remaining), _hit in flights(scene, walls, 13):
+        hit = aimed_hit(walls, (r, v, remaining))
+        if hit is None or hit.wall < 0.0 or not hit.time < remaining:
+            continue
+        found += 1
+        with mpmath.workdps(50):
+            level = _sphere_in_digits(TURN, center, radius, r, v, mpmath.mpf(START + SPAN) - mpmath.mpf(remaining))
+            root = mpmath.findroot(level, hit.time)
+            late = float(abs(root - hit.time) * abs(mpmath.diff(level, root))) / (2.0 * radius)
+            before = max(level(hit.time * k / 50.0) for k in range(1, 50))
+        assert late <= 4.0 * np.finfo(float).eps * (sum(map(abs, r)) + math.hypot(*v) * hit.time + 1.0)
+        assert before < 0.0
+    assert found >= FLIGHTS // 2
+
+
+def _sphere_in_digits(turn, center, radius, r, v, at):
+    """The level at a time after `at`."""
+    k = mpmath.matrix(turn.axis) / mpmath.norm(mpmath.matrix(turn.axis))
+    arm = mpmath.matrix(center) - mpmath.matrix(turn.center)
+    r, v, along = mpmath.matrix(r), mpmath.matrix(v), mpmath.fdot(k, arm) * k
+    across = mpmath.matrix(
+        [k[1] * arm[2] - k[2] * arm[1], k[2] * arm[0] - k[0] * arm[2], k[0] * arm[1] - k[1] * arm[0]]
+    )
+
+    def level(t):
+        angle = turn.rate * (at + t)
+        middle = mpmath.matrix(turn.center) + along + mpmath.cos(angle) * (arm - along) + mpmath.sin(angle) * across
+        return mpmath.norm(r + v * t - middle) ** 2 - mpmath.mpf(radius) ** 2
+
+    return level
 
 
 def _plane_in_digits(given, offset, r, v, at):

@@ -62,6 +62,18 @@ class PoseDerivatives(Record):
         return r if self.turn is None else center + self.turn.back(r - center)
 
 
+class Wave(Record):
+    """The sine and the versine of the angle of a swing, or of a rotation, at one instant."""
+
+    sine: float
+    versine: float
+
+
+def wave_of(angle):
+    """The `Wave` of an angle."""
+    return Wave(*sine_and_versine(angle))
+
+
 class Swing(Record):
     """C (cos(w t) - 1) + S sin(w t), with the time t since the end of the frame."""
 
@@ -69,15 +81,21 @@ class Swing(Record):
     sine: Vec
     rate: float
 
-    def added(self, t, d, v, a):
-        """A displacement and its first two derivatives with those of the swing added."""
-        s, versine = sine_and_versine(self.rate * t)
+    def added(self, wave, d, v, a):
+        """A displacement and its first two derivatives with those of the swing added, from the `Wave` of its angle."""
+        s, versine = wave
         c = 1.0 - versine
         return (
             d + self.sine * s - self.cosine * versine,
             v + self.rate * (self.sine * c - self.cosine * s),
             a - (self.rate * self.rate) * (self.sine * s + self.cosine * c),
         )
+
+    def amplitude(self):
+        """The largest |C cos a + S sin a|."""
+        c, s, both = square(self.cosine), square(self.sine), dot(self.cosine, self.sine)
+        half = 0.5 * (c - s)
+        return math.sqrt(0.5 * (c + s) + math.sqrt(half * half + both * both))
 
     def mean_velocity(self, middle, h):
         """w sinc(w h/2) (S cos w m - C sin w m) over a time h around the middle m."""
@@ -127,10 +145,10 @@ class Turn(Record):
     axis: Vec
     rate: float
 
-    def at(self, t):
-        """The rows of A."""
+    def at(self, wave):
+        """The rows of A, from the `Wave` of its angle."""
         # A(t) = A R, with the rotation R about the same axis: the rows of A, turned back.
-        s, versine = sine_and_versine(self.rate * t)
+        s, versine = wave
         k = self.axis
         # row cos a + (1 - cos a) k (k.row) - sin a k x row
         return RotationRows(
@@ -139,7 +157,8 @@ class Turn(Record):
 
     def mean_velocity(self, middle, h, arm):
         """(A1 - A0) rho/h of an arm rho in the frame of the wall: w sinc(w h/2) k x A(m) rho."""
-        return (self.rate * _sinc(0.5 * self.rate * h)) * cross(self.axis, self.at(middle).out(arm))
+        turned = self.at(wave_of(self.rate * middle)).out(arm)
+        return (self.rate * _sinc(0.5 * self.rate * h)) * cross(self.axis, turned)
 
 
 def _sinc(x):
@@ -162,15 +181,26 @@ class Drive(Record):
     time_scale: float  # a time in which it changes little [s]
     late: float  # its fastest speed times the time [m], which the round-off of its place is relative to
     jerks: Vec  # bounds of the components of d''' [m/s^3]
+    waves: Any = None  # those of the one instant that is asked for, where they are known: see `waves_at`
+
+    def rates(self):
+        """The rate of each angle: of the swings, then of the rotation."""
+        rates = tuple(swing.rate for swing in self.swings)
+        return rates if self.turn is None else (*rates, self.turn.rate)
+
+    def waves_at(self, remaining):
+        """The `Wave` of each angle when so much of the frame is left [s]."""
+        return tuple(wave_of(rate * -remaining) for rate in self.rates())
 
     def pose(self, remaining):
         """The `PoseDerivatives` when so much of the frame is left [s]."""
         t = -remaining
         d, v, a = ZERO, ZERO, ZERO
-        for swing in self.swings:
-            d, v, a = swing.added(t, d, v, a)
+        waves = self.waves_at(remaining) if self.waves is None else self.waves
+        for k, swing in enumerate(self.swings):
+            d, v, a = swing.added(waves[k], d, v, a)
         e, w, b = (ZERO, ZERO, ZERO) if self.track is None else self.track.at(t)
-        turn = None if self.turn is None else self.turn.at(t)
+        turn = None if self.turn is None else self.turn.at(waves[len(self.swings)])
         return PoseDerivatives(self.shift + t * self.velocity + d + e, self.velocity + v + w, a + b, turn)
 
     def mean_velocity(self, middle, h):
@@ -188,8 +218,7 @@ class Drive(Record):
             return None
         amplitude = 0.0
         for swing in self.swings:
-            # |C cos a + S sin a| <= |(C, S)|
-            amplitude += math.sqrt(square(swing.cosine) + square(swing.sine))
+            amplitude += swing.amplitude()
         return amplitude
 
     def swing_center(self, t):
@@ -222,23 +251,15 @@ def drive_of(surface: Surface, moment: float) -> Drive:
     # A guide says how impacts move a wall, which is at rest before.
     parts = [one for one in motions.parts_of(surface.motion) if not isinstance(one, motions.Guide)]
     velocity, track, turn, spin, center = np.zeros(3), None, None, None, ZERO
-    swings: tuple[Swing, ...] = ()
+    harmonics: list[motions.Led] = []
+    shift = motions.pose(surface.motion, moment).shift
     fastest = hardest = jerk = 0.0
     time_scale, jerks = math.inf, np.zeros(3)
     for one in parts:
         if isinstance(one, motions.Translation):
             velocity = velocity + np.array(one.velocity)
         elif isinstance(one, motions.Oscillation):
-            led = one.harmonic((0.0, 0.0, 0.0))
-            c, s = math.cos(led.rate * moment), math.sin(led.rate * moment)
-            # C cos(a + b) + S sin(a + b), with the angle a at the end of the frame
-            swing = Swing(_vector(c * led.cosine + s * led.sine), _vector(c * led.sine - s * led.cosine), led.rate)
-            swings = (*swings, swing)
-            amplitude, time_scale = math.hypot(*one.amplitude), min(time_scale, _SLOW / led.rate)
-            fastest += amplitude * led.rate
-            hardest += amplitude * led.rate**2
-            jerk += amplitude * led.rate**3
-            jerks += np.abs(one.amplitude) * led.rate**3
+            harmonics.append(one.harmonic((0.0, 0.0, 0.0)))
         elif isinstance(one, motions.Path):
             cubics = one.cubics
             track = Track(one.knots, cubics, _vector(one.displacement(moment)), moment)
@@ -256,16 +277,38 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             fastest += float(max(np.sqrt((control**2).sum(axis=0)).max() for control in controls))
         else:
             axis = motions.unit_axis(one)
+            direction = tuple(axis.tolist())
             time_scale = min(time_scale, _SLOW / abs(one.rate)) if one.rate else time_scale
             center, spin = _vector(one.center), _vector(one.rate * axis)
-            if not surface.is_unturned_by(tuple(axis.tolist()), one.center):
-                rows = motions.pose(one, moment).turn
-                x, y, z = map(vec, rows.tolist())
+            if surface.is_unturned_by(direction, one.center):
+                continue
+            about = surface.turning_center(direction) if one.rate else None
+            if about is None:
+                x, y, z = map(vec, motions.pose(one, moment).turn.tolist())
                 turn = Turn(x, y, z, _vector(axis), one.rate)
-    shift = motions.pose(surface.motion, moment).shift
+            else:
+                # It is carried along a circle, and turned about its own centre, which leaves it as it is.
+                circle = one.harmonic(about)
+                harmonics.append(circle)
+                center, shift = _vector(about), shift + circle.position(moment) - circle.start
+    swings = tuple(_swing(led, moment) for led in harmonics)
+    for swing, led in zip(swings, harmonics, strict=True):
+        amplitude, rate = swing.amplitude(), abs(led.rate)
+        time_scale = min(time_scale, _SLOW / rate)
+        fastest += amplitude * rate
+        hardest += amplitude * rate**2
+        jerk += amplitude * rate**3
+        jerks += np.hypot(led.cosine, led.sine) * rate**3
     fastest += math.hypot(*velocity)
     bounds = fastest, hardest, jerk, time_scale, fastest * moment, _vector(jerks)
     return Drive(_vector(shift), _vector(velocity), swings, track, turn, spin, center, *bounds)
+
+
+def _swing(led: motions.Led, moment: float) -> Swing:
+    """The swing of what is led, in the frame that ends at a moment [s]."""
+    c, s = math.cos(led.rate * moment), math.sin(led.rate * moment)
+    # C cos(a + b) + S sin(a + b), with the angle a at the end of the frame
+    return Swing(_vector(c * led.cosine + s * led.sine), _vector(c * led.sine - s * led.cosine), led.rate)
 
 
 def _vector(values: Any) -> Vec:

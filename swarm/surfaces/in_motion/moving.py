@@ -94,6 +94,22 @@ class Strided(Marched):
 class Aimed(Strided):
     """The same where most flights need none of them: see aim.py."""
 
+    def drives(self):
+        """The motion of each surface that moves other than uniformly."""
+        return tuple(wall.drive for wall in self.each if isinstance(wall, Moving) and wall.accelerates)
+
+    def with_waves(self, waves):
+        """The walls at one instant, at which the waves of all of these motions are these; () if they are not known."""
+        if not waves:
+            return self
+        made: tuple[Any, ...] = ()
+        for wall in self.each:
+            if isinstance(wall, Moving) and wall.accelerates:
+                count = len(wall.drive.rates())
+                wall, waves = wall._replace(drive=wall.drive._replace(waves=waves[:count])), waves[count:]
+            made = (*made, wall)
+        return self._replace(each=made)
+
 
 class Leaping(Marched):
     """The same where what moves otherwise as a field are facets: lanes leap through their cells."""

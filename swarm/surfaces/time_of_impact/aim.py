@@ -13,13 +13,17 @@ from ...kernel.gravity import accelerated
 from ...kernel.jit import select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import ZERO, norm
-from .rising import ThirdDerivativeBound, flight_of
+from ..in_motion.drive import Wave
+from .flights import COURSE
+from .rising import ThirdDerivativeBound, flight_of, nearest_root
 from .safe import closed_hit, seen_by_walls
 from .strides import AHEAD, CLOSED, MET, OTHER, SPEED, TIME, pace
 
 # Of a lane besides what its strides know: the guess, and of each wall the polynomial at the start, when the flight
 # enters what the wall never reaches, infinite if it does not, and when it leaves that.
 _GUESS, WALLS, _OF_WALL, _ENTERS, _LEAVES = 5, 6, 5, 3, 4
+# After the walls are the sine and the versine of each angle at the guess.
+_OF_WAVE = 2
 # Improvements of the guess before the last.
 AIMS = 2
 
@@ -52,10 +56,41 @@ def start(walls, gravity, course, lane, r, v, remaining):
             course[at + _LEAVES, lane] = way.leaves
 
 
+def put_waves(walls, course, lane, remaining):
+    """The waves of all motions at the guess of a lane, in a loop of its own: two short loops are sooner than a long."""
+    guess, at = course[_GUESS, lane], _first_wave(walls)
+    for drive in _known_drives(walls):
+        for wave in drive.waves_at(remaining - guess):
+            course[at, lane], course[at + 1, lane] = wave
+            at += _OF_WAVE
+
+
+def _at_guess(walls, course, lane):
+    """The walls with the waves of a lane."""
+    at = _first_wave(walls)
+    waves: tuple[Wave, ...] = ()
+    for drive in _known_drives(walls):
+        for _rate in drive.rates():
+            waves = (*waves, Wave(course[at, lane], course[at + 1, lane]))
+            at += _OF_WAVE
+    return walls.with_waves(waves)
+
+
+def _first_wave(walls):
+    return WALLS + len(walls.each) * _OF_WALL
+
+
+def _known_drives(walls):
+    """The motions of which the waves are kept: all, if a lane has the rows."""
+    drives = walls.drives()
+    count = sum(len(drive.rates()) for drive in drives)
+    return drives if count * _OF_WAVE <= len(walls.each) * (COURSE - _OF_WALL) else ()
+
+
 def improve(walls, gravity, course, lane, r, v, remaining):
     """A guess that is nearer to the hit."""
     guess = course[_GUESS, lane]
-    known = _known(walls, gravity, course[SPEED, lane], r, v, remaining, guess)
+    known = _known(_at_guess(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
     closed = course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining)
     way, _wall = _nearest_root(known)
@@ -68,7 +103,7 @@ def prove(walls, gravity, course, lane, r, v, remaining):
     """The hit of a lane, if it is proven."""
     guess, closed = course[_GUESS, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining)
-    known = _known(walls, gravity, course[SPEED, lane], r, v, remaining, guess)
+    known = _known(_at_guess(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
     way, wall = _nearest_root(known)
     meets = guess + way < longest
     way = select(meets, way, longest - guess)
@@ -108,9 +143,12 @@ def _known(walls, gravity, speed, r, v, remaining, t):
 
 
 def _nearest_root(known):
-    first, wall = math.inf, -1.0
+    """How far ahead, or back, the first of the parabolas rises that are next to 0 by their slopes, and its wall."""
+    c, b, a, wall = 0.0, 0.0, 0.0, -1.0
     for number, one in known:
-        way = one.level.nearest_root()
-        mine = way < first
-        first, wall = select(mine, way, first), select(mine, number, wall)
-    return first, wall
+        mine = one.level.ahead()
+        # -c/b < -c'/b' without a division
+        sooner = (mine.b > 0.0) & ((b <= 0.0) | (mine.c * b > c * mine.b))
+        c, b, a = select(sooner, mine.c, c), select(sooner, mine.b, b), select(sooner, mine.a2, a)
+        wall = select(sooner, number, wall)
+    return nearest_root(c, b, a), wall

@@ -143,9 +143,9 @@ class Level(Majorant):
         """When its own parabola rises."""
         return rise_time(self.c, self.b, self.a2)
 
-    def nearest_root(self):
-        """How far ahead, or back, its own parabola rises through 0 next to here; infinite if it does not rise here."""
-        return _nearest_root(self.c, self.b, self.a2)
+    def ahead(self):
+        """The level that may rise."""
+        return self
 
     def moved(self, way, meets):
         """Its own parabola from a little later on, where it is 0 if it meets the wall."""
@@ -178,9 +178,9 @@ class Between(Record):
         """The bound of f''' within that time."""
         return bounds.jerk
 
-    def nearest_root(self):
-        """As of a `Level`, of the plane ahead."""
-        return _nearest_root(self.place - self.radius, self.half, self.bend)
+    def ahead(self):
+        """That of the plane ahead."""
+        return Level(self.place - self.radius, self.half, self.bend, 1.0, 0.0)
 
     def moved(self, way, meets):
         """As of a `Level`."""
@@ -222,7 +222,8 @@ class Between(Record):
         return select(behind < ahead, behind, ahead)
 
 
-def _nearest_root(c, b, a):
+def nearest_root(c, b, a):
+    """How far ahead, or back, c + 2 b t + a t^2 rises through 0 next to here; infinite if it does not rise here."""
     bottom = b + _root(b * b - a * c)
     return select(b > 0.0, -c / select(b > 0.0, bottom, 1.0), math.inf)
 
@@ -230,13 +231,10 @@ def _nearest_root(c, b, a):
 def _is_below(c, slope, a, sixth, within, at_wall):
     """Whether c + slope t + a t^2 + sixth t^3 is surely not above 0 for so long; at a wall c is at most round-off."""
     c, rest, bend = select(at_wall & (c > 0.0), 0.0, c), within * sixth, within * a
-    # What the bracket is at most at both ends, or, without a bend down, the whole of it: both are convex.
+    # The bracket is convex, or grows: it is at most what it is at one of its ends.
     last = slope + bend + within * rest
     steepest = select(last > slope, last, slope)
-    convex = select(a > 0.0, last, last - bend)
-    lower = select(convex < steepest, convex, steepest)
-    # Or the parabola above it has no root.
-    return (c + within * select(lower > 0.0, lower, 0.0) <= 0.0) | ((c < 0.0) & (slope * slope < 4.0 * c * (a + rest)))
+    return c + within * select(steepest > 0.0, steepest, 0.0) <= 0.0
 
 
 def _root(discriminant):
