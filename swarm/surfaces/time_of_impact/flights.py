@@ -149,13 +149,15 @@ def _keep(course, at, lane, known):
     course[at + _TIME, lane], course[at + _LAST, lane] = known.free, select(known.goes_on, 1.0, 0.0)
 
 
-def turn(walls, course, row, lane):
-    """Where to guess the first hits of a straight flight from."""
+def turn(walls, course, row, lane, remaining):
+    """Where to guess the first hits of a straight flight from, with each wall that it may meet in this frame."""
     for k, wall in enumerate(walls.each):
         if wall.aims:
             at = row + k * COURSE
             level = _level(course, at, lane, wall)
-            course[at + _GUESS, lane], course[at + _LAST, lane] = level.turn(), 0.5 * level.window
+            free = level.is_free(remaining)
+            course[at + _GUESS, lane] = select(free, remaining, level.turn())
+            course[at + _LAST, lane] = select(free, -1.0, 0.5 * level.window)
 
 
 def aim(walls, course, row, lane):
@@ -163,7 +165,9 @@ def aim(walls, course, row, lane):
     for k, wall in enumerate(walls.each):
         if wall.aims:
             at = row + k * COURSE
-            course[at + _GUESS, lane] = _level(course, at, lane, wall).aim(course[at + _GUESS, lane])
+            guess = course[at + _GUESS, lane]
+            aim = _level(course, at, lane, wall).aim(guess)
+            course[at + _GUESS, lane] = select(course[at + _LAST, lane] > 0.0, aim, guess)
 
 
 def aimed(walls, course, row, lane, is_last):
@@ -174,17 +178,6 @@ def aimed(walls, course, row, lane, is_last):
             guess, length = level.aimed(course[at + _GUESS, lane], course[at + _LAST, lane], is_last)
             course[at + _GUESS, lane], course[at + _LAST, lane] = guess, length
             course[at + _TIME, lane] = select(length > 0.0, 0.0, guess)
-
-
-def leave_free(walls, course, row, lane, remaining):
-    """No more guesses with walls that the flight surely does not meet in this frame."""
-    for k, wall in enumerate(walls.each):
-        if wall.aims:
-            at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall)
-            free = (course[at + _LAST, lane] > 0.0) & level.is_free(remaining)
-            course[at + _TIME, lane] = select(free, remaining, course[at + _TIME, lane])
-            course[at + _GUESS, lane] = select(free, remaining, course[at + _GUESS, lane])
-            course[at + _LAST, lane] = select(free, -1.0, course[at + _LAST, lane])
 
 
 def _level(course, at, lane, wall):
