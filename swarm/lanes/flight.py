@@ -187,17 +187,27 @@ def _aim(walls, gravity, lanes, live):
     """
     course, tries, some = lanes.course, AIMED - 1, live
     for i in range(index(live)):
-        flights.turn(walls, course, 0, i, lanes.lane(i).remaining)
+        flights.turn(walls, course, 0, i)
     for i in range(index(live)):
         flights.aim(walls, course, 0, i)
     while tries > 0 and _MANY * some >= live:
         for i in range(index(live)):
+            flights.nearer(walls, course, 0, i)
+        for i in range(index(live)):
             flights.aimed(walls, course, 0, i, False)
         tries, some = tries - 1, _mark(walls, gravity, lanes, live)
+        # Most guesses lead to a hit, in this frame or after it: of those lanes nothing else is asked.
+        if _MANY * some >= live:
+            for i in range(index(live)):
+                flights.leave_free(walls, course, 0, i, lanes.lane(i).remaining)
+            some = _mark(walls, gravity, lanes, live)
     # However many lanes try with it, a lane tries as often.
     for k in range(some):
+        lane = index(lanes.order[k])
+        flights.leave_free(walls, course, 0, lane, lanes.lane(lane).remaining)
         for left in range(tries, -1, -1):
-            flights.aimed(walls, course, 0, lanes.order[k], left == 0)
+            flights.nearer(walls, course, 0, lane)
+            flights.aimed(walls, course, 0, lane, left == 0)
 
 
 def _go_on(walls, gravity, lanes, i):

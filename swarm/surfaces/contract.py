@@ -256,7 +256,7 @@ class Smooth(AtRest):
     # Whether its `course` may be one from afar.
     may_be_far = True
 
-    # How many numbers of the steps of a straight flight lanes keep, if those are a `PolynomialFlight`.
+    # How many numbers of the steps of a straight flight lanes keep, if they are a `PolynomialFlight`, a `flight`.
     kept = 0
     # Whether these begin with a guess of the root.
     aims = False

@@ -15,12 +15,13 @@ from swarm.surfaces.formulas.derivatives import derived
 from swarm.surfaces.formulas.numbers import OwnNumbers, SmoothCavity, SmoothSolid
 from swarm.surfaces.formulas.polynomial import (
     ConvexQuadraticCavity,
+    ConvexQuarticCavity,
     QuadraticCavity,
     QuadraticSolid,
     QuarticCavity,
     QuarticSolid,
 )
-from swarm.surfaces.time_of_impact.polynomial import PolynomialFlight
+from swarm.surfaces.time_of_impact.polynomial import ConvexFlight, PolynomialFlight
 
 EPSILON = 2.0**-52
 QUARTIC = "x**4/0.09 + y**4/0.09 + z**4/0.13 - 1"
@@ -132,7 +133,7 @@ def test_guesses_lead_to_most_hits_without_safe_steps(text, share):
     assert np.mean([level.first_step()[1] == 0.0 for level in levels]) >= share
 
 
-def _level_with_roots(random):
+def _level_with_roots(random, kind):
     """A level of degree 4 that is below 0 at first, with some of its roots next to each other."""
     roots = np.abs(random.normal(size=4)) * random.choice([-1.0, 1.0], 4)
     near = roots[0] * (1.0 + float(random.choice([0.0, 1e-12, 1e-8, 1e-4, 0.1])) * random.normal())
@@ -140,14 +141,18 @@ def _level_with_roots(random):
     level = np.polynomial.polynomial.polyfromroots(roots[: random.choice([3, 4])])
     level *= -np.sign(level[0])
     c, b, a2, a3, a4 = np.append(level, 0.0)[:5]
-    return PolynomialFlight(c, 0.5 * b, a2, a3, a4, window=1.0)
+    return kind(c, 0.5 * b, a2, a3, a4, window=1.0)
 
 
-def test_no_guess_leads_beyond_a_first_root():
-    """Judged by the value in exact arithmetic: it is above 0 by no more than round-off on the whole way to the hit."""
+@pytest.mark.parametrize("kind", [PolynomialFlight, ConvexFlight])
+def test_no_guess_leads_beyond_a_first_root(kind):
+    """Judged by the value in exact arithmetic: it is above 0 by no more than round-off on the whole way to the hit.
+
+    The guess may be one for a convex level, which these are not.
+    """
     random, hits = np.random.default_rng(5), 0
     for _flight in range(300):
-        level = _level_with_roots(random)
+        level = _level_with_roots(random, kind)
         time, length = level.first_step()
         if length == 0.0:
             hits += 1
@@ -162,7 +167,11 @@ def test_no_guess_leads_beyond_a_first_root():
 @pytest.mark.parametrize(
     ("text", "side", "kind"),
     [
-        (QUARTIC, "inside", QuarticCavity),
+        (QUARTIC, "inside", ConvexQuarticCavity),
+        ("x**2 + y**2 + x*y/2 + z**4 + x**4 - 1", "inside", ConvexQuarticCavity),
+        ("x**4 + y**4 + z**4 - x*y*z - 1", "inside", QuarticCavity),
+        ("p*x**4 - x**2 + y**2 + z**2 - 1", "inside", QuarticCavity),
+        (RING, "inside", QuarticCavity),
         (RING, "outside", QuarticSolid),
         ("x**2/p + y**2 + z*x + z**2 - sqrt(p)", "inside", ConvexQuadraticCavity),
         ("x**2 + y**2 - z**2 - 1", "inside", QuadraticCavity),

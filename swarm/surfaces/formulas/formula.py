@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+import numpy as np
+
 from ...common import checks
 from ...common.checks import Vector
 from ...errors import SceneError
@@ -21,6 +23,9 @@ from .expression import COORDINATES, FUNCTIONS
 from .form import Form, FormSurface
 from .numbers import Bend
 from .polynomial import base_of
+
+# Points at which it is asked whether a formula bends upwards, and what counts as 0 there: round-off.
+_SAMPLES, _FLAT = 1024, 1e-9
 
 
 @dataclass(frozen=True, repr=False, init=False)
@@ -83,11 +88,11 @@ class Formula(FormSurface):
 # A scene is made again in each process, run and copy, and bounds by intervals take 0.1 s.
 @functools.lru_cache(maxsize=64)
 def _form_of(
-    formula: str, parameters: tuple[tuple[str, float], ...], box: Box | None, size: float | None, side: str,
+    formula: str, given: tuple[tuple[str, float], ...], box: Box | None, size: float | None, side: str,
     curvature: float | None,
 ) -> Form:  # fmt: skip
     """The form of a formula, with the box, the size and the bend that are not given."""
-    names, values = tuple(name for name, _value in parameters), tuple(value for _name, value in parameters)
+    names, values = tuple(name for name, _value in given), tuple(value for _name, value in given)
     code = derived(formula, names)
     exact = code.with_values(values)
     box = box or exact.found_box()
@@ -97,8 +102,12 @@ def _form_of(
     phi, gradient, hessian = code.functions
     same_in_python = all(part.same_in_python for part in code.functions)
     is_solid = side == "outside" and box is not None
-    base = base_of(code.along, is_solid, exact.is_convex(side), same_in_python)
-    kind = class_of(make(*values), phi, gradient, hessian, code.along, base)
+    parameters = make(*values)
+    is_convex = exact.is_convex(side)
+    if code.along is not None and code.along.degree > 2:
+        is_convex = _seems_convex(phi, hessian, parameters, box, side)
+    base = base_of(code.along, is_solid, is_convex, same_in_python)
+    kind = class_of(parameters, phi, gradient, hessian, code.along, base)
     kind.same_in_python = same_in_python
     form = Form(kind, values, box, size, side)
     if box is not None:
@@ -108,6 +117,23 @@ def _form_of(
     if box is not None:
         form.check_bend()
     return form
+
+
+def _seems_convex(phi: Any, hessian: Any, parameters: Any, box: Box | None, side: str) -> bool:
+    """Whether a cavity with a polynomial of a higher degree bends upwards at points in its box.
+
+    By the principal minors of its second derivatives: their arithmetic is that of every processor.
+    """
+    if box is None or side != "inside" or not np.isfinite(box).all():
+        return False
+    low, high = np.array(box)[:, :, None]
+    x, y, z = low + (high - low) * np.random.default_rng(0).random((3, _SAMPLES))
+    a, b, c, ab, bc, ca, inside = np.broadcast_arrays(*hessian(parameters, x, y, z), phi(parameters, x, y, z) <= 0.0)
+    two = (a * b - ab * ab, b * c - bc * bc, c * a - ca * ca)
+    three = a * two[1] - ab * (ab * c - bc * ca) + ca * (ab * bc - b * ca)
+    most = max(float(np.abs(one).max()) for one in (a, b, c, ab, bc, ca))
+    minors = (*((one, most) for one in (a, b, c)), *((one, most**2) for one in two), (three, most**3))
+    return all(bool((one[inside] >= -_FLAT * scale).all()) for one, scale in minors)
 
 
 def _checked(parameters: Any) -> dict[str, float] | None:

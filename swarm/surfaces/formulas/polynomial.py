@@ -7,7 +7,7 @@ from ...kernel.gravity import rise_time_by, rise_time_inside
 from ...kernel.jit import outlined, select
 from ...kernel.vector import absolute, total
 from ..time_of_impact.course import first_rise
-from ..time_of_impact.polynomial import PolynomialFlight
+from ..time_of_impact.polynomial import ConvexFlight, PolynomialFlight
 from .numbers import OwnNumbers, SmoothCavity, SmoothSolid
 
 # The first step goes at most so many sizes, by the sum of the components of the velocity: about the longest chord.
@@ -83,6 +83,7 @@ class QuarticCavity(PolynomialNumbers):
     in_steps = True
     kept = 5
     aims = True
+    flight = PolynomialFlight
 
     @outlined
     def first_hit(self, r, v):
@@ -98,7 +99,7 @@ class QuarticCavity(PolynomialNumbers):
         # From the wall inwards
         rest = window * (abs(twice_b) + window * (abs(a2) + window * (abs(a3) + window * abs(a4))))
         leaves = (twice_b < 0.0) & (c >= -_ROUND_OFF * rest)
-        return PolynomialFlight(
+        return self.flight(
             select(leaves, twice_b, c),
             0.5 * select(leaves, a2, twice_b),
             select(leaves, a3, a2),
@@ -108,6 +109,12 @@ class QuarticCavity(PolynomialNumbers):
             end,
             window,
         )
+
+
+class ConvexQuarticCavity(QuarticCavity):
+    """One that is convex where it was looked at."""
+
+    flight = ConvexFlight
 
 
 class QuarticSolid(QuarticCavity):
@@ -126,5 +133,5 @@ def base_of(along: Any, is_solid: bool, is_convex: bool, is_smooth: bool) -> Any
     elif along.degree <= 2:
         cavity, solid = ConvexQuadraticCavity if is_convex else QuadraticCavity, QuadraticSolid
     else:
-        cavity, solid = QuarticCavity, QuarticSolid
+        cavity, solid = ConvexQuarticCavity if is_convex else QuarticCavity, QuarticSolid
     return solid if is_solid else cavity

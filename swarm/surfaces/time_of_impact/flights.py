@@ -8,7 +8,7 @@ from ...kernel.jit import outlined, select
 from ..presence.rooms import is_of_room, leaving
 from ..walls import Field
 from .course import Fall, Quartic
-from .polynomial import PolynomialFlight
+from .polynomial import ConvexFlight, PolynomialFlight
 from .straight import Looked, Straight
 
 
@@ -114,16 +114,28 @@ def begin(walls, gravity, course, row, lane, r, v, aims=False):
                 course[at + i, lane] = number
             course[at + _CLOSE, lane] = steps.nearly
         elif isinstance(steps, PolynomialFlight):
-            for i, number in zip(_OF_POLYNOMIAL, steps, strict=False):
-                if number is not None:
-                    course[at + i, lane] = number
+            _begin_polynomial(course, at, lane, steps)
             if aims and wall.aims:
-                course[at + _WINDOW, lane] = steps.window
+                _begin_guess(course, at, lane, steps)
                 continue
         elif isinstance(steps, Straight):
             _begin_looks(course, at, lane, steps)
             continue
         course[at + _TIME, lane], course[at + _LAST, lane] = steps.first_step()
+
+
+def _begin_polynomial(course, at, lane, flight):
+    """The numbers of a polynomial."""
+    for i, number in zip(_OF_POLYNOMIAL, flight, strict=False):
+        if number is not None:
+            course[at + i, lane] = number
+
+
+def _begin_guess(course, at, lane, flight):
+    """What a guess of its root begins with."""
+    course[at + _WINDOW, lane], course[at + _LAST, lane] = flight.window, 0.5 * flight.window
+    if isinstance(flight, ConvexFlight):
+        course[at + _GUESS, lane] = flight.turn()
 
 
 def _begin_looks(course, at, lane, flight):
@@ -149,15 +161,12 @@ def _keep(course, at, lane, known):
     course[at + _TIME, lane], course[at + _LAST, lane] = known.free, select(known.goes_on, 1.0, 0.0)
 
 
-def turn(walls, course, row, lane, remaining):
-    """Where to guess the first hits of a straight flight from, with each wall that it may meet in this frame."""
+def turn(walls, course, row, lane):
+    """Where to guess the first hits of a straight flight from, where that is a chain of operations of its own."""
     for k, wall in enumerate(walls.each):
-        if wall.aims:
-            at = row + k * COURSE
-            level = _level(course, at, lane, wall)
-            free = level.is_free(remaining)
-            course[at + _GUESS, lane] = select(free, remaining, level.turn())
-            course[at + _LAST, lane] = select(free, -1.0, 0.5 * level.window)
+        level = _level(course, row + k * COURSE, lane, wall) if wall.aims else None
+        if level is not None and not isinstance(level, ConvexFlight):
+            course[row + k * COURSE + _GUESS, lane] = level.turn()
 
 
 def aim(walls, course, row, lane):
@@ -165,13 +174,20 @@ def aim(walls, course, row, lane):
     for k, wall in enumerate(walls.each):
         if wall.aims:
             at = row + k * COURSE
+            course[at + _GUESS, lane] = _level(course, at, lane, wall).aim(course[at + _GUESS, lane])
+
+
+def nearer(walls, course, row, lane):
+    """The guesses nearer to the hits."""
+    for k, wall in enumerate(walls.each):
+        if wall.aims:
+            at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall)
             guess = course[at + _GUESS, lane]
-            aim = _level(course, at, lane, wall).aim(guess)
-            course[at + _GUESS, lane] = select(course[at + _LAST, lane] > 0.0, aim, guess)
+            course[at + _GUESS, lane] = select(course[at + _LAST, lane] > 0.0, level.nearer(guess), guess)
 
 
 def aimed(walls, course, row, lane, is_last):
-    """The guesses improved; with those that lead to a hit the first step."""
+    """The guesses still nearer; with those that lead to a hit the first step."""
     for k, wall in enumerate(walls.each):
         if wall.aims:
             at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall)
@@ -180,9 +196,20 @@ def aimed(walls, course, row, lane, is_last):
             course[at + _TIME, lane] = select(length > 0.0, 0.0, guess)
 
 
+def leave_free(walls, course, row, lane, remaining):
+    """No more guesses with walls that the flight surely does not meet in this frame."""
+    for k, wall in enumerate(walls.each):
+        if wall.aims:
+            at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall)
+            free = (course[at + _LAST, lane] > 0.0) & level.is_free(remaining)
+            course[at + _TIME, lane] = select(free, remaining, course[at + _TIME, lane])
+            course[at + _GUESS, lane] = select(free, remaining, course[at + _GUESS, lane])
+            course[at + _LAST, lane] = select(free, -1.0, course[at + _LAST, lane])
+
+
 def _level(course, at, lane, wall):
     """The `PolynomialFlight` to a wall."""
-    level = PolynomialFlight(*(course[at + i, lane] for i in _OF_POLYNOMIAL[: wall.kept]))
+    level = wall.flight(*(course[at + i, lane] for i in _OF_POLYNOMIAL[: wall.kept]))
     return level._replace(window=course[at + _WINDOW, lane]) if wall.aims else level
 
 

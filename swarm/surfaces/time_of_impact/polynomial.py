@@ -23,7 +23,7 @@ _TINY = 1e-30
 _CONVERGES = 1e-5
 # A guess of the root takes so many times two steps of Halley's method in all; the second of these may change the slope
 # and the time by these parts: the square of one times the other is left, the square of which is round-off.
-AIMED, _HALLEY_STEPS, _HALLEY_CONVERGES, _HALLEY_WAY = 3, 2, 1e-3, 1e-2
+AIMED, _HALLEY_CONVERGES, _HALLEY_WAY = 3, 1e-3, 1e-2
 # The root of e x^3 + m x^2 + (1 - 2 m) x = 1 - m is (1 + p e + q e^2)/(1 + (1 + p) e + s e^2), for m of 0 or 1/2 to 9 %
 # up to e = 100.
 _P, _Q, _S = 0.8, 0.01, 0.08
@@ -76,6 +76,15 @@ def _are_below_in_halves(b0, b1, b2, b3):
     return _are_below(b0, first, early, before) & _are_below(before + after, after, late, b3)
 
 
+class _HalleyStep(Record):
+    """What is known of a level where a step of Halley's method begins, and how far back the step leads."""
+
+    value: float
+    slope: float
+    bend: float  # a bound of half the second derivative
+    way: float
+
+
 class PolynomialFlight(Record):
     """The steps of a flight along which c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 is to rise through 0.
 
@@ -99,7 +108,7 @@ class PolynomialFlight(Record):
             return select(self.since <= self.until, self.since, math.inf), 0.5 * self.window
         time, length = self.aim(self.turn()), 0.5 * self.window
         for k in range(AIMED):
-            time, length = self.aimed(time, length, k == AIMED - 1)
+            time, length = self.aimed(self.nearer(time), length, k == AIMED - 1)
         return select(length > 0.0, 0.0, time), length
 
     def turn(self):
@@ -116,27 +125,31 @@ class PolynomialFlight(Record):
         """A cubic that is the level on the wall, and above it elsewhere up to the window."""
         return self.c, 2.0 * self.b, self.a2, self.a3 + self.a4 * self.window
 
+    def nearer(self, t):
+        """A time nearer to the root, by a step of Halley's method."""
+        return t - self._halley(t).way
+
     def aimed(self, t, length, is_last):
         """(a time nearer to the root, the length or 0 if one step of Newton's method leads from it to the root)."""
-        c, b, a2, a3, a4 = self.c, 2.0 * self.b, self.a2, self.a3, self.a4
-        root, converges = t, False
-        for _step in range(_HALLEY_STEPS):
-            a3t, a4t = root * a3, root * root * a4
-            value = c + root * (b + root * (a2 + a3t + a4t))
-            slope = b + root * (2.0 * a2 + 3.0 * a3t + 4.0 * a4t)
-            half, bend = a2 + 3.0 * a3t + 6.0 * a4t, abs(a2) + 3.0 * abs(a3t) + 6.0 * abs(a4t)
-            steep = slope * slope
-            converges = (slope > 0.0) & (abs(value) * bend <= _HALLEY_CONVERGES * steep)
-            bottom = steep - value * half
-            way = value * slope / select(bottom == 0.0, _TINY, bottom)
-            root = root - way
-            converges = converges & (abs(way) <= _HALLEY_WAY * root)
+        step = self._halley(t)
+        root = t - step.way
+        converges = (step.slope > 0.0) & (abs(step.value) * step.bend <= _HALLEY_CONVERGES * (step.slope * step.slope))
+        converges = converges & (abs(step.way) <= _HALLEY_WAY * root)
         before = self._before(root)
         # What is below 0 by its coefficients is so by those of its halves.
         below = _are_below(*before) | (is_last & _are_below_in_halves(*before))
         found = converges & below
         goes_on = length > 0.0
         return select(goes_on, root, t), select(goes_on & found, 0.0, length)
+
+    def _halley(self, t):
+        """A step of Halley's method from a time."""
+        c, b, a2, a3t, a4t = self.c, 2.0 * self.b, self.a2, t * self.a3, t * t * self.a4
+        value = c + t * (b + t * (a2 + a3t + a4t))
+        slope = b + t * (2.0 * a2 + 3.0 * a3t + 4.0 * a4t)
+        half, bend = a2 + 3.0 * a3t + 6.0 * a4t, abs(a2) + 3.0 * abs(a3t) + 6.0 * abs(a4t)
+        bottom = slope * slope - value * half
+        return _HalleyStep(value, slope, bend, value * slope / select(bottom == 0.0, _TINY, bottom))
 
     def is_free(self, until):
         """Whether it is surely below 0 until this time."""
@@ -174,3 +187,14 @@ class PolynomialFlight(Record):
         goes_on = under_way(t, last)
         length = select(is_last | (after == math.inf), 0.0, length)
         return select(goes_on, after, t), select(goes_on, length, last)
+
+
+class ConvexFlight(PolynomialFlight):
+    """The same where the level bends upwards all the way, so that the cubic rises: it bends the other way once at most.
+
+    Only the guess asks for that, so it need not be certain.
+    """
+
+    def turn(self):
+        _c, _b, a2, a3 = self._cubic()
+        return -a2 / select(a3 == 0.0, _TINY, 3.0 * a3)
