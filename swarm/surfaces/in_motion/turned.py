@@ -7,7 +7,7 @@ time as D. The end is, with where the free step ends in the frame, f = A1^T (r0 
     rho1 = f - kappa Q D(rho0, rho1),   Q = A1^T M^-T,
 that of the body at rest but for Q, which is nearly the identity: the body's push with f + kappa (D - Q D) again and
 again, each time nearer by about the angle of the step and what the surface bends in it. Where the wall is flat, D is
-along its normal n, and across the wall the end is that of one push of the body with kappa n.Q n.
+along its normal n and n.Q n = 1: across the wall the end is that of the body, of one push.
 """
 
 from ...kernel.limits import EPSILON
@@ -25,16 +25,6 @@ class TurnedStep(Record):
     end: Vec
     way: Vec
     rest: Vec
-
-
-class FlatStep(Record):
-    """A step in the frame of a flat wall: start, free displacement, Q n, n.Q n, and the end but for along the wall."""
-
-    start: Vec
-    way: Vec
-    turned: Vec
-    share: float
-    end: Vec
 
 
 class Turned(Posed):
@@ -61,28 +51,20 @@ class Turned(Posed):
         return TurnedStep(end, way, rest)
 
     def push(self, r, p, kappa):
-        n = self.body.flat_normal()
-        if n is None:
+        if self.body.flat_normal() is None:
             return self.end_out(self._step(r, p, kappa).end)
-        flat = self._flat_step(n, r, p, kappa)
-        size = dot(n, self.body.discrete_gradient(flat.start, flat.end))
-        return self.end_out(flat.end + (kappa * size) * (flat.share * n - flat.turned))
+        start = self.own_place(r)
+        end = self.body.push(start, self.own_end(r + p) - start, kappa)
+        gradient = self.body.discrete_gradient(start, end)
+        return self.end_out(end + kappa * (gradient - self.end.back(self.normal_out(gradient))))
 
     def rise(self, r, p, kappa):
-        n = self.body.flat_normal()
-        if n is not None:
-            flat = self._flat_step(n, r, p, kappa)
-            rise, slope = self.body.rise(flat.start, flat.way, flat.share * kappa)
-            return rise, flat.share * slope
+        start = self.own_place(r)
+        if self.body.flat_normal() is not None:
+            return self.body.rise(start, self.own_end(r + p) - start, kappa)
         step = self._step(r, p, kappa)
-        rise, slope = self.body.rise(self.own_place(r), step.way, kappa)
+        rise, slope = self.body.rise(start, step.way, kappa)
         return rise, slope + dot(self.body.discrete_gradient(step.end, step.end), step.rest)
-
-    def _flat_step(self, n, r, p, kappa):
-        """The `FlatStep` of a wall with this normal: D is along it, and so is what counts of Q D."""
-        start, turned = self.own_place(r), self.end.back(self.normal_out(n))
-        way, share = self.own_end(r + p) - start, dot(n, turned)
-        return FlatStep(start, way, turned, share, self.body.push(start, way, share * kappa))
 
     def chord_guess(self, r, p):
         start = self.own_place(r)
