@@ -123,34 +123,46 @@ def pairs_of(chosen):
     return {pair for cell in chosen for pair in itertools.combinations(enumerate(cell), 2)}
 
 
-# Walls whose push or way is found by iteration, and engines that ask them in every step, or for each ball anew.
-SLOW_TO_ASK = ("formula", "mesh", "own surface", "polygon", "prism", "sampled", "stadium")
+# Engines that ask walls in every step, or for each ball anew: a run takes 0.2 to 7 s, and one of the others 0.1 s.
 ASKING_OFTEN = (
     "bodies, Impact", "points, Penalty", "grains, Penalty", "points, AugmentedLagrangian", "balls, heavy wall",
 )  # fmt: skip
+# Walls whose push or way is found by iteration: such a run takes up to 15 s.
+SLOW_TO_ASK = ("formula", "mesh", "own surface", "polygon", "prism", "sampled", "stadium")
 
 
 def cover():
     """Cells in which each pair of an engine, a wall and a capability occurs that occurs at all.
 
-    The engine changes from each wall to the next and from each capability to the next. At walls that are slow to ask
-    those come first that ask them seldom, from impact to impact.
+    The quick ring has each pair of an engine and a capability. Those that ask walls often are at each wall once more,
+    with a capability that changes from wall to wall, or plain where the wall is slow to ask. All else is for the
+    others, which change as well. A cell that works says more than one that is refused.
     """
-    known, engines, chosen = set(cells.CELLS), list(cells.ENGINES), list(SOON)
-    found = pairs_of(chosen)
+    known, names, chosen = set(cells.CELLS), list(cells.CAPABILITIES), list(SOON)
+    found, seldom = pairs_of(SOON), [engine for engine in cells.ENGINES if engine not in ASKING_OFTEN]
+
+    def take(turn, is_wanted):
+        """The first cell of a turn that is wanted and works, or else the first that is wanted, or is there at all."""
+        turn = sorted((cell for cell in turn if cell in known), key=lambda one: pairs.KNOWN[str(one)] != "works")
+        one = next(filter(is_wanted, turn), turn[0] if turn else None)
+        if one is not None:
+            found.update(pairs_of([one]))
+            chosen.append(one)
+
     for w, wall in enumerate(cells.WALLS):
-        for c, capability in enumerate(cells.CAPABILITIES):
-            if ((1, wall), (2, capability)) in found:
-                continue
-            first = [engine for engine in engines if wall not in SLOW_TO_ASK or engine not in ASKING_OFTEN]
-            turn = [Cell(first[(w + c + k) % len(first)], wall, capability) for k in range(len(first))]
-            turn += [Cell(engine, wall, capability) for engine in ASKING_OFTEN]
-            chosen += [cell for cell in turn if cell in known][:1]
-    found = pairs_of(chosen)
+        is_slow = wall in SLOW_TO_ASK
+        for e, engine in enumerate(ASKING_OFTEN):
+            if ((0, engine), (1, wall)) not in found:
+                first = 0 if is_slow else (w + 7 * e) % len(names)
+                turn = [Cell(engine, wall, name) for name in (*names[first:], *names[:first])]
+                take(turn, lambda one, slow=is_slow: slow or ((1, one.wall), (2, one.capability)) not in found)
+        for c, name in enumerate(names):
+            if ((1, wall), (2, name)) not in found:
+                first = (w + c) % len(seldom)
+                take([Cell(one, wall, name) for one in (*seldom[first:], *seldom[:first], *ASKING_OFTEN)], bool)
     for cell in cells.CELLS:
         if not pairs_of([cell]) <= found:
-            found |= pairs_of([cell])
-            chosen.append(cell)
+            take([cell], bool)
     return list(dict.fromkeys(chosen))
 
 
