@@ -28,6 +28,14 @@ def select(condition: Any, first: Any, second: Any) -> Any:
     return first if condition else second
 
 
+def is_known(_value: Any) -> bool:
+    """Whether Python knows a number: always in plain Python, which then need not compute what a `select` discards.
+
+    A kernel knows few: `trace/calls.py` answers in its place.
+    """
+    return True
+
+
 class Kernel:
     """A function that is compiled when it is first called.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..kernel.arrays import scratch
-from ..kernel.jit import outlined, select
+from ..kernel.jit import is_known, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
 from .presence.rooms import owner_of
@@ -225,7 +225,7 @@ class Walls(Record):
         its type.
         """
         answer = None
-        for first, wall in reversed(self.numbered()):
+        for first, wall in reversed(self._with_number(number) if is_known(number) else self.numbered()):
             if isinstance(wall, Field):
                 one, here = wall.members.wall(number - first), number < first + wall.count()
             else:
@@ -233,6 +233,14 @@ class Walls(Record):
             value = ask(one, *given)
             answer = value if answer is None else select(here, value, answer)
         return neutral if answer is None else answer
+
+    def _with_number(self, number):
+        """That one of `numbered` which has a number, or the last one."""
+        every = self.numbered()
+        for k, (first, wall) in enumerate(every):
+            if number < first + wall.count() if isinstance(wall, Field) else number == first:
+                return every[k : k + 1]
+        return every[-1:]
 
     # --- Of all ---
 

@@ -129,3 +129,21 @@ def test_a_wall_in_uniform_translation_is_asked_in_its_frame(pull, point, veloci
     ask, more = ("first_hit", ()) if pull is None else ("falling_hit", (np.array(pull),))
     here = call(getattr(wall, ask), point, velocity, *more)
     assert here == call(getattr(body, ask), point - shift, velocity - speed, *more)
+
+
+@pytest.mark.parametrize("number", [0.0, 2.0, 3.0, 5.0, 6.0])
+def test_plain_python_asks_only_the_wall_with_the_number(number):
+    """A field of three, a box of three, and of any other number the last one."""
+    balls = swarm.Spheres([(x, 0.0, 0.0) for x in (-0.5, 0.0, 0.5)], 0.1)
+    walls, asked = swarm.Scene([swarm.Box((1.0, 1.1, 1.2)), balls]).compiled().walls(0.0), []
+    field, *slabs = walls.each
+    each = [*(field.members.wall(float(k)) for k in range(3)), *slabs]
+
+    def level(wall, r):
+        asked.append(wall)
+        return wall.phi(r)
+
+    r = np.array([0.3, -0.2, 0.1])
+    found = call(walls.of, number, 0.0, level, r)
+    assert len(asked) == 1
+    assert found == call(each[min(int(number), 5)].phi, r)

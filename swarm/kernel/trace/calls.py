@@ -14,7 +14,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.extending import lower_builtin, type_callable
 
 from ..entries import is_own
-from ..jit import Kernel, select
+from ..jit import Kernel, is_known, select
 from .frame import CallFrame, Range
 from .notes import taken
 from .twins import twin_of
@@ -75,6 +75,7 @@ _RECORDS = (tuple, type(None))
 # What is called in place of a function while it is traced.
 REPLACED: dict[Any, Callable[..., Any]] = {
     isinstance: _is_instance,
+    is_known: lambda value: not isinstance(value, Value),
     range: Range,
     select: traced_select,
     len: lambda values: values.shape[0] if isinstance(values, Value) else len(values),
