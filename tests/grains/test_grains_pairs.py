@@ -7,8 +7,8 @@ import pytest
 from grains_runs import ROOM, cloud, ran
 
 import swarm
+from swarm.grains import contacts, lists
 from swarm.grains import grain_arrays as arrays
-from swarm.grains import lists
 from swarm.grains.cell import Lengths, nearest
 from swarm.kernel.vector import Vec
 
@@ -96,6 +96,30 @@ def test_the_lists_are_those_of_all_pairs(period):
     reach = radius[:, None] + radius + skin
     expected = {frozenset((i, j)) for i in range(n) for j in range(i) if apart[i, j] < reach[i, j]}
     assert set(pairs) == expected
+
+
+def test_pairs_that_are_looked_at_twice_are_those_that_may_have_met(monkeypatch):
+    """What misses by more than a step can be off course is left out, and the run has the same bits without that."""
+    looks, find_missed = [], contacts._find_missed
+    monkeypatch.setattr(contacts, "_find_missed", lambda *given: looks.append(1) or find_missed(*given))
+
+    # One that flies into a row, the others of which are hardly apart: a step finds contacts that it had not foreseen.
+    position, velocity = np.zeros((3, 4)), np.zeros((3, 4))
+    position[0], velocity[0, 0] = [-1e-4, 0.02, 0.04 + 1e-9, 0.06 + 2e-9], 1.0
+    start = swarm.Particles(position, velocity, MASS, radius=RADIUS)
+
+    def ended(wider):
+        monkeypatch.setattr(contacts, "_WIDER", wider)
+        looks.clear()
+        result = ran(ROOM, start, swarm.Penalty(2e-5, ALPHA, 1.0), 2e-3)
+        assert result.observables["collisions"][-1] == 3
+        return len(looks), result.particles
+
+    (short, quick), (fewer, thorough) = ended(contacts._WIDER), ended(0.0)
+    # In some thirty steps balls push one another.
+    assert short > fewer + 25
+    assert np.array_equal(quick.position, thorough.position)
+    assert np.array_equal(quick.velocity, thorough.velocity)
 
 
 def test_a_pair_among_others_ends_as_it_does_alone():
