@@ -29,7 +29,7 @@ from .grain_arrays import (
     vector_at,
     vector_in,
 )
-from .groups import balls_of, move_in, of_group, twist_in
+from .lanes_of_pairs import balls_of, move_in, of_group, twist_in
 from .vessel import met, met_member, moves
 
 

@@ -1,43 +1,260 @@
-"""Sweeps over the contacts of pairs by their groups, see groups.py.
+"""The contacts of pairs in groups, each in a lane: one after the other takes three times as long.
 
-Where two of a group share a ball it goes in parts: so each contact begins with what the ones before have led to.
+They are some parts, and a group has one of each part, so that its balls are far from one another. The numbers of a
+group are beside one another, by columns, and LLVM makes vectors of them: what is computed for a group is a loop over
+its lanes that reads what balls have, one without a branch, and one that writes to balls, which may be the same ones.
+Sweeps go over all groups; where two of a group share a ball it goes in parts: so each contact begins with what the ones
+before have led to.
 """
+
+import math
 
 import numpy as np
 
-from ..kernel.arrays import index, kept, unwritten
+from ..kernel.arrays import fetch, index, kept, unwritten
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, square
-from .contacts import changed, closing, improved, pressed, size_of, weight_of, worse
+from .contacts import (
+    apart,
+    begin_solve,
+    changed,
+    closing,
+    improved,
+    lasting,
+    pressed,
+    scale_of,
+    size_of,
+    weight_of,
+    worse,
+)
 from .friction import arm_of, rubbed, turning
 from .grain_arrays import (
     AFTER,
+    BEFORE,
+    COAST,
+    COLUMNS_OF_LANES,
     DAMPING,
     DRAG,
     EASE,
+    EASES,
+    ENDS,
     GAIN,
     GAP,
     IMPULSE,
+    KEPT_ROLL,
     LANES,
+    LEVER,
+    LEVERS,
+    LIGHTNESS,
+    LISTED,
     NEARNESS,
+    ONE,
+    OTHER,
+    PLACE,
     PUSH,
+    RADIUS,
+    ROLL,
     ROUNDNESS,
     SCALE,
     SIZE,
     START,
+    OfPair,
+    set_vector,
     set_vector_in,
     vector_at,
     vector_in,
+    with_lanes,
 )
-from .groups import balls_of, move_in, of_group, push_ends, twist_ends
+
+# The balls of contacts so much later are asked for. A loop that asks is not one of vectors either: LLVM would make
+# gathers of its loads, which take AMD processors longer.
+_LATER = 32
+
+
+def of_group(touches, g):
+    """The rows of the contacts, the first one of a group, the rows of the balls, and the first one of the group."""
+    tile = with_lanes(touches.tile)
+    return tile.rows, index(g * COLUMNS_OF_LANES), tile.ends, index(g * ENDS)
+
+
+def balls_of(ends, e, lane):
+    """The balls of a contact of the group with these rows of balls."""
+    fetch(ends, index(e * LANES) + lane + _LATER)
+    return index(ends[e, lane]), index(ends[e + 1, lane])
+
+
+def pair_at(touches, g, lane):
+    """A contact of a group, and its balls."""
+    rows, q, ends, e = of_group(touches, g)
+    return OfPair(rows, q, lane), balls_of(ends, e, lane)
+
+
+def move_in(matter, rows, q, lane, difference):
+    """The change of s in a step by that of the velocities at its end."""
+    return vector_in(rows, q + COAST, lane) + 0.5 * matter.h * difference
+
+
+# --- At the start of a step ------------------------------------------------------------------------------
+
+# Rows of what the contacts of a group begin with: v_i - v_j, of both ends of the step together, R_i + R_j, and the sum
+# of the magnitudes of the velocities that are foreseen.
+_BOTH, _REACH, _SPEEDS, _READ = 0, 3, 4, 5
+
+
+def _lay(touches, g, lane, c):
+    """Give a contact that has been found a lane."""
+    rows, q, ends, e = of_group(touches, g)
+    ends[e, lane], ends[e + 1, lane] = touches.found[c, ONE], touches.found[c, OTHER]
+    rows[q + LISTED, lane] = touches.found[c, PLACE]
+
+
+@outlined
+def _begin_group(matter, grains, near, touches, group):
+    """Begin to solve for the contacts of a group from one lane to another."""
+    (g, begin, end), place, speed, spin, half = group, grains.place, grains.speed, grains.spin, 0.5 * matter.h
+    read, (rows, q, ends, e) = unwritten((_READ, LANES), np.float64), of_group(touches, g)
+    for k in range(begin, end):
+        lane = index(k)
+        i, j = balls_of(ends, e, lane)
+        v, u = vector_at(speed, i, BEFORE), vector_at(speed, j, BEFORE)
+        set_vector_in(rows, q + START, lane, apart(matter, place, i, j))
+        set_vector_in(rows, q + COAST, lane, v - u)
+        v1, u1 = vector_at(speed, i, AFTER), vector_at(speed, j, AFTER)
+        set_vector_in(read, _BOTH, lane, (v + v1) - (u + u1))
+        read[_SPEEDS, lane] = size_of(v1) + size_of(u1)
+        read[_REACH, lane] = place[i, RADIUS] + place[j, RADIUS]
+        one, two = place[i, LIGHTNESS], place[j, LIGHTNESS]
+        rows[q + EASES, lane], rows[q + EASES + 1, lane] = one, two
+        if near.drag is not None:
+            listed = index(int(rows[q + LISTED, lane]))
+            if matter.pairs.friction is not None:
+                rows[q + LEVERS, lane], rows[q + LEVERS + 1, lane] = one * spin[i, LEVER], two * spin[j, LEVER]
+                set_vector_in(rows, q + DRAG, lane, vector_at(near.drag, listed, 0))
+            if matter.pairs.rolling is not None:
+                set_vector_in(rows, q + ROLL, lane, vector_at(near.drag, listed, KEPT_ROLL))
+    for k in range(begin, end):
+        lane = index(k)
+        s0, move = vector_in(rows, q + START, lane), half * vector_in(read, _BOTH, lane)
+        size = math.sqrt(s0.x * s0.x + s0.y * s0.y + s0.z * s0.z)
+        gap, ease = read[_REACH, lane] - size, rows[q + EASES, lane] + rows[q + EASES + 1, lane]
+        rows[q + SIZE, lane], rows[q + GAP, lane], rows[q + EASE, lane] = size, gap, ease
+        set_vector_in(rows, q + COAST, lane, half * vector_in(rows, q + COAST, lane))
+        damping = None
+        if matter.pairs.damping is not None:
+            damping = matter.pairs.damping / math.sqrt(ease) / matter.h
+            rows[q + DAMPING, lane] = damping
+        way = closing(s0, size, move)
+        push, gain = begin_solve(pressed(matter, damping, gap, way.change), half * ease)
+        rows[q + PUSH, lane], rows[q + GAIN, lane] = push, gain
+        rows[q + SCALE, lane] = scale_of(matter, push, read[_SPEEDS, lane], ease)
+        set_vector_in(rows, q + IMPULSE, lane, push * way.along)
+        if matter.pairs.friction is not None:
+            rows[q + NEARNESS, lane] = 1.0 / read[_REACH, lane]
+            set_vector_in(rows, q + DRAG, lane, vector_in(rows, q + DRAG, lane) * lasting(gap))
+        if matter.pairs.rolling is not None:
+            set_vector_in(rows, q + ROLL, lane, vector_in(rows, q + ROLL, lane) * lasting(gap))
+
+
+@outlined
+def group_pairs(matter, grains, near, touches, known):
+    """Put the contacts that have been found, after those which are known, into groups, and begin to solve for them."""
+    count, found, marks = touches.used[0], touches.found, touches.marks
+    if known == 0:
+        groups, parts = (count + LANES - 1) // LANES, 0
+        marks[:] = 0
+        for g in range(groups):
+            lanes, splits = (count - g + groups - 1) // groups, 0
+            parts += 1
+            for k in range(lanes):
+                c = index(k * groups + g)
+                i, j = index(found[c, ONE]), index(found[c, OTHER])
+                if (marks[i] == parts) | (marks[j] == parts):
+                    splits |= 1 << k
+                    parts += 1
+                marks[i], marks[j] = parts, parts
+                _lay(touches, g, index(k), c)
+            touches.lanes[index(g)], touches.splits[index(g)] = lanes, splits
+            _begin_group(matter, grains, near, touches, (g, 0, lanes))
+        touches.used[1] = groups
+    else:
+        # Few, behind the others.
+        for k in range(known, count):
+            last = touches.used[1] - 1
+            if touches.lanes[index(last)] == LANES:
+                last += 1
+                touches.lanes[index(last)], touches.splits[index(last)], touches.used[1] = 0, 0, last + 1
+            lane = touches.lanes[index(last)]
+            _lay(touches, last, index(lane), index(k))
+            touches.lanes[index(last)] = lane + 1
+            touches.splits[index(last)] |= 1 << lane
+            _begin_group(matter, grains, near, touches, (last, lane, lane + 1))
+
+
+# --- At its end ------------------------------------------------------------------------------------------
+
+
+@outlined
+def push_pairs(matter, grains, touches):
+    """Add the impulses of the pairs to the velocities at the end of the step."""
+    speed, given = grains.speed, unwritten((3, LANES), np.float64)
+    for g in range(touches.used[1]):
+        rows, q, ends, e = of_group(touches, g)
+        lanes = touches.lanes[index(g)]
+        for k in range(lanes):
+            lane = index(k)
+            impulse = vector_in(rows, q + IMPULSE, lane)
+            if matter.pairs.friction is not None:
+                impulse = impulse + vector_in(rows, q + DRAG, lane)
+            set_vector_in(given, 0, lane, impulse)
+        for k in range(lanes):
+            push_ends(speed, rows, q, ends, e, index(k), vector_in(given, 0, index(k)))
+
+
+def push_ends(speed, rows, q, ends, e, lane, impulse):
+    """Change the velocities of both balls of a contact by an impulse on the first one."""
+    i, j = balls_of(ends, e, lane)
+    set_vector(speed, i, AFTER, vector_at(speed, i, AFTER) + impulse * rows[q + EASES, lane])
+    set_vector(speed, j, AFTER, vector_at(speed, j, AFTER) - impulse * rows[q + EASES + 1, lane])
+
+
+def twist_ends(spin, rows, q, ends, e, lane, twist):
+    """Change the spins of both balls of a contact by a twist."""
+    i, j = balls_of(ends, e, lane)
+    set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * rows[q + LEVERS, lane])
+    set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * rows[q + LEVERS + 1, lane])
+
+
+@outlined
+def twist_pairs(matter, grains, touches):
+    """Add the twists of all pairs to the spins at the end of the step; the velocities there are final."""
+    speed, spin, given = grains.speed, grains.spin, unwritten((3, LANES), np.float64)
+    for g in range(touches.used[1]):
+        rows, q, ends, e = of_group(touches, g)
+        lanes = touches.lanes[index(g)]
+        for k in range(lanes):
+            i, j = balls_of(ends, e, index(k))
+            set_vector_in(given, 0, index(k), vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
+        for k in range(lanes):
+            lane = index(k)
+            move = move_in(matter, rows, q, lane, vector_in(given, 0, lane))
+            set_vector_in(given, 0, lane, twist_in(rows, q, lane, move))
+        for k in range(lanes):
+            twist_ends(spin, rows, q, ends, e, index(k), vector_in(given, 0, index(k)))
+
+
+def twist_in(rows, q, lane, move):
+    """s x J/R of a pair; its s changes by `move`: with all of J, so that no angular momentum is lost at all."""
+    s = vector_in(rows, q + START, lane) + 0.5 * move
+    impulse = vector_in(rows, q + IMPULSE, lane) + vector_in(rows, q + DRAG, lane)
+    return cross(s * rows[q + NEARNESS, lane], impulse)
+
+
+# --- Sweeps --------------------------------------------------------------------------------------------
 
 # Rows of what a group begins with: v_i - v_j, and R_i w_i + R_j w_j; and of what it gives: the change of the impulse,
 # the twist, and the largest error of the sweep in each lane.
 _SLIP, _TURNING, _BEGUN = 0, 3, 6
 _PART, _TWIST, _WORST, _GIVEN = 0, 3, 6, 7
-
-
-# --- A group ---------------------------------------------------------------------------------------------
 
 
 def _press(matter, rows, q, lane, begun, given, share):
@@ -73,7 +290,7 @@ def _rub(matter, rows, q, lane, begun, given, share):
     given[_WORST, lane] = worse(size_of(more) * rows[q + SCALE, lane], kept(given[_WORST, lane]))
 
 
-def _begin(grains, ends, e, lane, begun):
+def _read(grains, ends, e, lane, begun):
     """Read what the improvement of a contact begins with; its balls."""
     i, j = balls_of(ends, e, lane)
     set_vector_in(begun, _SLIP, lane, vector_at(grains.speed, i, AFTER) - vector_at(grains.speed, j, AFTER))
@@ -85,7 +302,7 @@ def _sweep_group(matter, grains, touches, group, arrays, share):
     (g, begin, end), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
     for k in range(begin, end):
-        _begin(grains, ends, e, index(k), begun)
+        _read(grains, ends, e, index(k), begun)
     for k in range(begin, end):
         _way, part = _press(matter, rows, q, index(k), begun, given, share)
         set_vector_in(given, _PART, index(k), part)
@@ -98,7 +315,7 @@ def _rub_group(matter, grains, touches, group, arrays, share):
     (g, begin, end), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
     for k in range(begin, end):
-        i, j = _begin(grains, ends, e, index(k), begun)
+        i, j = _read(grains, ends, e, index(k), begun)
         set_vector_in(begun, _TURNING, index(k), turning(grains, i, j, AFTER))
     for k in range(begin, end):
         _rub(matter, rows, q, index(k), begun, given, share)
@@ -107,7 +324,7 @@ def _rub_group(matter, grains, touches, group, arrays, share):
         twist_ends(grains.spin, rows, q, ends, e, index(k), vector_in(given, _TWIST, index(k)))
 
 
-# --- All -------------------------------------------------------------------------------------------------
+# --- Sweeps over all groups -----------------------------------------------------------------------------
 
 
 def _over_groups(one, matter, grains, touches, share):

@@ -37,8 +37,8 @@ from .grain_arrays import (
     set_vector,
     vector_at,
 )
-from .groups import move_in, pair_at
 from .held import velocity_of
+from .lanes_of_pairs import move_in, pair_at
 from .vessel import met, met_member
 
 

@@ -30,7 +30,7 @@ from .grain_arrays import (
     set_vector,
     vector_at,
 )
-from .groups import pair_at
+from .lanes_of_pairs import pair_at
 from .vessel import met, moves
 
 

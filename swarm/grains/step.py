@@ -20,9 +20,8 @@ from .contacts import find_more_pairs, find_pairs, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, rub_wall, twist_wall
 from .grain_arrays import AFTER, BEFORE, DONE, LIGHTNESS, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
-from .groups import group_pairs, push_pairs, twist_pairs
 from .held import let_go
-from .lanes_of_pairs import rub_pairs, sweep_pairs
+from .lanes_of_pairs import group_pairs, push_pairs, rub_pairs, sweep_pairs, twist_pairs
 from .logged import log_pairs, log_wall, note_pairs, note_wall
 from .overlaps import look_at_pairs, look_at_wall
 from .passing import count_moves
