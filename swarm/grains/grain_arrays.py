@@ -22,21 +22,8 @@ BEFORE, AFTER, ARM, LEVER = 0, 3, 6, 7
 # function of the wall; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
 # inverse of the mass that moves; the damping; the gain of a Newton step; and where there is friction its
 # impulse, the place in the lists, the angular impulse of the resistance to rolling, and what both take.
-START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN, DRAG, LISTED, ROLL, RUBBED = (
-    0,
-    3,
-    4,
-    5,
-    6,
-    9,
-    12,
-    13,
-    14,
-    16,
-    19,
-    20,
-    23,
-)
+START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN = 0, 3, 4, 5, 6, 9, 12, 13, 14
+DRAG, LISTED, ROLL, RUBBED = 16, 19, 20, 23
 COLUMNS, COLUMNS_OF_FRICTION = 16, 24
 # And of one of a pair, in a lane: what makes its changes relative ones, 1/(R_i + R_j), and of both balls 1/m and what
 # turns them.

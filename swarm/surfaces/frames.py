@@ -70,6 +70,7 @@ _CONSTANTS = (
     "may_be_far",
     "in_steps",
     "kept",
+    "aims",
     "has_levels",
     "has_core",
     "proves",

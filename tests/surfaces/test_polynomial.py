@@ -21,6 +21,7 @@ from swarm.surfaces.formulas.polynomial import (
     QuarticCavity,
     QuarticSolid,
 )
+from swarm.surfaces.time_of_impact import flights
 from swarm.surfaces.time_of_impact.polynomial import ConvexFlight, PolynomialFlight
 
 EPSILON = 2.0**-52
@@ -131,6 +132,27 @@ def test_guesses_lead_to_most_hits_without_safe_steps(text, share):
     levels = [level for level in _from_wall(text, 30) if level.a4 == 0.0]
     assert len(levels) == 30
     assert np.mean([level.first_step()[1] == 0.0 for level in levels]) >= share
+
+
+def test_flights_to_a_formula_that_is_turned_begin_with_a_guess(monkeypatch):
+    guesses, aim = [], flights.aim
+
+    def counted(*given):
+        guesses.append(1)
+        return aim(*given)
+
+    monkeypatch.setattr(flights, "aim", counted)
+    start = swarm.fill(swarm.Scene([swarm.Formula(QUARTIC)]), 4, speed=1.0, seed=3)
+    turned = swarm.Particles(start.position[[2, 0, 1]], start.velocity[[2, 0, 1]])
+    ends = []
+    # By a third of a turn about (1, 1, 1) x becomes y, y becomes z, and z becomes x.
+    third = (1.0, 1.0, 1.0, 1.0)
+    for rotation, particles in ((None, start), (third, turned)):
+        scene = swarm.Scene([swarm.Formula(QUARTIC, rotation=rotation)])
+        ends.append(swarm.simulate(scene, particles, swarm.Impact(), until=2.0, compile="never").particles)
+        assert guesses
+        guesses.clear()
+    assert ends[1].position == pytest.approx(ends[0].position[[2, 0, 1]], abs=1e-12)
 
 
 def _level_with_roots(random, kind):

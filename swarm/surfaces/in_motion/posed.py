@@ -155,7 +155,8 @@ class Posed(Framed):
         """When a straight flight may meet another body of a field."""
         return safe.until_next_cell(self.body, self.sees(None, r, v), self.remaining)
 
-    is_quartic, may_be_far, has_levels, in_steps, kept, leaves_once = False, True, False, False, 0, False
+    is_quartic, may_be_far, has_levels, leaves_once = False, True, False, False
+    in_steps, kept, aims = False, 0, False
 
     def safe_time(self, r, v, pull):
         return 0.0
