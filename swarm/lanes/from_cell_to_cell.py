@@ -1,5 +1,7 @@
 """The first hits of all lanes with the facets of a mesh: each lane goes from cell to cell until it meets one.
 
+A mesh that moves takes the same lanes through its cells in its own frame, in_moving_cells.py.
+
 All lanes take a step together, in loops of which those without branches vectorise; then those that have come into a
 cell with facets look at these. One lane after the other would wait for each number that it looks up: 4 times as long.
 """
@@ -22,15 +24,16 @@ from .table import STRIDE, marked_lanes
 _TIME, _WALL = 0, 1
 # So many blocks of entries are looked at together; so many a lane has usually.
 _BLOCKS, _USUAL = 256, 2
-_ROOM = _BLOCKS * BLOCK
+# So many facets are looked at together.
+ROOM = _BLOCKS * BLOCK
 # Steps of a lane after which its flight is said to be free so far.
-_MOST = 4000
+MOST = 4000
 
 
-class Under(Record):
+class UnderWay(Record):
     """The lanes that are under way, closed up."""
 
-    rows: Array  # position and velocity at the start, where it is now, and what is known of its cell
+    rows: Array  # `own` rows of a flight at its start, where it is now, and what is known of its cell
     time: Array  # how far it has come
     until: Array  # how far it comes in this step, up to its hit
     wall: Array  # the facet of that hit, or -1
@@ -39,17 +42,69 @@ class Under(Record):
     owner: Array  # int64, the lane
     last: Array  # the time after which no hit counts
 
+    own = 6
+
+    def begin(self, i, lane, found):
+        """A lane with its hit so far at its start."""
+        put(self.rows, _START, i, lane.r)
+        put(self.rows, _SPEED, i, lane.v)
+        self.time[i], self.owner[i] = 0.0, i
+        self.last[i] = select(lane.remaining < found, lane.remaining, found)
+
     def move(self, source, target):
         """One lane into the place of another one."""
-        for k in range(6):
+        for k in range(self.own):
             self.rows[k, target] = self.rows[k, source]
         self.time[target], self.owner[target] = self.time[source], self.owner[source]
         self.last[target] = self.last[source]
+
+    def until_in(self, gravity, mesh, i):
+        """Until when a lane that is outside of the grid surely does not come into it."""
+        raise NotImplementedError
+
+    def keep(self, course, i, time, wall):
+        """Keep the hit of a lane, if it is the first so far."""
+        owner = index(self.owner[i])
+        if time < course[_TIME, owner]:
+            course[_TIME, owner], course[_WALL, owner] = time, wall
+
+    def go_on(self, gravity, mesh, before, course, n):
+        """Every lane to the next cell, or to its hit: how many are under way still."""
+        left = 0
+        for i in range(index(n)):
+            until, wall = self.until[i], self.wall[i]
+            if not self.inside[i]:
+                until = self.until_in(gravity, mesh, i)
+            if wall >= 0.0 or not until < self.last[i]:
+                self.keep(course, i, until, select(wall < 0.0, -1.0, wall + before))
+                continue
+            self.time[i] = until
+            if left < i:
+                self.move(i, index(left))
+            left += 1
+        return left
+
+
+def under_way(kind, rows, *more):
+    """Room for lanes that are under way, of that kind with so many rows, and what only it has."""
+    return kind(
+        unwritten((rows, STRIDE), np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
+        unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64),
+        unwritten(STRIDE, np.bool_), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64), *more,
+    )  # fmt: skip
+
+
+class Under(UnderWay):
+    """Those that fly straight or fall, past facets at rest."""
 
     def now(self, gravity, i):
         """The position and the velocity of a lane now."""
         r, v, t = column(self.rows, _START, i), column(self.rows, _SPEED, i), self.time[i]
         return r + displacement(gravity, v, t), accelerated(gravity, v, t)
+
+    def until_in(self, gravity, mesh, i):
+        """As of `UnderWay`."""
+        return _until_in(gravity, mesh.grid, self, i)
 
 
 class Maybe(Record):
@@ -61,6 +116,17 @@ class Maybe(Record):
     lane: Array  # int64
     entry: Array  # int64
     facet: Array  # int64
+
+    def look_up(self, facets, some):
+        """Look up so many."""
+        for j in range(some):
+            self.facet[j] = facets.grid.entries[index(self.entry[j])]
+            ask_for(facets.table, self.facet[j], facets.table.shape[1])
+
+
+def maybe_met():
+    """Room for them."""
+    return Maybe(unwritten(ROOM, np.int64), unwritten(ROOM, np.int64), unwritten(ROOM, np.int64))
 
 
 class Looks(Record):
@@ -90,30 +156,19 @@ _MIDDLE = _BACK
 @outlined
 def go_through(gravity, facets, before, lanes, live):
     """The first hits of every live lane with facets that have so many walls before them, or that found before."""
-    course = lanes.course
-    under = Under(
-        unwritten((_PLACES, STRIDE), np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
-        unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64),
-        unwritten(STRIDE, np.bool_), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
-    )  # fmt: skip
+    course, under, maybe = lanes.course, under_way(Under, _PLACES), maybe_met()
     looks = Looks(unwritten(_BLOCKS, np.int64), unwritten(_BLOCKS, np.int64))
-    maybe = Maybe(unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64))
     for i in range(index(live)):
-        lane = lanes.lane(i)
-        found, remaining = course[_TIME, i], lane.remaining
-        put(under.rows, _START, i, lane.r)
-        put(under.rows, _SPEED, i, lane.v)
-        under.time[i], under.owner[i] = 0.0, i
-        under.last[i] = select(remaining < found, remaining, found)
+        under.begin(i, lanes.lane(i), course[_TIME, i])
     n = int(live)
-    for _step in range(_MOST):
+    for _step in range(MOST):
         _find_cells(gravity, facets.grid, under, lanes, n)
         _look(gravity, facets, under, (looks, maybe), lanes.order, marked_lanes(lanes, n))
-        n = _go_on(gravity, facets.grid, before, course, under, n)
+        n = under.go_on(gravity, facets, before, course, n)
         if n == 0:
             return
     for i in range(index(n)):
-        _keep(course, under, i, under.time[i], -1.0)
+        under.keep(course, i, under.time[i], -1.0)
 
 
 def _find_cells(gravity, cells, under, lanes, n):
@@ -195,9 +250,7 @@ def _look_into(gravity, facets, under, found, blocks):
 
 def _look_at(gravity, facets, under, maybe, some):
     """So many lanes each at a facet."""
-    for n in range(some):
-        maybe.facet[n] = facets.grid.entries[index(maybe.entry[n])]
-        ask_for(facets.table, maybe.facet[n], facets.table.shape[1])
+    maybe.look_up(facets, some)
     for n in range(some):
         i, m = index(maybe.lane[n]), index(maybe.facet[n])
         r, v = column(under.rows, _START, i), column(under.rows, _SPEED, i)
@@ -207,32 +260,8 @@ def _look_at(gravity, facets, under, maybe, some):
         under.wall[i] = select(sooner, float(maybe.facet[n]), under.wall[i])
 
 
-def _go_on(gravity, cells, before, course, under, n):
-    """Every lane to the next cell, or to its hit: how many are under way still."""
-    left = 0
-    for i in range(index(n)):
-        until, wall = under.until[i], under.wall[i]
-        if not under.inside[i]:
-            until = _until_in(gravity, cells, under, i)
-        if wall >= 0.0 or not until < under.last[i]:
-            _keep(course, under, i, until, select(wall < 0.0, -1.0, wall + before))
-            continue
-        under.time[i] = until
-        if left < i:
-            under.move(i, index(left))
-        left += 1
-    return left
-
-
 @outlined
 def _until_in(gravity, cells, under, i):
     """Until when a lane that is outside of the grid surely does not come into it."""
     place, pace = under.now(gravity, i)
     return under.time[i] + until_next(gravity, cells, cell_of(cells, place), place, pace)
-
-
-def _keep(course, under, i, time, wall):
-    """Keep the hit of a lane, if it is the first so far."""
-    owner = index(under.owner[i])
-    if time < course[_TIME, owner]:
-        course[_TIME, owner], course[_WALL, owner] = time, wall

@@ -15,7 +15,6 @@ from ..kernel.gravity import accelerated
 from ..kernel.grid import cell_of, entries_of, until_next, until_out
 from ..kernel.jit import Array, outlined, select
 from ..kernel.limits import EPSILON
-from ..kernel.record import Record
 from ..kernel.vector import ZERO, column, dot, norm, put
 from ..surfaces.facets.facet_cells import may_pass, way_in
 from ..surfaces.facets.free_room import FULL, KIND, all_away_for, room_of
@@ -24,45 +23,39 @@ from ..surfaces.time_of_impact.course import rise_time
 from ..surfaces.time_of_impact.flights import Hit
 from ..surfaces.time_of_impact.march import lets_go
 from ..surfaces.time_of_impact.rising import InWallFrame, Level, ThirdDerivativeBound, flight_of
-from .from_cell_to_cell import Maybe, ask_for
+from .from_cell_to_cell import MOST, ROOM, UnderWay, maybe_met, under_way
 from .table import STRIDE
 
-# The hit of a lane, in rows of `course`.
-_TIME, _WALL = 0, 1
-# So many facets are looked at together.
-_ROOM = 1024
-# Steps of a lane after which its flight is said to be free so far, and safe steps to one facet.
-_MOST, _STEPS = 4000, 100
+# The time of the hit of a lane, a row of `course`.
+_TIME = 0
+# Safe steps to one facet.
+_STEPS = 100
 # The bounds of a flight hold for so many times as long as it would be among its cells if it went straight on.
 _CURVED = 1.5
-# And for at most so many times the time in which the motion changes little: a turn by a radian.
-_AHEAD = 20.0
+# And for at most so many times the time in which the motion changes little: a turn by a radian and a quarter.
+_LONGEST = 25.0
 # A part of the room of a facet, by which a flight goes on that comes to its plane just beyond an edge.
 _ON = 0.5
 # Where a step to a facet ends that does not lead to the hit.
 _NEARER, _BEYOND, _BEHIND = -1.0, -2.0, -3.0
 
 
-class Leaps(Record):
-    """The lanes that are under way, closed up."""
+class Leaps(UnderWay):
+    """Those that leap through the cells of a mesh that moves: curves in its frame."""
 
-    rows: Array  # the flight at its start, and where it is now in the frame of the mesh
-    time: Array  # how far it has come
-    until: Array  # how far it comes in this step, up to its hit
-    wall: Array  # the facet of that hit, or -1
-    cell: Array  # int64
-    inside: Array  # bool, whether it is in the grid
-    owner: Array  # int64, the lane
-    last: Array  # the time after which no hit counts
     first: Array  # int64, the first entry of its cell
     count: Array  # int64, how many it has
 
-    def move(self, source, target):
-        """One lane into the place of another one."""
-        for k in range(_OWN):
-            self.rows[k, target] = self.rows[k, source]
-        self.time[target], self.owner[target] = self.time[source], self.owner[source]
-        self.last[target] = self.last[source]
+    own = 8
+
+    def begin(self, i, lane, found):
+        """As of `UnderWay`."""
+        UnderWay.begin(self, i, lane, found)
+        self.rows[_REMAINING, i], self.rows[_FAST, i] = lane.remaining, norm(lane.v)
+
+    def until_in(self, gravity, mesh, i):
+        """As of `UnderWay`."""
+        return _until_in(gravity, mesh, self, i)
 
     def flight(self, gravity, i):
         """The flight of a lane."""
@@ -87,36 +80,24 @@ _PLACE, _BACK, _AHEAD, _ROWS = 19, 22, 25, 28
 @outlined
 def go_through_moving(gravity, mesh, before, lanes, live):
     """The first hits of every live lane with facets that have so many walls before them, or that found before."""
-    course = lanes.course
-    leaps = Leaps(
-        unwritten((_ROWS, STRIDE), np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
-        unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64),
-        unwritten(STRIDE, np.bool_), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
-        unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64),
-    )  # fmt: skip
-    maybe = Maybe(unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64), unwritten(_ROOM, np.int64))
+    entries = unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64)
+    course, leaps, maybe = lanes.course, under_way(Leaps, _ROWS, *entries), maybe_met()
     for i in range(index(live)):
-        lane = lanes.lane(i)
-        found, remaining = course[_TIME, i], lane.remaining
-        put(leaps.rows, _START, i, lane.r)
-        put(leaps.rows, _SPEED, i, lane.v)
-        leaps.rows[_REMAINING, i], leaps.rows[_FAST, i] = remaining, norm(lane.v)
-        leaps.time[i], leaps.owner[i] = 0.0, i
-        leaps.last[i] = select(remaining < found, remaining, found)
+        leaps.begin(i, lanes.lane(i), course[_TIME, i])
     n = int(live)
-    for _step in range(_MOST):
+    for _step in range(MOST):
         _find_cells(gravity, mesh, leaps, n)
         _look(gravity, mesh, leaps, maybe, n)
-        n = _go_on(gravity, mesh, before, course, leaps, n)
+        n = leaps.go_on(gravity, mesh, before, course, n)
         if n == 0:
             return
     for i in range(index(n)):
-        _keep(course, leaps, i, leaps.time[i], -1.0)
+        leaps.keep(course, i, leaps.time[i], -1.0)
 
 
 def _find_cells(gravity, mesh, leaps, n):
     """Where every lane is in the frame of the mesh, in which cell, and how far it surely comes from there."""
-    cells, rows, most = mesh.body.grid, leaps.rows, _AHEAD * mesh.drive.time_scale
+    cells, rows, most = mesh.body.grid, leaps.rows, _LONGEST * mesh.drive.time_scale
     for i in range(index(n)):
         seen = mesh.seen(leaps.flight(gravity, i), leaps.time[i])
         put(rows, _OWN, i, seen.r)
@@ -163,7 +144,7 @@ def _look(gravity, mesh, leaps, maybe, n):
                 if may_pass(cells, index(k), here):
                     maybe.lane[some], maybe.entry[some] = i, k
                     some += 1
-                    if some == _ROOM:
+                    if some == ROOM:
                         _look_at(gravity, mesh, leaps, maybe, some)
                         some = 0
     _look_at(gravity, mesh, leaps, maybe, some)
@@ -172,10 +153,7 @@ def _look(gravity, mesh, leaps, maybe, n):
 @outlined
 def _look_at(gravity, mesh, leaps, maybe, some):
     """So many lanes each at a facet."""
-    facets = mesh.body
-    for j in range(index(some)):
-        maybe.facet[j] = facets.grid.entries[index(maybe.entry[j])]
-        ask_for(facets.table, maybe.facet[j], facets.table.shape[1])
+    maybe.look_up(mesh.body, index(some))
     for j in range(index(some)):
         i, m = index(maybe.lane[j]), maybe.facet[j]
         met = _met(gravity, mesh, leaps, i, m)
@@ -259,23 +237,6 @@ def _is_beside(facet, seen, level, own, longest, bounds):
     return facet.within(_place(seen, own)) < -beside
 
 
-def _go_on(gravity, mesh, before, course, leaps, n):
-    """Every lane to the next cell, or to its hit: how many are under way still."""
-    left = 0
-    for i in range(index(n)):
-        until, wall = leaps.until[i], leaps.wall[i]
-        if not leaps.inside[i]:
-            until = _until_in(gravity, mesh, leaps, i)
-        if wall >= 0.0 or not until < leaps.last[i]:
-            _keep(course, leaps, i, until, select(wall < 0.0, -1.0, wall + before))
-            continue
-        leaps.time[i] = until
-        if left < i:
-            leaps.move(i, index(left))
-        left += 1
-    return left
-
-
 @outlined
 def _until_in(gravity, mesh, leaps, i):
     """Until when a lane that is outside of the grid surely does not come into it."""
@@ -288,10 +249,3 @@ def _until_in(gravity, mesh, leaps, i):
             break
         within = math.sqrt(time * within)
     return leaps.time[i] + time
-
-
-def _keep(course, leaps, i, time, wall):
-    """Keep the hit of a lane, if it is the first so far."""
-    owner = index(leaps.owner[i])
-    if time < course[_TIME, owner]:
-        course[_TIME, owner], course[_WALL, owner] = time, wall
