@@ -4,8 +4,8 @@ import math
 
 from ...kernel.arrays import index
 from ...kernel.jit import outlined
-from .aim import find_partner, find_wall, forget_wall, tell_partner
 from .cells import take_out, until_exit
+from .next_collision import find_partner, find_wall, forget_wall, tell_partner
 from .queue import requeue
 from .rows import DUE, FLOATS, LEAVES, MEETS, NO_PARTNER, PARTNER, WALL, WHOLES
 from .window import OUT

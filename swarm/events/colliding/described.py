@@ -14,10 +14,10 @@ from ...particles import Particles
 from ...scene import Scene
 from ...surfaces.in_motion.drive import drive_of
 from ..reacting.described import scenery_of
-from .aim import Alike, Holdable, Various
 from .box import Domain
 from .cells import Axis, BallGrid
 from .meet import Loss
+from .next_collision import Alike, Holdable, Various
 from .queue import FIRST, SPARE
 from .resting import repose_of
 from .rows import CELL, FLOATS, NO_PARTNER, PARTNER, RADIUS, STAMP, TIME, WALL, WHOLES, Flock, Kept

@@ -17,13 +17,13 @@ from ...kernel.vector import either, norm, put, square
 from ...lanes.watching.log import Struck, is_full
 from .again import aim_again, queue_both, stay, vanish
 from .ahead import fetch_next
-from .aim import find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .bounce import FLIES, GONE, STAYS, bounce, press
 from .cells import cross, mark_near, until_exit
 from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, REACH, SAME, fit, moment_of
 from .followed import come_over, follow
 from .heavy import first_number
 from .meet import met
+from .next_collision import find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .queue import FIRST, build, requeue
 from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NO_PARTNER, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
 from .striking import renew_ended, shift_leases, strike_heavy

@@ -7,7 +7,7 @@ from ...kernel.arrays import index
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import dot, square, with_square
-from .aim import between
+from .next_collision import between
 from .rubbing import rub_pair
 
 # The square of the part of their speeds with which balls part at least: four roundings.

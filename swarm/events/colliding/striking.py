@@ -13,11 +13,11 @@ from ...lanes.watching.log import Struck
 from ..reacting.freedoms import TOO_LONG, TOO_SHORT, ParticleFlight
 from ..reacting.strikes import Turner, all_stay, exit_at, strike, with_energy
 from .again import aim_again, queue_both, vanish
-from .aim import find_wall
 from .bounce import FLIES, let_out
 from .clock import EVENTS, moment_of
 from .followed import follow
 from .heavy import LISTED, SINCE, STRIKES, first_number
+from .next_collision import find_wall
 from .queue import FIRST, requeue
 from .rows import FLOATS, WALL
 from .window import END
