@@ -85,12 +85,12 @@ class UnderWay(Record):
         return left
 
 
-def under_way(kind, rows, *more):
-    """Room for lanes that are under way, of that kind with so many rows, and what only it has."""
+def under_way(kind, rows):
+    """Room for lanes that are under way, of that kind with so many rows."""
     return kind(
         unwritten((rows, STRIDE), np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
         unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64),
-        unwritten(STRIDE, np.bool_), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64), *more,
+        unwritten(STRIDE, np.bool_), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
     )  # fmt: skip
 
 

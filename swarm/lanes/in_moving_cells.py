@@ -8,12 +8,10 @@ a flight may come through the plane of one, safe steps to that facet alone lead 
 import math
 from typing import Any
 
-import numpy as np
-
-from ..kernel.arrays import index, unwritten
+from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
 from ..kernel.grid import cell_of, entries_of, until_next, until_out
-from ..kernel.jit import Array, outlined, select
+from ..kernel.jit import outlined, select
 from ..kernel.limits import EPSILON
 from ..kernel.vector import ZERO, column, dot, norm, put
 from ..surfaces.facets.facet_cells import may_pass, way_in
@@ -24,7 +22,7 @@ from ..surfaces.time_of_impact.flights import Hit
 from ..surfaces.time_of_impact.march import lets_go
 from ..surfaces.time_of_impact.rising import InWallFrame, Level, ThirdDerivativeBound, flight_of
 from .from_cell_to_cell import MOST, ROOM, UnderWay, maybe_met, under_way
-from .table import STRIDE
+from .table import marked_lanes
 
 # The time of the hit of a lane, a row of `course`.
 _TIME = 0
@@ -42,9 +40,6 @@ _NEARER, _BEYOND, _BEHIND = -1.0, -2.0, -3.0
 
 class Leaps(UnderWay):
     """Those that leap through the cells of a mesh that moves: curves in its frame."""
-
-    first: Array  # int64, the first entry of its cell
-    count: Array  # int64, how many it has
 
     own = 8
 
@@ -80,14 +75,13 @@ _PLACE, _BACK, _AHEAD, _ROWS = 19, 22, 25, 28
 @outlined
 def go_through_moving(gravity, mesh, before, lanes, live):
     """The first hits of every live lane with facets that have so many walls before them, or that found before."""
-    entries = unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64)
-    course, leaps, maybe = lanes.course, under_way(Leaps, _ROWS, *entries), maybe_met()
+    course, leaps, maybe = lanes.course, under_way(Leaps, _ROWS), maybe_met()
     for i in range(index(live)):
         leaps.begin(i, lanes.lane(i), course[_TIME, i])
     n = int(live)
     for _step in range(MOST):
-        _find_cells(gravity, mesh, leaps, n)
-        _look(gravity, mesh, leaps, maybe, n)
+        _find_cells(gravity, mesh, leaps, lanes, n)
+        _look(gravity, mesh, leaps, maybe, lanes.order, marked_lanes(lanes, n))
         n = leaps.go_on(gravity, mesh, before, course, n)
         if n == 0:
             return
@@ -95,8 +89,8 @@ def go_through_moving(gravity, mesh, before, lanes, live):
         leaps.keep(course, i, leaps.time[i], -1.0)
 
 
-def _find_cells(gravity, mesh, leaps, n):
-    """Where every lane is in the frame of the mesh, in which cell, and how far it surely comes from there."""
+def _find_cells(gravity, mesh, leaps, lanes, n):
+    """Where every lane is in the frame of the mesh, in which cell, how far it surely comes, and whether it may meet."""
     cells, rows, most = mesh.body.grid, leaps.rows, _LONGEST * mesh.drive.time_scale
     for i in range(index(n)):
         seen = mesh.seen(leaps.flight(gravity, i), leaps.time[i])
@@ -124,29 +118,27 @@ def _find_cells(gravity, mesh, leaps, n):
         leaps.until[i], leaps.wall[i] = leaps.time[i] + time, -1.0
     for i in range(index(n)):
         cell = index(leaps.cell[i])
-        leaps.count[i] = 0
+        lanes.marked[i] = False
         if cells.known.room[cell, KIND] == FULL:
             seen, span = leaps.seen(mesh, gravity, i), leaps.until[i] - leaps.time[i]
             turns = seen.bounds(span).acceleration * span
-            if not all_away_for(cells.known.room, cell, seen.v, turns):
-                first, stop = entries_of(cells, cell)
-                leaps.first[i], leaps.count[i] = first, stop - first
+            lanes.marked[i] = not all_away_for(cells.known.room, cell, seen.v, turns)
 
 
-def _look(gravity, mesh, leaps, maybe, n):
-    """Every lane at the facets in its cell, by their planes first."""
+def _look(gravity, mesh, leaps, maybe, order, n):
+    """So many lanes at the facets in their cells, by their planes first."""
     cells, some = mesh.body.grid, 0
-    for i in range(index(n)):
-        if leaps.count[i] > 0:
-            seen, span = leaps.seen(mesh, gravity, i), leaps.until[i] - leaps.time[i]
-            here = way_in(cells, column(leaps.rows, _PLACE, i), seen, span)
-            for k in range(leaps.first[i], leaps.first[i] + leaps.count[i]):
-                if may_pass(cells, index(k), here):
-                    maybe.lane[some], maybe.entry[some] = i, k
-                    some += 1
-                    if some == ROOM:
-                        _look_at(gravity, mesh, leaps, maybe, some)
-                        some = 0
+    for j in range(index(n)):
+        i = index(order[j])
+        seen, span = leaps.seen(mesh, gravity, i), leaps.until[i] - leaps.time[i]
+        here, (first, stop) = way_in(cells, column(leaps.rows, _PLACE, i), seen, span), entries_of(cells, leaps.cell[i])
+        for k in range(first, stop):
+            if may_pass(cells, index(k), here):
+                maybe.lane[some], maybe.entry[some] = i, k
+                some += 1
+                if some == ROOM:
+                    _look_at(gravity, mesh, leaps, maybe, some)
+                    some = 0
     _look_at(gravity, mesh, leaps, maybe, some)
 
 
