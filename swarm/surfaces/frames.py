@@ -71,6 +71,7 @@ _CONSTANTS = (
     "in_steps",
     "kept",
     "aims",
+    "flight",
     "has_levels",
     "has_core",
     "proves",
