@@ -25,6 +25,7 @@ from .surfaces.pieces import Images, Pieces, pieces_of
 from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.presence.doors import instants_of
 from .surfaces.presence.openings import require_few
+from .surfaces.room import lasting
 from .surfaces.surface import UNBOUNDED, Box, Surface, held_opening
 from .surfaces.union import Place
 
@@ -337,6 +338,18 @@ class Scene:
         self, surfaces: Sequence[Surface], time: float = 0.0
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A box around the volume that some of the surfaces leave, and the cell that repeats."""
+        low, high = self._box_of(surfaces, time)
+        for k, union in enumerate(surfaces):
+            if len(union.rooms) > 1 and not np.isfinite(high - low).all():
+                # Another surface may close each of its rooms, such as a lid over a cone.
+                others = [*surfaces[:k], *surfaces[k + 1 :]]
+                boxes = [self._box_of([*others, *lasting(room)], time) for room in union.rooms]
+                low = np.maximum(low, np.min([least for least, _most in boxes], axis=0))
+                high = np.minimum(high, np.max([most for _least, most in boxes], axis=0))
+        return low, high
+
+    def _box_of(self, surfaces: Sequence[Surface], time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The box of `bounds_of`, of surfaces that are each taken as a whole."""
         boxes = np.array([box_of(surface, time) for surface in surfaces] or [UNBOUNDED])
         low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
         if self.period is not None:

@@ -138,7 +138,7 @@ def _of_all(plan: Plan, path: Path, plugins: Iterable[str], threads: int | None)
             seconds += (_in_python if options.compile == "never" else _seconds)(task) - _BEGINNING + _NEXT
     share = len(plan.variants) / len(some)
     most = "at most " * (task.options.storage.compression != "none")
-    every = f"about {_about(seconds * share)} one after the other, besides {_BEGINNING:g} s to begin"
+    every = f"about {_about(seconds * share)} one after the other, besides {_BEGINNING:g} s to begin and what compiles"
     return f"trajectories {most}{in_bytes(size * share)}, {every}"
 
 
@@ -234,6 +234,8 @@ def _time(task: Task) -> dict[str, str]:
         return stated | {"time": f"about {_about(python)}, in plain Python{more}"}
     on = f" on {threads} threads" if threads > 1 and any(one.shared for one in loads) else ""
     once = f", and once {_about(compiling * missing)} to compile {missing} of {kernels} kernels" if missing else ""
+    if once and task.bodies is None and task.particles.radius is None and _settles(task):
+        once += ", and others where particles come to slide"
     return stated | {"time": f"about {_about(seconds)}{on}{once}{more}; from the start, to a factor of a few"}
 
 

@@ -25,7 +25,7 @@ def matter_of(compiled: CompiledScene, method: Method, radius: NDArray[np.float6
     """What is the same for all balls of a scene, with these radii, and all steps of a method."""
     scene = compiled.scene
     pairs, law, dt = scene.pairs or Pairs(), method.law(), float(method.dt)  # type: ignore[attr-defined]
-    surfaces = [scene.surfaces[i] for i in compiled.numbering.surfaces_of_rows]
+    surfaces = [compiled.pieces.each[i] for i in compiled.numbering.pieces_of_rows]
     return Matter(
         law,
         scene.pull(),

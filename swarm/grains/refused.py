@@ -20,8 +20,9 @@ _TINY = float(np.finfo(np.float64).tiny)
 def unsolved(moment: float, dt: float) -> str:
     """Of impulses that did not converge, in the step of a length [s] at a moment [s]."""
     return (
-        f"the step at {moment:.9g} s failed: the impulses of its contacts did not converge; a smaller dt than "
-        f"{dt:g} s, or a softer penalty, helps"
+        f"the step at {moment:.9g} s failed: the impulses of its contacts did not converge; take a smaller "
+        f"dt than {dt:g} s, or a softer penalty; if neither helps, look for a gap or an edge between walls that is "
+        "narrower than a ball"
     )
 
 

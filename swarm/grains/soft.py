@@ -27,7 +27,7 @@ def require_soft_balls(scene: Scene, particles: Particles, method: Method) -> No
 
 def _require_damping(scene: Scene) -> None:
     """Raise a `SceneError` for a restitution that a damper cannot give."""
-    named = [(f"surfaces[{i}]", surface.restitution) for i, surface in enumerate(scene.surfaces)]
+    named = [(f"surfaces[{i}]", one.restitution) for i, whole in enumerate(scene.surfaces) for one in whole.surfaces()]
     for name, value in (*named, *(() if scene.pairs is None else [("pairs", scene.pairs.restitution)])):
         if value < MOST_DAMPED:
             raise SceneError(

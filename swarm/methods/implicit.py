@@ -247,7 +247,7 @@ class Midpoint(ImplicitRule):
 
     Conserves: quadratic invariants only, so the energy of a linear spring that never lets go, but not that of a contact
     that begins and ends: each changes the energy by what the force at the middle of a step misses. No stability limit.
-    Order: 2 in dt between contacts. Cost: free steps, which it takes exactly, are jumped over in one evaluation; a
+    Order: 2 in dt. Cost: free steps, which it takes exactly, are jumped over in one evaluation; a
     contact step solves one scalar equation.
     Walls may move without turning: the force is that of the walls at the middle of the step.
     Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.1.

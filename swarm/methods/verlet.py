@@ -25,9 +25,9 @@ class Verlet(fixed_step.SoftWalls):
     Raises:
         SceneError: an argument is out of its range; a frame time is not a whole number of steps.
 
-    Conserves: nothing exactly; each contact with a wall of exponent 1 changes the energy by a part of about
-    dt sqrt(alpha/m); its sign depends on where in a step it begins, and beyond dt sqrt(alpha/m) = 2 it is unstable:
-    the energy grows without bound. Order: 2 in dt between contacts, 1 across the corner of the force at the wall. Cost:
+    Conserves: nothing exactly; each contact with a wall of exponent 1 changes the energy by a part of up to
+    about dt^2 alpha/m; its sign depends on where in a step it begins, and beyond dt sqrt(alpha/m) = 2 it is unstable:
+    the energy grows without bound. Order: 2 in dt, also across the corner of the force at the wall. Cost:
     free steps, which it takes exactly, are jumped over in one evaluation; two forces a contact step. Penetration:
     |v| sqrt(m/alpha), more where it is unstable; through the middle of a solid it ends the run with an error.
     Walls may move without turning: each force is that of the walls at its time.

@@ -98,7 +98,7 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
                         log.begin = before
                     while not run.advance(span, moment, *_meanwhile(session, writer, show)):
                         share = run.share_done(span)
-                        still.look(number, share, run.furthest_behind())
+                        still.look(number, share, run.furthest_behind(), session.compiled.seconds)
                         show.within(before + share * (moment - before), until)
                         session.look(run, writer, number - 1, before, moment)
                 seen = {

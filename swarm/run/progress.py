@@ -149,17 +149,21 @@ class Standstill:
     """Warns once of a run with a frame that hardly goes on."""
 
     def __init__(self) -> None:
-        self._shares, self._number, self._has_warned, self._is_slow = Pace(LOOK), 0, False, False
+        self._shares, self._about, self._has_warned, self._is_slow = Pace(LOOK), (0, 0.0), False, False
 
-    def look(self, number: int, share: float, behind: tuple[int, list[float]] | None) -> None:
-        """Look at a frame, of which this share is done: `behind` is the last particle, and where it is [m]."""
-        if number != self._number:
-            self._shares, self._number, self._is_slow = Pace(LOOK), number, False
+    def look(self, number: int, share: float, behind: tuple[int, list[float]] | None, compiled: float) -> None:
+        """Look at a frame, of which this share is done.
+
+        `behind` is the last particle, and where it is [m]; `compiled` is for how long kernels were compiled so far [s],
+        in which a frame does not go on.
+        """
+        if (number, compiled) != self._about:
+            self._shares, self._about, self._is_slow = Pace(LOOK), (number, compiled), False
         self._shares.note(share)
         elapsed, advanced = self._shares.lately()
         if self._has_warned or elapsed < LOOK:
             return
-        # Twice in a row: in between a kernel may have been compiled.
+        # Twice in a row: other work of the machine may last for as long.
         was_slow, self._is_slow = self._is_slow, advanced * _A_MONTH < (1.0 - share) * elapsed
         if not (was_slow and self._is_slow):
             return
@@ -169,9 +173,10 @@ class Standstill:
             last = f"; the last one is particle {behind[0]}, at ({', '.join(f'{x:.6g}' for x in behind[1])}) m"
         _LOG.warning(
             "frame %d hardly goes on: in %.0f s particles have done %.2g of it%s. A particle meets its walls almost "
-            "without time between where walls touch but do not overlap, as boxes in a row, or where a user-defined "
-            "method or law takes energy at each impact and lets no particle rest: let such walls overlap, or let slow "
-            "particles rest. The run goes on; end it with Ctrl-C", number, elapsed, advanced, last,
+            "without time between where walls touch but do not overlap, as boxes in a row, where friction holds it in "
+            "a corner of walls that turn, or where a user-defined method or law takes energy at each impact and lets no "
+            "particle rest: let such walls overlap, round the corner off, or let slow particles rest. The run goes "
+            "on; end it with Ctrl-C", number, elapsed, advanced, last,
         )  # fmt: skip
 
 

@@ -153,3 +153,27 @@ def test_a_grain_that_is_larger_than_a_room_is_refused():
     grain = swarm.Particles((0.0, 0.0, 0.1), (0.0, 0.0, 0.0), mass=1e-4, radius=0.012)
     with pytest.raises(swarm.SceneError, match=r"radius must be below 0\.01 m"):
         swarm.simulate(swarm.Scene([BIN]), grain, swarm.Penalty(1e-4, 2e3), until=0.1, every=0.1, progress=False)
+
+
+@pytest.mark.parametrize("kind", [swarm.Union, swarm.Intersection])
+def test_losses_given_to_parts_are_those_given_to_the_whole(kind):
+    """A ball that slides on the floor: friction and restitution of the parts act as those of the whole do."""
+    losses = {"friction": 0.4, "restitution": 0.5, "rolling": 0.01}
+    ends = []
+    for mine, common in (({}, losses), (losses, {})):
+        boxes = [swarm.Box((0.5, 0.5, 0.5), (x, 0.0, 0.0), **mine) for x in (-0.3, 0.3)]
+        scene = swarm.Scene([kind(boxes, **common)], (0.0, 0.0, -9.81))
+        ball = swarm.Particles((0.0, 0.0, -0.449), (0.5, 0.0, 0.0), mass=1.0, radius=0.05)
+        ends.append(swarm.simulate(scene, ball, swarm.Penalty(dt=5e-5, penalty=1e5), until=0.05))
+    assert ends[0].observables["dissipated_energy"][-1] > 0.02
+    assert ends[1].particles.velocity.tolist() == ends[0].particles.velocity.tolist()
+    assert ends[1].particles.spin.tolist() == ends[0].particles.spin.tolist()
+
+
+def test_a_lid_closes_each_room_of_a_union():
+    cone, outlet = swarm.Cone(0.5, center=(0.0, 0.0, -0.02)), swarm.Cylinder(0.012, length=0.04)
+    scene = swarm.Scene([swarm.Union([cone, outlet]), swarm.Plane((0.0, 0.0, 1.0), 0.06)])
+    low, high = scene.bounds()
+    assert (low[2], high[2]) == (-0.02, 0.06)
+    assert high[0] == pytest.approx(0.08 * math.tan(0.5), rel=1e-12)
+    assert len(swarm.fill(scene, 10, speed=1.0)) == 10

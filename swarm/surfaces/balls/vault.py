@@ -108,7 +108,7 @@ def no_balls_in(union: Any) -> str | None:
             return f"{begin}one is made of a {name}, and edges of rooms are known to balls of the insides of {known}"
     for what in (*_LAWS, *_CHANGES):
         if len({repr(getattr(surface, what)) for surface in surfaces}) > 1:
-            return f"{begin}the parts differ in {what}, while an edge belongs to both"
+            return f"{begin}the parts differ in {what}, while an edge belongs to both: give the {what} to the whole"
     if len(rooms) > 2 and _any_corner(vault_of(union)):
         return f"{begin}three meet at a point, where balls would turn about a tip; they turn about edges of two"
     return None

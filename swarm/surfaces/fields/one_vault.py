@@ -21,7 +21,7 @@ from .members import SignedDistance
 from .one_wall import OneWall
 
 # What all parts of a union that is one wall have in common, besides their openings.
-IN_COMMON = "restitution", "friction", "temperature", "accommodation", "laws", "motion", "present"
+IN_COMMON = "restitution", "friction", "rolling", "temperature", "accommodation", "laws", "motion", "present"
 
 
 class RoomsTogether(Record):
