@@ -174,8 +174,8 @@ class Standstill:
         _LOG.warning(
             "frame %d hardly goes on: in %.0f s particles have done %.2g of it%s. A particle meets its walls almost "
             "without time between where walls touch but do not overlap, as boxes in a row, where friction holds it in "
-            "a corner of walls that turn, or where a user-defined method or law takes energy at each impact and lets no "
-            "particle rest: let such walls overlap, round the corner off, or let slow particles rest. The run goes "
+            "a corner of walls that turn, or where a user-defined method or law takes energy at each impact and lets "
+            "no particle rest: let such walls overlap, round the corner off, or let slow particles rest. The run goes "
             "on; end it with Ctrl-C", number, elapsed, advanced, last,
         )  # fmt: skip
 
