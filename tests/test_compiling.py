@@ -1,5 +1,7 @@
 """What is said while kernels compile, in words, for their names are of the code."""
 
+import threading
+import time
 from types import SimpleNamespace
 
 import pytest
@@ -52,3 +54,23 @@ def test_every_kernel_of_a_run_has_words(run):
             made._kinds = {1, 2, 4, 5}
         names = {kernel.__name__ for kernel, _arguments in made.calls()}
     assert names <= compiling._WORDS.keys()
+
+
+def test_a_compilation_that_takes_long_is_a_warning(monkeypatch, caplog):
+    """Once, while it goes on; one that has ended warns of nothing."""
+    monkeypatch.setattr(cache, "LONG", 0.01)
+    with cache.kernels_compiled(lambda sentence: None):
+        listener = cache.listeners[-1]
+        listener.begins(named("sin"), True)
+        while not caplog.messages:
+            time.sleep(0.01)
+        listener.ends()
+        assert caplog.messages[0].startswith("compiling a kernel, once: sin: it takes more than 10 s so far; ")
+        monkeypatch.setattr(cache, "LONG", 60.0)
+        before = set(threading.enumerate())
+        listener.begins(named("cos"), True)
+        (waiting,) = set(threading.enumerate()) - before
+        listener.ends()
+        waiting.join(10.0)
+        assert not waiting.is_alive()
+    assert len(caplog.messages) == 1

@@ -8,6 +8,7 @@ import logging
 import math
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,6 +20,12 @@ from .deferred import compiler
 _SETTINGS = ".numba_config.yaml"
 _COMPILING = "compiling a kernel, once: {}"
 _LOG = logging.getLogger("swarm")
+# A compilation that takes longer [s] is a warning, for not every run shows what is compiled.
+LONG = 10.0
+_SLOW = (
+    f"it takes more than {LONG:g} s so far; each wall that moves by itself and has friction adds some seconds, which the "
+    "triangles of one Mesh do not"
+)
 
 
 def base() -> Path:
@@ -83,6 +90,7 @@ class Listener:
 
     def __init__(self, tell: Callable[[str], None], sentence: Callable[[Any], str] | None) -> None:
         self._tell, self._sentence, self._begun = tell, sentence, list[float]()
+        self._timer: threading.Timer | None = None
         self.spent = Spent()
 
     def begins(self, function: Any, is_kernel: bool) -> None:
@@ -92,6 +100,10 @@ class Listener:
             message = _COMPILING.format(function.__name__) if self._sentence is None else self._sentence(function)
             _LOG.info(message)
             self._tell(message)
+            self._end_timer()
+            self._timer = threading.Timer(LONG, _LOG.warning, (f"{message}: {_SLOW}",))
+            self._timer.daemon = True
+            self._timer.start()
 
     def ends(self) -> None:
         """A compilation ends."""
@@ -100,8 +112,14 @@ class Listener:
         first = self._begun.pop()
         # One that is compiled within another is counted there.
         if not self._begun:
+            self._end_timer()
             self.spent.latest = first, time.monotonic()
             self.spent.seconds += self.spent.latest[1] - first
+
+    def _end_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
 
 
 # Of the contexts that are open: the compiler tells each of them.
