@@ -23,8 +23,8 @@ _LOG = logging.getLogger("swarm")
 # A compilation that takes longer [s] is a warning, for not every run shows what is compiled.
 LONG = 10.0
 _SLOW = (
-    f"it takes more than {LONG:g} s so far; each wall that moves by itself and has friction adds some seconds, which the "
-    "triangles of one Mesh do not"
+    f"it takes more than {LONG:g} s so far; each wall that moves by itself and has friction adds some seconds, which "
+    "the triangles of one Mesh do not"
 )
 
 
