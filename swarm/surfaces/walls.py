@@ -41,6 +41,14 @@ class Following(Record):
         return self._replace(body=self.body.grown(radius))
 
 
+def _with_number(every, number):
+    """That one of the `numbered` walls which has a number, or the last one."""
+    for k, (first, wall) in enumerate(every):
+        if number < first + wall.count() if isinstance(wall, Field) else number == first:
+            return every[k : k + 1]
+    return every[-1:]
+
+
 class Touched(Record):
     """The first wall that a step is in contact with, or -1, and how many there are."""
 
@@ -224,8 +232,10 @@ class Walls(Record):
         Of any other number it is that of the last wall: a caller that has no wall ignores it. `neutral` is any value of
         its type.
         """
-        answer = None
-        for first, wall in reversed(self._with_number(number) if is_known(number) else self.numbered()):
+        answer, every = None, self.numbered()
+        # A kernel may know the number of a wall, but not how many a field has before it.
+        knows = is_known(number) and len(every) > 1 and is_known(every[-1][0])
+        for first, wall in reversed(_with_number(every, number) if knows else every):
             if isinstance(wall, Field):
                 one, here = wall.members.wall(number - first), number < first + wall.count()
             else:
@@ -233,14 +243,6 @@ class Walls(Record):
             value = ask(one, *given)
             answer = value if answer is None else select(here, value, answer)
         return neutral if answer is None else answer
-
-    def _with_number(self, number):
-        """That one of `numbered` which has a number, or the last one."""
-        every = self.numbered()
-        for k, (first, wall) in enumerate(every):
-            if number < first + wall.count() if isinstance(wall, Field) else number == first:
-                return every[k : k + 1]
-        return every[-1:]
 
     # --- Of all ---
 

@@ -363,3 +363,15 @@ def test_a_particle_that_lets_go_of_a_facet_that_turns_flies_on(away, monkeypatc
     monkeypatch.setattr(flight, "go_through_moving", counted)
     particle = swarm.Particles([[HALF], [y], [0.01]], [[-rate * y - away], [0.5 * rate * HALF], [0.05]])
     run([cube(motion=swarm.Rotation((0.0, 0.0, 1.0), rate))], particle, 0.3)
+
+
+def test_a_contact_that_lasts_on_a_mesh_that_turns_compiles():
+    """A kernel may know the number of its wall, but not how many triangles are before others."""
+    block = swarm.Mesh(
+        (0.05, 0.05, 0.01) * CUBE, TRIANGLES, "outside", motion=swarm.Rotation((0, 1, 0), 1.0), restitution=0.4
+    )
+    scene = swarm.Scene([swarm.Box((0.2, 0.12, 0.2), restitution=0.4), block], DOWN)
+    start = swarm.Particles([[0.0, 0.03], [0.0, 0.03], [0.03, 0.04]], np.zeros((3, 2)))
+    ends = [swarm.simulate(scene, start, swarm.Impact(), until=0.5, compile=tier) for tier in ("always", "never")]
+    assert ends[0].observables["sliding_time"][-1] > 0.0
+    assert ends[0].particles.position.tolist() == ends[1].particles.position.tolist()
