@@ -305,7 +305,11 @@ class Scene:
         return not (at_start and (not self.has_doors() or np.isfinite(self._bounds_of_lasting(self.surfaces)).all()))
 
     def poses(self, time: float) -> list[motions.Pose]:
-        """The pose of every surface at a time [s]."""
+        """The pose of every surface at a time [s].
+
+        What the surface has at a point p, as it is given, is then at `center` + `turn` @ (p - `center`) + `shift`;
+        `quaternion` is the rotation `turn` as (w, x, y, z).
+        """
         return [motions.pose(surface.motion, time) for surface in self.surfaces]
 
     def open_faces(self, time: float = 0.0) -> NDArray[np.float64]:

@@ -40,7 +40,7 @@ _FEW = 4
 
 @dataclass(frozen=True, repr=False)
 class Path(Given):
-    """Displacement along a cubic spline, which is C^2: of a wall, not of a point.
+    """Displacement along a cubic spline, which is C^2: of a wall, not of a point, and without a rotation.
 
     Args:
         times: at least two, ascending [s].
