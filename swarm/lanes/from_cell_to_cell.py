@@ -15,7 +15,7 @@ from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
 from ..surfaces.facets.facet_cells import BLOCK, from_middle, here_in, passes
-from ..surfaces.facets.free_room import Cone, cone_of, room_of
+from ..surfaces.facets.free_room import NormalCone, cone_of, room_of
 from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact import flights
 from .table import STRIDE, marked_lanes
@@ -198,7 +198,7 @@ def _find_cells(gravity, cells, under, lanes, n):
 
 def _may_meet(gravity, under, i):
     """Whether a lane may move towards a facet of its cell, at the start of its way through it or at the end."""
-    v, cone = column(under.rows, _SPEED, i), Cone(column(under.rows, _AXIS, i), under.rows[_SINE, i])
+    v, cone = column(under.rows, _SPEED, i), NormalCone(column(under.rows, _AXIS, i), under.rows[_SINE, i])
     if gravity is None:
         return not cone.is_left(v)
     now, then = accelerated(gravity, v, under.time[i]), accelerated(gravity, v, under.until[i])

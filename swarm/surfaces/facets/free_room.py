@@ -29,7 +29,7 @@ class FreeCells(Record):
     ahead: Vec
 
 
-class Cone(Record):
+class NormalCone(Record):
     """A cone of normals: its axis, and the sine of its half-angle, of which each is a part of `_FULL`."""
 
     axis: Vec
@@ -53,7 +53,7 @@ def cone_of(rows, cell):
     """The cone of the normals of a cell; of one without facets it is one that every flight leaves."""
     is_full = rows[cell, KIND] == FULL
     axis = Vec(float(rows[cell, 0]), float(rows[cell, 1]), float(rows[cell, 2]))
-    return Cone(select(is_full, 1.0, 0.0) * axis, select(is_full, float(rows[cell, SINE]), -1.0))
+    return NormalCone(select(is_full, 1.0, 0.0) * axis, select(is_full, float(rows[cell, SINE]), -1.0))
 
 
 def all_away_for(rows, cell, v, change):
