@@ -1,5 +1,6 @@
 """The shares of a frame: every particle is in one, whichever thread takes it; and where a frame halts."""
 
+import math
 import threading
 
 import numba
@@ -13,8 +14,10 @@ from swarm.contact import events
 from swarm.kernel.arrays import next_of
 from swarm.kernel.jit import kernel
 from swarm.lanes import lane_arrays as lanes
+from swarm.lanes.block import NEVER
 from swarm.lanes.share import Draws, Share, ThreadPlace
 from swarm.lanes.table import LANES
+from swarm.run import watch
 from swarm.run.engine import Run
 
 SPHERE = swarm.Scene([swarm.Sphere(0.5)])
@@ -76,8 +79,11 @@ def test_the_start_and_every_frame_are_observed_whole(n, threads, block_size):
 
 def test_a_short_frame_uses_no_thread(monkeypatch):
     """And a long one after it does: what counts is the work in it, by the pace of the last."""
+    # A slow machine frees the caller's thread, and others take the frame up.
+    monkeypatch.setattr(watch, "_FREED", math.inf)
     particles = swarm.fill(SPHERE, 4 * observables.CHUNK, speed=1.0, seed=1)
     with Run(SPHERE.compiled(), particles, swarm.Impact(), 2, None) as run:
+        run._watch._alone = dict.fromkeys((False, True), NEVER)
         run.advance(0.1, 0.1)
         monkeypatch.setattr(run, "_pace", 1e-3)
         submitted, submit = [], run._pool.submit
