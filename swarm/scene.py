@@ -161,7 +161,7 @@ class Scene:
         return min(high[k] - low[k] for k in self.axes()) / 2.0
 
     def across(self) -> int | None:
-        """The axis across the plane of a scene of two dimensions, None where it has none."""
+        """The axis across the plane of a scene of two dimensions, or None."""
         return planes.across_of(self.plane)
 
     def axes(self) -> list[int]:

@@ -309,7 +309,7 @@ def _sliding(task: Task) -> list[Workload]:
 
 
 def _impacts(task: Task) -> float:
-    """The impacts on walls, if particles go on as they fly at the start; none where none flies."""
+    """The impacts on walls, if particles go on as they fly at the start; 0 if no particle flies."""
     if not task.scene.surfaces or not len(task.particles):
         return 0.0
     moves = task.scene.moves()

@@ -96,7 +96,7 @@ def timed(root: Any, chosen: Exported, firsts: NDArray[np.int64]) -> Any:
 
 
 def as_typed(time: float) -> float:
-    """The decimal of few digits that a time is but for round-off, if there is one: of frame 3 at every 0.1 s it is 0.3.
+    """The decimal of few digits that a time is but for round-off, if it has few: of frame 3 at every 0.1 s it is 0.3.
 
     Programs look for the last step at or before a time that a user types, and 0.30000000000000004 is after it.
 

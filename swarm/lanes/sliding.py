@@ -21,7 +21,7 @@ _named = Rows()
 
 
 class Sliding(Advanced):
-    """A particle that slides, in its lane. What its second wall has is 0 where it has none."""
+    """A particle that slides, in its lane. Without a second wall the numbers of that are 0."""
 
     r, v, a = _named.vector(), _named.vector(), _named.vector()
     # The numbers of its walls, -1 for none, and how they press on it.

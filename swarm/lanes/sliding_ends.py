@@ -98,7 +98,7 @@ def decide(slide, i):
 
 
 def _until_gone(slide, event, active, path, remaining):
-    """The part of a step after which a wall ends, or is open, or a cell that repeats does; infinite where none does."""
+    """The part of a step after which a wall ends, or is open, or a cell that repeats does, or infinity."""
     lanes, near, found = slide.lanes, crossing.near(slide.method, path.r0), np.inf
     if event & ENDS:
         found = part_until_end(slide.walls, active, path, near, remaining)

@@ -191,7 +191,7 @@ class Surface(Validated):
         return rotations.turned_back(self.rotation, self.center)  # type: ignore[attr-defined]
 
     def size(self) -> float:
-        """The characteristic length of the surface [m], infinite where it has none."""
+        """The characteristic length of the surface [m], or infinity."""
         raise NotImplementedError
 
     def bounds(self) -> Box:

@@ -26,7 +26,7 @@ class Domain(Record):
     source: Any = None  # None, or `RandomSource` where walls send them off
     repose: Any = None  # None, or `Repose` where balls may come to rest
     turning: Any = None  # None, or `BallSpins` of balls that have a spin
-    owners: Any = None  # the number in the scene of each wall without a mass; None where none has one
+    owners: Any = None  # the number in the scene of each wall without a mass; None if no wall has a mass
     rows: Any = None  # and its row of the books
 
     def owner(self, wall):

@@ -38,7 +38,7 @@ _IMAGES = 4
 _LEAST = 5
 # Balls fly this part of the scene in an epoch, about.
 _EPOCH = 0.125
-# t_c where none is given is this part of the time in which balls fly their diameter; under gravity, by which contacts
+# t_c, if it is not given, is this part of the time in which balls fly their diameter; under gravity, by which contacts
 # last, the second part of that in which they fly or fall so far.
 _DURATION, _FALL = 1e-4, 1e-3
 # A flight from a wall back to it takes at least this part of an epoch: on a shorter one round-off is all there is.

@@ -53,7 +53,7 @@ def _hit_before(walls, gravity, r, v, remaining, longest):
 
 
 def middle_of(box):
-    """The walls in the middle of a window, and half its length, None where none moves."""
+    """The walls in the middle of a window, and half its length, or None if no wall moves."""
     if box.window is None:
         return box.walls, None
     half = 0.5 * box.window[SPAN]

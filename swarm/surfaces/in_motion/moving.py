@@ -43,7 +43,7 @@ class Moving(Record):
         return self.posed(self.body, start, end, self.drive, remaining, after)
 
     def seen(self, flight, t):
-        """A particle as safe steps to the wall see it after a time of its flight: None where none are needed."""
+        """A particle as safe steps to the wall see it after a time of its flight, or None if no steps are needed."""
         remaining = flight.remaining - t
         return flight.seen(t, self.during(remaining, remaining), flight.pull)
 
