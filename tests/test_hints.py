@@ -75,6 +75,26 @@ def test_no_hint_for_the_surfaces_of_the_tables(name, method, caplog):
     assert hints_of(scene, method, caplog=caplog) == []
 
 
+@pytest.mark.parametrize("kind", ["balls", "a source of balls", "points"])
+def test_a_counter_that_balls_do_not_reach(kind, caplog):
+    """A ball leaves by its foot: the centre of one of 2 cm stops 2 cm above the hole."""
+    hole = swarm.Cylinder(0.1)
+    scene = swarm.Scene([swarm.Box((0.5, 0.5, 0.5), openings=[hole])], DOWN)
+    radius = {"balls": 0.02, "a source of balls": 1e-3, "points": None}[kind]
+    start = swarm.Particles(np.array([0.0, 0.0, 0.3]), np.zeros(3), radius=radius)
+    births = swarm.Source(swarm.Sphere(0.1), volume=True, rate=1.0, speed=1.0, radius=(0.01, 0.02))
+    options = {"sources": [births]} if kind == "a source of balls" else {}
+
+    def given(counter):
+        hints = hints_of(scene, particles=start, counters=[counter], caplog=caplog, **options)
+        return [hint for hint in hints if hint.startswith("counters[0] is nearer to surfaces[0].openings[0] than the")]
+
+    assert len(given(swarm.Plane((0.0, 0.0, 1.0), -0.481))) == (kind != "points")
+    assert given(swarm.Plane((0.0, 0.0, 1.0), -0.47)) == []
+    elsewhere = swarm.Counter(swarm.Plane((0.0, 0.0, 1.0), -0.5), inside=swarm.Sphere(0.1, center=(0.3, 0.0, -0.5)))
+    assert given(elsewhere) == []
+
+
 @pytest.mark.parametrize("path", sorted(Path("examples/scenes").glob("*.toml")), ids=lambda path: path.stem)
 def test_no_hint_for_the_scenes_of_the_examples(path, caplog):
     job = scene_file.read(path)

@@ -3,6 +3,7 @@
 import itertools
 import logging
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from ...kernel.limits import EPSILON
 from ...methods import Impact
 from ...scene import Scene
 from ...surfaces.instant import box_of, gaps_of
+from ...surfaces.presence.openings import least_distance
 from ...surfaces.surface import Surface
 from ..options import Task
 from . import softness, workload
@@ -35,6 +37,7 @@ def give(task: Task) -> None:
     warn_of_overlap(task.scene)
     _warn_of_faces(task.scene)
     _warn_of_fall(task.compiled)
+    _warn_of_counters(task)
     softness.warn_of_depths(task)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
         # About the fastest: of some.
@@ -83,6 +86,34 @@ def _warn_of_faces(scene: Scene) -> None:
                 "there is a wall between them while they only touch; let them overlap where they are to be one room",
                 i, one, other,
             )  # fmt: skip
+
+
+def _warn_of_counters(task: Task) -> None:
+    """Warn where balls leave through an opening before their centres have come to a counter there."""
+    scene, counters = task.scene, task.options.counters
+    radii = [_largest_radius(source.radius) for source in task.options.sources]
+    radii += [] if task.particles.radius is None else [float(task.particles.radius.max(initial=0.0))]
+    radius = max(radii, default=0.0)
+    if radius == 0.0:
+        return
+    for i, surface in enumerate(scene.surfaces):
+        for k, volume in enumerate(surface.open_volumes()):
+            for j, counter in enumerate(counters):
+                volumes = (volume,) if counter.inside is None else (volume, counter.inside)
+                if least_distance(surface, volumes, counter.surface) < radius:
+                    _LOG.warning(
+                        "counters[%d] is nearer to surfaces[%d].openings[%d] than the largest radius, %g m: a ball "
+                        "leaves as soon as the point of it that touches the wall is in the opening, before its centre "
+                        "is at the counter, which misses it; take the observable 'escaped', or a counter that is "
+                        "farther inside",
+                        j, i, k, radius,
+                    )  # fmt: skip
+                    return
+
+
+def _largest_radius(radius: Any) -> float:
+    """The largest radius of the balls of a source [m]; 0 of points."""
+    return 0.0 if radius is None else float(np.max(radius))
 
 
 def _warn_of_rest(task: Task) -> None:

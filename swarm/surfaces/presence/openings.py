@@ -20,7 +20,7 @@ from .. import required
 from ..fields.grouped import by_kind
 from ..fields.many import Many, members_of
 from ..fields.members import Members, can_be_member, kind_of
-from ..instant import has_room, side_of
+from ..instant import distances_of, has_room, side_of
 from ..outlines.outlined import Outlined
 from ..periodic.images import Lengths, images_of
 from ..surface import Surface
@@ -32,6 +32,9 @@ from .rooms import leads_on
 
 # Most walls that all openings of a scene may be compiled for.
 _MOST = 24
+# Places of a wall at which a counter is looked for in an opening, and Newton's steps onto the wall for each.
+_PLACES, _NEWTON = 4096, 8
+_TINY = np.finfo(np.float64).tiny
 # A volume without end is searched as far as this many times the wall and what gives the volume extend.
 _REACH = 2.0
 
@@ -200,11 +203,7 @@ def require_few(openings: Sequence[Opened]) -> None:
 def reaches(surface: Surface, opening: Surface) -> bool:
     """Whether a volume has points on both sides of a wall."""
     both = _gap(opening, sign_of(opening)), _gap(surface, side_of(surface))
-    reach = _REACH * max(surface.extent(), opening.extent())
-    low, high = (np.array(corner)[:, None] for corner in _box_of(opening))
-    # Also where the box of a flat volume has no width
-    room = 1e-9 * reach
-    low, high = np.maximum(low - room, -reach), np.minimum(high + room, reach)
+    low, high = _box_around(surface, opening)
     return all(
         has_room(
             low,
@@ -214,6 +213,26 @@ def reaches(surface: Surface, opening: Surface) -> bool:
         )
         for sign in (1.0, -1.0)
     )
+
+
+def least_distance(surface: Surface, volumes: Sequence[Surface], other: Surface) -> float:
+    """The distance of a surface from the places of a wall in all the volumes, the first an opening, of some [m]."""
+    low, high = _box_around(surface, volumes[0])
+    points = low + (high - low) * np.random.default_rng(0).random((3, _PLACES))
+    for _ in range(_NEWTON):
+        slopes = surface.gradient(points)
+        points = points - surface.phi(points) / np.maximum((slopes**2).sum(axis=0), _TINY) * slopes
+    within = np.all([sign_of(volume) * volume.phi(points) <= 0.0 for volume in volumes], axis=0)
+    return float(np.abs(distances_of((other,), points[:, within], 0.0)).min(initial=math.inf))
+
+
+def _box_around(surface: Surface, opening: Surface) -> Any:
+    """The corners of the box of an opening (3, 1) [m], as far as it is of use at its wall."""
+    reach = _REACH * max(surface.extent(), opening.extent())
+    low, high = (np.array(corner)[:, None] for corner in _box_of(opening))
+    # Also where the box of a flat volume has no width
+    room = 1e-9 * reach
+    return np.maximum(low - room, -reach), np.minimum(high + room, reach)
 
 
 def _gap(surface: Surface, sign: float) -> Any:
