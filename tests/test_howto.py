@@ -49,6 +49,10 @@ FACTS = {
     "A stadium, or another outline with arcs": lambda a: (
         close(a["same"].area(), a["stadium"].area(), 1e-12) and close(a["notched"].area(), 4.0, 1e-12)
     ),
+    # It empties at a steady rate, as sand does, not with the height that is left.
+    "A hopper that empties": lambda a: (
+        a["left"][-1] == 400 and close(a["left"][8] - a["left"][5], a["left"][10] - a["left"][7], 0.2)
+    ),
     "A tube between two chambers": lambda a: (
         a["result"].observables["escaped"][-1] == 0 and (abs(a["x"]) < 0.5).sum() < (a["x"] > 0.5).sum()
     ),
