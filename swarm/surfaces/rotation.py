@@ -16,6 +16,8 @@ from ..motion.wall import product as product
 from .frames import Framed
 
 Quaternion = tuple[float, float, float, float]
+# How far the products of the rows of a rotation matrix may be from those of unit vectors: single precision in a file.
+_ORTHONORMAL = 1e-6
 
 
 def quaternion(name: str, value: Any) -> Quaternion | None:
@@ -23,10 +25,11 @@ def quaternion(name: str, value: Any) -> Quaternion | None:
 
     Args:
         name: the argument's name, for errors.
-        value: None, four numbers (w, x, y, z) not all 0, or {"axis": three numbers not all 0, "angle": radians}.
+        value: None, four numbers (w, x, y, z) not all 0, {"axis": three numbers not all 0, "angle": radians}, or three
+            rows of a rotation matrix, from the surface's own frame to the scene's.
 
     Raises:
-        SceneError: `value` has another form, or is of length 0.
+        SceneError: `value` has another form, is of length 0, or is a matrix that does not keep lengths or that mirrors.
 
     >>> quaternion("rotation", {"axis": (0, 0, 2), "angle": math.pi})
     (6.123233995736766e-17, 0.0, 0.0, 1.0)
@@ -39,9 +42,29 @@ def quaternion(name: str, value: Any) -> Quaternion | None:
         axis = unit(f"{name}.axis", value["axis"])
         half = 0.5 * number(f"{name}.angle", value["angle"], "a finite number of radians")
         turn = math.cos(half), *(math.sin(half) * part for part in axis)
+    elif len(rows := parts_of(value) or ()) == 3 and all(parts_of(row) is not None for row in rows):
+        turn = _of_matrix(name, value)
     else:
         turn = unit(name, value, 4)
     return None if turn[0] in (1.0, -1.0) else turn  # type: ignore[return-value]
+
+
+def _of_matrix(name: str, value: Any) -> tuple[float, ...]:
+    """The unit quaternion of a rotation matrix, by its largest part, which no difference of near numbers makes."""
+    rows = np.array([vector(f"{name}[{i}]", row) for i, row in enumerate(value)])
+    if np.abs(rows @ rows.T - np.eye(3)).max() > _ORTHONORMAL or np.linalg.det(rows) < 0.0:
+        raise SceneError(
+            f"{name} must be a matrix of three rows that are of length 1, at right angles and not mirrored, got "
+            f"{rows.tolist()}: the lengths of its rows are {np.sqrt((rows**2).sum(axis=1)).tolist()}, and its "
+            f"determinant is {np.linalg.det(rows):g}; take the size of a surface from its own arguments"
+        )
+    # 4 q q^T is linear in the matrix (Shepperd 1978).
+    x, y, z = rows.diagonal()
+    outer = np.diag([1.0 + x + y + z, 1.0 + x - y - z, 1.0 - x + y - z, 1.0 - x - y + z])
+    for i, j, k in ((1, 2, 3), (2, 3, 1), (3, 1, 2)):
+        outer[0, i] = outer[i, 0] = rows[k - 1, j - 1] - rows[j - 1, k - 1]
+        outer[j, k] = outer[k, j] = rows[k - 1, j - 1] + rows[j - 1, k - 1]
+    return unit(name, outer[outer.diagonal().argmax()].tolist(), 4)
 
 
 def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
@@ -53,8 +76,8 @@ def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
         parts = tuple(number(f"{name}[{i}]", part) for i, part in enumerate(parts_of(value) or ()))
         if len(parts) != count:
             raise SceneError(
-                f"{name} must be a quaternion of four numbers (w, x, y, z), or a table of axis and angle, got "
-                f"{shown(value)}"
+                f"{name} must be a quaternion of four numbers (w, x, y, z), a table of axis and angle, or three rows "
+                f"of a rotation matrix, got {shown(value)}"
             )
     largest = max(map(abs, parts))
     if largest == 0.0:

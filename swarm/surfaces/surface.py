@@ -62,8 +62,8 @@ class Surface(Validated):
 
     Args:
         rotation: about the centre, or the origin where there is no `center`: None, a quaternion (w, x, y, z) of any
-            length, or {"axis": (x, y, z), "angle": rad}. A union, an intersection or a field of many bodies gives it to
-            each of these.
+            length, {"axis": (x, y, z), "angle": rad}, or the rows of a rotation matrix. A union, an intersection or a
+            field of many bodies gives it to each of these.
         restitution: e in [0, 1]: an impact turns the normal velocity v_n into -e v_n. 1 keeps the energy.
         friction: Coulomb's coefficient, 0 or more: the tangential impulse, or force, opposes the slip; it is at most
             this times the normal one, and at most what stops the slip.

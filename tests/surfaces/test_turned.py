@@ -8,6 +8,7 @@ import pytest
 import swarm
 from bench import cells
 from swarm.serialization import tables
+from swarm.surfaces import rotation
 
 AXIS, ANGLE = np.array((1.0, -2.0, 3.0)) / np.sqrt(14.0), 0.7
 TURN = {"axis": tuple(AXIS), "angle": ANGLE}
@@ -62,3 +63,33 @@ def test_openings_of_parts_turn_with_them():
     assert np.abs(np.array(box.center) - MATRIX @ (0.0, 0.5, 0.0)).max() < 1e-15
     assert np.abs(np.array(opening.surface.center) - MATRIX @ (0.5, 0.0, 0.0)).max() < 1e-15
     assert opening.times == ((0.0, 1.0),)
+
+
+def test_a_rotation_matrix_is_a_rotation():
+    """Also half turns about each axis, whose quaternion begins with 0, and their neighbours."""
+    rng = np.random.default_rng(5)
+    turns = [*rng.normal(size=(200, 4)), *np.eye(4), *(np.eye(4) + 1e-9 * rng.normal(size=(4, 4)))]
+    for turn in turns:
+        turn = turn / np.sqrt((turn**2).sum())
+        rows = rotation.matrix(tuple(turn))
+        for given in (rows, rows.tolist()):
+            found = rotation.matrix(swarm.Sphere(1.0, rotation=given).rotation)
+            assert np.abs(found - rows).max() < 4e-15
+    assert swarm.Sphere(1.0, rotation=np.eye(3)).rotation is None
+    assert np.abs(np.abs(swarm.Sphere(1.0, rotation=MATRIX).rotation @ np.array(QUATERNION)) - 1.0) < 1e-15
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [2.0 * np.eye(3), np.diag((1.0, 1.0, -1.0)), [[1, 0, 0], [0, 1, 0], [0, 1, 0]]],
+    ids=["long", "mirror", "flat"],
+)
+def test_what_is_no_rotation_matrix(rows):
+    with pytest.raises(swarm.SceneError, match=r"rotation must be a matrix of three rows that are of length 1"):
+        swarm.Sphere(1.0, rotation=rows)
+
+
+@pytest.mark.parametrize("rows", [[[1, 0, 0], [0, 1], [0, 0, 1]], [[1, 0, 0], [0, "a", 0], [0, 0, 1]]])
+def test_a_row_of_another_length(rows):
+    with pytest.raises(swarm.SceneError, match=r"rotation\[1\]"):
+        swarm.Sphere(1.0, rotation=rows)
