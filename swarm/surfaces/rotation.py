@@ -46,7 +46,7 @@ def quaternion(name: str, value: Any) -> Quaternion | None:
         turn = _of_matrix(name, value)
     else:
         turn = unit(name, value, 4)
-    return None if turn[0] in (1.0, -1.0) else turn  # type: ignore[return-value]
+    return turn if any(turn[1:]) else None  # type: ignore[return-value]
 
 
 def _of_matrix(name: str, value: Any) -> tuple[float, ...]:
