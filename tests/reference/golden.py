@@ -45,6 +45,7 @@ compilations. Still each step costs a thousand times its compiled time, so the r
 every branch: some ten impacts of 30 particles with `Impact`, one or two of four particles with a fixed step.
 """
 
+import argparse
 import functools
 import hashlib
 import json
@@ -301,15 +302,20 @@ def disagreement_of_threads(name, known):
 
 def main():
     """Write the digests, or compare with those that were written."""
-    words = [word for word in sys.argv[1:] if not word.startswith("--")]
+    parser = argparse.ArgumentParser(description="Golden runs: the last bits of short runs, as digests.")
+    parser.add_argument("words", nargs="*", help="only the runs whose names have all these words")
+    parser.add_argument("--write", action="store_true", help="write golden.json instead of comparing with it")
+    parser.add_argument("--threads", action="store_true", help="compare compiled runs of one thread and of two with it")
+    given = parser.parse_args()
+    words = given.words
     known = json.loads(FILE.read_text())
     wanted = [name for name in [*runs(), *cell_names()] if all(word in name for word in words)]
-    if "--threads" in sys.argv:
+    if given.threads:
         wanted = [name for name in wanted if is_compiled(name)]
-    job = _written if "--write" in sys.argv else disagreement_of_threads if "--threads" in sys.argv else _compared
+    job = _written if given.write else disagreement_of_threads if given.threads else _compared
     with multiprocessing.get_context("spawn").Pool() as pool:
         found = dict(zip(wanted, pool.starmap(job, [(one, known.get(one)) for one in wanted], 1), strict=True))
-    if "--write" in sys.argv:
+    if given.write:
         kept = known if words else {}
         FILE.write_text(
             "{\n" + ",\n".join(f" {json.dumps(k)}: {json.dumps(v)}" for k, v in (kept | found).items()) + "\n}\n"
