@@ -76,8 +76,8 @@ class Numbering:
         if parts:
             known = part_of[self.pieces_of_rows]
             self.parts_of_rows = PartsOfRows(tuple(np.where(known < 0, len(parts), known).tolist()), len(parts))
-        self.pieces_of_walls = np.repeat(rows[:, 0], rows[:, 1])
-        self.rows_of_walls = np.repeat(np.arange(len(rows)), rows[:, 1])
+        self.pieces_of_walls = rows[:, 0].repeat(rows[:, 1])
+        self.rows_of_walls = np.arange(len(rows)).repeat(rows[:, 1])
         self.members = np.array(
             [np.array(pieces.owners, np.int64)[self.pieces_of_walls], part_of[self.pieces_of_walls]]
         )

@@ -87,7 +87,7 @@ def start_energies(compiled: CompiledScene, law: Any, state: State) -> None:
         start = energies(compiled, law, state.mass[some], state.position[:, some], state.velocity[:, some])
         scale = energy_scale(compiled.scene, start)
         state.energy[some] = start.total()
-        state.inverse_scale[some] = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)
+        state.inverse_scale[some] = np.divide(1.0, scale, out=np.zeros(scale.shape), where=scale > 0.0)
 
 
 @kernel

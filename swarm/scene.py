@@ -284,12 +284,13 @@ class Scene:
         With a radius (N,) points are the centres of balls.
         """
         if radius is not None:
-            return np.flatnonzero(~(self.distances_outside(points, 0.0, radius) <= distance).all(axis=0))
+            beyond = ~np.asarray((self.distances_outside(points, 0.0, radius) <= distance).all(axis=0))
+            return beyond.nonzero()[0]
         found = []
         # In batches, so that NumPy's intermediate results stay in the processor's cache.
         for begin in range(0, points.shape[1], _BATCH):
             batch = points[:, begin : begin + _BATCH]
-            suspects = np.flatnonzero(~self.admits(batch))
+            suspects = (~self.admits(batch)).nonzero()[0]
             if suspects.size:
                 near = (self.distances_outside(batch[:, suspects]) <= distance).all(axis=0)
                 found.append(begin + suspects[~near])

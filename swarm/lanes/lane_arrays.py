@@ -196,7 +196,7 @@ def empty(walls: int, given: int, period: Any = None, rows: int = Flying.ALL) ->
         particle=np.zeros(STRIDE, np.int64),
         marked=eights.view(np.bool_),
         eights=eights,
-        some=np.zeros_like(eights),
+        some=np.zeros(STRIDE // EIGHT, np.int64),
         order=np.zeros(STRIDE, np.int64),
         left_behind=table(Flying.ROWS + given),
         period=period,

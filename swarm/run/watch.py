@@ -33,7 +33,7 @@ class Watch:
 
     def __init__(self, particles: int) -> None:
         lanes = min(LANES, particles)
-        self.passes = np.full(1, NEVER)
+        self.passes = np.array([NEVER])
         self._asked, self._latest, self._plain = NEVER, math.inf, False
         self._alone = {False: _FLIGHTS // lanes, True: _PLAIN_FLIGHTS // lanes}
         # When the caller's thread began to compute, infinite where it does not, and when it first did [s].
