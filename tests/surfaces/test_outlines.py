@@ -236,6 +236,21 @@ def test_a_prism_has_lids(compiled_at_once):
         assert scene.gaps(result.particles.position).max() < 1e-15
 
 
+@pytest.mark.parametrize("lid", [-1.0, 1.0])
+@pytest.mark.parametrize("corners", [5, 8, 40])
+def test_a_fall_meets_the_lids_of_a_prism_however_many_sides_it_has(corners, lid):
+    """What falls on a lid in a time T is back after 2 T."""
+    angles, height, pull = 2.0 * np.pi * np.arange(corners) / corners, 0.01, lid * 9.81
+    prism = swarm.Prism(np.stack([np.cos(angles), np.sin(angles)], axis=1), 2.0)
+    time, start = math.sqrt(2.0 * height / 9.81), (0.1, 0.03, lid * (1.0 - height))
+    result = swarm.simulate(
+        swarm.Scene([prism], (0.0, 0.0, pull)), swarm.Particles(start, (0.0, 0.0, 0.0)), swarm.Impact(),
+        until=2.0 * time, compile="never",
+    )  # fmt: skip
+    assert result.observables["impacts"][-1] == 1
+    assert result.particles.position[:, 0] == pytest.approx(start, abs=1e-14)
+
+
 # --- Slides ----------------------------------------------------------------------------------------------
 
 

@@ -294,7 +294,8 @@ class Outlined(Many):
         half = math.inf if self.height is None else 0.5 * self.height
         low, high = np.vstack([low, np.full(low.shape[1], -half)]), np.vstack([high, np.full(low.shape[1], half)])
         if self.height is not None:
-            lids = np.array([[-half, half]])
+            # In the order of the walls: with the box of the other one a lid is in no cell
+            lids = np.array([[half, -half]])
             first, last = low[:2].min(axis=1), high[:2].max(axis=1)
             low = np.hstack([low, np.vstack([np.tile(first[:, None], 2), lids])])
             high = np.hstack([high, np.vstack([np.tile(last[:, None], 2), lids])])
