@@ -25,6 +25,8 @@ _NO_SPEED = 1e-13
 # Sweeps until a point is on three walls: one where they are flat.
 _SWEEPS = 20
 _EPSILON = 2.220446049250313e-16
+# Round-off of a velocity that three walls say, over the sum of theirs, where their normals are orthogonal.
+_NO_SLIP = 8.0 * _EPSILON
 # A step that ends where a wall does not press is tried again so much shorter; one to another wall is cut so often.
 _RETRY, _MOST_TRIES = 0.25, 100
 
@@ -63,26 +65,33 @@ def _normals(walls, active, r):
     return tuple(walls.unit_normal(wall, r) for wall in active)
 
 
-def _force(friction, wall, n, slip):
-    """The direction of the force of a wall, -(n + mu s/|s|), without its sign."""
+def _force(friction, wall, n, slip, none):
+    """The direction of the force of a wall, -(n + mu s/|s|), without its sign; a slip up to `none` is no slip.
+
+    A wall that the particle goes with needs no friction, since the three hold it by their normals alone.
+    """
     if friction is None:
         return n
-    speed = norm(slip)
-    return n + (wall_laws.of_wall(friction, wall) / select(speed > 0.0, speed, 1.0)) * slip
+    speed, slips = norm(slip), norm(slip) > none
+    return n + select(slips, wall_laws.of_wall(friction, wall) / select(slips, speed, 1.0), 0.0) * slip
 
 
 @outlined
 def _corner(laws, walls, gravity, active, r, least):
     """`Corner` of three walls at a point on them; they hold if each presses by more than `least`."""
     a, b, c = _normals(walls, active, r)
-    if not abs(dot(a, cross(b, c))) > _FLATTEST:
+    volume = abs(dot(a, cross(b, c)))
+    if not volume > _FLATTEST:
         return _NONE
     v, w, x = tuple(walls.velocity(wall, r) for wall in active)
     u, pull = _solved(a, b, c, dot(a, v), dot(b, w), dot(c, x)), accelerated(gravity, ZERO, 1.0)
     # What is left of the pull in the frame of the particle
     rest = _solved(a, b, c, *(walls.outward_acceleration(wall, r, u, pull) for wall in active))
     friction = laws.friction
-    p, q, s = tuple(_force(friction, *one) for one in zip(active, (a, b, c), (u - v, u - w, u - x), strict=True))
+    # Of walls of one body all slips are round-off, which has any direction.
+    none = _NO_SLIP * (norm(v) + norm(w) + norm(x)) / volume
+    slips = zip(active, (a, b, c), (u - v, u - w, u - x), strict=True)
+    p, q, s = tuple(_force(friction, *one, none) for one in slips)
     load = _parts(p, q, s, rest)
     holds = (load.x > least) & (load.y > least) & (load.z > least)
     power = Vec(-load.x * dot(p, v), -load.y * dot(q, w), -load.z * dot(s, x))
@@ -114,12 +123,23 @@ def _settled(walls, active, r):
     """A point near three walls, moved onto them; whether it is there."""
     least = 4.0 * _EPSILON * total(absolute(r))
     for _sweep in range(_SWEEPS):
-        d, e, f = tuple(walls.distance(wall, r) for wall in active)
+        a, b, c = _normals(walls, active, r)
+        # From the walls as they go on beyond their edges: those of a mesh end in the corner.
+        d, e, f = tuple(dot(n, r - walls.project(wall, r)) for wall, n in zip(active, (a, b, c), strict=True))
         if max(abs(d), abs(e), abs(f)) <= least:
             return r, True
-        a, b, c = _normals(walls, active, r)
         r = r - _solved(a, b, c, d, e, f)
     return r, False
+
+
+@outlined
+def _ahead(walls, now, active, r, u, remaining, h):
+    """A place near three walls after a time: the first one carries it, and along that it goes straight on.
+
+    Of walls of one body it is on them, however they turn.
+    """
+    carried = walls.during(remaining, remaining - h).carry(active.first, r)
+    return carried + h * (u - now.velocity(active.first, r))
 
 
 # --- While it is carried ---------------------------------------------------------------------------------
@@ -149,8 +169,9 @@ def carry(method, walls, gravity, state, i, p):
     start, h, phase, used, tries = _corner(laws, now, gravity, active, r, 0.0), p.remaining, CAREFUL, 0.0, 0
     while remaining > 0.0 and tries <= _MOST_TRIES:
         h = min(h, remaining, now.shortest_time_scale())
-        middle, _there = _settled(walls.at(remaining - 0.5 * h), active, r + (0.5 * h) * start.u)
-        r1, there = _settled(walls.at(remaining - h), active, r + h * start.u)
+        way = (walls, now, active, r, start.u, remaining)
+        middle, _there = _settled(walls.at(remaining - 0.5 * h), active, _ahead(*way, 0.5 * h))
+        r1, there = _settled(walls.at(remaining - h), active, _ahead(*way, h))
         half = _corner(laws, walls.at(remaining - 0.5 * h), gravity, active, middle, 0.0)
         end = _corner(laws, walls.at(remaining - h), gravity, active, r1, 0.0)
         if not (there and half.holds and end.holds):

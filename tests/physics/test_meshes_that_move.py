@@ -375,3 +375,17 @@ def test_a_contact_that_lasts_on_a_mesh_that_turns_compiles():
     ends = [swarm.simulate(scene, start, swarm.Impact(), until=0.5, compile=tier) for tier in ("always", "never")]
     assert ends[0].observables["sliding_time"][-1] > 0.0
     assert ends[0].particles.position.tolist() == ends[1].particles.position.tolist()
+
+
+def test_what_rests_in_a_corner_of_a_mesh_that_turns_is_carried():
+    """With friction too: its walls are of one body, along none of which it slips, and they end in the corner."""
+    center, vertex, diagonal = (0.02, 0.0, 0.0), (-HALF, -HALF, -HALF), np.ones(3)
+    mesh = cube(motion=swarm.Rotation((0.2, 0.1, 1.0), 0.3, center), restitution=0.5, friction=0.3)
+    particle = swarm.Particles(vertex + 0.01 * diagonal, (0.0, 0.0, 0.0))
+    result = run([mesh], particle, 1.0, tuple((-9.81 * diagonal).tolist()), every=0.25)
+    seen = result.observables
+    assert seen["impacts"][-1] == seen["impacts"][2] < 100
+    assert np.diff(seen["sliding_time"])[2:] == pytest.approx(0.25, rel=1e-12)
+    turned = drive_of(mesh, 1.0).pose(0.0).place_out(vec(center), vec(vertex))
+    assert result.particles.position[:, 0] == pytest.approx(list(turned), abs=1e-14)
+    assert drift(seen) <= 1e-14
