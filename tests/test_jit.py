@@ -3,12 +3,14 @@
 import functools
 import math
 import os
+import re
 import subprocess
 import sys
 import threading
 from pathlib import Path
 from typing import NamedTuple
 
+import llvmlite.binding as llvm
 import numba
 import numpy as np
 import pytest
@@ -22,7 +24,7 @@ from swarm.compiled_scene import MOST_WALLS
 from swarm.kernel import arrays, cache, machine_code
 from swarm.kernel import jit as _jit
 from swarm.kernel.arrays import kept
-from swarm.kernel.compilers import _DEEPEST, deep
+from swarm.kernel.compilers import _DEEPEST, deep, features_of
 from swarm.kernel.gravity import Gravity, accelerated, displacement, potential
 from swarm.kernel.jit import select
 from swarm.kernel.record import Record
@@ -290,6 +292,47 @@ assert not re.search(r"call[^\\n]*NRT_", kernel)
 assert re.search(r"<[248] x double> @llvm.sqrt", kernel)
 """
     python("-c", code, env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}).check_returncode()
+
+
+# Those that `compilers.py` takes vectors of 512 bits for, unless the user says what the processor has.
+IN_WIDE_VECTORS = "avx512vbmi2" in (name for name, has in llvm.get_host_cpu_features().items() if has)
+wide_only = pytest.mark.skipif(
+    not IN_WIDE_VECTORS or numba.config.CPU_FEATURES is not None,
+    reason="the processor is not one on which vectors of 512 bits pay, or $NUMBA_CPU_FEATURES says what it has",
+)
+
+
+def roots(rows):
+    for i in range(rows.shape[1]):
+        rows[1, i] = math.sqrt(rows[0, i])
+
+
+@pytest.mark.level3(only=True)
+@compiled_only
+@wide_only
+@pytest.mark.parametrize(("decorator", "is_wide"), [(_jit.kernel, True), (_jit.long_kernel, False)])
+def test_kernels_of_flights_take_vectors_of_512_bits(decorator, is_wide, monkeypatch, tmp_path):
+    """The square roots of eight lanes at once; of many short loops four, which is what LLVM takes by itself."""
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    rows, kernel = np.arange(528.0).reshape(2, 264), decorator(roots)
+    kernel(rows)
+    assert rows[1].tolist() == np.sqrt(rows[0]).tolist()
+    (text,) = kernel.inspect_asm().values()
+    assert bool(re.search(r"vsqrtpd.*%zmm", text)) == is_wide
+
+
+@compiled_only
+def test_the_features_that_a_user_names_are_taken_as_they_are(monkeypatch, tmp_path):
+    """And a kernel that was compiled for others is not found: they are in its key."""
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    kernel = _jit.kernel(roots).compiled
+    codegen, keys = kernel.targetctx.codegen(), []
+    for named in (None, codegen._tm_features):
+        monkeypatch.setattr(numba.config, "CPU_FEATURES", named)
+        keys.append(kernel._cache._asked((), codegen)[2])
+        is_wide = IN_WIDE_VECTORS and named is None
+        assert (features_of(codegen) != codegen._tm_features) == is_wide
+    assert (keys[0] != keys[1]) == IN_WIDE_VECTORS
 
 
 @_jit.outlined

@@ -28,7 +28,7 @@ from numba.extending import typeof_impl
 from numba.np import linalg as blas
 
 from .cache import base, is_disabled, listeners
-from .compilers import KernelCompiler, LongKernelCompiler, PartCompiler
+from .compilers import KernelCompiler, LongKernelCompiler, PartCompiler, features_of
 from .deferred import loaded
 from .digest import key_of_kernel, was_compiled
 from .emission import array_operations, sums, vector_operators  # noqa: F401  # each tells Numba of its operations
@@ -223,7 +223,8 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         return kinds in self._keys or was_compiled(*self._asked(kinds, codegen))
 
     def _asked(self, kinds: Any, codegen: Any) -> tuple[Any, ...]:
-        return self._py_func, kinds, (*super()._index_key((), codegen), str(_CONFIG.OPT)), _folder() / _DIGESTS
+        processor = *super()._index_key((), codegen), features_of(codegen), str(_CONFIG.OPT)
+        return self._py_func, kinds, processor, _folder() / _DIGESTS
 
     def save_overload(self, kinds: Any, made: Any) -> None:
         # What Python code inside of a helper needs, as Numba does it for a kernel that it loads.
