@@ -1,6 +1,8 @@
 """A flight of every lane of a block: to its next contact, or to the end of the frame."""
 
-from ..kernel.arrays import index
+import numpy as np
+
+from ..kernel.arrays import index, unwritten
 from ..kernel.jit import outlined
 from ..surfaces.in_motion.moving import Aimed, Carried, Leaping, Marched, Strided
 from ..surfaces.periodic.period import cut
@@ -11,12 +13,23 @@ from ..surfaces.time_of_impact.polynomial import AIMED, POLYNOMIAL_STEPS
 from .field_hits import hit_of_lane, keep_hit, seek
 from .in_moving_cells import go_through_moving
 from .periodic import cut_steps
-from .table import marked_lanes
+from .table import STRIDE, LaneView, Rows, copy_lane, marked_lanes
 
 # Safe steps to walls in any motion that all lanes take in a pass after the first.
 _STRIDES = 3
 # Guesses are improved in all lanes together if more than one in so many needs it.
 _MANY = 8
+
+
+_named = Rows()
+_named.take(strides.KNOWN)
+
+
+class Open(LaneView):
+    """A lane without a proven hit: what its strides know, where it starts, and how much of the frame is left."""
+
+    r, v, remaining = _named.vector(), _named.vector(), _named.number()
+    COUNT = _named.count
 
 
 def go(method, walls, gravity, lanes, live):
@@ -100,23 +113,18 @@ def _stride(walls, gravity, lanes, live):
     # A fall that walls often come near to is proven too seldom: in a box that shakes it took half as long again.
     course, aims = lanes.course, gravity is None and isinstance(walls, Aimed)
     if aims:
-        some = _aim_at_moving(walls, gravity, lanes, live)
-        if _MANY * some < live:
-            for k in range(some):
-                _stride_first(walls, gravity, lanes, index(lanes.order[k]))
-            return
-    else:
-        for i in range(index(live)):
-            lane = lanes.lane(i)
-            strides.start(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
+        _stride_open(walls, gravity, lanes, _aim_at_moving(walls, gravity, lanes, live))
+        return
+    for i in range(index(live)):
+        lane = lanes.lane(i)
+        strides.start(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
     for i in range(index(live)):
         lane = lanes.lane(i)
         strides.stride(walls, gravity, course, i, lane.r, lane.v, lane.remaining, True)
-    if not aims:
-        for _round in range(_STRIDES):
-            for i in range(index(live)):
-                lane = lanes.lane(i)
-                strides.stride(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)
+    for _round in range(_STRIDES):
+        for i in range(index(live)):
+            lane = lanes.lane(i)
+            strides.stride(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)
 
 
 def _aim_at_moving(walls, gravity, lanes, live):
@@ -151,10 +159,22 @@ def _mark_open(lanes, live):
 
 
 @outlined
-def _stride_first(walls, gravity, lanes, i):
-    """The first safe step of a lane to walls in any motion."""
-    lane = lanes.lane(i)
-    strides.stride(walls, gravity, lanes.course, i, lane.r, lane.v, lane.remaining, True)
+def _stride_open(walls, gravity, lanes, some):
+    """The first safe step of so many lanes, those in `lanes.order`, to walls in any motion.
+
+    Side by side in a table of their own: one lane alone takes as long as a vector of them.
+    """
+    course, beside = lanes.course, unwritten((Open.COUNT, STRIDE), np.float64)
+    for k in range(index(some)):
+        i, one = index(lanes.order[k]), Open(beside, k)
+        lane = lanes.lane(i)
+        copy_lane(course, i, beside, k, strides.KNOWN)
+        one.r, one.v, one.remaining = lane.r, lane.v, lane.remaining
+    for k in range(index(some)):
+        one = Open(beside, k)
+        strides.stride(walls, gravity, beside, k, one.r, one.v, one.remaining, True)
+    for k in range(index(some)):
+        copy_lane(beside, k, course, index(lanes.order[k]), strides.FOUND)
 
 
 def _go_by_steps(walls, gravity, lanes, live):

@@ -19,6 +19,8 @@ from .safe import closed_hit, seen_by_walls
 # What a lane knows of its way: the time of the flight so far, the wall that it has met or -1, and the first hit with
 # the walls that have a closed form; the speed at its start.
 TIME, MET, CLOSED, OTHER, SPEED = 0, 1, 2, 3, 4
+# How many rows these are, and how many of them, the first, strides change.
+KNOWN, FOUND = 5, 2
 # The bounds of a stride hold for at most so many times the pace of a wall: beyond, a power series says little.
 AHEAD = 32.0
 
