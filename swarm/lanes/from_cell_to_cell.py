@@ -1,6 +1,6 @@
 """The first hits of all lanes with the facets of a mesh: each lane goes from cell to cell until it meets one.
 
-A mesh that moves takes the same lanes through its cells in its own frame, in_moving_cells.py.
+Lanes go through the cells of a mesh that moves in the same way, as curves in its frame: in_moving_cells.py.
 
 All lanes take a step together, in loops of which those without branches vectorise; then those that have come into a
 cell with facets look at these. One lane after the other would wait for each number that it looks up: 4 times as long.
@@ -14,7 +14,7 @@ from ..kernel.grid import cell_of, entries_of, until_next, until_out
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
-from ..surfaces.facets.facet_cells import BLOCK, from_middle, here_in, passes
+from ..surfaces.facets.facet_cells import BLOCK, flight_in, from_middle, passes
 from ..surfaces.facets.free_room import NormalCone, cone_of, room_of
 from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact import flights
@@ -24,16 +24,20 @@ from .table import STRIDE, marked_lanes
 _TIME, _WALL = 0, 1
 # So many blocks of entries are looked at together; so many a lane has usually.
 _BLOCKS, _USUAL = 256, 2
-# So many facets are looked at together.
-ROOM = _BLOCKS * BLOCK
 # Steps of a lane after which its flight is said to be free so far.
-MOST = 4000
+_MOST = 4000
+# The rows of a lane that is under way. Those of its flight at its start are first, so many they are at most; then where
+# it is, the room of its cell, and a cone of the normals there. Rows of a mesh that moves are after them.
+START, SPEED, _OWN = 0, 3, 8
+PLACE, _BACK, _AHEAD, _AXIS, _SINE, ROWS = _OWN, _OWN + 3, _OWN + 6, _OWN + 9, _OWN + 12, _OWN + 13
+# Where it is from the middle of its cell, when what is behind it is not asked for any more
+MIDDLE = _BACK
 
 
 class UnderWay(Record):
     """The lanes that are under way, closed up."""
 
-    rows: Array  # `own` rows of a flight at its start, where it is now, and what is known of its cell
+    rows: Array  # what is known of each lane
     time: Array  # how far it has come
     until: Array  # how far it comes in this step, up to its hit
     wall: Array  # the facet of that hit, or -1
@@ -42,14 +46,51 @@ class UnderWay(Record):
     owner: Array  # int64, the lane
     last: Array  # the time after which no hit counts
 
-    own = 6
+    # How many rows there are, and how many of them are of the flight at its start.
+    width, own = ROWS, 6
 
     def begin(self, i, lane, found):
         """A lane with its hit so far at its start."""
-        put(self.rows, _START, i, lane.r)
-        put(self.rows, _SPEED, i, lane.v)
+        put(self.rows, START, i, lane.r)
+        put(self.rows, SPEED, i, lane.v)
         self.time[i], self.owner[i] = 0.0, i
         self.last[i] = select(lane.remaining < found, lane.remaining, found)
+
+    # --- What differs where the mesh moves ---
+
+    def facets(self, mesh):
+        """The facets of the mesh."""
+        raise NotImplementedError
+
+    def see(self, gravity, mesh, i):
+        """Look where a lane is now in the frame of the mesh; its place."""
+        raise NotImplementedError
+
+    def now(self, gravity, i):
+        """The position and the velocity of a lane now in the frame of the mesh, as it was seen."""
+        raise NotImplementedError
+
+    def until_out(self, gravity, mesh, i, first, last):
+        """How long a lane surely is among the cells from one place to another one."""
+        raise NotImplementedError
+
+    def until_in(self, gravity, mesh, i):
+        """Until when a lane that is outside of the grid surely does not come into it."""
+        raise NotImplementedError
+
+    def may_meet(self, gravity, mesh, i, cone):
+        """Whether a lane may move towards a facet with a normal in this cone on its way through its cell."""
+        raise NotImplementedError
+
+    def way(self, gravity, mesh, i):
+        """That way, as `FlightInCell`."""
+        raise NotImplementedError
+
+    def met(self, gravity, mesh, i, m):
+        """The `Hit` of a lane with a facet; without a wall how far it surely meets none, if that is less."""
+        raise NotImplementedError
+
+    # --- From step to step ---
 
     def move(self, source, target):
         """One lane into the place of another one."""
@@ -57,10 +98,6 @@ class UnderWay(Record):
             self.rows[k, target] = self.rows[k, source]
         self.time[target], self.owner[target] = self.time[source], self.owner[source]
         self.last[target] = self.last[source]
-
-    def until_in(self, gravity, mesh, i):
-        """Until when a lane that is outside of the grid surely does not come into it."""
-        raise NotImplementedError
 
     def keep(self, course, i, time, wall):
         """Keep the hit of a lane, if it is the first so far."""
@@ -85,26 +122,60 @@ class UnderWay(Record):
         return left
 
 
-def under_way(kind, rows):
-    """Room for lanes that are under way, of that kind with so many rows."""
+def under_way(kind):
+    """Room for lanes that are under way, of that kind."""
     return kind(
-        unwritten((rows, STRIDE), np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
+        unwritten((kind.width, STRIDE), np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
         unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64),
         unwritten(STRIDE, np.bool_), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
     )  # fmt: skip
 
 
-class Under(UnderWay):
+class AtRest(UnderWay):
     """Those that fly straight or fall, past facets at rest."""
 
+    def facets(self, mesh):
+        """As of `UnderWay`."""
+        return mesh
+
+    def see(self, gravity, mesh, i):
+        """As of `UnderWay`."""
+        return self.now(gravity, i)[0]
+
     def now(self, gravity, i):
-        """The position and the velocity of a lane now."""
-        r, v, t = column(self.rows, _START, i), column(self.rows, _SPEED, i), self.time[i]
+        """As of `UnderWay`."""
+        r, v, t = column(self.rows, START, i), column(self.rows, SPEED, i), self.time[i]
         return r + displacement(gravity, v, t), accelerated(gravity, v, t)
+
+    def until_out(self, gravity, mesh, i, first, last):
+        """As of `UnderWay`."""
+        place, pace = self.now(gravity, i)
+        return until_out(gravity, mesh.grid, first, last, place, pace)
 
     def until_in(self, gravity, mesh, i):
         """As of `UnderWay`."""
         return _until_in(gravity, mesh.grid, self, i)
+
+    def may_meet(self, gravity, mesh, i, cone):
+        """As of `UnderWay`."""
+        # At the start of the way or at its end
+        v = column(self.rows, SPEED, i)
+        if gravity is None:
+            return not cone.is_left(v)
+        now, then = accelerated(gravity, v, self.time[i]), accelerated(gravity, v, self.until[i])
+        return not (cone.is_left(now) & cone.is_left(then))
+
+    def way(self, gravity, mesh, i):
+        """As of `UnderWay`."""
+        v, time = column(self.rows, SPEED, i), self.time[i]
+        at, pace = column(self.rows, MIDDLE, i), accelerated(gravity, v, time)
+        return flight_in(mesh.grid, at, pace, gravity, self.until[i] - time)
+
+    def met(self, gravity, mesh, i, m):
+        """As of `UnderWay`."""
+        r, v = column(self.rows, START, i), column(self.rows, SPEED, i)
+        time, _hits = flights.hit(gravity, member(mesh, m), r, v)
+        return flights.Hit(time, float(m))
 
 
 class Maybe(Record):
@@ -126,7 +197,8 @@ class Maybe(Record):
 
 def maybe_met():
     """Room for them."""
-    return Maybe(unwritten(ROOM, np.int64), unwritten(ROOM, np.int64), unwritten(ROOM, np.int64))
+    room = _BLOCKS * BLOCK
+    return Maybe(unwritten(room, np.int64), unwritten(room, np.int64), unwritten(room, np.int64))
 
 
 class Looks(Record):
@@ -147,117 +219,106 @@ def ask_for(table, row, size):
     fetch(table, row * size + size // 2)
 
 
-# Of its rows
-_START, _SPEED, _PLACE, _BACK, _AHEAD, _AXIS, _SINE, _PLACES = 0, 3, 6, 9, 12, 15, 18, 19
-# Where it is from the middle of its cell, when what is behind it is not asked for any more
-_MIDDLE = _BACK
-
-
 @outlined
 def go_through(gravity, facets, before, lanes, live):
     """The first hits of every live lane with facets that have so many walls before them, or that found before."""
-    course, under, maybe = lanes.course, under_way(Under, _PLACES), maybe_met()
+    go_from_cell_to_cell(under_way(AtRest), gravity, facets, before, lanes, live)
+
+
+def go_from_cell_to_cell(under, gravity, mesh, before, lanes, live):
+    """As `go_through`, of lanes that are under way in this manner, and of a mesh that they know."""
+    course, maybe = lanes.course, maybe_met()
     looks = Looks(unwritten(_BLOCKS, np.int64), unwritten(_BLOCKS, np.int64))
     for i in range(index(live)):
         under.begin(i, lanes.lane(i), course[_TIME, i])
     n = int(live)
-    for _step in range(MOST):
-        _find_cells(gravity, facets.grid, under, lanes, n)
-        _look(gravity, facets, under, (looks, maybe), lanes.order, marked_lanes(lanes, n))
-        n = under.go_on(gravity, facets, before, course, n)
+    for _step in range(_MOST):
+        _find_cells(gravity, mesh, under, lanes, n)
+        _look(gravity, mesh, under, (looks, maybe), lanes.order, marked_lanes(lanes, n))
+        n = under.go_on(gravity, mesh, before, course, n)
         if n == 0:
             return
     for i in range(index(n)):
         under.keep(course, i, under.time[i], -1.0)
 
 
-def _find_cells(gravity, cells, under, lanes, n):
+def _find_cells(gravity, mesh, under, lanes, n):
     """The cell that every lane is in, how far it comes from there, and whether it may meet a facet on this way."""
+    cells, rows = under.facets(mesh).grid, under.rows
     for i in range(index(n)):
-        place, _pace = under.now(gravity, i)
-        cell = cell_of(cells, place)
-        put(under.rows, _PLACE, i, cell.place)
+        cell = cell_of(cells, under.see(gravity, mesh, i))
+        put(rows, PLACE, i, cell.place)
         under.cell[i], under.inside[i] = cell.number, cell.inside
     # What is outside of the grid is in the cell after its last, which holds nothing.
     for i in range(index(n)):
         cell = index(under.cell[i])
         room, cone = room_of(cells.known.room, cell), cone_of(cells.known.room, cell)
-        put(under.rows, _BACK, i, room.back)
-        put(under.rows, _AHEAD, i, room.ahead)
-        put(under.rows, _AXIS, i, cone.axis)
-        under.rows[_SINE, i] = cone.sine
+        put(rows, _BACK, i, room.back)
+        put(rows, _AHEAD, i, room.ahead)
+        put(rows, _AXIS, i, cone.axis)
+        rows[_SINE, i] = cone.sine
     for i in range(index(n)):
-        place, pace = under.now(gravity, i)
-        at, back, ahead = (column(under.rows, row, i) for row in (_PLACE, _BACK, _AHEAD))
-        out = until_out(gravity, cells, at - back, at + ahead, place, pace)
+        place, _pace = under.now(gravity, i)
+        at, back, ahead = (column(rows, row, i) for row in (PLACE, _BACK, _AHEAD))
+        out = under.until_out(gravity, mesh, i, at - back, at + ahead)
         under.until[i], under.wall[i] = under.time[i] + out, -1.0
-        put(under.rows, _MIDDLE, i, from_middle(cells, at, place))
+        put(rows, MIDDLE, i, from_middle(cells, at, place))
     for i in range(index(n)):
-        lanes.marked[i] = _may_meet(gravity, under, i)
+        cone = NormalCone(column(rows, _AXIS, i), rows[_SINE, i])
+        lanes.marked[i] = under.may_meet(gravity, mesh, i, cone)
 
 
-def _may_meet(gravity, under, i):
-    """Whether a lane may move towards a facet of its cell, at the start of its way through it or at the end."""
-    v, cone = column(under.rows, _SPEED, i), NormalCone(column(under.rows, _AXIS, i), under.rows[_SINE, i])
-    if gravity is None:
-        return not cone.is_left(v)
-    now, then = accelerated(gravity, v, under.time[i]), accelerated(gravity, v, under.until[i])
-    return not (cone.is_left(now) & cone.is_left(then))
-
-
-def _look(gravity, facets, under, found, order, n):
+def _look(gravity, mesh, under, found, order, n):
     """So many lanes at the facets in their cells, by their planes first."""
-    planes, (looks, _maybe), blocks = facets.grid.known.planes, found, index(0)
+    cells, (looks, _maybe), blocks = under.facets(mesh).grid, found, index(0)
     for j in range(n):
         i = order[j]
-        first, stop = entries_of(facets.grid, under.cell[i])
+        first, stop = entries_of(cells, under.cell[i])
         begin, end = first // BLOCK, (stop + BLOCK - 1) // BLOCK
         if blocks > _BLOCKS - _USUAL:
-            _look_into(gravity, facets, under, found, blocks)
+            _look_into(gravity, mesh, under, found, blocks)
             blocks = index(0)
         # Those that are not its own the next lane writes over: how many there are no processor foresees.
         for k in range(_USUAL):
-            looks.take(planes, blocks + index(k), i, begin + k)
+            looks.take(cells.known.planes, blocks + index(k), i, begin + k)
         blocks += index(select(end - begin < _USUAL, end - begin, _USUAL))
         for block in range(begin + _USUAL, end):
             if blocks == _BLOCKS:
-                _look_into(gravity, facets, under, found, blocks)
+                _look_into(gravity, mesh, under, found, blocks)
                 blocks = index(0)
-            looks.take(planes, blocks, i, block)
+            looks.take(cells.known.planes, blocks, i, block)
             blocks += index(1)
-    _look_into(gravity, facets, under, found, blocks)
+    _look_into(gravity, mesh, under, found, blocks)
 
 
 @outlined
-def _look_into(gravity, facets, under, found, blocks):
+def _look_into(gravity, mesh, under, found, blocks):
     """Lanes each at a block of entries in their cells, then at the facets of which they may pass the planes."""
-    (looks, maybe), cells, some = found, facets.grid, index(0)
+    (looks, maybe), cells, some = found, under.facets(mesh).grid, index(0)
     marked = unwritten((_BLOCKS, BLOCK), np.bool_)
     for j in range(blocks):
-        i, block, time = index(looks.lane[j]), looks.block[j], under.time[index(looks.lane[j])]
-        v, at = accelerated(gravity, column(under.rows, _SPEED, i), time), column(under.rows, _MIDDLE, i)
-        here, (first, stop) = here_in(gravity, cells, at, v, under.until[i] - time), entries_of(cells, under.cell[i])
+        i, block = index(looks.lane[j]), looks.block[j]
+        way, (first, stop) = under.way(gravity, mesh, i), entries_of(cells, under.cell[i])
         for k in range(BLOCK):
             is_own = (block * BLOCK + k >= first) & (block * BLOCK + k < stop)
-            marked[j, k] = is_own & passes(cells, index(block), index(k), here)
+            marked[j, k] = is_own & passes(cells, index(block), index(k), way)
     for j in range(blocks):
         for k in range(BLOCK):
             maybe.entry[some] = looks.block[j] * BLOCK + k
             maybe.lane[some] = looks.lane[j]
             some += index(marked[j, k])
-    _look_at(gravity, facets, under, maybe, some)
+    _look_at(gravity, mesh, under, maybe, some)
 
 
-def _look_at(gravity, facets, under, maybe, some):
+def _look_at(gravity, mesh, under, maybe, some):
     """So many lanes each at a facet."""
-    maybe.look_up(facets, some)
+    maybe.look_up(under.facets(mesh), some)
     for n in range(some):
-        i, m = index(maybe.lane[n]), index(maybe.facet[n])
-        r, v = column(under.rows, _START, i), column(under.rows, _SPEED, i)
-        time, _hits = flights.hit(gravity, member(facets, m), r, v)
-        sooner = time < under.until[i]
-        under.until[i] = select(sooner, time, under.until[i])
-        under.wall[i] = select(sooner, float(maybe.facet[n]), under.wall[i])
+        i = index(maybe.lane[n])
+        met = under.met(gravity, mesh, i, index(maybe.facet[n]))
+        sooner = met.time < under.until[i]
+        under.until[i] = select(sooner, met.time, under.until[i])
+        under.wall[i] = select(sooner, met.wall, under.wall[i])
 
 
 @outlined

@@ -1,8 +1,8 @@
 """The first hits of all lanes with the facets of a mesh that moves: from cell to cell in the frame of the mesh.
 
 There a flight is a curve, with a bound of its jerk: each lane goes on for as long as it surely stays among the cells
-that it is in. All lanes take a step together, as at a mesh at rest; those in a cell with facets look at these. Where
-a flight may come through the plane of one, safe steps to that facet alone lead to the hit: none is skipped.
+that it is in. The loops are those of a mesh at rest. Where a flight may come through the plane of a facet, safe steps
+to that facet alone lead to the hit: none is skipped.
 """
 
 import math
@@ -10,22 +10,21 @@ from typing import Any
 
 from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
-from ..kernel.grid import cell_of, entries_of, until_next, until_out
+from ..kernel.grid import cell_of, until_next, until_out
 from ..kernel.jit import outlined, select
 from ..kernel.limits import EPSILON
 from ..kernel.vector import ZERO, column, dot, norm, put
-from ..surfaces.facets.facet_cells import may_pass, way_in
-from ..surfaces.facets.free_room import FULL, KIND, all_away_for, room_of
+from ..surfaces.facets.facet_cells import flight_in
 from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact.course import rise_time
 from ..surfaces.time_of_impact.flights import Hit
 from ..surfaces.time_of_impact.march import lets_go
 from ..surfaces.time_of_impact.rising import InWallFrame, Level, ThirdDerivativeBound, flight_of
-from .from_cell_to_cell import MOST, ROOM, UnderWay, maybe_met, under_way
-from .table import marked_lanes
+from .from_cell_to_cell import MIDDLE, ROWS, SPEED, START, UnderWay, go_from_cell_to_cell, under_way
 
-# The time of the hit of a lane, a row of `course`.
-_TIME = 0
+# More rows of a lane that is under way: of its flight at its start, and of where it is in the frame of the mesh.
+_REMAINING, _FAST = SPEED + 3, SPEED + 4
+_PLACE, _PACE, _PULL, _ARM, _COORDINATES = ROWS, ROWS + 3, ROWS + 6, ROWS + 9, ROWS + 10
 # Safe steps to one facet.
 _STEPS = 100
 # The bounds of a flight hold for so many times as long as it would be among its cells if it went straight on.
@@ -38,23 +37,19 @@ _ON = 0.5
 _NEARER, _BEYOND, _BEHIND = -1.0, -2.0, -3.0
 
 
-class Leaps(UnderWay):
-    """Those that leap through the cells of a mesh that moves: curves in its frame."""
+class InMotion(UnderWay):
+    """Those that go through the cells of a mesh that moves: curves in its frame."""
 
-    own = 8
+    width, own = ROWS + 11, 8
 
     def begin(self, i, lane, found):
         """As of `UnderWay`."""
         UnderWay.begin(self, i, lane, found)
         self.rows[_REMAINING, i], self.rows[_FAST, i] = lane.remaining, norm(lane.v)
 
-    def until_in(self, gravity, mesh, i):
-        """As of `UnderWay`."""
-        return _until_in(gravity, mesh, self, i)
-
     def flight(self, gravity, i):
         """The flight of a lane."""
-        r, v, rows = column(self.rows, _START, i), column(self.rows, _SPEED, i), self.rows
+        r, v, rows = column(self.rows, START, i), column(self.rows, SPEED, i), self.rows
         return flight_of(r, v, accelerated(gravity, ZERO, 1.0), rows[_REMAINING, i], rows[_FAST, i])
 
     def seen(self, mesh, gravity, i):
@@ -62,103 +57,70 @@ class Leaps(UnderWay):
         rows = self.rows
         weight = norm(accelerated(gravity, ZERO, 1.0))
         return InWallFrame(
-            mesh.drive, column(rows, _OWN, i), column(rows, _PACE, i), column(rows, _PULL, i),
+            mesh.drive, column(rows, _PLACE, i), column(rows, _PACE, i), column(rows, _PULL, i),
             rows[_FAST, i] + self.time[i] * weight, rows[_ARM, i], weight, rows[_COORDINATES, i],
         )  # fmt: skip
 
+    def facets(self, mesh):
+        """As of `UnderWay`."""
+        return mesh.body
 
-# Of its rows
-_START, _SPEED, _REMAINING, _FAST, _OWN, _PACE, _PULL, _ARM, _COORDINATES = 0, 3, 6, 7, 8, 11, 14, 17, 18
-_PLACE, _BACK, _AHEAD, _ROWS = 19, 22, 25, 28
+    def see(self, gravity, mesh, i):
+        """As of `UnderWay`."""
+        rows, seen = self.rows, mesh.seen(self.flight(gravity, i), self.time[i])
+        put(rows, _PLACE, i, seen.r)
+        put(rows, _PACE, i, seen.v)
+        put(rows, _PULL, i, seen.a)
+        rows[_ARM, i], rows[_COORDINATES, i] = seen.arm, seen.coordinates
+        return seen.r
+
+    def now(self, gravity, i):
+        """As of `UnderWay`."""
+        return column(self.rows, _PLACE, i), column(self.rows, _PACE, i)
+
+    def until_out(self, gravity, mesh, i, first, last):
+        """As of `UnderWay`."""
+        cells, most = mesh.body.grid, _LONGEST * mesh.drive.time_scale
+        seen, longest = self.seen(mesh, gravity, i), self.last[i] - self.time[i]
+        # The bound of the acceleration grows with the time that it holds for.
+        straight = _CURVED * until_out(None, cells, first, last, seen.r, seen.v)
+        within = select(straight < longest, straight, longest)
+        within = select(within < most, within, most)
+        time = until_out(seen.pulls(within), cells, first, last, seen.r, seen.v)
+        return select(time < within, time, within)
+
+    def until_in(self, gravity, mesh, i):
+        """As of `UnderWay`."""
+        return _until_in(gravity, mesh, self, i)
+
+    def may_meet(self, gravity, mesh, i, cone):
+        """As of `UnderWay`."""
+        seen, span = self.seen(mesh, gravity, i), self.until[i] - self.time[i]
+        return not cone.is_left(seen.v, seen.bounds(span).acceleration * span)
+
+    def way(self, gravity, mesh, i):
+        """As of `UnderWay`."""
+        seen, span = self.seen(mesh, gravity, i), self.until[i] - self.time[i]
+        at = column(self.rows, MIDDLE, i)
+        return flight_in(mesh.body.grid, at, seen.v, seen.a, span, seen.bounds(span))
+
+    def met(self, gravity, mesh, i, m):
+        """As of `UnderWay`."""
+        return _met(gravity, mesh, self, i, m)
 
 
 @outlined
 def go_through_moving(gravity, mesh, before, lanes, live):
     """The first hits of every live lane with facets that have so many walls before them, or that found before."""
-    course, leaps, maybe = lanes.course, under_way(Leaps, _ROWS), maybe_met()
-    for i in range(index(live)):
-        leaps.begin(i, lanes.lane(i), course[_TIME, i])
-    n = int(live)
-    for _step in range(MOST):
-        _find_cells(gravity, mesh, leaps, lanes, n)
-        _look(gravity, mesh, leaps, maybe, lanes.order, marked_lanes(lanes, n))
-        n = leaps.go_on(gravity, mesh, before, course, n)
-        if n == 0:
-            return
-    for i in range(index(n)):
-        leaps.keep(course, i, leaps.time[i], -1.0)
-
-
-def _find_cells(gravity, mesh, leaps, lanes, n):
-    """Where every lane is in the frame of the mesh, in which cell, how far it surely comes, and whether it may meet."""
-    cells, rows, most = mesh.body.grid, leaps.rows, _LONGEST * mesh.drive.time_scale
-    for i in range(index(n)):
-        seen = mesh.seen(leaps.flight(gravity, i), leaps.time[i])
-        put(rows, _OWN, i, seen.r)
-        put(rows, _PACE, i, seen.v)
-        put(rows, _PULL, i, seen.a)
-        rows[_ARM, i], rows[_COORDINATES, i] = seen.arm, seen.coordinates
-        cell = cell_of(cells, seen.r)
-        put(rows, _PLACE, i, cell.place)
-        leaps.cell[i], leaps.inside[i] = cell.number, cell.inside
-    # What is outside of the grid is in the cell after its last, which holds nothing.
-    for i in range(index(n)):
-        room = room_of(cells.known.room, index(leaps.cell[i]))
-        put(rows, _BACK, i, room.back)
-        put(rows, _AHEAD, i, room.ahead)
-    for i in range(index(n)):
-        seen, longest = leaps.seen(mesh, gravity, i), leaps.last[i] - leaps.time[i]
-        at, back, ahead = (column(rows, row, i) for row in (_PLACE, _BACK, _AHEAD))
-        # The bound of the acceleration grows with the time that it holds for.
-        straight = _CURVED * until_out(None, cells, at - back, at + ahead, seen.r, seen.v)
-        within = select(straight < longest, straight, longest)
-        within = select(within < most, within, most)
-        time = until_out(seen.pulls(within), cells, at - back, at + ahead, seen.r, seen.v)
-        time = select(time < within, time, within)
-        leaps.until[i], leaps.wall[i] = leaps.time[i] + time, -1.0
-    for i in range(index(n)):
-        cell = index(leaps.cell[i])
-        lanes.marked[i] = False
-        if cells.known.room[cell, KIND] == FULL:
-            seen, span = leaps.seen(mesh, gravity, i), leaps.until[i] - leaps.time[i]
-            turns = seen.bounds(span).acceleration * span
-            lanes.marked[i] = not all_away_for(cells.known.room, cell, seen.v, turns)
-
-
-def _look(gravity, mesh, leaps, maybe, order, n):
-    """So many lanes at the facets in their cells, by their planes first."""
-    cells, some = mesh.body.grid, 0
-    for j in range(index(n)):
-        i = index(order[j])
-        seen, span = leaps.seen(mesh, gravity, i), leaps.until[i] - leaps.time[i]
-        here, (first, stop) = way_in(cells, column(leaps.rows, _PLACE, i), seen, span), entries_of(cells, leaps.cell[i])
-        for k in range(first, stop):
-            if may_pass(cells, index(k), here):
-                maybe.lane[some], maybe.entry[some] = i, k
-                some += 1
-                if some == ROOM:
-                    _look_at(gravity, mesh, leaps, maybe, some)
-                    some = 0
-    _look_at(gravity, mesh, leaps, maybe, some)
+    go_from_cell_to_cell(under_way(InMotion), gravity, mesh, before, lanes, live)
 
 
 @outlined
-def _look_at(gravity, mesh, leaps, maybe, some):
-    """So many lanes each at a facet."""
-    maybe.look_up(mesh.body, index(some))
-    for j in range(index(some)):
-        i, m = index(maybe.lane[j]), maybe.facet[j]
-        met = _met(gravity, mesh, leaps, i, m)
-        if met.time < leaps.until[i]:
-            leaps.until[i], leaps.wall[i] = met.time, met.wall
-
-
-@outlined
-def _met(gravity, mesh, leaps, i, m):
-    """The `Hit` of a lane with a facet in this step; without a wall how far it surely meets none, if that is less."""
-    facet, flight = member(mesh.body, index(m)), leaps.flight(gravity, i)
-    t, until, room = leaps.time[i], leaps.until[i], facet.room.value
-    seen = leaps.seen(mesh, gravity, i)
+def _met(gravity, mesh, under, i, m):
+    """As `UnderWay.met`, in this step."""
+    facet, flight = member(mesh.body, index(m)), under.flight(gravity, i)
+    t, until, room = under.time[i], under.until[i], facet.room.value
+    seen = under.seen(mesh, gravity, i)
     for _k in range(_STEPS):
         step = _step_to(facet, seen, until - t)
         if not step.time < until - t:
@@ -217,7 +179,7 @@ def _place(seen, t):
 def _is_beside(facet, seen, level, own, longest, bounds):
     """Whether a flight surely comes through the plane of a facet beyond an edge, and not back to it.
 
-    Its level c + 2 b t + a t^2 has the root `own`, as in `facet_cells.may_pass`.
+    Its level c + 2 b t + a t^2 has the root `own`, as in `facet_cells.passes`.
     """
     (depth, rate, bend), more = level, bounds.jerk * longest * longest * longest * (1.0 / 6.0) + facet.room.value
     below = rate * rate - bend * depth
@@ -230,9 +192,9 @@ def _is_beside(facet, seen, level, own, longest, bounds):
 
 
 @outlined
-def _until_in(gravity, mesh, leaps, i):
+def _until_in(gravity, mesh, under, i):
     """Until when a lane that is outside of the grid surely does not come into it."""
-    cells, seen, longest = mesh.body.grid, leaps.seen(mesh, gravity, i), leaps.last[i] - leaps.time[i]
+    cells, seen, longest = mesh.body.grid, under.seen(mesh, gravity, i), under.last[i] - under.time[i]
     cell, time, within = cell_of(cells, seen.r), 0.0, longest
     for _k in range(8):
         until = until_next(seen.pulls(within), cells, cell, seen.r, seen.v)
@@ -240,4 +202,4 @@ def _until_in(gravity, mesh, leaps, i):
         if not 2.0 * time < within:
             break
         within = math.sqrt(time * within)
-    return leaps.time[i] + time
+    return under.time[i] + time

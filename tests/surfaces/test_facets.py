@@ -8,10 +8,13 @@ from thorny import aimed, hollow, slivered, thorny
 
 import swarm
 from swarm import scene_file
+from swarm.kernel.gravity import Bounds
 from swarm.kernel.grid import until_out
-from swarm.kernel.vector import Vec
+from swarm.kernel.vector import Vec, vec
 from swarm.serialization import tables
 from swarm.surfaces.facets import free_room as room
+from swarm.surfaces.facets.facet_cells import BLOCK, flight_in, from_middle, passes
+from swarm.surfaces.fields.members import member
 
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
 WIDTHS = (0.5, 1.0, 1.5)
@@ -107,6 +110,34 @@ def test_when_a_flight_leaves_a_block(gravity):
 
 
 # --- Flights ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("jerks", [0.0, 10.0, 250.0])
+def test_no_facet_that_a_curve_meets_is_passed_over(jerks):
+    """Of cubic curves, of which the bounds of acceleration and jerk are known: by the roots of their levels."""
+    random, met, asked, passed = np.random.default_rng(4), 0, 0, 0
+    for mesh in (swarm.Mesh(*thorny()), swarm.Mesh(*slivered())):
+        cells = mesh.members.grid
+        low, width, shape = (np.array(one) for one in (cells.low, cells.width, cells.shape))
+        for number in random.permutation(np.flatnonzero(np.diff(cells.first[:-1])))[:1500]:
+            place = np.array(np.unravel_index(number, shape.astype(int)), float)
+            r, middle = (low + (place + away) * width for away in (random.uniform(0.0, 1.0, 3), 0.5))
+            v, a, j = random.standard_normal((3, 3)) * [[1.0], [random.choice([0.1, 1.0, 10.0])], [jerks]]
+            span = random.choice([0.1, 0.5, 1.0]) * width.max()
+            bounds = Bounds(np.inf, np.linalg.norm(a) + np.linalg.norm(j) * span, np.linalg.norm(j))
+            here = flight_in(cells, from_middle(cells, vec(place), vec(r)), vec(v), vec(a), span, bounds)
+            for k in range(cells.first[number], cells.first[number + 1]):
+                facet, passes_it = member(mesh.members, cells.entries[k]), passes(cells, k // BLOCK, k % BLOCK, here)
+                n, asked, passed = np.array(facet.normal), asked + 1, passed + bool(passes_it)
+                roots = np.roots([n @ j / 6.0, n @ a / 2.0, n @ v, n @ r - facet.offset])
+                for t in roots.real[(abs(roots.imag) < 1e-9) & (roots.real >= 0.0) & (roots.real <= span)]:
+                    at = r + t * (v + t * (0.5 * a + t * j / 6.0))
+                    is_in = (abs(at - middle) <= 0.5 * width).all() and facet.within(vec(at)) >= 0.0
+                    if is_in and n @ (v + t * (a + 0.5 * t * j)) > 0.0:
+                        met += 1
+                        assert passes_it
+    assert met >= 100
+    assert passed <= 0.5 * asked
 
 
 @pytest.mark.parametrize("gravity", [None, DOWN])

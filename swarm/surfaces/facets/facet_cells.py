@@ -118,10 +118,18 @@ class FlightInCell(Record):
     """A flight through a cell: lengths are in the unit of the balls, times in the time that it takes."""
 
     at: Vec  # from the middle of the cell
-    way: Vec  # by its velocity, and by gravity, or None
+    way: Vec  # by its velocity, and by its acceleration, or None
     bent: Any
     slow: float  # a way by a velocity and by an acceleration that may be none, along whole normals
     weak: float
+    curve: Any  # the `CurveBound` of what it may come farther, or None
+
+
+class CurveBound(Record):
+    """What bounds a flight that is no parabola, in the same units."""
+
+    jerk: float  # how far it may be from the parabola at its end
+    curved: float  # how far from the line
 
 
 def from_middle(cells, place, r):
@@ -130,14 +138,26 @@ def from_middle(cells, place, r):
     return r - (cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z))
 
 
-def here_in(gravity, cells, at, v, span):
-    """A flight that is in a cell for so long, from this place on from its middle."""
+def flight_in(cells, at, v, pull, span, bounds=None):
+    """The `FlightInCell` of a flight that is in a cell for so long, from this place on from its middle.
+
+    Args:
+        cells: the grid.
+        at: the place [m].
+        v: the velocity there [m/s].
+        pull: the acceleration there [m/s^2], or None.
+        span: how long [s].
+        bounds: its `Bounds` for so long, where the acceleration changes.
+    """
     unit = (_FULL / _REACH) / math.sqrt(square(cells.width))
-    way, bent, weak = (unit * span) * v, None, 0.0
-    if gravity is not None:
-        bent = (0.5 * unit * span * span) * as_vector(gravity)
+    way, bent, weak, curve = (unit * span) * v, None, 0.0, None
+    if pull is not None:
+        bent = (0.5 * unit * span * span) * as_vector(pull)
         weak = _FULL * _OFF_SPEED * total(absolute(bent))
-    return FlightInCell(unit * at, way, bent, _FULL * _OFF_SPEED * total(absolute(way)) + 2.0 * weak, weak)
+    if bounds is not None:
+        half = 0.5 * unit * span * span
+        curve = CurveBound(half * bounds.jerk * span * (1.0 / 3.0), half * bounds.acceleration)
+    return FlightInCell(unit * at, way, bent, _FULL * _OFF_SPEED * total(absolute(way)) + 2.0 * weak, weak, curve)
 
 
 def passes(cells, block, k, here):
@@ -156,78 +176,40 @@ def passes(cells, block, k, here):
         away = rate * (here.at - center) - depth * here.way
         beside = radius * rate + 2.0 * _BESIDE * _NEAR_PLACE * here.slow
         return meets & (not ((rate > 2.0 * here.slow) & (square(away) > beside * beside)))
-    bend = dot(normal, here.bent)
-    rises = select(bend > 0.0, bend, 0.0)
-    is_inside = (depth <= _NEAR) | ((bend > -here.weak) & (beyond < 2.0 * here.slow))
-    reach = depth + select(beyond > 0.0, beyond, 0.0) + rises + here.weak
-    meets = (beyond + 2.0 * rises > 0.0) & is_inside & (reach >= -_NEAR)
-    # Where it comes through the plane, at the speed 2 root along the normal
+    return _passes_in_curve(here, (depth, rate, dot(normal, here.bent)), center, radius)
+
+
+def _passes_in_curve(here, level, center, radius):
+    """As `passes` of a parabola, or of what is near to one: its level is depth + rate s + bend s^2 at the part s."""
+    (depth, rate, bend), jerk, farther = level, 0.0, 0.0
+    if here.curve is not None:
+        jerk, farther = _FULL * here.curve.jerk, here.curve.jerk
+    rises, falls = select(bend > 0.0, bend, 0.0), select(bend < 0.0, -bend, 0.0)
+    # The level is that give or take `more`.
+    more, most, least = here.slow + jerk + _NEAR, rate + rises, rate - falls
+    grows, reaches = most + rises + here.slow + 3.0 * jerk > 0.0, depth + select(most > 0.0, most, 0.0) >= -more
+    # What is behind the plane comes back first.
+    comes_back = (bend > -(here.weak + 3.0 * jerk)) & (depth + select(least < 0.0, least, 0.0) <= more)
+    meets = grows & reaches & ((depth <= _NEAR) | comes_back)
+    # Where it comes through the plane its level rises by 2 root. It is near to 0 for so short a time only, unless it
+    # comes back.
     b = 0.5 * rate
     below = b * b - bend * depth
-    root = np.sqrt(select(below > 0.0, below, 0.0))
-    is_known = (b > here.slow) & (below > here.slow * here.slow)
+    turns = (bend < 0.0) & (depth + rate + bend <= more)
+    is_known = (rate > 0.0) & (below > more * (more + 4.0 * abs(bend))) & (not turns)
+    root = np.sqrt(select(is_known, below, 0.0))
     part = -depth / select(is_known, b + root, 1.0)
     away = here.at + part * (here.way + part * here.bent) - center
-    beside = radius + _BESIDE * _NEAR_PLACE * here.slow / select(is_known, root, 1.0)
-    return meets & (not (is_known & (square(away) > beside * beside)))
-
-
-class WayInCell(Record):
-    """A flight of which the jerk has a bound, in a cell: how far it comes at most."""
-
-    from_middle: Vec
-    v: Vec
-    half_pull: Vec
-    span: float
-    bent: float  # what it may come farther than by its velocity and acceleration
-    halfway: Vec  # half its way by the velocity alone, and how far from there it may be
-    beside: float
-    way: float  # a bound of its length, and of that of the parabola in the time before or after it
-    near: float
-    slow: float
-
-
-def way_in(cells, place, seen, span):
-    """A flight in the cell at this place for some time, as the frame of the cells sees it."""
-    v, bounds = seen.v, seen.bounds(span)
-    near, half = _OFF * math.sqrt(square(cells.width)), 0.5 * seen.a
-    slow = _OFF_SPEED * (total(absolute(v)) + span * total(absolute(half)))
-    here, ahead = from_middle(cells, place, seen.r), (0.5 * span) * v
-    curved = 0.5 * bounds.acceleration * span * span
-    straight = math.sqrt(square(ahead))
-    beside, way = straight + curved + near, 2.0 * straight + 4.0 * curved
-    bent = bounds.jerk * span * span * span * (1.0 / 6.0)
-    return WayInCell(here, v, half, span, bent, here + ahead, beside, way, near, slow)
-
-
-def may_pass(cells, k, way):
-    """As `passes` of such a flight."""
-    rows, block, k = cells.known.planes, k // BLOCK, k % BLOCK
-    normal = (1.0 / _FULL) * _row(rows, block, 0, k)
-    depth = dot(normal, way.from_middle) - float(rows[block, 3, k]) * (way.near * (1.0 / (_FULL * _OFF)))
-    rate, bend = dot(normal, way.v) * way.span, dot(normal, way.half_pull) * way.span * way.span
-    rises, falls = rate + select(bend > 0.0, bend, 0.0), select(bend < 0.0, -bend, 0.0) - rate
-    more = way.slow * way.span + way.bent + way.near
-    # What is behind the plane comes back first.
-    meets = (depth + select(rises > 0.0, rises, 0.0) >= -more) & (depth - select(falls > 0.0, falls, 0.0) <= more)
-    radius, scale = float(rows[block, 7, k]), way.near * (_REACH / (_FULL * _OFF))
-    if not meets or radius == _FULL:
+    # Times the root, so that little is divided.
+    length = (here.slow + 2.0 * here.weak) * (1.0 / (_FULL * _OFF_SPEED))
+    beside = (radius + farther + _NEAR_PLACE) * root + length * more
+    meets = meets & (not (is_known & (square(away) * below > beside * beside)))
+    if here.curve is None:
         return meets
-    center, reach = scale * _row(rows, block, 4, k), radius * scale + way.beside
-    if square(way.halfway - center) > reach * reach:
-        return False
-    # Where it comes through the plane: the level is depth + rate s + bend s^2 give or take `more`, at the part s of its
-    # time, and rises by 2 root there. It is that near to 0 for so short a time only, unless it comes back.
-    below = 0.25 * rate * rate - bend * depth
-    if (rate <= 0.0) | (below <= 4.0 * abs(bend) * more) | ((bend < 0.0) & (depth + rate + bend <= more)):
-        return True
-    root = math.sqrt(below)
-    if root <= more:
-        return True
-    s = -depth / (0.5 * rate + root)
-    place = way.from_middle + (s * way.span) * (way.v + (s * way.span) * way.half_pull)
-    reach = radius * scale + way.near + way.bent + way.way * (more / root)
-    return square(place - center) <= reach * reach
+    # Around its middle it is in a ball of half its length.
+    middle, half = here.at + 0.5 * here.way - center, radius + here.curve.curved + _NEAR_PLACE
+    half = half + 0.5 * math.sqrt(square(here.way))
+    return meets & (square(middle) <= half * half)
 
 
 def _row(rows, block, first, k):

@@ -18,6 +18,8 @@ FULL, FREE, CLOSED = 0, 1, -1
 _FULL = 127.0
 # A sine that no cone has: normals in all directions. Of the others a little more than they are, for whole numbers.
 _WIDEST, _MORE = 126.0, 3.0
+# The sine of a cone that every flight leaves, however its velocity changes.
+_LEFT = -2.0 * _FULL
 # The farthest leap, in cells, and the longest step of a block that grows.
 _FARTHEST, _LONGEST = 120, 64
 
@@ -35,9 +37,9 @@ class NormalCone(Record):
     axis: Vec
     sine: float
 
-    def is_left(self, v):
-        """Whether a flight surely moves away from all that have these normals."""
-        return dot(self.axis, v) < -self.sine * norm(v)
+    def is_left(self, v, change=0.0):
+        """Whether a flight surely moves away from all that have these normals, while v changes by so much at most."""
+        return dot(self.axis, v) + _FULL * change < -self.sine * (norm(v) + change)
 
 
 def room_of(rows, cell):
@@ -53,13 +55,7 @@ def cone_of(rows, cell):
     """The cone of the normals of a cell; of one without facets it is one that every flight leaves."""
     is_full = rows[cell, KIND] == FULL
     axis = Vec(float(rows[cell, 0]), float(rows[cell, 1]), float(rows[cell, 2]))
-    return NormalCone(select(is_full, 1.0, 0.0) * axis, select(is_full, float(rows[cell, SINE]), -1.0))
-
-
-def all_away_for(rows, cell, v, change):
-    """The same while its velocity changes by so much at most."""
-    axis = Vec(float(rows[cell, 0]), float(rows[cell, 1]), float(rows[cell, 2]))
-    return dot(axis, v) + _FULL * change < -float(rows[cell, SINE]) * (norm(v) + change)
+    return NormalCone(select(is_full, 1.0, 0.0) * axis, select(is_full, float(rows[cell, SINE]), _LEFT))
 
 
 def rooms_of(held: NDArray[np.bool_], normals: NDArray[np.float64], starts: NDArray[np.int32]) -> NDArray[np.int8]:

@@ -12,7 +12,7 @@ from ..presence.patched import Patched
 from ..shapes.plane import PlaneNumbers
 from ..time_of_impact import flights
 from .facet import ROOM, Shared
-from .facet_cells import BLOCK, from_middle, here_in, may_pass, passes, way_in
+from .facet_cells import BLOCK, flight_in, from_middle, passes
 from .free_room import FULL, KIND, room_of
 from .nearest import foot_on
 
@@ -48,10 +48,11 @@ class Facets(Members, Patched):
         return until if cell.inside else until_next(gravity, cells, cell, r, v)
 
     def way_in_cell(self, cell, seen, span):
-        return way_in(self.grid, cell.place, seen, span)
+        at = from_middle(self.grid, cell.place, seen.r)
+        return flight_in(self.grid, at, seen.v, seen.a, span, seen.bounds(span))
 
     def may_meet(self, k, here):
-        return may_pass(self.grid, k, here)
+        return passes(self.grid, index(k // BLOCK), index(k % BLOCK), here)
 
     def keeps(self, number, r):
         is_other = (number < 0.0) | (number >= self.count())
@@ -108,7 +109,7 @@ def _first_hit(facets, gravity, r, v):
             room = room_of(cells.known.room, number)
             until = t + until_out(gravity, cells, cell.place - room.back, cell.place + room.ahead, place, pace)
             if cells.known.room[number, KIND] == FULL:
-                here = here_in(gravity, cells, from_middle(cells, cell.place, place), pace, until - t)
+                here = flight_in(cells, from_middle(cells, cell.place, place), pace, gravity, until - t)
                 found = hit_in(facets, gravity, (r, v), (number, until), here)
                 if found.wall >= 0.0:
                     return found
