@@ -121,6 +121,8 @@ def _met(gravity, mesh, under, i, m):
     facet, flight = member(mesh.body, index(m)), under.flight(gravity, i)
     t, until, room = under.time[i], under.until[i], facet.room.value
     seen = under.seen(mesh, gravity, i)
+    if _misses(facet, seen, until - t):
+        return Hit(math.inf, -1.0)
     for _k in range(_STEPS):
         step = _step_to(facet, seen, until - t)
         if not step.time < until - t:
@@ -140,10 +142,7 @@ def _step_to(facet, seen, longest) -> Any:
     if is_behind:
         # It comes back first.
         depth, rate, bend = -depth, -rate, -bend
-    own = rise_time(depth, rate, bend)
-    ahead, whole = min(2.0 * own, longest), seen.bounds(longest)
-    if not is_behind and own < longest and _is_beside(facet, seen, (depth, rate, bend), own, longest, whole):
-        return Hit(math.inf, -1.0)
+    ahead = min(2.0 * rise_time(depth, rate, bend), longest)
     bounds = seen.bounds(ahead)
     sixth = bounds.jerk * (1.0 / 6.0)
     time = min(rise_time(depth, rate, bend + sixth * ahead), ahead)
@@ -157,7 +156,7 @@ def _step_to(facet, seen, longest) -> Any:
         return Hit(time, 0.0)
     within = facet.within(seen.r)
     if within < 0.0:
-        return Hit(max(time, min(-within / whole.speed, longest)), _BEYOND)
+        return Hit(max(time, min(-within / seen.bounds(longest).speed, longest)), _BEYOND)
     return Hit(time, 0.0 if time * bounds.speed <= room else _NEARER)
 
 
@@ -176,19 +175,21 @@ def _place(seen, t):
     return seen.r + t * (seen.v + (0.5 * t) * seen.a)
 
 
-def _is_beside(facet, seen, level, own, longest, bounds):
-    """Whether a flight surely comes through the plane of a facet beyond an edge, and not back to it.
+def _misses(facet, seen, longest):
+    """Whether a flight surely does not meet a facet for so long, nor is behind it: it is beyond an edge if it may.
 
-    Its level c + 2 b t + a t^2 has the root `own`, as in `facet_cells.passes`.
+    The level of its plane is c + 2 b t + a t^2, give or take J t^3/6 <= k t^2: it rises between the times at which both
+    bounds do, unless the lower one comes back.
     """
-    (depth, rate, bend), more = level, bounds.jerk * longest * longest * longest * (1.0 / 6.0) + facet.room.value
-    below = rate * rate - bend * depth
-    if (rate <= 0.0) | (below <= 4.0 * abs(bend) * more):
-        return False
-    if bend < 0.0 and depth + longest * (2.0 * rate + longest * bend) <= more:
-        return False
-    beside = more * (1.0 + bounds.speed / math.sqrt(below))
-    return facet.within(_place(seen, own)) < -beside
+    c, b, a = facet.phi(seen.r), 0.5 * dot(facet.normal, seen.v), 0.5 * dot(facet.normal, seen.a)
+    bounds, room = seen.bounds(longest), facet.room.value
+    k = bounds.jerk * longest * (1.0 / 6.0)
+    begin, end = rise_time(c, b, a + k), rise_time(c - room, b, a - k)
+    stays = (a >= k) | (c - room + longest * (2.0 * b + longest * (a - k)) > 0.0)
+    is_near = begin < longest
+    begin, end = select(is_near, begin, 0.0), select(stays & (end < longest), end, longest)
+    beside = 0.5 * bounds.speed * (end - begin) + k * end * end + room
+    return (c <= room) & ((not is_near) | (facet.within(_place(seen, 0.5 * (begin + end))) < -beside))
 
 
 @outlined
