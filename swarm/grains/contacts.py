@@ -20,6 +20,7 @@ from .grain_arrays import (
     AFTER,
     BEFORE,
     DAMPING,
+    LAST,
     LIGHTNESS,
     LOST,
     ONE,
@@ -64,6 +65,11 @@ class Matter(Record):
     def rubs(self):
         """Whether there is any friction: a constant for the compiler."""
         return any(one.friction is not None for one in (self.pairs, *self.walls))
+
+    @property
+    def rubs_everywhere(self):
+        """Whether there is friction at every contact: a constant for the compiler."""
+        return all(one.friction is not None for one in (self.pairs, *self.walls))
 
     @property
     def damped(self):
@@ -151,6 +157,30 @@ def change_of(contact, k, new, share):
 def size_of(a):
     """The sum of the magnitudes of the components."""
     return total(absolute(a))
+
+
+# --- Of sweeps for friction ------------------------------------------------------------------------------
+
+
+class Sweep(Record):
+    """One of some sweeps: its number, 0 where it goes over all contacts, the share of changes, and the largest error.
+
+    Which contacts a later sweep for friction goes over is noted by their balls, `Touches.stirred`.
+    """
+
+    number: int
+    share: float
+    solved: float
+
+
+def is_due(sweep, stirred, i):
+    """Whether a contact of a ball was not solved in the sweep before or in this one: else none of the ball changes."""
+    return stirred[i] >= sweep.number - 1
+
+
+def stir(sweep, stirred, i, off):
+    """Note where a contact of a ball is not solved."""
+    stirred[i] = select(off <= sweep.solved, stirred[i], sweep.number)
 
 
 # --- Of pairs --------------------------------------------------------------------------------------------
@@ -248,7 +278,7 @@ def _off_course(matter, grains):
     speed, most = grains.speed, 0.0
     for k in range(speed.shape[0]):
         i = index(k)
-        foreseen = vector_at(speed, i, BEFORE) + vector_at(grains.change, i, 0)
+        foreseen = vector_at(speed, i, BEFORE) + vector_at(grains.change, i, LAST)
         most = worse(square(vector_at(speed, i, AFTER) - foreseen), most)
     return 0.5 * matter.h * math.sqrt(most)
 

@@ -18,7 +18,7 @@ from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, cross, dot, square
 from ..surfaces.in_motion.posed import Posed
 from .at_walls import press_at_wall, rising
-from .contacts import change_of, size_of, worse
+from .contacts import change_of, is_due, size_of, stir, worse
 from .grain_arrays import (
     AFTER,
     ARM,
@@ -96,13 +96,15 @@ def faced(wall, grains, touches, c, i, move):
 
 
 @outlined
-def rub_wall(matter, law, wall, grains, touches, number, share):
+def rub_wall(matter, law, wall, grains, touches, number, sweep):
     """Improve the impulse and the friction of each ball at a wall; the largest change, as for pairs."""
     rows, speed, spin, half, worst = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h, 0.0
-    begin = touches.wall_spans[0, number]
+    begin, share = touches.wall_spans[0, number], sweep.share
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
+        if not is_due(sweep, touches.stirred, i):
+            continue
         radius, ease, w = grains.place[i, RADIUS], rows[c, EASE], vector_at(spin, i, AFTER)
         own = met(wall, touches.listed, touches.spans, c, radius)
         way, v, off = press_at_wall(matter, law, own, grains, rows, (c, i), share)
@@ -114,7 +116,9 @@ def rub_wall(matter, law, wall, grains, touches, number, share):
         more, part = change_of(OfWall(rows, c), DRAG, new, share)
         set_vector(speed, i, AFTER, v + part * ease)
         set_vector(spin, i, AFTER, w - cross(n, part) * (ROUNDNESS * ease / radius))
-        worst = worse(size_of(more) * rows[c, SCALE], worse(off, worst))
+        off = worse(size_of(more) * rows[c, SCALE], off)
+        stir(sweep, touches.stirred, i, off)
+        worst = worse(off, worst)
     return worst
 
 

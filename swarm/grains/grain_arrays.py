@@ -18,6 +18,9 @@ X, LOST, RADIUS, LIGHTNESS = 0, 3, 6, 7
 # Columns of `Grains.speed`: at the start of a step, and at its end. Of `Grains.spin` also the radius again, and what
 # turns the ball, m R/I: what friction reads of a ball is then in two lines.
 BEFORE, AFTER, ARM, LEVER = 0, 3, 6, 7
+# Columns of `Grains.change`: that of the velocity in the last step, with which the next one begins to solve, and that
+# by the impulses of pairs in this one.
+LAST, GIVEN = 0, 4
 # Columns of a contact: s0, from one centre to the other at the start of a step, or the centre; |s0|, or the inner
 # function of the wall; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
 # inverse of the mass that moves; the damping; the gain of a Newton step; and where there is friction its
@@ -55,7 +58,7 @@ class Grains(NamedTuple):
     place: Array  # (N, 8)
     speed: Array  # (N, 8)
     listed: Array  # (N, 4) where it was when pairs were listed
-    change: Array  # (N, 4) of its velocity in the last step, with which the next one begins to solve
+    change: Array  # (N, 8) of its velocity
     spin: Any  # (N, 8) angular velocities, as `speed`; None where there is no friction
 
 
@@ -97,6 +100,7 @@ class Touches(NamedTuple):
     lanes: Array  # (groups,) int64, how many contacts each group has
     splits: Array  # (groups,) int64, the lanes, as bits, where a part begins: no ball is twice in a part of a group
     marks: Array  # (N,) int64, of each ball the last part that it is in
+    stirred: Array  # (N,) int32, of each ball the last sweep for friction in which one of its contacts was not solved
     used: Array  # (2,) how many contacts of pairs there are, and how many groups
     found: Array  # (room + 1, FOUND) int32, the contacts of pairs as they were found
     missed: Array  # (room + 1, FOUND) int32, the pairs that have missed one another by no more than the margin
@@ -178,7 +182,7 @@ def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = 
     if turning is not None:
         turning[:, BEFORE : BEFORE + 3] = spin.T
         turning[:, ARM], turning[:, LEVER] = radius, ROUNDNESS / radius
-    return Grains(np.arange(n), place, speed, np.zeros((n, 4)), np.zeros((n, 4)), turning)
+    return Grains(np.arange(n), place, speed, np.zeros((n, 4)), np.zeros((n, 8)), turning)
 
 
 def beside(grains: Grains, more: Grains) -> Grains:
@@ -216,8 +220,9 @@ def touches_of(n: int, walls: int, pairs: int, touching: int, is_kept: bool = Fa
         aligned(groups * COLUMNS_OF_LANES * LANES).reshape(-1, LANES), np.zeros((groups * ENDS, LANES), np.int32)
     )  # fmt: skip
     return Touches(
-        tile, np.zeros(groups, np.int64), np.zeros(groups, np.int64), np.zeros(n, np.int64), np.zeros(2, np.int64),
-        np.zeros((pairs + 1, FOUND), np.int32), np.zeros((pairs + 1, FOUND), np.int32), np.zeros(1, np.int64),
-        np.zeros(1), np.zeros((touching, columns)), np.zeros(touching, np.int32), np.zeros((2, walls), np.int64),
+        tile, np.zeros(groups, np.int64), np.zeros(groups, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int32),
+        np.zeros(2, np.int64), np.zeros((pairs + 1, FOUND), np.int32), np.zeros((pairs + 1, FOUND), np.int32),
+        np.zeros(1, np.int64), np.zeros(1),
+        np.zeros((touching, columns)), np.zeros(touching, np.int32), np.zeros((2, walls), np.int64),
         None if listed is None else np.zeros((touching, 3), np.int32), listed,
     )  # fmt: skip

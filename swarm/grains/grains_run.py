@@ -44,7 +44,7 @@ from .sent_off import Sender
 from .step import MarchRule, World, march
 
 # The first skin of the lists, of the radius of the smallest ball. In a skin a ball may move by half of it.
-_SKIN = 0.2
+_SKIN = 0.4
 # Room in the lists: so many pairs of each ball, and balls at walls, which become so many times as many.
 _PAIRS, _AT_WALLS, _MORE = 6, 1, 1.5
 # A birth that is due so little of a step later than a step begins comes with it; and later than any step.

@@ -15,15 +15,18 @@ from ..kernel.arrays import fetch, index, kept, unwritten
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, square
 from .contacts import (
+    Sweep,
     apart,
     begin_solve,
     changed,
     closing,
     improved,
+    is_due,
     lasting,
     pressed,
     scale_of,
     size_of,
+    stir,
     weight_of,
     worse,
 )
@@ -40,6 +43,7 @@ from .grain_arrays import (
     ENDS,
     GAIN,
     GAP,
+    GIVEN,
     IMPULSE,
     KEPT_ROLL,
     LANES,
@@ -97,8 +101,8 @@ def move_in(matter, rows, q, lane, difference):
 # --- At the start of a step ------------------------------------------------------------------------------
 
 # Rows of what the contacts of a group begin with: v_i - v_j, of both ends of the step together, R_i + R_j, and the sum
-# of the magnitudes of the velocities that are foreseen.
-_BOTH, _REACH, _SPEEDS, _READ = 0, 3, 4, 5
+# of the magnitudes of the velocities that are foreseen; then the impulse, and the twist.
+_BOTH, _REACH, _SPEEDS, _ALL, _TURN, _READ = 0, 3, 4, 5, 8, 11
 
 
 def _lay(touches, g, lane, c):
@@ -110,7 +114,7 @@ def _lay(touches, g, lane, c):
 
 @outlined
 def _begin_group(matter, grains, near, touches, group):
-    """Begin to solve for the contacts of a group from one lane to another."""
+    """Begin to solve for the contacts of a group from one lane to another, with their impulses as they are foreseen."""
     (g, begin, end), place, speed, spin, half = group, grains.place, grains.speed, grains.spin, 0.5 * matter.h
     read, (rows, q, ends, e) = unwritten((_READ, LANES), np.float64), of_group(touches, g)
     for k in range(begin, end):
@@ -148,11 +152,26 @@ def _begin_group(matter, grains, near, touches, group):
         rows[q + PUSH, lane], rows[q + GAIN, lane] = push, gain
         rows[q + SCALE, lane] = scale_of(matter, push, read[_SPEEDS, lane], ease)
         set_vector_in(rows, q + IMPULSE, lane, push * way.along)
+        set_vector_in(read, _ALL, lane, push * way.along)
         if matter.pairs.friction is not None:
             rows[q + NEARNESS, lane] = 1.0 / read[_REACH, lane]
-            set_vector_in(rows, q + DRAG, lane, vector_in(rows, q + DRAG, lane) * lasting(gap))
+            drag = vector_in(rows, q + DRAG, lane) * lasting(gap)
+            set_vector_in(rows, q + DRAG, lane, drag)
+            set_vector_in(read, _ALL, lane, push * way.along + drag)
+            set_vector_in(read, _TURN, lane, twist_in(rows, q, lane, move))
         if matter.pairs.rolling is not None:
             set_vector_in(rows, q + ROLL, lane, vector_in(rows, q + ROLL, lane) * lasting(gap))
+    _give(matter, grains, touches, group, read)
+
+
+def _give(matter, grains, touches, group, read):
+    """Add what a group begins with to the sums of balls, from one lane to another."""
+    g, begin, end = group
+    rows, q, ends, e = of_group(touches, g)
+    for k in range(begin, end):
+        push_ends(grains.change, GIVEN, (rows, q, ends, e), index(k), vector_in(read, _ALL, index(k)))
+        if matter.pairs.friction is not None:
+            twist_ends(grains.spin, rows, q, ends, e, index(k), vector_in(read, _TURN, index(k)))
 
 
 @outlined
@@ -174,7 +193,8 @@ def group_pairs(matter, grains, near, touches, known):
                 marks[i], marks[j] = parts, parts
                 _lay(touches, g, index(k), c)
             touches.lanes[index(g)], touches.splits[index(g)] = lanes, splits
-            _begin_group(matter, grains, near, touches, (g, 0, lanes))
+        for g in range(groups):
+            _begin_group(matter, grains, near, touches, (g, 0, touches.lanes[index(g)]))
         touches.used[1] = groups
     else:
         # Few, behind the others.
@@ -195,8 +215,8 @@ def group_pairs(matter, grains, near, touches, known):
 
 @outlined
 def push_pairs(matter, grains, touches):
-    """Add the impulses of the pairs to the velocities at the end of the step."""
-    speed, given = grains.speed, unwritten((3, LANES), np.float64)
+    """Sum the impulses of the pairs."""
+    given = unwritten((3, LANES), np.float64)
     for g in range(touches.used[1]):
         rows, q, ends, e = of_group(touches, g)
         lanes = touches.lanes[index(g)]
@@ -207,14 +227,15 @@ def push_pairs(matter, grains, touches):
                 impulse = impulse + vector_in(rows, q + DRAG, lane)
             set_vector_in(given, 0, lane, impulse)
         for k in range(lanes):
-            push_ends(speed, rows, q, ends, e, index(k), vector_in(given, 0, index(k)))
+            push_ends(grains.change, GIVEN, (rows, q, ends, e), index(k), vector_in(given, 0, index(k)))
 
 
-def push_ends(speed, rows, q, ends, e, lane, impulse):
-    """Change the velocities of both balls of a contact by an impulse on the first one."""
+def push_ends(target, column, tile, lane, impulse):
+    """Change what both balls of a contact have in a column, velocities or sums, by an impulse on the first one."""
+    rows, q, ends, e = tile
     i, j = balls_of(ends, e, lane)
-    set_vector(speed, i, AFTER, vector_at(speed, i, AFTER) + impulse * rows[q + EASES, lane])
-    set_vector(speed, j, AFTER, vector_at(speed, j, AFTER) - impulse * rows[q + EASES + 1, lane])
+    set_vector(target, i, column, vector_at(target, i, column) + impulse * rows[q + EASES, lane])
+    set_vector(target, j, column, vector_at(target, j, column) - impulse * rows[q + EASES + 1, lane])
 
 
 def twist_ends(spin, rows, q, ends, e, lane, twist):
@@ -252,13 +273,13 @@ def twist_in(rows, q, lane, move):
 # --- Sweeps --------------------------------------------------------------------------------------------
 
 # Rows of what a group begins with: v_i - v_j, and R_i w_i + R_j w_j; and of what it gives: the change of the impulse,
-# the twist, and the largest error of the sweep in each lane.
+# the twist, the largest error of the sweep in each lane, and that of the contact.
 _SLIP, _TURNING, _BEGUN = 0, 3, 6
-_PART, _TWIST, _WORST, _GIVEN = 0, 3, 6, 7
+_PART, _TWIST, _WORST, _OFF, _GIVEN = 0, 3, 6, 7, 8
 
 
-def _press(matter, rows, q, lane, begun, given, share):
-    """Improve the impulse of a contact of a group: its `Closing`, and the change."""
+def _press(matter, rows, q, lane, begun, share):
+    """Improve the impulse of a contact of a group: its `Closing`, the change, and the error."""
     move = move_in(matter, rows, q, lane, vector_in(begun, _SLIP, lane))
     way = closing(vector_in(rows, q + START, lane), rows[q + SIZE, lane], move)
     damping = None if matter.pairs.damping is None else rows[q + DAMPING, lane]
@@ -268,14 +289,12 @@ def _press(matter, rows, q, lane, begun, given, share):
     more, part = changed(old, push * way.along, share)
     rows[q + PUSH, lane] = push
     set_vector_in(rows, q + IMPULSE, lane, old + part)
-    off = weight_of(matter.pairs) * (size_of(more) * rows[q + SCALE, lane])
-    given[_WORST, lane] = worse(off, kept(given[_WORST, lane]))
-    return way, part
+    return way, part, weight_of(matter.pairs) * (size_of(more) * rows[q + SCALE, lane])
 
 
 def _rub(matter, rows, q, lane, begun, given, share):
     """Improve the impulse and the friction of a contact of a group."""
-    way, part = _press(matter, rows, q, lane, begun, given, share)
+    way, part, off = _press(matter, rows, q, lane, begun, share)
     ease, push, over = rows[q + EASE, lane], rows[q + PUSH, lane], 1.0 / square(way.along)
     arm = arm_of(way, rows[q + SIZE, lane], way.change, rows[q + NEARNESS, lane])
     slip = vector_in(begun, _SLIP, lane) + ease * part - cross(vector_in(begun, _TURNING, lane), arm)
@@ -287,7 +306,8 @@ def _rub(matter, rows, q, lane, begun, given, share):
     set_vector_in(rows, q + DRAG, lane, old + rub)
     set_vector_in(given, _PART, lane, part + rub)
     set_vector_in(given, _TWIST, lane, cross(arm, rub))
-    given[_WORST, lane] = worse(size_of(more) * rows[q + SCALE, lane], kept(given[_WORST, lane]))
+    off = worse(size_of(more) * rows[q + SCALE, lane], off)
+    given[_OFF, lane], given[_WORST, lane] = off, worse(off, kept(given[_WORST, lane]))
 
 
 def _read(grains, ends, e, lane, begun):
@@ -297,47 +317,76 @@ def _read(grains, ends, e, lane, begun):
     return i, j
 
 
-def _sweep_group(matter, grains, touches, group, arrays, share):
+def _sweep_group(matter, grains, touches, group, arrays, sweep):
     """Improve the impulses of a group from one lane to another."""
     (g, begin, end), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
     for k in range(begin, end):
         _read(grains, ends, e, index(k), begun)
     for k in range(begin, end):
-        _way, part = _press(matter, rows, q, index(k), begun, given, share)
+        _way, part, off = _press(matter, rows, q, index(k), begun, sweep.share)
         set_vector_in(given, _PART, index(k), part)
+        given[_WORST, index(k)] = worse(off, kept(given[_WORST, index(k)]))
     for k in range(begin, end):
-        push_ends(grains.speed, rows, q, ends, e, index(k), vector_in(given, _PART, index(k)))
+        push_ends(grains.speed, AFTER, (rows, q, ends, e), index(k), vector_in(given, _PART, index(k)))
 
 
-def _rub_group(matter, grains, touches, group, arrays, share):
+def _rub_group(matter, grains, touches, group, arrays, sweep):
     """Improve the impulses of a group with those of friction, as `_sweep_group`."""
     (g, begin, end), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
     for k in range(begin, end):
         i, j = _read(grains, ends, e, index(k), begun)
         set_vector_in(begun, _TURNING, index(k), turning(grains, i, j, AFTER))
+    unsolved = False
     for k in range(begin, end):
-        _rub(matter, rows, q, index(k), begun, given, share)
+        _rub(matter, rows, q, index(k), begun, given, sweep.share)
+        unsolved |= not given[_OFF, index(k)] <= sweep.solved
     for k in range(begin, end):
-        push_ends(grains.speed, rows, q, ends, e, index(k), vector_in(given, _PART, index(k)))
+        push_ends(grains.speed, AFTER, (rows, q, ends, e), index(k), vector_in(given, _PART, index(k)))
         twist_ends(grains.spin, rows, q, ends, e, index(k), vector_in(given, _TWIST, index(k)))
+    if unsolved:
+        for k in range(begin, end):
+            i, j = balls_of(ends, e, index(k))
+            stir(sweep, touches.stirred, i, given[_OFF, index(k)])
+            stir(sweep, touches.stirred, j, given[_OFF, index(k)])
 
 
 # --- Sweeps over all groups -----------------------------------------------------------------------------
 
 
-def _over_groups(one, matter, grains, touches, share):
+_ALL_LANES = -1
+
+
+def _all_lanes(touches, g, sweep):
+    return _ALL_LANES
+
+
+def _due_lanes(touches, g, sweep):
+    """The lanes of a group with contacts that a sweep goes over, as bits."""
+    if sweep.number == 0:
+        return _ALL_LANES
+    _rows, _q, ends, e = of_group(touches, g)
+    stirred, due = touches.stirred, 0
+    for k in range(touches.lanes[index(g)]):
+        i, j = balls_of(ends, e, index(k))
+        due |= (is_due(sweep, stirred, i) | is_due(sweep, stirred, j)) << k
+    return due
+
+
+def _over_groups(one, lanes_of, matter, grains, touches, sweep):
     begun, given = unwritten((_BEGUN, LANES), np.float64), unwritten((_GIVEN, LANES), np.float64)
     for lane in range(LANES):
         given[_WORST, index(lane)] = 0.0
     for g in range(touches.used[1]):
         lanes, splits, begin = touches.lanes[index(g)], touches.splits[index(g)], 0
+        due = lanes_of(touches, g, sweep)
         while begin < lanes:
             end = begin + 1
-            while end < lanes and (splits >> end) & 1 == 0:
-                end += 1
-            one(matter, grains, touches, (g, begin, end), (begun, given), share)
+            if (due >> begin) & 1 == 1:
+                while end < lanes and (splits >> end) & 1 == 0 and (due >> end) & 1 == 1:
+                    end += 1
+                one(matter, grains, touches, (g, begin, end), (begun, given), sweep)
             begin = end
     worst = 0.0
     for lane in range(LANES):
@@ -348,10 +397,10 @@ def _over_groups(one, matter, grains, touches, share):
 @outlined
 def sweep_pairs(matter, grains, touches, share):
     """Improve the impulse of each pair; the largest change of one, relative to what moves there."""
-    return _over_groups(_sweep_group, matter, grains, touches, share)
+    return _over_groups(_sweep_group, _all_lanes, matter, grains, touches, Sweep(0, share, 0.0))
 
 
 @outlined
-def rub_pairs(matter, grains, touches, share):
-    """Improve the impulse and the friction of each pair; the largest change, relative to what moves there."""
-    return _over_groups(_rub_group, matter, grains, touches, share)
+def rub_pairs(matter, grains, touches, sweep):
+    """Improve the impulse and the friction of each pair that is due; the largest change, relative to what moves."""
+    return _over_groups(_rub_group, _due_lanes, matter, grains, touches, sweep)

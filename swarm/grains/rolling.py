@@ -11,7 +11,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, dot, square
 from ..surfaces.in_motion.posed import Posed
-from .contacts import change_of, size_of, worse
+from .contacts import change_of, size_of, stir, worse
 from .friction import across, rubbed
 from .grain_arrays import (
     AFTER,
@@ -58,7 +58,7 @@ def _resist(contact, rolling, sizes, share):
 
 
 @outlined
-def roll_pairs(matter, grains, touches, share):
+def roll_pairs(matter, grains, touches, sweep):
     """Improve the angular impulse of each pair in turn; the largest change, relative to what moves there."""
     place, spin, worst = grains.place, grains.spin, 0.0
     for g in range(touches.used[1]):
@@ -67,9 +67,11 @@ def roll_pairs(matter, grains, touches, share):
             w, u, one, two = vector_at(spin, i, AFTER), vector_at(spin, j, AFTER), _ease(place, i), _ease(place, j)
             radius = place[i, RADIUS] * place[j, RADIUS] / (place[i, RADIUS] + place[j, RADIUS])
             rolling = w - u, matter.pairs.rolling
-            part, off = _resist(contact, rolling, (radius, one + two), share)
+            part, off = _resist(contact, rolling, (radius, one + two), sweep.share)
             set_vector(spin, i, AFTER, w + part * one)
             set_vector(spin, j, AFTER, u - part * two)
+            stir(sweep, touches.stirred, i, off)
+            stir(sweep, touches.stirred, j, off)
             worst = worse(off, worst)
     return worst
 
@@ -113,7 +115,7 @@ def _spin_of(wall, grains, touches, c, i):
 
 
 @outlined
-def roll_wall(matter, law, wall, grains, touches, number, share):
+def roll_wall(matter, law, wall, grains, touches, number, sweep):
     """Improve the angular impulse of each ball at a wall; the largest change, as for pairs."""
     rows, place, spin, begin, worst = touches.wall_rows, grains.place, grains.spin, touches.wall_spans[0, number], 0.0
     for k in range(begin, begin + touches.wall_spans[1, number]):
@@ -121,8 +123,9 @@ def roll_wall(matter, law, wall, grains, touches, number, share):
         i = index(touches.wall_ends[c])
         w, ease = vector_at(spin, i, AFTER), _ease(place, i)
         rolling = w - _spin_of(wall, grains, touches, c, i), law.rolling
-        part, off = _resist(OfWall(rows, c), rolling, (place[i, RADIUS], ease), share)
+        part, off = _resist(OfWall(rows, c), rolling, (place[i, RADIUS], ease), sweep.share)
         set_vector(spin, i, AFTER, w + part * ease)
+        stir(sweep, touches.stirred, i, off)
         worst = worse(off, worst)
     return worst
 

@@ -12,14 +12,28 @@ from ..common.status import Status
 from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
 from ..kernel.jit import Array, long_kernel, outlined
-from ..kernel.vector import square
+from ..kernel.vector import ZERO, square
 from ..lanes.watching.log import is_full
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall, count_members
-from .contacts import find_more_pairs, find_pairs, worse
+from .contacts import Sweep, find_more_pairs, find_pairs, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, rub_wall, twist_wall
-from .grain_arrays import AFTER, BEFORE, DONE, LIGHTNESS, LOST, SINCE, SKIN, TAKEN, X, set_vector, vector_at
+from .grain_arrays import (
+    AFTER,
+    BEFORE,
+    DONE,
+    GIVEN,
+    LAST,
+    LIGHTNESS,
+    LOST,
+    SINCE,
+    SKIN,
+    TAKEN,
+    X,
+    set_vector,
+    vector_at,
+)
 from .held import let_go
 from .lanes_of_pairs import group_pairs, push_pairs, rub_pairs, sweep_pairs, twist_pairs
 from .logged import log_pairs, log_wall, note_pairs, note_wall
@@ -76,23 +90,36 @@ def _begin(matter, grains, skin):
     for k in range(place.shape[0]):
         i = index(k)
         v = vector_at(speed, i, BEFORE)
-        set_vector(speed, i, AFTER, v + vector_at(grains.change, i, 0))
+        set_vector(speed, i, AFTER, v + vector_at(grains.change, i, LAST))
         farthest = worse(square(vector_at(place, i, X) + v * matter.h - vector_at(listed, i, X)), farthest)
     return farthest <= 0.25 * skin * skin
 
 
 @outlined
+def _forget_spins(grains):
+    """The spins at the end of a step without contacts."""
+    if grains.spin is not None:
+        for k in range(grains.spin.shape[0]):
+            set_vector(grains.spin, index(k), AFTER, vector_at(grains.spin, index(k), BEFORE))
+
+
+@outlined
+def _forget_given(grains):
+    """No impulses of pairs are summed yet."""
+    for k in range(grains.change.shape[0]):
+        set_vector(grains.change, index(k), GIVEN, ZERO)
+
+
+@outlined
 def _fly(matter, grains):
-    """The velocities at the end of a step without contacts."""
-    speed, spin = grains.speed, grains.spin
+    """The velocities at the end of a step by the impulses of pairs that have been summed."""
+    speed = grains.speed
     for k in range(speed.shape[0]):
         i = index(k)
-        if spin is not None:
-            set_vector(spin, i, AFTER, vector_at(spin, i, BEFORE))
         v = vector_at(speed, i, BEFORE)
         if matter.holds is None or grains.place[i, LIGHTNESS] > 0.0:
             v = accelerated(matter.pull, v, matter.h)
-        set_vector(speed, i, AFTER, v)
+        set_vector(speed, i, AFTER, v + vector_at(grains.change, i, GIVEN))
 
 
 def _gather(matter, walls, world, is_first):
@@ -109,23 +136,40 @@ def _gather(matter, walls, world, is_first):
 
 
 def _push(matter, walls, world):
-    """The velocities at the end of a step by all impulses, and the spins."""
+    """The velocities at the end of a step by all impulses; those of pairs have been summed."""
     grains, touches = world.grains, world.touches
     _fly(matter, grains)
-    push_pairs(matter, grains, touches)
     for k in range(len(walls.each)):
         push_walls(matter.walls[k], grains, touches, k)
-    if matter.rubs:
-        if matter.pairs.friction is not None:
-            twist_pairs(matter, grains, touches)
-        for k, wall in enumerate(walls.each):
-            if matter.walls[k].friction is not None:
-                twist_wall(matter, wall, grains, touches, k)
+
+
+def _push_again(matter, walls, world):
+    """The same, and the spins, by what the impulses of all contacts have become."""
+    _forget_given(world.grains)
+    push_pairs(matter, world.grains, world.touches)
+    _push(matter, walls, world)
+    _turn(matter, walls, world)
+
+
+def _twist_at_walls(matter, walls, world):
+    """Add the twists of walls, and what resists rolling, to the spins at the end of a step."""
+    grains, touches = world.grains, world.touches
+    for k, wall in enumerate(walls.each):
+        if matter.walls[k].friction is not None:
+            twist_wall(matter, wall, grains, touches, k)
     if matter.pairs.rolling is not None:
         turn_pairs(grains, touches)
     for k in range(len(walls.each)):
         if matter.walls[k].rolling is not None:
             turn_wall(grains, touches, k)
+
+
+def _turn(matter, walls, world):
+    """The spins at the end of a step by all impulses, where the velocities are known."""
+    _forget_spins(world.grains)
+    if matter.pairs.friction is not None:
+        twist_pairs(matter, world.grains, world.touches)
+    _twist_at_walls(matter, walls, world)
 
 
 def _sweep(matter, walls, world, share):
@@ -137,18 +181,22 @@ def _sweep(matter, walls, world, share):
     return worst
 
 
-def _rub(matter, walls, world, share):
+def _rub(matter, walls, world, sweep):
     """Improve all impulses with those of friction, as `_sweep`."""
-    grains, touches = world.grains, world.touches
-    rub_or_sweep = sweep_pairs if matter.pairs.friction is None else rub_pairs
-    worst = rub_or_sweep(matter, grains, touches, share)
+    grains, touches, share = world.grains, world.touches, sweep.share
+    if matter.pairs.friction is None:
+        worst = sweep_pairs(matter, grains, touches, share)
+    else:
+        worst = rub_pairs(matter, grains, touches, sweep)
     if matter.pairs.rolling is not None:
-        worst = worse(roll_pairs(matter, grains, touches, share), worst)
+        worst = worse(roll_pairs(matter, grains, touches, sweep), worst)
     for k, wall in enumerate(walls.each):
-        rub_or_sweep_wall = sweep_wall if matter.walls[k].friction is None else rub_wall
-        worst = worse(rub_or_sweep_wall(matter, matter.walls[k], wall, grains, touches, k, share), worst)
+        if matter.walls[k].friction is None:
+            worst = worse(sweep_wall(matter, matter.walls[k], wall, grains, touches, k, share), worst)
+        else:
+            worst = worse(rub_wall(matter, matter.walls[k], wall, grains, touches, k, sweep), worst)
         if matter.walls[k].rolling is not None:
-            worst = worse(roll_wall(matter, matter.walls[k], wall, grains, touches, k, share), worst)
+            worst = worse(roll_wall(matter, matter.walls[k], wall, grains, touches, k, sweep), worst)
     return worst
 
 
@@ -166,8 +214,9 @@ def _stalled(pace, worst):
 def _solve_friction(matter, walls, world):
     """Sweep until friction changes little; whether it does."""
     worst, sweeps, share, best, since = 1.0, 0, 1.0, math.inf, 0
+    world.touches.stirred[:] = -1
     while sweeps < _MOST_RUBS:
-        worst = _rub(matter, walls, world, share)
+        worst = _rub(matter, walls, world, Sweep(sweeps if matter.rubs_everywhere else 0, share, _RUBBED))
         sweeps += 1
         if worst <= _RUBBED:
             break
@@ -238,7 +287,7 @@ def _arrive(matter, grains):
         end = r + move
         set_vector(place, i, X, end)
         set_vector(place, i, LOST, move - (end - r))
-        set_vector(grains.change, i, 0, v - vector_at(speed, i, BEFORE))
+        set_vector(grains.change, i, LAST, v - vector_at(speed, i, BEFORE))
         set_vector(speed, i, BEFORE, v)
         if grains.spin is not None:
             set_vector(grains.spin, i, BEFORE, vector_at(grains.spin, i, AFTER))
@@ -344,14 +393,19 @@ def _step(matter, walls, listed, world, skin):
     if matter.openings is not None:
         _open(matter, walls, world)
     _forget(walls, world)
+    _forget_given(grains)
+    _forget_spins(grains)
     _gather(matter, walls, world, True)
-    more = 1
-    while more > 0:
-        _push(matter, walls, world)
+    _push(matter, walls, world)
+    _twist_at_walls(matter, walls, world)
+    while True:
         if not _solve(matter, walls, world):
             return Status.UNSOLVED.value
-        _push(matter, walls, world)
-        more = _gather(matter, walls, world, False)
+        if _gather(matter, walls, world, False) == 0:
+            break
+        _push_again(matter, walls, world)
+    # So that no angular momentum is lost, by the arms of the whole step: those of sweeps were of what had been solved.
+    _turn(matter, walls, world)
     farthest, longest = _moved(matter, grains)
     sweep = _swept(matter, walls, listed, grains, skin)
     farthest, longest = worse(sweep.farthest, farthest), worse(sweep.longest, longest)
