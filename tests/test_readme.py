@@ -147,14 +147,15 @@ def test_every_shipped_scene_is_named():
 
 
 def test_ci_runs_the_readme_test_command():
-    """.ci/run calls what README tells a newcomer: all tests, those of its first command among them."""
+    """.ci/run calls README's first command, and with `all` the second one."""
     ci = (ROOT / ".ci" / "run").read_text()
     assert 'pip install -e ".[test]"' in README
     assert "python -m pytest -n auto --dist worksteal\n" in README
     assert 'pip install --quiet --disable-pip-version-check -e ".[test]"' in ci
     sentence = 'python -m pytest -n auto --dist worksteal -m "not long"` runs the slow ones too, and `-m long`'
     assert sentence in " ".join(README.split())
-    assert 'python -m pytest -q -n auto --dist worksteal -m "not long"\n' in ci
+    assert 'python -m pytest -q -n auto --dist worksteal "${slow[@]}"\n' in ci
+    assert '[ "${1:-}" != all ] || slow=(-m "not long")\n' in ci
 
 
 def copy_examples(folder, count):
