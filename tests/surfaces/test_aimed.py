@@ -8,6 +8,7 @@ import pytest
 
 import swarm
 from swarm.kernel.vector import dot, vec
+from swarm.lanes import flight as flights_of_lanes
 from swarm.surfaces.in_motion.moving import Aimed
 from swarm.surfaces.time_of_impact import aim, strides
 from swarm.surfaces.time_of_impact.flights import COURSE
@@ -143,6 +144,26 @@ def test_a_sphere_that_goes_along_a_circle_is_met_as_in_fifty_digits():
         assert late <= 4.0 * np.finfo(float).eps * (sum(map(abs, r)) + math.hypot(*v) * hit.time + 1.0)
         assert before < 0.0
     assert found >= FLIGHTS // 2
+
+
+def test_lanes_without_a_proof_step_side_by_side_as_each_would_alone(monkeypatch):
+    """Of a box that turns several are open in one pass, and some, in their order, have others between them."""
+    scene, many = swarm.Scene([swarm.Box((0.5, 0.4, 0.3), motion=TURN)]), []
+    step = flights_of_lanes._stride_open
+
+    def counted(walls, gravity, lanes, some):
+        many.append(lanes.order[:some].tolist())
+        step(walls, gravity, lanes, some)
+
+    monkeypatch.setattr(flights_of_lanes, "_stride_open", counted)
+    start = swarm.fill(scene, 12, speed=0.5, seed=1)
+    together = swarm.simulate(scene, start, swarm.Impact(), until=2.0, compile="never").particles
+    assert any(len(open_lanes) > 2 and open_lanes != list(range(len(open_lanes))) for open_lanes in many)
+    for i in range(12):
+        one = swarm.Particles(start.position[:, [i]], start.velocity[:, [i]])
+        alone = swarm.simulate(scene, one, swarm.Impact(), until=2.0, compile="never").particles
+        assert alone.position[:, 0].tolist() == together.position[:, i].tolist()
+        assert alone.velocity[:, 0].tolist() == together.velocity[:, i].tolist()
 
 
 def _sphere_in_digits(turn, center, radius, r, v, at):
