@@ -10,11 +10,11 @@ import numpy as np
 
 from ..kernel.arrays import fetch, index, unwritten
 from ..kernel.gravity import accelerated, displacement
-from ..kernel.grid import cell_of, entries_of, until_next, until_out
+from ..kernel.grid import cell_of, until_next, until_out
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import column, put
-from ..surfaces.facets.facet_cells import BLOCK, flight_in, from_middle, passes
+from ..surfaces.facets.facet_cells import BLOCK, blocks_of, flight_in, from_middle, passes
 from ..surfaces.facets.free_room import NormalCone, cone_of, room_of
 from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact import flights
@@ -184,15 +184,16 @@ class Maybe(Record):
     All are looked up before one is looked at: so they are on their way from memory together.
     """
 
+    place: Array  # int64, which entry of all blocks that are looked at
     lane: Array  # int64
-    entry: Array  # int64
     facet: Array  # int64
 
-    def look_up(self, facets, some):
+    def look_up(self, facets, looks, some):
         """Look up so many."""
-        for j in range(some):
-            self.facet[j] = facets.grid.entries[index(self.entry[j])]
-            ask_for(facets.table, self.facet[j], facets.table.shape[1])
+        for n in range(some):
+            j, k = index(self.place[n] // BLOCK), index(self.place[n] % BLOCK)
+            self.lane[n], self.facet[n] = looks.lane[j], facets.grid.known.facets[index(looks.block[j]), k]
+            ask_for(facets.table, self.facet[n], facets.table.shape[1])
 
 
 def maybe_met():
@@ -273,8 +274,7 @@ def _look(gravity, mesh, under, found, order, n):
     cells, (looks, _maybe), blocks = under.facets(mesh).grid, found, index(0)
     for j in range(n):
         i = order[j]
-        first, stop = entries_of(cells, under.cell[i])
-        begin, end = first // BLOCK, (stop + BLOCK - 1) // BLOCK
+        begin, end = blocks_of(cells, under.cell[i])
         if blocks > _BLOCKS - _USUAL:
             _look_into(gravity, mesh, under, found, blocks)
             blocks = index(0)
@@ -294,25 +294,23 @@ def _look(gravity, mesh, under, found, order, n):
 @outlined
 def _look_into(gravity, mesh, under, found, blocks):
     """Lanes each at a block of entries in their cells, then at the facets of which they may pass the planes."""
-    (looks, maybe), cells, some = found, under.facets(mesh).grid, index(0)
+    (looks, maybe), cells, some = found, under.facets(mesh).grid, 0
     marked = unwritten((_BLOCKS, BLOCK), np.bool_)
     for j in range(blocks):
-        i, block = index(looks.lane[j]), looks.block[j]
-        way, (first, stop) = under.way(gravity, mesh, i), entries_of(cells, under.cell[i])
+        block, way = index(looks.block[j]), under.way(gravity, mesh, index(looks.lane[j]))
         for k in range(BLOCK):
-            is_own = (block * BLOCK + k >= first) & (block * BLOCK + k < stop)
-            marked[j, k] = is_own & passes(cells, index(block), index(k), way)
+            marked[j, k] = passes(cells, block, index(k), way)
     for j in range(blocks):
         for k in range(BLOCK):
-            maybe.entry[some] = looks.block[j] * BLOCK + k
-            maybe.lane[some] = looks.lane[j]
-            some += index(marked[j, k])
-    _look_at(gravity, mesh, under, maybe, some)
+            maybe.place[index(some)] = j * BLOCK + k
+            some += marked[j, k]
+    _look_at(gravity, mesh, under, found, index(some))
 
 
-def _look_at(gravity, mesh, under, maybe, some):
+def _look_at(gravity, mesh, under, found, some):
     """So many lanes each at a facet."""
-    maybe.look_up(under.facets(mesh), some)
+    looks, maybe = found
+    maybe.look_up(under.facets(mesh), looks, some)
     for n in range(some):
         i = index(maybe.lane[n])
         met = under.met(gravity, mesh, i, index(maybe.facet[n]))

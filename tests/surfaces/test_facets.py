@@ -9,11 +9,11 @@ from thorny import aimed, hollow, slivered, thorny
 import swarm
 from swarm import scene_file
 from swarm.kernel.gravity import Bounds
-from swarm.kernel.grid import until_out
+from swarm.kernel.grid import cell_of, until_out
 from swarm.kernel.vector import Vec, vec
 from swarm.serialization import tables
 from swarm.surfaces.facets import free_room as room
-from swarm.surfaces.facets.facet_cells import BLOCK, flight_in, from_middle, passes
+from swarm.surfaces.facets.facet_cells import flight_in, from_middle
 from swarm.surfaces.fields.members import member
 
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
@@ -125,9 +125,11 @@ def test_no_facet_that_a_curve_meets_is_passed_over(jerks):
             v, a, j = random.standard_normal((3, 3)) * [[1.0], [random.choice([0.1, 1.0, 10.0])], [jerks]]
             span = random.choice([0.1, 0.5, 1.0]) * width.max()
             bounds = Bounds(np.inf, np.linalg.norm(a) + np.linalg.norm(j) * span, np.linalg.norm(j))
-            here = flight_in(cells, from_middle(cells, vec(place), vec(r)), vec(v), vec(a), span, bounds)
-            for k in range(cells.first[number], cells.first[number + 1]):
-                facet, passes_it = member(mesh.members, cells.entries[k]), passes(cells, k // BLOCK, k % BLOCK, here)
+            cell = cell_of(cells, vec(r))
+            here = flight_in(cells, from_middle(cells, cell.place, vec(r)), vec(v), vec(a), span, bounds)
+            first, stop = cells.first[number], cells.first[number + 1]
+            for k in range(first, stop):
+                facet, passes_it = member(mesh.members, cells.entries[k]), mesh.members.may_meet(cell, k - first, here)
                 n, asked, passed = np.array(facet.normal), asked + 1, passed + bool(passes_it)
                 roots = np.roots([n @ j / 6.0, n @ a / 2.0, n @ v, n @ r - facet.offset])
                 for t in roots.real[(abs(roots.imag) < 1e-9) & (roots.real >= 0.0) & (roots.real <= span)]:

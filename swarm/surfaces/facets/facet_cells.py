@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel import cache
-from ...kernel.arrays import aligned_copy
+from ...kernel.arrays import aligned_copy, index
 from ...kernel.gravity import as_vector
 from ...kernel.grid import MARGIN, Floats, Grid, filled_grid
 from ...kernel.jit import Array, select
@@ -46,10 +46,16 @@ _SOME = 60
 BLOCK = 8
 
 
+# A plane that hardly a flight comes through: far ahead, with no normal.
+_NO_PLANE = np.array([0, 0, 0, -32767, 0, 0, 0, 0], np.int16)
+
+
 class FacetCells(Record):
     """What is known of the cells of facets: `Grid.known`."""
 
-    planes: Array  # (entries / BLOCK, 8, BLOCK) int16, of each the normal, and from the middle of the cell: `passes`
+    starts: Array  # (cells + 2) int32, where the blocks of a cell begin: each has its entries from a block's begin on
+    facets: Array  # (blocks, BLOCK) int32, the last one of a cell again and again where a block is not full
+    planes: Array  # (blocks, 8, BLOCK) int16, of each the normal, and from the middle of the cell: `passes`
     room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
 
 
@@ -69,8 +75,23 @@ def cells_around(like, table: Floats, corners: Floats, beyond: float = 0.0, marg
     enter = cache.in_python(enter_bodies) if len(table) <= _SOME else enter_bodies
     cells = _cells(corners, low.min(axis=1), high.max(axis=1), margin)
     grid = filled_grid(*cells, partial(enter, like, table, (low, high)), margin)
-    numbers = np.repeat(np.arange(len(grid.first) - 2), np.diff(grid.first[:-1]))
-    return grid._replace(known=FacetCells(_planes(grid, table, corners, numbers), np.empty((0, 8), np.int8)))
+    return grid._replace(known=_in_blocks(grid, table, corners))
+
+
+def _in_blocks(grid: Grid, table: Floats, corners: Floats) -> FacetCells:
+    """The entries of a grid in blocks, without what is free around its cells."""
+    counts = np.diff(grid.first)
+    blocks = -(-counts // BLOCK)
+    starts = np.concatenate([[0], np.cumsum(blocks)]).astype(np.int32)
+    cells = np.repeat(np.arange(len(counts)), blocks)
+    # The places of the entries of each block among those of its cell
+    places = BLOCK * (np.arange(len(cells)) - starts[cells])[:, None] + np.arange(BLOCK)
+    last = counts[cells][:, None] - 1
+    facets = grid.entries[grid.first[cells][:, None] + np.minimum(places, last)]
+    planes = _planes(grid, table, corners, facets.ravel(), np.repeat(cells, BLOCK))
+    planes[(places > last).ravel()] = _NO_PLANE
+    planes = planes.reshape(-1, BLOCK, 8).swapaxes(1, 2)
+    return FacetCells(starts, aligned_copy(facets), aligned_copy(planes), np.empty((0, 8), np.int8))
 
 
 def _cells(corners: Floats, low: Floats, high: Floats, margin: float) -> tuple[Floats, Floats, Floats]:
@@ -90,25 +111,33 @@ def _cells(corners: Floats, low: Floats, high: Floats, margin: float) -> tuple[F
     return middle - 0.5 * shape * width, shape, width
 
 
-def _planes(grid: Grid, table: Floats, corners: Floats, cells: NDArray[np.int64]) -> NDArray[np.int16]:
-    """The planes and the balls of all entries, each in the cell with this number."""
+def _planes(
+    grid: Grid, table: Floats, corners: Floats, facets: NDArray[np.int32], cells: NDArray[np.int64]
+) -> NDArray[np.int16]:
+    """The planes and the balls of facets, each in the cell with this number."""
     width = np.array(grid.width)
     diagonal = float(np.linalg.norm(width))
-    made = np.zeros((-(-len(cells) // BLOCK) * BLOCK, 8), np.int16)
+    made = np.zeros((len(cells), 8), np.int16)
     middles = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
     radii = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
     for first in range(0, len(cells), _TOGETHER):
         some = slice(first, min(first + _TOGETHER, len(cells)))
         places = np.stack(np.unravel_index(cells[some], tuple(int(n) for n in grid.shape)), axis=1)
-        normal, offset = table[grid.entries[some], :3], table[grid.entries[some], 3]
+        normal, offset = table[facets[some], :3], table[facets[some], 3]
         middle = np.array(grid.low) + (places + 0.5) * width
         made[some, :3] = np.rint(normal * _FULL)
         made[some, 3] = np.rint((offset - (normal * middle).sum(axis=1)) * (_FULL / diagonal))
-        away, radius = middles[grid.entries[some]] - middle, radii[grid.entries[some]]
+        away, radius = middles[facets[some]] - middle, radii[facets[some]]
         near = (np.abs(away).max(axis=1) < _REACH * diagonal) & (radius < 0.9 * _REACH * diagonal)
         made[some, 4:7] = np.where(near[:, None], np.rint(away * (_FULL / (_REACH * diagonal))), 0.0)
         made[some, 7] = np.where(near, np.ceil(radius * (_FULL / (_REACH * diagonal))) + 2.0, _FULL)
-    return aligned_copy(made.reshape(-1, BLOCK, 8).swapaxes(1, 2))
+    return made
+
+
+def blocks_of(cells, number):
+    """The begin and the end of the blocks of entries of the cell with this number."""
+    cell, starts = index(number), cells.known.starts
+    return starts[cell], starts[cell + index(1)]
 
 
 # --- Which planes a flight passes ------------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, displacement
 from ...kernel.grid import cell_of, entries_at, entries_of, until_next, until_out
@@ -12,7 +14,7 @@ from ..presence.patched import Patched
 from ..shapes.plane import PlaneNumbers
 from ..time_of_impact import flights
 from .facet import ROOM, Shared
-from .facet_cells import BLOCK, flight_in, from_middle, passes
+from .facet_cells import BLOCK, blocks_of, flight_in, from_middle, passes
 from .free_room import FULL, KIND, room_of
 from .nearest import foot_on
 
@@ -27,6 +29,10 @@ class Facets(Members, Patched):
     """The facets of a mesh: walls on one side, each between its edges; what is known of their grid is `FacetCells`."""
 
     in_blocks = True
+
+    def gone(self):
+        without, known = Members.gone(self).grid, self.grid.known
+        return self._replace(grid=without._replace(known=known._replace(starts=np.zeros_like(known.starts))))
 
     def field_hit(self, gravity, r, v):
         return _first_hit(self, gravity, r, v)
@@ -51,8 +57,8 @@ class Facets(Members, Patched):
         at = from_middle(self.grid, cell.place, seen.r)
         return flight_in(self.grid, at, seen.v, seen.a, span, seen.bounds(span))
 
-    def may_meet(self, k, here):
-        return passes(self.grid, index(k // BLOCK), index(k % BLOCK), here)
+    def may_meet(self, cell, k, here):
+        return _passes(self.grid, cell.number, k, here)
 
     def keeps(self, number, r):
         is_other = (number < 0.0) | (number >= self.count())
@@ -127,9 +133,15 @@ def hit_in(facets, gravity, flight, cell, here):
     found, cells = flights.Hit(until, -1.0), facets.grid
     first, stop = entries_of(cells, number)
     for k in range(first, stop):
-        if passes(cells, index(k // BLOCK), index(k % BLOCK), here):
+        if _passes(cells, number, index(k - first), here):
             m = cells.entries[k]
             time, _hits = flights.hit(gravity, member(facets, index(m)), r, v)
             if time < found.time:
                 found = flights.Hit(time, float(m))
     return found
+
+
+def _passes(cells, number, k, here):
+    """Whether a flight may meet the facet of an entry of the cell with this number."""
+    begin, _end = blocks_of(cells, number)
+    return passes(cells, index(begin + k // BLOCK), index(k % BLOCK), here)

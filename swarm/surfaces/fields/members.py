@@ -146,8 +146,8 @@ class Members(Record):
         """What `may_meet` asks of a flight that is so long in a cell [s]."""
         return
 
-    def may_meet(self, k, here):
-        """Whether that flight may meet the body of an entry."""
+    def may_meet(self, cell, k, here):
+        """Whether that flight may meet the body of an entry of the cell."""
         return True
 
     # --- Of those in the cell of a point ---

@@ -78,7 +78,7 @@ def _nearest_in_cell(field, number, found, flight, t, longest):
     first, stop = entries_of(grid, cell.number)
     here = field.body.way_in_cell(cell, seen, min(found.time, longest))
     for k in range(first, stop):
-        if field.body.may_meet(index(k), here):
+        if field.body.may_meet(cell, index(k - first), here):
             m = grid.entries[k]
             found = _nearer(seen, member(field.body, index(m)), number + m, found, min(found.time, longest))
     return found
