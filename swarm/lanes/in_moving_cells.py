@@ -106,6 +106,9 @@ class InMotion(UnderWay):
 
     def met(self, gravity, mesh, i, m):
         """As of `UnderWay`."""
+        facet, seen, until = member(mesh.body, m), self.seen(mesh, gravity, i), self.until[i]
+        if _misses(facet, seen, until - self.time[i]):
+            return Hit(math.inf, -1.0)
         return _met(gravity, mesh, self, i, m)
 
 
@@ -121,8 +124,6 @@ def _met(gravity, mesh, under, i, m):
     facet, flight = member(mesh.body, index(m)), under.flight(gravity, i)
     t, until, room = under.time[i], under.until[i], facet.room.value
     seen = under.seen(mesh, gravity, i)
-    if _misses(facet, seen, until - t):
-        return Hit(math.inf, -1.0)
     for _k in range(_STEPS):
         step = _step_to(facet, seen, until - t)
         if not step.time < until - t:
