@@ -1,5 +1,6 @@
 """What is kept of contacts from step to step, such as their friction, carried over when lists are made anew."""
 
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,7 +62,8 @@ def _turned(drag: NDArray[np.float64], sign: NDArray[np.float64]) -> NDArray[np.
 
 def _in_order(key: NDArray[np.int64], drag: NDArray[np.float64]) -> NDArray[np.int64]:
     """The places of those that are not 0 in the order of their keys."""
-    acts = np.flatnonzero((drag[: key.size] != 0.0).any(axis=1))
+    # Column by column: of rows of three NumPy takes ten times as long.
+    acts = np.flatnonzero(functools.reduce(np.logical_or, (one != 0.0 for one in drag[: key.size].T)))
     return np.asarray(acts[np.argsort(key[acts])])
 
 

@@ -214,8 +214,8 @@ def near_of(
 def touches_of(n: int, walls: int, pairs: int, touching: int, is_kept: bool = False, listed: Any = None) -> Touches:
     """Room for the contacts of so many pairs and of so many balls at walls; `Neighbours` has the members of fields."""
     columns = COLUMNS_OF_FRICTION if is_kept else COLUMNS
-    # One more for those that are found by a step that has been solved without them.
-    groups = -(-pairs // LANES) + 1
+    # One more for those that are found by a step that has been solved without them, and one to ask for beside the last.
+    groups = -(-pairs // LANES) + 2
     tile = Tile(
         aligned(groups * COLUMNS_OF_LANES * LANES).reshape(-1, LANES), np.zeros((groups * ENDS, LANES), np.int32)
     )  # fmt: skip

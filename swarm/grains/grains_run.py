@@ -212,7 +212,7 @@ class GrainsRun(BaseRun):
         cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, matter.period)
         for rows in (grains.number, grains.place, grains.speed, grains.change, grains.spin):
             if rows is not None:
-                rows[:] = rows[order]
+                rows[:] = rows.take(order, axis=0)
         while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:
             near = self._make_room(pairs, near.slot.size)
         self._list_walls(kernel, near, skin)

@@ -35,6 +35,7 @@ from .grain_arrays import (
     AFTER,
     BEFORE,
     COAST,
+    COLUMNS,
     COLUMNS_OF_LANES,
     DAMPING,
     DRAG,
@@ -87,6 +88,20 @@ def balls_of(ends, e, lane):
     return index(ends[e, lane]), index(ends[e + 1, lane])
 
 
+def _fetch_next(rows, q, lane, columns):
+    """Ask for the lane's part of so many columns of the next group: those of many balls are not in the second cache."""
+    for k in range(-(-columns // LANES)):
+        fetch(rows, (q + COLUMNS_OF_LANES + k * LANES + lane) * LANES)
+
+
+def _fetch_ball(grains, i):
+    """Ask for what a contact begins with of a ball."""
+    for rows in (grains.place, grains.speed, grains.change):
+        fetch(rows, i * rows.shape[1])
+    if grains.spin is not None:
+        fetch(grains.spin, i * grains.spin.shape[1])
+
+
 def pair_at(touches, g, lane):
     """A contact of a group, and its balls."""
     rows, q, ends, e = of_group(touches, g)
@@ -120,6 +135,8 @@ def _begin_group(matter, grains, near, touches, group):
     for k in range(begin, end):
         lane = index(k)
         i, j = balls_of(ends, e, lane)
+        # Of the second ball in the next group, which has been laid; the first one is often that of this group.
+        _fetch_ball(grains, index(ends[e + ENDS + 1, lane]))
         v, u = vector_at(speed, i, BEFORE), vector_at(speed, j, BEFORE)
         set_vector_in(rows, q + START, lane, apart(matter, place, i, j))
         set_vector_in(rows, q + COAST, lane, v - u)
@@ -323,6 +340,7 @@ def _sweep_group(matter, grains, touches, group, arrays, sweep):
     rows, q, ends, e = of_group(touches, g)
     for k in range(begin, end):
         _read(grains, ends, e, index(k), begun)
+        _fetch_next(rows, q, index(k), COLUMNS)
     for k in range(begin, end):
         _way, part, off = _press(matter, rows, q, index(k), begun, sweep.share)
         set_vector_in(given, _PART, index(k), part)
@@ -337,6 +355,7 @@ def _rub_group(matter, grains, touches, group, arrays, sweep):
     rows, q, ends, e = of_group(touches, g)
     for k in range(begin, end):
         i, j = _read(grains, ends, e, index(k), begun)
+        _fetch_next(rows, q, index(k), COLUMNS_OF_LANES)
         set_vector_in(begun, _TURNING, index(k), turning(grains, i, j, AFTER))
     unsolved = False
     for k in range(begin, end):

@@ -33,7 +33,9 @@ class CellOrder(NamedTuple):
 
 def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[CellOrder, NDArray[np.int64]]:
     """The `CellOrder` of balls at centres (N, 3), no narrower than a reach, and the order of balls by them."""
-    low, high = (centres.min(axis=0), centres.max(axis=0)) if len(centres) else np.zeros((2, 3))
+    # Of columns: of rows of three NumPy takes ten times as long.
+    x, y, z = centres.T
+    low, high = np.array([[k.min(), k.max()] for k in (x, y, z)]).T if len(centres) else np.zeros((2, 3))
     wraps = np.zeros(3, np.bool_)
     for k, length in enumerate(period or ()):
         if length is not None:
