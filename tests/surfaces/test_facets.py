@@ -82,7 +82,12 @@ def test_every_cell_has_the_facets_that_come_into_it():
     shape = np.array(grid.shape, int)
     places = np.minimum(((points - np.array(grid.low)) * np.array(grid.inverse)).astype(int), shape - 1)
     for m, cell in enumerate((places[:, 0] * shape[1] + places[:, 1]) * shape[2] + places[:, 2]):
-        assert m in grid.entries[grid.first[cell] : grid.first[cell + 1]]
+        entries = grid.entries[grid.first[cell] : grid.first[cell + 1]]
+        assert m in entries
+        blocks = slice(*grid.known.starts[cell : cell + 2])
+        assert np.array_equal(grid.known.facets[blocks].flat[: len(entries)], entries)
+        is_one = grid.known.planes[blocks, :3].any(axis=1)
+        assert np.array_equal(is_one.ravel(), np.arange(is_one.size) < len(entries))
     held = np.diff(grid.first[:-1]).reshape(shape) > 0
     assert np.array_equal(grid.known.room[:-1, room.KIND].reshape(shape) == room.FULL, held)
     for cell in random.choice(np.flatnonzero(grid.known.room[:-1, room.KIND] == room.FREE), 300):
