@@ -163,7 +163,7 @@ def size_of(a):
 
 
 class Sweep(Record):
-    """One of some sweeps: its number, 0 where it goes over all contacts, the share of changes, and the largest error.
+    """One of some sweeps: its number, 0 where it goes over all contacts, the share of changes, and what is solved.
 
     Which contacts a later sweep for friction goes over is noted by their balls, `Touches.stirred`.
     """

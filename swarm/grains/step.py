@@ -50,6 +50,9 @@ _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 _LEAST_RATIO = 0.1
 # Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them.
 _RUBBED = 1e-2
+# A contact that a sweep for friction changed by less leaves the others of its balls as they are: so the largest errors
+# are those of sweeps over all.
+_STIRRING = 3e-3
 _MOST_SWEEPS = 1000
 # So many sweeps for friction; then it is given as it is, and so are dampers with changes that are no larger than that.
 _MOST_RUBS, _LAGGING = 200, 2e-6
@@ -216,7 +219,7 @@ def _solve_friction(matter, walls, world):
     worst, sweeps, share, best, since = 1.0, 0, 1.0, math.inf, 0
     world.touches.stirred[:] = -1
     while sweeps < _MOST_RUBS:
-        worst = _rub(matter, walls, world, Sweep(sweeps if matter.rubs_everywhere else 0, share, _RUBBED))
+        worst = _rub(matter, walls, world, Sweep(sweeps if matter.rubs_everywhere else 0, share, _STIRRING))
         sweeps += 1
         if worst <= _RUBBED:
             break
