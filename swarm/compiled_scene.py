@@ -258,7 +258,8 @@ class CompiledScene:
             return [wall for one in self._pieces_at(numbers) for wall in walls_then(one, moment, self.largest)]
 
         if scene.moves():
-            walls = carried(fields, [*self._pieces_at(order.alone()), *(own or ())], moment, self.largest)
+            surfaces = [*self._pieces_at(order.alone()), *(own or ())]
+            walls = carried(fields, surfaces, moment, self.largest, in_rooms=bool(order.unions))
         else:
             many = [(one.present is None, *walls_then(one, moment, self.largest)) for one in fields]
             walls = Walls((

@@ -36,6 +36,15 @@ def is_known(_value: Any) -> bool:
     return True
 
 
+def is_alike(one: Any, other: Any) -> bool:
+    """Whether a `select` may take one of two records for the other, so that one code serves both.
+
+    Plain Python asks the one that it has the number of. In a kernel they are alike if they have the same parts, and
+    Python knows the same of these; `trace/calls.py` answers there.
+    """
+    return one is other
+
+
 class Kernel:
     """A function that is compiled when it is first called.
 

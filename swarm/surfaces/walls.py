@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..kernel.arrays import scratch
-from ..kernel.jit import is_known, outlined, select
+from ..kernel.jit import is_alike, is_known, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO
 from .presence.rooms import owner_of
@@ -47,6 +47,15 @@ def _with_number(every, number):
         if number < first + wall.count() if isinstance(wall, Field) else number == first:
             return every[k : k + 1]
     return every[-1:]
+
+
+def _alike(every):
+    """The `numbered` walls, those that are alike and follow one another together."""
+    found: tuple[Any, ...] = ()
+    for one in every:
+        joins = len(found) > 0 and not isinstance(one[1], Field) and is_alike(found[-1][-1][1], one[1])
+        found = (*found[:-1], (*found[-1], one)) if joins else (*found, (one,))
+    return found
 
 
 class Touched(Record):
@@ -235,11 +244,15 @@ class Walls(Record):
         answer, every = None, self.numbered()
         # A kernel may know the number of a wall, but not how many a field has before it.
         knows = is_known(number) and len(every) > 1 and is_known(every[-1][0])
-        for first, wall in reversed(_with_number(every, number) if knows else every):
-            if isinstance(wall, Field):
-                one, here = wall.members.wall(number - first), number < first + wall.count()
+        # Those that are alike are asked once: a kernel for many walls of one kind is not much longer than for one.
+        for alike in reversed(_alike(_with_number(every, number) if knows else every)):
+            first, one = alike[-1]
+            if isinstance(one, Field):
+                one, here = one.members.wall(number - first), number < first + one.count()
             else:
-                one, here = wall, number == first
+                here = (number >= alike[0][0]) & (number <= first)
+                for other, wall in reversed(alike[:-1]):
+                    one = select(number == other, wall, one)
             value = ask(one, *given)
             answer = value if answer is None else select(here, value, answer)
         return neutral if answer is None else answer

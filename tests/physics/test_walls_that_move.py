@@ -17,6 +17,7 @@ from examples import fermi
 from swarm.kernel.vector import ZERO, Vec, vec
 from swarm.lanes import block
 from swarm.motion import pose
+from swarm.surfaces.in_motion import moving
 from swarm.surfaces.in_motion.drive import drive_of
 from swarm.surfaces.time_of_impact import safe
 
@@ -643,3 +644,25 @@ def test_a_hit_of_a_wall_at_rest_at_once_is_none_of_one_that_moves():
             )
         assert hit.time == 0.0
         assert scene.compiled().numbering.surfaces_of_rows[int(hit.wall)] == 0
+
+
+def test_surfaces_that_move_together_are_one_motion(monkeypatch):
+    """The second one follows the first, in kernels too, and not one bit is another."""
+    turns, falls = swarm.Rotation((0.0, 1.0, 0.0), 2.0), swarm.Translation((0.0, 0.0, -0.1))
+    how = {"side": "outside", "restitution": 0.9, "friction": 0.1}
+    floor = swarm.Box((0.06, 0.06, 0.01), center=(0.0, 0.0, -0.06), motion=turns, **how)
+    sides = [swarm.Box((0.01, 0.06, 0.06), center=(x, 0.0, 0.0), motion=turns, **how) for x in (-0.05, 0.05)]
+    other = swarm.Box((0.01, 0.01, 0.01), center=(0.2, 0.0, 0.0), motion=falls, **how)
+    walls = moving.carried([], [floor, *sides, other], 0.3).each
+    assert [type(wall) for wall in walls] == [moving.TurningWall, *2 * [moving.Following], moving.Translated]
+    scene = swarm.Scene([swarm.Box((0.4, 0.4, 0.4)), floor, *sides, other], (0.0, 0.0, -9.81))
+    start = swarm.Particles([[0.0, 0.03], [0.0, 0.01], [-0.04, 0.0]], [[0.5, 0.8], [0.05, 0.0], [-1.0, 0.5]])
+
+    def end():
+        result = swarm.simulate(scene, start, swarm.Impact(), until=0.1, compile="never")
+        assert result.observables["impacts"][-1] > 0
+        return [result.particles.position.tolist(), result.observables["wall_work"].tolist()]
+
+    together = end()
+    monkeypatch.setattr(moving, "_led_together", lambda _surfaces, of_surfaces: of_surfaces)
+    assert together == end()

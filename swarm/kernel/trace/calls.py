@@ -14,12 +14,12 @@ from numba.core.dispatcher import Dispatcher
 from numba.extending import lower_builtin, type_callable
 
 from ..entries import is_own
-from ..jit import Kernel, is_known, select
+from ..jit import Kernel, is_alike, is_known, select
 from .frame import CallFrame, Range
 from .notes import taken
 from .twins import twin_of
 from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted
-from .ways import traced_select, unified
+from .ways import are_alike, traced_select, unified
 
 # Functions that are operations of a kernel, see `noted`, by themselves where all that they are given is known.
 OPERATIONS: set[Any] = {
@@ -75,6 +75,7 @@ _RECORDS = (tuple, type(None))
 # What is called in place of a function while it is traced.
 REPLACED: dict[Any, Callable[..., Any]] = {
     isinstance: _is_instance,
+    is_alike: are_alike,
     is_known: lambda value: not isinstance(value, Value),
     range: Range,
     select: traced_select,

@@ -102,6 +102,16 @@ def traced_select(condition: Any, first: Any, second: Any) -> Any:
     return first if first is second or first is None else noted(select, condition, first, second)
 
 
+def are_alike(one: Any, other: Any) -> bool:
+    """`is_alike` in a trace."""
+    if isinstance(one, tuple):
+        same = type(one) is type(other) and len(one) == len(other)
+        return same and all(map(are_alike, one, other))
+    if isinstance(one, Value):
+        return isinstance(other, Value) and one.kind == other.kind
+    return _is_same(one, other)
+
+
 @type_callable(select)
 def _type_of_select(_context):
     return lambda condition, first, second: types.unliteral(first)

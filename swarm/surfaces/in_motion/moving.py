@@ -7,6 +7,8 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from ...kernel.record import Record
 from ...kernel.vector import norm
 from ...motion import Guide
@@ -126,14 +128,17 @@ def _during(wall, last, remaining, after):
 
 
 def carried(
-    fields: Sequence[Surface], surfaces: Sequence[Surface], moment: float, largest: float | None = None
-) -> Walls:
+    fields: Sequence[Surface], surfaces: Sequence[Surface], moment: float, largest: float | None = None,
+    in_rooms: bool = False,
+) -> Walls:  # fmt: skip
     """The walls of a scene in the frame that ends at a moment [s]; those of fields are before all others.
 
-    Of points, or of balls of this radius at most [m].
+    Of points, or of balls of this radius at most [m]. `in_rooms` is whether some are of unions, the rooms of which are
+    asked each by itself.
     """
     of_surfaces = [walls_of(surface, moment, largest) for surface in surfaces]
-    all_walls = (*(Field(walls_of(field, moment, largest)[0]) for field in fields), *itertools.chain(*of_surfaces))
+    each = of_surfaces if in_rooms else _led_together(surfaces, of_surfaces)
+    all_walls = (*(Field(walls_of(field, moment, largest)[0]) for field in fields), *itertools.chain(*each))
     if all(surface.motion is None for surface in (*fields, *surfaces)):
         return Walls(all_walls)
     if fields:
@@ -144,6 +149,27 @@ def carried(
     if not all(map(_may_stride, marched)):
         return Marched(all_walls)
     return (Aimed if all(map(_may_aim, marched)) else Strided)(all_walls)
+
+
+def _led_together(surfaces: Sequence[Surface], of_surfaces: Sequence[list[Any]]) -> list[list[Any]]:
+    """The walls of surfaces; those that move as the surface before them follow it, and have one pose with it.
+
+    Five boxes that make a cup are one motion for a kernel, which is as much less to compile.
+    """
+    found = list(of_surfaces)
+    for k in range(1, len(found)):
+        before, (first, *others) = of_surfaces[k - 1][0], of_surfaces[k]
+        free = surfaces[k - 1].mass is None and surfaces[k].mass is None
+        if free and isinstance(first, Moving) and type(first) is type(before) and _are_equal(first.drive, before.drive):
+            found[k] = [Following(first.body), *others]
+    return found
+
+
+def _are_equal(one: Any, other: Any) -> bool:
+    """Whether two records have the same numbers in the same parts."""
+    if isinstance(one, tuple):
+        return type(one) is type(other) and len(one) == len(other) and all(map(_are_equal, one, other))
+    return type(one) is type(other) and bool(np.array_equal(one, other))
 
 
 def _may_leap(field: Field) -> bool:
