@@ -404,11 +404,10 @@ def _step(matter, walls, listed, world, skin):
     while True:
         if not _solve(matter, walls, world):
             return Status.UNSOLVED.value
+        _push_again(matter, walls, world)
         if _gather(matter, walls, world, False) == 0:
             break
         _push_again(matter, walls, world)
-    # So that no angular momentum is lost, by the arms of the whole step: those of sweeps were of what had been solved.
-    _turn(matter, walls, world)
     farthest, longest = _moved(matter, grains)
     sweep = _swept(matter, walls, listed, grains, skin)
     farthest, longest = worse(sweep.farthest, farthest), worse(sweep.longest, longest)

@@ -31,9 +31,8 @@ One cell of `AugmentedLagrangian` in a sphere that turns was written again when 
 instead: another step of second order, 2e-6 at its end.
 Five runs of a formula of degree 4 that is convex were written again when guesses of its roots began where the level
 along a flight bends the other way: the same hits, to round-off, 6e-13 at their ends.
-All cells of grains were written again when impulses were summed as contacts begin and the sweeps' velocities were kept:
-7e-14 at their ends, 1e-12 of samples, and 1e-4 where pairs rub, which is what friction is solved to: that end is 2.5e-5
-from one with friction solved to 1e-9, and was 8.8e-5 from it.
+The cell of grains where pairs rub was written again when twists were summed as contacts begin: 1e-4 at its end, which
+is what friction is solved to. That end is 2.5e-5 from one with friction solved to 1e-9, and was 8.8e-5 from it.
 Twelve cells of a user-defined surface were written again when straight flights to it looked from both sides: hits to
 round-off.
 
