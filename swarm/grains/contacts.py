@@ -162,7 +162,7 @@ def size_of(a):
 # --- Of sweeps for friction ------------------------------------------------------------------------------
 
 
-class Sweep(Record):
+class ContactSweep(Record):
     """One of some sweeps: its number, 0 where it goes over all contacts, the share of changes, and what is solved.
 
     Which contacts a later sweep for friction goes over is noted by their balls, `Touches.stirred`.

@@ -15,7 +15,7 @@ from ..kernel.arrays import fetch, index, kept, unwritten
 from ..kernel.jit import outlined
 from ..kernel.vector import cross, dot, square
 from .contacts import (
-    Sweep,
+    ContactSweep,
     apart,
     begin_solve,
     changed,
@@ -416,7 +416,7 @@ def _over_groups(one, lanes_of, matter, grains, touches, sweep):
 @outlined
 def sweep_pairs(matter, grains, touches, share):
     """Improve the impulse of each pair; the largest change of one, relative to what moves there."""
-    return _over_groups(_sweep_group, _all_lanes, matter, grains, touches, Sweep(0, share, 0.0))
+    return _over_groups(_sweep_group, _all_lanes, matter, grains, touches, ContactSweep(0, share, 0.0))
 
 
 @outlined

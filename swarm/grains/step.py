@@ -16,7 +16,7 @@ from ..kernel.vector import ZERO, square
 from ..lanes.watching.log import is_full
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall, count_members
-from .contacts import Sweep, find_more_pairs, find_pairs, worse
+from .contacts import ContactSweep, find_more_pairs, find_pairs, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, rub_wall, twist_wall
 from .grain_arrays import (
@@ -219,7 +219,7 @@ def _solve_friction(matter, walls, world):
     worst, sweeps, share, best, since = 1.0, 0, 1.0, math.inf, 0
     world.touches.stirred[:] = -1
     while sweeps < _MOST_RUBS:
-        worst = _rub(matter, walls, world, Sweep(sweeps if matter.rubs_everywhere else 0, share, _STIRRING))
+        worst = _rub(matter, walls, world, ContactSweep(sweeps if matter.rubs_everywhere else 0, share, _STIRRING))
         sweeps += 1
         if worst <= _RUBBED:
             break

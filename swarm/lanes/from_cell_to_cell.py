@@ -131,7 +131,7 @@ def under_way(kind):
     )  # fmt: skip
 
 
-class AtRest(UnderWay):
+class UnderWayAtRest(UnderWay):
     """Those that fly straight or fall, past facets at rest."""
 
     def facets(self, mesh):
@@ -223,7 +223,7 @@ def ask_for(table, row, size):
 @outlined
 def go_through(gravity, facets, before, lanes, live):
     """The first hits of every live lane with facets that have so many walls before them, or that found before."""
-    go_from_cell_to_cell(under_way(AtRest), gravity, facets, before, lanes, live)
+    go_from_cell_to_cell(under_way(UnderWayAtRest), gravity, facets, before, lanes, live)
 
 
 def go_from_cell_to_cell(under, gravity, mesh, before, lanes, live):

@@ -37,7 +37,7 @@ _ON = 0.5
 _NEARER, _BEYOND, _BEHIND = -1.0, -2.0, -3.0
 
 
-class InMotion(UnderWay):
+class UnderWayInMotion(UnderWay):
     """Those that go through the cells of a mesh that moves: curves in its frame."""
 
     width, own = ROWS + 11, 8
@@ -115,7 +115,7 @@ class InMotion(UnderWay):
 @outlined
 def go_through_moving(gravity, mesh, before, lanes, live):
     """The first hits of every live lane with facets that have so many walls before them, or that found before."""
-    go_from_cell_to_cell(under_way(InMotion), gravity, mesh, before, lanes, live)
+    go_from_cell_to_cell(under_way(UnderWayInMotion), gravity, mesh, before, lanes, live)
 
 
 @outlined
