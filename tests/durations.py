@@ -14,7 +14,7 @@ import pytest
 
 FILE = Path(__file__).with_suffix(".json")
 # From here on a test is slow [s].
-SLOW = 0.3
+SLOW = 0.2
 # Of a file of slow tests alone the shortest is in the quick ring as well, if it takes less than this [s].
 AT_LEAST_ONE = 1.0
 _spent = {}
