@@ -219,11 +219,13 @@ def least_distance(surface: Surface, volumes: Sequence[Surface], other: Surface)
     """The distance of a surface from the places of a wall in all the volumes, the first an opening, of some [m]."""
     low, high = _box_around(surface, volumes[0])
     points = low + (high - low) * np.random.default_rng(0).random((3, _PLACES))
-    for _ in range(_NEWTON):
-        slopes = surface.gradient(points)
-        points = points - surface.phi(points) / np.maximum((slopes**2).sum(axis=0), _TINY) * slopes
-    within = np.all([sign_of(volume) * volume.phi(points) <= 0.0 for volume in volumes], axis=0)
-    return float(np.abs(distances_of((other,), points[:, within], 0.0)).min(initial=math.inf))
+    # From where phi has no gradient a step leads nowhere, and no volume has such a place.
+    with np.errstate(all="ignore"):
+        for _ in range(_NEWTON):
+            slopes = surface.gradient(points)
+            points = points - surface.phi(points) / np.maximum((slopes**2).sum(axis=0), _TINY) * slopes
+        within = np.all([sign_of(volume) * volume.phi(points) <= 0.0 for volume in volumes], axis=0)
+        return float(np.abs(distances_of((other,), points[:, within], 0.0)).min(initial=math.inf))
 
 
 def _box_around(surface: Surface, opening: Surface) -> Any:
