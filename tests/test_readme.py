@@ -96,11 +96,9 @@ REPORTS = {
     for part in re.split(r"^## ", REPORTED, flags=re.MULTILINE)[1:]
     if (blocks := re.findall(r"```\n(.*?)```", part, re.DOTALL))
 }
-# What waits for a quiet machine: python -m bench fields -o bench/results
-WAITING = [pytest.mark.xfail(strict=True, reason="its table is not committed yet")]
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=WAITING * (name == "Fields")) for name in REPORTS])
+@pytest.mark.parametrize("name", REPORTS)
 def test_a_report_that_is_quoted_is_committed_and_names_its_commit(name):
     part = REPORTED.split(f"## {name}\n")[1].split("\n## ")[0]
     assert re.search(r"\b[0-9a-f]{7}, 20\d\d-\d\d-\d\d", part)
