@@ -23,7 +23,7 @@ _LOG = logging.getLogger("swarm")
 # A compilation that takes longer [s] is a warning, for not every run shows what is compiled.
 LONG = 10.0
 _SLOW = (
-    f"it takes more than {LONG:g} s so far; each wall that moves by itself and has friction adds some seconds, which "
+    f"it takes more than {LONG:g} s so far; where walls that move have friction, each of them adds some seconds; "
     "the triangles of one Mesh do not"
 )
 

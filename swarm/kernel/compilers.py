@@ -41,10 +41,10 @@ def _level() -> int:
 
 
 def features_of(codegen: Any) -> str:
-    """The processor as LLVM takes it for kernels of flights: as Numba does, with vectors of 512 bits where they pay.
+    """LLVM's features of the processor for kernels of flights: Numba's, and vectors of 512 bits where they pay.
 
     By itself LLVM takes 256 bits on Intel's processors, for the first of those with AVX-512 lower their frequency for
-    wider ones. They are told by an instruction set that they lack, and keep 256 bits; on them nothing was measured.
+    wider ones. Those lack the instruction set `_RECENT` and keep 256 bits; on them nothing was measured.
     Measured in turn on a Sapphire Rapids, times of 256 bits: an impact on walls that swing or turn 0.7 to 0.8, a
     formula of degree 4 0.80, boxes and rotated ellipsoids 0.8 to 0.9, other shapes 0.9 to 1.0 with gravity or without,
     meshes 0.93 to 0.97, first calls the same. Grains, balls, bodies and sliding gain nothing (0.97 to 1.07): their
@@ -58,7 +58,7 @@ def features_of(codegen: Any) -> str:
 
 @functools.cache
 def _in_wide_vectors(codegen: Any) -> Any:
-    """Numba's code generator, the engine of which it shares, with passes that are told of `features_of`."""
+    """Numba's code generator, the engine of which it shares, with passes for `features_of`."""
     if features_of(codegen) == codegen._tm_features:
         return codegen
     options: dict[str, Any] = {"opt": _level()}

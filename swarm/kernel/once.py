@@ -13,7 +13,7 @@ _GLANCE = 0.05
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Hold the lock of a file, or none where it cannot be had: the folder is read-only, or its disk has no locks."""
+    """Hold the lock of a file; without it if the folder is read-only, or its disk has no locks."""
     import filelock
 
     lock = filelock.FileLock(path, timeout=_LONGEST)

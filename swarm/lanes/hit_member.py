@@ -38,7 +38,7 @@ def _fields(walls):
 
 
 def picks(method, walls):
-    """Room for the numbers of a body in each lane, of every field; none where a contact looks at all bodies."""
+    """Room for the numbers of a body in each lane, of every field, or () if a contact looks at all bodies."""
     if method.looks_around:
         return ()
     return tuple(scratch((STRIDE, width(field.members.like)), np.float64) for _number, field in _fields(walls))

@@ -312,6 +312,8 @@ def main():
     words = given.words
     known = json.loads(FILE.read_text())
     wanted = [name for name in [*runs(), *cell_names()] if all(word in name for word in words)]
+    if not wanted:
+        parser.error(f"no run has all these words in its name: {' '.join(words)}")
     if given.threads:
         wanted = [name for name in wanted if is_compiled(name)]
     job = _written if given.write else disagreement_of_threads if given.threads else _compared

@@ -216,7 +216,16 @@ def reaches(surface: Surface, opening: Surface) -> bool:
 
 
 def least_distance(surface: Surface, volumes: Sequence[Surface], other: Surface) -> float:
-    """The distance of a surface from the places of a wall in all the volumes, the first an opening, of some [m]."""
+    """How near a surface comes to the part of a wall that an opening cuts out.
+
+    Args:
+        surface: the wall.
+        volumes: an opening of it, and others: only places in all of them count.
+        other: the surface, such as a counter.
+
+    Returns:
+        The least distance from some places of the wall [m], infinite if none of them is in all the volumes.
+    """
     low, high = _box_around(surface, volumes[0])
     points = low + (high - low) * np.random.default_rng(0).random((3, _PLACES))
     # From where phi has no gradient a step leads nowhere, and no volume has such a place.
