@@ -91,6 +91,7 @@ _OF_KEYS: dict[str, Form] = {
     "side": {"enum": list(SIDES)},
     "rotation": either(
         listed(NUMBER, 4, 4),
+        listed(listed(NUMBER, 3, 3), 3, 3),
         {"type": "object", "properties": {"axis": VECTOR, "angle": NUMBER}, "required": ["axis", "angle"],
          "additionalProperties": False},
     ),
@@ -104,7 +105,12 @@ _OF_KEYS: dict[str, Form] = {
     "radii": NUMBERS,
     "lengths": NUMBERS,
     "axes": either(VECTOR, ROWS),
-    "rotations": listed(listed(NUMBER, 4, 4), 1),
+    "rotations": either(
+        listed(NUMBER, 4, 4),
+        listed(listed(NUMBER, 4, 4), 1),
+        listed(listed(NUMBER, 3, 3), 3, 3),
+        listed(listed(listed(NUMBER, 3, 3), 3, 3), 1),
+    ),
     "outline": listed(listed(NUMBER, 2, 3), 1),
     "values": either(listed(listed(listed(NUMBER, 1), 1), 1), TEXT),
     "triangles": listed(listed(INTEGER, 3, 3), 1),

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.checks import Vector, number, parts_of, shown, vector
+from ..common import rows
+from ..common.checks import Vector, array, number, parts_of, shown, vector
 from ..errors import SceneError
 from ..kernel.gravity import Gravity, as_vector
 from ..kernel.limits import UNIT_LENGTH
@@ -42,7 +43,7 @@ def quaternion(name: str, value: Any) -> Quaternion | None:
         axis = unit(f"{name}.axis", value["axis"])
         half = 0.5 * number(f"{name}.angle", value["angle"], "a finite number of radians")
         turn = math.cos(half), *(math.sin(half) * part for part in axis)
-    elif len(rows := parts_of(value) or ()) == 3 and all(parts_of(row) is not None for row in rows):
+    elif len(parts := parts_of(value) or ()) == 3 and all(parts_of(row) is not None for row in parts):
         turn = _of_matrix(name, value)
     else:
         turn = unit(name, value, 4)
@@ -50,21 +51,53 @@ def quaternion(name: str, value: Any) -> Quaternion | None:
 
 
 def _of_matrix(name: str, value: Any) -> tuple[float, ...]:
-    """The unit quaternion of a rotation matrix, by its largest part, which no difference of near numbers makes."""
-    rows = np.array([vector(f"{name}[{i}]", row) for i, row in enumerate(value)])
-    if np.abs(rows @ rows.T - np.eye(3)).max() > _ORTHONORMAL or np.linalg.det(rows) < 0.0:
+    """The unit quaternion of a rotation matrix."""
+    given = np.array([vector(f"{name}[{i}]", row) for i, row in enumerate(value)])
+    return unit(name, _of_matrices(name, given)[0].tolist(), 4)
+
+
+def quaternions(name: str, value: Any, count: int) -> NDArray[np.float64]:
+    """Rotations of many bodies as quaternions (n, 4), of the lengths that are given.
+
+    Args:
+        name: the argument's name, for errors.
+        value: a quaternion for each body (n, 4) or the rows of a rotation matrix for each (n, 3, 3), or one for all.
+        count: the number of bodies.
+
+    Raises:
+        SceneError: `value` has another shape, a quaternion is 0, or a matrix does not keep lengths or mirrors.
+    """
+    given = array(name, value)
+    if given.shape not in ((3, 3), (count, 3, 3)):
+        return rows.quaternions(name, value, count)
+    return rows.quaternions(name, np.broadcast_to(_of_matrices(name, given), (count, 4)), count)
+
+
+def _of_matrices(name: str, given: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit quaternions of rotation matrices, each from its largest part, which no difference of near numbers makes."""
+    many = given.reshape(-1, 3, 3)
+    products = many @ np.swapaxes(many, 1, 2)
+    bad = ~(np.abs(products - np.eye(3)).max(axis=(1, 2)) <= _ORTHONORMAL) | (np.linalg.det(many) < 0.0)
+    if bad.any():
+        i = int(bad.argmax())
+        where, one = (f"{name}[{i}]" if given.ndim == 3 else name), many[i]
         raise SceneError(
-            f"{name} must be a matrix of three rows that are of length 1, at right angles and not mirrored, got "
-            f"{rows.tolist()}: the lengths of its rows are {np.sqrt((rows**2).sum(axis=1)).tolist()}, and its "
-            f"determinant is {np.linalg.det(rows):g}; take the size of a surface from its own arguments"
+            f"{where} must be a matrix of three rows that are of length 1, at right angles and not mirrored, got "
+            f"{one.tolist()}: the lengths of its rows are {np.sqrt((one**2).sum(axis=1)).tolist()}, and its "
+            f"determinant is {np.linalg.det(one):g}; take the size of a surface from its own arguments"
         )
     # 4 q q^T is linear in the matrix (Shepperd 1978).
-    x, y, z = rows.diagonal()
-    outer = np.diag([1.0 + x + y + z, 1.0 + x - y - z, 1.0 - x + y - z, 1.0 - x - y + z])
+    x, y, z = many.diagonal(axis1=1, axis2=2).T
+    outer = np.zeros((len(many), 4, 4))
+    for i, square in enumerate((1.0 + x + y + z, 1.0 + x - y - z, 1.0 - x + y - z, 1.0 - x - y + z)):
+        outer[:, i, i] = square
     for i, j, k in ((1, 2, 3), (2, 3, 1), (3, 1, 2)):
-        outer[0, i] = outer[i, 0] = rows[k - 1, j - 1] - rows[j - 1, k - 1]
-        outer[j, k] = outer[k, j] = rows[k - 1, j - 1] + rows[j - 1, k - 1]
-    return unit(name, outer[outer.diagonal().argmax()].tolist(), 4)
+        outer[:, 0, i] = outer[:, i, 0] = many[:, k - 1, j - 1] - many[:, j - 1, k - 1]
+        outer[:, j, k] = outer[:, k, j] = many[:, k - 1, j - 1] + many[:, j - 1, k - 1]
+    largest = outer.diagonal(axis1=1, axis2=2).argmax(axis=1)
+    chosen = outer[np.arange(len(many)), largest]
+    turns: NDArray[np.float64] = chosen / np.linalg.norm(chosen, axis=1, keepdims=True)
+    return turns
 
 
 def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:

@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 from conftest import row
 from test_cli import command
@@ -98,6 +99,22 @@ def test_every_example_fits():
 @pytest.mark.parametrize(("old", "new"), FITS)
 def test_what_fits(old, new):
     assert [error.message[:200] for error in SCENE.iter_errors(tomllib.loads(changed(old, new)))] == []
+
+
+def test_every_form_of_a_rotation_fits_and_is_read(tmp_path):
+    """A quaternion, an axis with an angle, and the rows of a matrix; of bodies one for all, and one for each."""
+    one = "[0.0, 0.0, 0.0, 1.0]", "{axis = [0, 0, 1], angle = 3.141592653589793}", "[[-1, 0, 0], [0, -1, 0], [0, 0, 1]]"
+    turned = [('kind = "box"\nhalf_widths = [1, 2, 3]', "rotation", form) for form in one]
+    solid = "centers = [[0, 0, 0]]\nhalf_widths = [0.1, 0.2, 0.3]"
+    boxes = f'kind = "sphere"\nradius = 9\n[[surface]]\nkind = "boxes"\n{solid}'
+    turned += [(boxes, "rotations", form) for of_all in (one[0], one[2]) for form in (of_all, f"[{of_all}]")]
+    for i, (kind, key, form) in enumerate(turned):
+        path, text = tmp_path / f"{i}.toml", changed('kind = "sphere"\nradius = 0.5', f"{kind}\n{key} = {form}")
+        path.write_text(text)
+        with row(form):
+            assert [error.message[:200] for error in SCENE.iter_errors(tomllib.loads(text))] == []
+            turn = getattr(scene_file.read(path).scene.surfaces[-1], key)
+            assert np.abs(np.ravel(turn)) == pytest.approx([0.0, 0.0, 0.0, 1.0], abs=1e-15)
 
 
 @pytest.mark.parametrize(("old", "new"), WRONG)

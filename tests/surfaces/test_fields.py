@@ -17,6 +17,7 @@ from swarm.kernel.grid import cell_of, entries_of
 from swarm.kernel.vector import vec
 from swarm.serialization import tables
 from swarm.surfaces import ALL_SURFACES
+from swarm.surfaces import rotation as rotations
 from swarm.surfaces.time_of_impact import flights
 
 EPSILON = np.finfo(np.float64).eps
@@ -187,12 +188,31 @@ def test_more_than_a_few_of_one_kind_are_one_field():
         (lambda: swarm.Boxes([[0, 0, 0]], (0.1, 0.0, 0.1)), ["half_widths", "above 0", "0.0"]),
         (lambda: swarm.Boxes([[0, 0, 0]], (0.1, 0.1)), ["half_widths", "3 numbers", "(2,)"]),
         (lambda: swarm.Ellipsoids([[0, 0, 0]], (1, 1, 1), [[0, 0, 0, 0]]), ["rotations[0]", "not all 0"]),
+        (lambda: swarm.Boxes([[0, 0, 0]], (1, 1, 1), [np.eye(3), np.eye(3)]), ["rotations", "4 numbers", "(2, 3, 3)"]),
+        (lambda: swarm.Boxes([[0, 0, 0]] * 2, (1, 1, 1), [np.eye(3), -np.eye(3)]), ["rotations[1]", "not mirrored"]),
+        (lambda: swarm.Boxes([[0, 0, 0]], (1, 1, 1), 2 * np.eye(3)), ["rotations", "lengths of its rows", "2.0"]),
     ],
 )  # fmt: skip
 def test_bad_bodies_are_reported(build, parts):
     with pytest.raises(SceneError) as caught:
         build()
     assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+def test_rotations_of_bodies_may_be_matrices():
+    """A box that a matrix turns has the gap of one box with the same `rotation`, in each of the four largest parts."""
+    turns = [{"axis": (1, 2, 3), "angle": 0.3}, {"axis": (9, 1, 2), "angle": 3.0}]
+    turns += [{"axis": (1, -9, 2), "angle": 3.0}, {"axis": (2, 1, 9), "angle": 3.0}]
+    matrices = np.stack([rotations.matrix(rotations.quaternion("rotation", turn)) for turn in turns])
+    centers = np.array([[3.0 * i, 0.0, 0.0] for i in range(4)])
+    boxes = swarm.Boxes(centers, (0.5, 0.3, 0.1), matrices)
+    places = centers.T + np.array([[0.2], [0.45], [-0.35]])
+    gaps = [
+        swarm.Box((0.5, 0.3, 0.1), centers[i], "outside", rotation=turn).phi(places[:, i : i + 1])[0]
+        for i, turn in enumerate(turns)
+    ]
+    assert boxes.phi(places) == pytest.approx(gaps, abs=1e-15)
+    assert (swarm.Boxes(centers, (0.5, 0.3, 0.1), matrices[1]).rotations == boxes.rotations[1]).all()
 
 
 def test_a_hundred_million_bodies_are_refused_with_their_memory(monkeypatch):

@@ -187,7 +187,8 @@ class Boxes(Many):
     Args:
         centers: (n, 3) [m], one row a box.
         half_widths: (n, 3) or three numbers for all, above 0 [m].
-        rotations: None, or (n, 4), a quaternion (w, x, y, z) of any length for each, about its centre.
+        rotations: None, or for each, about its centre, a quaternion (w, x, y, z) of any length (n, 4) or the rows of a
+            rotation matrix (n, 3, 3).
         side: "outside".
 
     Raises:
@@ -224,7 +225,8 @@ class Ellipsoids(Many):
     Args:
         centers: (n, 3) [m], one row an ellipsoid.
         semi_axes: (n, 3) or three numbers for all, above 0 [m].
-        rotations: None, or (n, 4), a quaternion (w, x, y, z) of any length for each, about its centre.
+        rotations: None, or for each, about its centre, a quaternion (w, x, y, z) of any length (n, 4) or the rows of a
+            rotation matrix (n, 3, 3).
         side: "outside".
 
     Raises:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ... import motion as motions
-from ...common.rows import balls, bodies, directions, kept, lengths, quaternions, widths
+from ...common.rows import balls, bodies, directions, kept, lengths, widths
 from ...errors import SceneError
 from ...kernel.grid import Floats, one_cell
 from ...motion.wall import product
@@ -46,7 +46,7 @@ _ROWS = {
     "axes": _BodyRows("axis", ("axis_x", "axis_y", "axis_z"), directions),
     "half_widths": _BodyRows("half_widths", ("half_x", "half_y", "half_z"), widths),
     "semi_axes": _BodyRows("semi_axes", ("a", "b", "c"), widths),
-    "rotations": _BodyRows("rotation", ("q_w", "q_x", "q_y", "q_z"), quaternions),
+    "rotations": _BodyRows("rotation", ("q_w", "q_x", "q_y", "q_z"), rotations.quaternions),
 }
 
 
