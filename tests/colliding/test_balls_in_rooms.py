@@ -19,18 +19,52 @@ BIN = swarm.Union(
         swarm.Intersection([swarm.Cone(0.6, center=(0.0, 0.0, -0.9)), swarm.Plane((0.0, 0.0, 1.0), 0.0)]),
     ]
 )
-UNIONS = {"boxes": BOXES, "spheres": SPHERES, "pipe": PIPE, "foam": FOAM, "bin": BIN}
+# Walls of three rooms meet at tips, about which balls turn.
+BUBBLES = swarm.Union([SPHERES.parts[0], swarm.Sphere(0.45, (0.5, 0.1, 0.0)), swarm.Sphere(0.45, (0.2, 0.5, 0.05))])
+CROSS = swarm.Union([
+    swarm.Box((0.5, 0.3, 0.3)), swarm.Box((0.3, 0.5, 0.3), (0.05, 0.02, 0.1)),
+    swarm.Box((0.3, 0.3, 0.5), (0.0, 0.05, 0.02)),
+])  # fmt: skip
+PIPES = swarm.Union([
+    swarm.Cylinder(0.3, (1.0, 0.0, 0.0), 1.0), swarm.Cylinder(0.3, (0.0, 1.0, 0.0), 1.0, (0.05, 0.0, 0.02)),
+    swarm.Cylinder(0.3, (0.1, 0.0, 1.0), 1.0),
+])  # fmt: skip
+TIPPED = {"bubbles": BUBBLES, "cross": CROSS, "pipes": PIPES}
+UNIONS = {"boxes": BOXES, "spheres": SPHERES, "pipe": PIPE, "foam": FOAM, "bin": BIN, **TIPPED}
 FLIGHTS = 6
 
 
+def walls_of(union, radius):
+    return swarm.Scene([union]).compiled().of_balls(radius).walls(0.0).grown(radius).each
+
+
 def met(union, radius, place, velocity, pull):
-    """When a flight meets the walls."""
-    walls = swarm.Scene([union]).compiled().of_balls(radius).walls(0.0).grown(radius).each
-    r, v = Vec(*np.array(place)), Vec(*np.array(velocity))
+    """When a flight meets the walls: a fall is looked at in several parts."""
+    walls = walls_of(union, radius)
+    r, v, g = (Vec(*np.array(one, float)) for one in (place, velocity, pull or (0.0, 0.0, 0.0)))
+    time, meets = 0.0, False
     with np.errstate(all="ignore"):
-        if pull is None:
-            return min(wall.first_hit(r, v) for wall in walls)
-        return min(wall.falling_hit(r, v, Vec(*pull)) for wall in walls)
+        while not meets and time < 9.0:
+            at, w = r + time * (v + (0.5 * time) * g), v + time * g
+            looked = (wall.first_hit(at, w) if pull is None else wall.falling_hit(at, w, g) for wall in walls)
+            later, meets = min(looked)
+            time += later
+    return time, meets
+
+
+@pytest.mark.parametrize("name", list(TIPPED))
+def test_a_ball_that_flies_at_a_tip_meets_it_at_a_distance_of_its_radius(name):
+    union, radius = UNIONS[name], 0.04
+    tips = [np.array(tip) for wall in walls_of(union, radius) for tip in wall.tips]
+    assert len(tips) == {"bubbles": 2, "cross": 2, "pipes": 8}[name]
+    for tip in tips:
+        # The tip is on the walls of three rooms and in none; the way to it is from the middle of the vessel.
+        assert np.sort(np.abs([part.phi(tip[:, None])[0] for part in union.parts])) == pytest.approx(
+            [0.0] * 3, abs=1e-15
+        )
+        time, meets = met(union, radius, -0.1 * tip, 1.1 * tip, None)
+        assert meets
+        assert time == pytest.approx(1.0 - radius / np.linalg.norm(1.1 * tip), abs=1e-13)
 
 
 @pytest.mark.parametrize("pull", [None, (0.5, 1.0, -3.0)], ids=["straight", "fall"])

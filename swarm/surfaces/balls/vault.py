@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...kernel.vector import Vec
+from ...kernel.limits import EPSILON
+from ...kernel.vector import ZERO, Vec, cross, dot, norm
 from ..room import room_bounds
 from ..shapes.box import Box
 from ..shapes.cone import Cone
@@ -20,13 +21,16 @@ from ..shapes.sphere import Sphere
 from ..surface import Box as Bounds
 from ..surface import Surface
 from .tip import TipPlane
-from .vaulted import FLAT, RoomEdge, RoomFace, Vaulted, crossing, is_seen
+from .vaulted import FLAT, RoomEdge, RoomFace, Vaulted, crossing, is_seen, outward
 
 # Of the extent: what is round-off of a place, and what is farther than anything.
 _SLACK, _FAR = 1e-11, 1e6
 # Places from which edges are looked for, and most rooms; of the smallest radius of curvature at these places, what is
 # taken for certain.
 _PLACES, _MOST, _ROUND = 24, 64, 0.5
+# Newton's steps to a tip, at most; one that is so many roundings of a place is the last. Walls whose normals span no
+# more than this do not meet at a point.
+_SWEEPS, _STILL, _PARALLEL = 30, 4.0 * EPSILON, 1e-9
 # What all parts of a union that balls meet have in common: laws, and how the whole moves, comes and goes, and opens.
 _LAWS = "restitution", "friction", "temperature", "accommodation", "laws"
 _CHANGES = "motion", "openings", "present", "mass", "inertia"
@@ -109,8 +113,6 @@ def no_balls_in(union: Any) -> str | None:
     for what in (*_LAWS, *_CHANGES):
         if len({repr(getattr(surface, what)) for surface in surfaces}) > 1:
             return f"{begin}the parts differ in {what}, while an edge belongs to both: give the {what} to the whole"
-    if len(rooms) > 2 and _any_corner(vault_of(union)):
-        return f"{begin}three meet at a point, where balls would turn about a tip; they turn about edges of two"
     return None
 
 
@@ -129,32 +131,37 @@ def _walls_of(vault: Vault) -> tuple[Any, ...]:
 
 def _made(vault: Vault) -> list[Vaulted]:
     rooms, extent = _rooms_of(vault), vault.extent()
-    slack, places = _SLACK * extent, _places_in(vault)
+    slack, places, bounds = _SLACK * extent, _places_in(vault), [room_bounds(room) for room in vault.rooms_of]
     faces = [
-        RoomFace(wall, rooms[k], _without(rooms, k), *_bend_of(one, wall))
+        RoomFace(wall, (k, k), *_bend_of(one, wall))
         for k, room in enumerate(vault.rooms_of) for one, wall in _each(room)
     ]  # fmt: skip
     first = np.cumsum([0, *map(len, rooms)]).tolist()
     group, edges = list(range(len(faces))), []
+    tips: list[tuple[int, Vec]] = []
     for edge, (k, a), (m, b) in _edges_of(rooms):
-        on_it = [place for place in _crossings(edge, places) if _is_on(edge, place, slack)]
-        if any(is_seen(edge, place, slack) for place in on_it):
+        on_it = [place for place in _crossings(edge, places) if _is_on((edge.one, edge.other), place, slack)]
+        ends = _tips_of(edge, on_it, rooms, bounds, slack, extent) if on_it else []
+        if ends or any(is_seen(rooms, edge.rooms, place, slack) for place in on_it):
             edge = edge._replace(bend=_ROUND * min(map(edge.bend_at, on_it)))
             one, other = group[first[k] + a], group[first[m] + b]
             group = [one if g == other else g for g in group]
             edges.append((first[k] + a, edge))
+            new = (x for x in ends if all(norm(x - tip) > slack for _i, tip in tips))
+            tips.extend((first[k] + a, tip) for tip in new)
     return [
         Vaulted(
-            tuple(face for face, g in zip(faces, group, strict=True) if g == mine),
-            tuple(edge for i, edge in edges if group[i] == mine), 0.0, slack, _FAR * extent,
+            rooms, tuple(face for face, g in zip(faces, group, strict=True) if g == mine),
+            tuple(edge for i, edge in edges if group[i] == mine),
+            tuple(tip for i, tip in tips if group[i] == mine), 0.0, slack, _FAR * extent,
         )
         for mine in dict.fromkeys(group)
     ]  # fmt: skip
 
 
-def _rooms_of(vault: Vault) -> list[tuple[Any, ...]]:
+def _rooms_of(vault: Vault) -> tuple[tuple[Any, ...], ...]:
     """The walls of every room."""
-    return [tuple(wall for _surface, wall in _each(room)) for room in vault.rooms_of]
+    return tuple(tuple(wall for _surface, wall in _each(room)) for room in vault.rooms_of)
 
 
 def _each(room: Any) -> Iterator[tuple[Surface, Any]]:
@@ -178,15 +185,11 @@ def _places_in(vault: Vault) -> list[Vec]:
     return [Vec(*place) for place in np.random.default_rng(0).uniform(low, high, (_PLACES, 3)).tolist()]
 
 
-def _edges_of(rooms: list[Any]) -> Iterator[tuple[RoomEdge, tuple[int, int], tuple[int, int]]]:
+def _edges_of(rooms: tuple[Any, ...]) -> Iterator[tuple[RoomEdge, tuple[int, int], tuple[int, int]]]:
     """What may be an edge between two rooms, and the numbers of both walls."""
     for k, m in itertools.combinations(range(len(rooms)), 2):
         for a, b in itertools.product(range(len(rooms[k])), range(len(rooms[m]))):
-            yield RoomEdge(rooms[k][a], rooms[m][b], rooms[k] + rooms[m], _without(rooms, k, m)), (k, a), (m, b)
-
-
-def _without(rooms: list[Any], *some: int) -> tuple[Any, ...]:
-    return tuple(room for k, room in enumerate(rooms) if k not in some)
+            yield RoomEdge(rooms[k][a], rooms[m][b], (k, m)), (k, a), (m, b)
 
 
 def _crossings(edge: RoomEdge, places: list[Vec]) -> Iterator[Vec]:
@@ -195,17 +198,62 @@ def _crossings(edge: RoomEdge, places: list[Vec]) -> Iterator[Vec]:
             yield crossing(edge.one, edge.other, place, math.inf)
 
 
-def _is_on(edge: RoomEdge, x: Vec, slack: float) -> bool:
-    """Whether a place is on both walls."""
-    return bool(max(abs(edge.one.distance(x)), abs(edge.other.distance(x))) <= slack)
+def _is_on(walls: tuple[Any, ...], x: Vec, slack: float) -> bool:
+    """Whether a place is on all of the walls."""
+    return bool(max(abs(wall.distance(x)) for wall in walls) <= slack)
 
 
-def _any_corner(vault: Vault) -> bool:
-    """Whether an edge of two rooms goes into a third one."""
-    slack, places = _SLACK * vault.extent(), _places_in(vault)
-    for edge, _one, _other in _edges_of(_rooms_of(vault)):
-        alone = edge._replace(others=())
-        on_it = [x for x in _crossings(edge, places) if _is_on(edge, x, slack) and is_seen(alone, x, slack)]
-        if len({bool(is_seen(edge, x, slack)) for x in on_it}) > 1:
-            return True
-    return False
+def _tips_of(
+    edge: RoomEdge, on_it: list[Vec], rooms: tuple[Any, ...], bounds: list[Any], slack: float, far: float
+) -> list[Vec]:
+    """The places of an edge where it is seen and goes into a third room.
+
+    Args:
+        edge: an edge.
+        on_it: places where its walls cross.
+        rooms: the walls of each room.
+        bounds: a box around each room.
+        slack: round-off of a place [m].
+        far: so far along the edge from its places others are looked for [m].
+    """
+    found: list[Vec] = []
+    starts = [x + way * along for x in on_it for along in [_along(edge, x)] for way in (0.0, far, -far)]
+    for k, room in enumerate(rooms):
+        boxes = [bounds[i] for i in (*edge.rooms, k)]
+        low, high = np.max([box[0] for box in boxes], axis=0), np.min([box[1] for box in boxes], axis=0)
+        if k in edge.rooms or (low > high + slack).any():
+            continue
+        for wall in room:
+            walls = edge.one, edge.other, wall
+            for start in starts:
+                x = _meeting(walls, start)
+                if (
+                    _is_on(walls, x, slack)
+                    and is_seen(rooms, (*edge.rooms, k), x, slack)
+                    and all(norm(x - y) > slack for y in found)
+                ):
+                    found.append(Vec(*map(float, x)))
+    return found
+
+
+def _along(edge: RoomEdge, x: Vec) -> Vec:
+    """The unit vector along an edge."""
+    along = cross(outward(edge.one, x), outward(edge.other, x))
+    return Vec(*(float(part) / norm(along) for part in along))
+
+
+def _meeting(walls: tuple[Any, ...], x: Vec) -> Vec:
+    """The place where three walls meet, by Newton's method; another place where it finds none."""
+    for _sweep in range(_SWEEPS):
+        normals = [outward(wall, x) for wall in walls]
+        step = ZERO
+        for i, wall in enumerate(walls):
+            step = step - wall.distance(x) * cross(normals[i - 2], normals[i - 1])
+        volume = dot(normals[0], cross(normals[1], normals[2]))
+        if abs(volume) < _PARALLEL:
+            break
+        step = step * (1.0 / volume)
+        x = x + step
+        if norm(step) <= _STILL * norm(x):
+            break
+    return x

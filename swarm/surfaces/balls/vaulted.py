@@ -2,7 +2,7 @@
 
 A wall of a room is seen where it is in no other room; where walls of two rooms cross is an edge, about which balls
 turn. The nearest place of a wall is its foot, that of an edge is found by Newton's method: it is the one on the line in
-both planes that touch the walls, next to the ball.
+both planes that touch the walls, next to the ball. Where walls of three rooms meet is a tip, a place by itself.
 
 A flight of a hard ball is looked at. Where the foot on a face is seen, the flight is free until it meets the parallel
 surface; of an edge for as long as its bend says. A face or an edge that is hidden is not met before its foot may be
@@ -32,22 +32,20 @@ FLAT, _ALIGNED = (PlaneNumbers, SlabNumbers), 1.0 - 1e-14
 
 
 class RoomFace(Record):
-    """A wall of a room, the walls of that room, and the other rooms."""
+    """A wall of a room."""
 
     wall: Any
-    own: Any
-    others: Any
+    rooms: Any  # the number of the room, twice
     round: Any = None  # the smallest radius of curvature [m], None where it is another one at each place
     slope: float = 0.0  # by how much at most that becomes less, of the way along the wall
 
 
 class RoomEdge(Record):
-    """Walls of two rooms that cross, the walls of both of these, and the other rooms."""
+    """Walls of two rooms that cross."""
 
     one: Any
     other: Any
-    own: Any
-    others: Any
+    rooms: Any  # the numbers of the two rooms
     bend: float = math.inf  # the smallest radius of curvature [m]
 
     def bend_at(self, x):
@@ -82,10 +80,12 @@ class Rim(Record):
 
 
 class Vaulted(Smooth):
-    """What is farther than the radius of a ball from faces of a union and the edges between them."""
+    """What is farther than the radius of a ball from faces of a union, the edges between them and the tips of these."""
 
+    rooms: Any  # the walls of each room of the union
     faces: Any
     edges: Any
+    tips: Any  # places
     radius: Any
     slack: float  # round-off of a place [m]
     most: float  # farther than anything [m]
@@ -129,14 +129,18 @@ def nearest(wall, r):
     for face in wall.faces:
         foot = r - face.wall.distance(r) * outward(face.wall, r)
         away = norm(foot - r)
-        better = is_seen(face, foot, wall.slack) & (away < best)
+        better = is_seen(wall.rooms, face.rooms, foot, wall.slack) & (away < best)
         best, place = select(better, away, best), either(better, foot, place)
     for edge in wall.edges:
         foot = crossing(edge.one, edge.other, r, _FAR * wall.radius)
         away = norm(foot - r)
         on_both = max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) <= wall.slack
-        better = on_both & is_seen(edge, foot, wall.slack) & (away < best)
+        better = on_both & is_seen(wall.rooms, edge.rooms, foot, wall.slack) & (away < best)
         best, place = select(better, away, best), either(better, foot, place)
+    for tip in wall.tips:
+        away = norm(tip - r)
+        better = away < best
+        best, place = select(better, away, best), either(better, tip, place)
     return best, place
 
 
@@ -145,29 +149,37 @@ def outward(wall, r):
     return wall.side * wall.gradient(r)
 
 
-def is_seen(part, place, slack):
+def is_seen(rooms, own, place, slack):
     """Whether a place of a face or an edge is in its own rooms, and not inside of others."""
-    return hidden(part, place, ZERO) <= slack
+    return hidden(rooms, own, place, ZERO) <= slack
 
 
 @outlined
-def hidden(part, place, n):
+def hidden(rooms, own, place, n):
     """How far a place of a face or an edge is from where it would be seen, at least; 0 or less where it is seen.
 
     A flat face has the normal n: what is behind a wall along it stays so.
+
+    Args:
+        rooms: the walls of each room of the union.
+        own: the numbers of the rooms whose walls these are.
+        place: the place.
+        n: a unit normal, or 0.
     """
-    depth = part.own[0].distance(place)
-    for wall in part.own[1:]:
-        depth = max(depth, wall.distance(place))
-    for room in part.others:
-        gap = -math.inf
+    depth = -math.inf
+    for k, room in enumerate(rooms):
+        inside, outside = -math.inf, -math.inf
         for wall in room:
             away = wall.distance(place)
-            if isinstance(wall, FLAT) and away < 0.0:
+            inside = max(inside, away)
+            if isinstance(wall, FLAT):
                 turn = dot(n, outward(wall, place))
-                away = select(turn * turn > _ALIGNED, -math.inf, away)
-            gap = max(gap, away)
-        depth = max(depth, -gap)
+                away = select((away < 0.0) & (turn * turn > _ALIGNED), -math.inf, away)
+            outside = max(outside, away)
+        is_own = own[0] == k
+        for number in own[1:]:
+            is_own = is_own | (number == k)
+        depth = max(depth, select(is_own, inside, -outside))
     return depth
 
 
@@ -211,6 +223,8 @@ def _look(wall, r, v, pull, t, is_first):
         step = min(step, _to_face(wall, face, p, w, pull))
     for edge in wall.edges:
         step = min(step, _to_edge(wall, edge, p, w, pull))
+    for tip in wall.tips:
+        step = min(step, march.safe_step(_rim_of(wall, tip, p), p, w, pull, 0.0)[2])
     arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= room
     return march.SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
 
@@ -221,7 +235,7 @@ def _to_face(wall, face, p, w, pull):
     away = face.wall.distance(p)
     n = outward(face.wall, p)
     foot = p - away * n
-    depth = hidden(face, foot, n if isinstance(face.wall, FLAT) else ZERO)
+    depth = hidden(wall.rooms, face.rooms, foot, n if isinstance(face.wall, FLAT) else ZERO)
     step = 0.0
     if depth <= wall.slack or away <= -wall.radius:
         grown = face.wall.grown(wall.radius)
@@ -242,10 +256,15 @@ def _to_edge(wall, edge, p, w, pull):
     foot = crossing(edge.one, edge.other, p, _FAR * wall.radius)
     if max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) > wall.slack:
         return _unseen(wall, least, _UNFOUND * wall.radius, w, pull)
-    away, depth = norm(foot - p), hidden(edge, foot, ZERO)
+    away, depth = norm(foot - p), hidden(wall.rooms, edge.rooms, foot, ZERO)
     if depth > wall.slack:
         return _unseen(wall, away, max(_way_of_foot(edge.bend, 0.0, away, depth), _LEAST * depth), w, pull)
     return march.safe_step(Rim(edge.bend, foot, away, wall.radius), p, w, pull, 0.0)[2]
+
+
+def _rim_of(wall, tip, p):
+    """A tip as a ball at a place sees it: as it sees a straight edge, whose foot stays where it is."""
+    return Rim(math.inf, tip, norm(tip - p), wall.radius)
 
 
 def _round_at(face, foot, n):
@@ -293,7 +312,7 @@ class Hidden(rising.Ahead):
 
 @outlined
 def _moving_step(wall, seen, longest):
-    """The `LevelStep` of all faces and edges."""
+    """The `LevelStep` of all faces, edges and tips."""
     away, place = nearest(wall, seen.r)
     half = 0.5 * dot((place - seen.r) * (1.0 / select(away > 0.0, away, 1.0)), seen.v)
     step = longest
@@ -301,6 +320,8 @@ def _moving_step(wall, seen, longest):
         step = min(step, _moving_to_face(wall, face, seen, longest))
     for edge in wall.edges:
         step = min(step, _moving_to_edge(wall, edge, seen, longest))
+    for tip in wall.tips:
+        step = min(step, rising.bent_step(_rim_of(wall, tip, seen.r), seen, longest).time)
     return rising.LevelStep(wall.radius - away, half, step)
 
 
@@ -309,7 +330,7 @@ def _moving_to_face(wall, face, seen, longest):
     """As `_to_face`."""
     away, n = face.wall.distance(seen.r), outward(face.wall, seen.r)
     foot = seen.r - away * n
-    depth, step = hidden(face, foot, n if isinstance(face.wall, FLAT) else ZERO), 0.0
+    depth, step = hidden(wall.rooms, face.rooms, foot, n if isinstance(face.wall, FLAT) else ZERO), 0.0
     if depth <= wall.slack or away <= -wall.radius:
         step = face.wall.grown(wall.radius).moving_step(seen, longest).time
     if depth <= wall.slack:
@@ -325,7 +346,7 @@ def _moving_to_edge(wall, edge, seen, longest):
     foot = crossing(edge.one, edge.other, seen.r, _FAR * wall.radius)
     if max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) > wall.slack:
         return _unseen_in_motion(wall, least, _UNFOUND * wall.radius, seen, longest)
-    away, depth = norm(foot - seen.r), hidden(edge, foot, ZERO)
+    away, depth = norm(foot - seen.r), hidden(wall.rooms, edge.rooms, foot, ZERO)
     if depth > wall.slack:
         way = max(_way_of_foot(edge.bend, 0.0, away, depth), _LEAST * depth)
         return _unseen_in_motion(wall, away, way, seen, longest)
