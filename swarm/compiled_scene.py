@@ -120,6 +120,8 @@ class CompiledScene:
 
     def __init__(self, scene: "Scene", largest: float | None = None, apart: str | None = None) -> None:
         self.scene, self.largest, self._apart = scene, largest, apart
+        # The walls where nothing moves, by which of the pieces are there.
+        self._known: dict[tuple[bool, ...], Walls] = {}
         in_steps = largest is None and is_in_steps(apart)
         reach = scene.reach_of_steps() if in_steps else largest
         self.pieces = scene.pieces if reach is None else scene.pieces_of_balls(reach)
@@ -153,7 +155,7 @@ class CompiledScene:
 
     @cached_property
     def _spans(self) -> list[tuple[int, int]]:
-        return self.order.spans(self.pieces.each)
+        return self.order.rows(self.pieces.each, together=True)
 
     @cached_property
     def laws(self) -> Laws | None:
@@ -178,13 +180,12 @@ class CompiledScene:
         runs = [run for i, walls in self._spans for run in self.pieces.each[i].runs(walls)]
         return [surface for surface, walls in runs for _wall in range(walls)]
 
-    def openings(self, moment: float = 0.0) -> tuple[Opened, ...] | None:
-        """The openings of every wall in the frame that ends at a moment [s], or None."""
-        return self.openings_of(self._spans, moment)
+    def openings(self, moment: float = 0.0, some: list[tuple[int, int]] | None = None) -> tuple[Opened, ...] | None:
+        """The openings of the walls in the frame that ends at a moment [s], or None.
 
-    def openings_of(self, spans: list[tuple[int, int]], moment: float) -> tuple[Opened, ...] | None:
-        """The openings of some walls in a row, given as (piece, walls), or None."""
-        volumes, doorways = self.pieces.volumes, self.pieces.doorways
+        Of all walls, or of some in a row that are given as (piece, walls).
+        """
+        spans, volumes, doorways = self._spans if some is None else some, self.pieces.volumes, self.pieces.doorways
         if self.largest is None:
             return openings_in(spans, (volumes, doorways), moment) or None
         # Balls meet no rooms that a door could be between: it opens nothing, and files have the times of escapes.
@@ -231,11 +232,6 @@ class CompiledScene:
         return [self.pieces.owners[rooms[0][0]] for rooms in self.order.unions]
 
     # --- Walls ---------------------------------------------------------------------------------------
-
-    @cached_property
-    def _known(self) -> dict[tuple[bool, ...], Walls]:
-        """The walls where nothing moves, by which of the pieces are there."""
-        return {}
 
     @cached_property
     def _groups(self) -> list[Members]:

@@ -57,8 +57,11 @@ class Particles:
         radius: ArrayLike | None = None,
         spin: ArrayLike | None = None,
     ) -> None:
-        checked = _checked(position, velocity, mass)
-        self.position, self.velocity, self.mass = (np.array(array, order="C") for array in checked)
+        rows, speeds = _rows("position", position), _rows("velocity", velocity)
+        if speeds.shape != rows.shape:
+            raise SceneError(f"velocity must have the shape of position, (3, {rows.shape[1]}), got {speeds.shape}")
+        self.position, self.velocity = (np.array(array, order="C") for array in (rows, speeds))
+        self.mass = np.array(_each("mass", mass, len(self), "kg"), order="C")
         self.image = None if image is None else _images(image, len(self))
         self.radius = None if radius is None else np.array(_each("radius", radius, len(self), "m"), order="C")
         self.spin = None if spin is None else np.array(_spins(spin, radius, len(self)), order="C")
@@ -174,21 +177,12 @@ class Births(NamedTuple):
         return int(np.searchsorted(self.time, moment, side="right"))
 
 
-def _checked(position: ArrayLike, velocity: ArrayLike, mass: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """The three arrays as floats, in shapes that go together."""
-    rows, speeds = _rows("position", position), _rows("velocity", velocity)
-    n = rows.shape[1]
-    if speeds.shape[1] != n:
-        raise SceneError(f"velocity must have the shape of position, (3, {n}), got {speeds.shape}")
-    return rows, speeds, _each("mass", mass, n, "kg")
-
-
 def _each(name: str, value: ArrayLike, n: int, unit: str) -> Floats:
     """A number above 0 for each of n particles."""
     given = checks.array(name, value)
     if given.ndim > 1 or (given.ndim == 1 and given.size != n):
         raise SceneError(f"{name} must be one number or have shape ({n},), got shape {given.shape}")
-    given = np.broadcast_to(given, (n,))
+    given = np.full(n, given)
     # NaN compares as false.
     if not (given.min() >= checks.SMALLEST and given.max() <= checks.LARGEST):
         first = int(np.argmin((given >= checks.SMALLEST) & (given <= checks.LARGEST)))

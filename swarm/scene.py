@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import motion as motions
 from .common import checks, notebook
+from .common.once import once
 from .compiled_scene import CompiledScene, is_in_steps
 from .errors import SceneError
 from .kernel.gravity import Gravity
@@ -162,18 +163,15 @@ class Scene:
 
     def across(self) -> int | None:
         """The axis across the plane of a scene of two dimensions, or None."""
-        return planes.across_of(self.plane)
+        return planes.PLANES.get(self.plane)
 
     def axes(self) -> list[int]:
         """The axes along which particles may move."""
         return [k for k in range(3) if k != self.across()]
 
+    @once
     def finite_size(self) -> float:
         """`size`, or the extent of the surfaces where the volume is open, or too thin to be a length of the motion."""
-        return self._finite_size
-
-    @cached_property
-    def _finite_size(self) -> float:
         size, extent = self.size(), self.extent()
         return size if _THIN * extent < size < math.inf else extent
 
@@ -207,7 +205,7 @@ class Scene:
         if radius is not None:
             return np.asarray((self.distances_outside(points, 0.0, radius) <= 0.0).all(axis=0))
         rows = points if self.period is None else into_cell(self.period, points)[0]
-        admitted = np.ones(rows.shape[1], np.bool_)
+        admitted = np.full(rows.shape[1], True)
         for image in (image for images in self.pieces.images for image in images if image.is_there(0.0)):
             admitted[admitted] = image.admits(rows[:, admitted])
         return admitted
@@ -238,12 +236,9 @@ class Scene:
         found = [np.max(values(several, rows), axis=0) if one.is_there(time) else away for one, several in each]
         return np.array(found).reshape(len(found), *away.shape)
 
+    @once
     def reach_of_steps(self) -> float | None:
         """How far outside of the cell a step of points may end [m]; None where it meets no images there."""
-        return self._reach_of_steps
-
-    @cached_property
-    def _reach_of_steps(self) -> float | None:
         period = self.period or (None, None, None)
         repeats = [k for k, length in enumerate(period) if length is not None]
         for one in self.surfaces if repeats else ():
@@ -296,12 +291,9 @@ class Scene:
                 found.append(begin + suspects[~near])
         return np.concatenate(found) if found else np.empty(0, np.intp)
 
+    @once
     def is_open(self) -> bool:
         """Whether a particle may fly to infinity, at the start or after a wall disappears."""
-        return self._is_open
-
-    @cached_property
-    def _is_open(self) -> bool:
         at_start = np.isfinite(self.bounds()).all()
         return not (at_start and (not self.has_doors() or np.isfinite(self._bounds_of_lasting(self.surfaces)).all()))
 
@@ -430,20 +422,14 @@ class Scene:
         """Gravity as kernels take it."""
         return None if self.gravity is None else Gravity(*self.gravity)
 
+    @once
     def moves(self) -> bool:
         """Whether a surface moves, or may be moved."""
-        return self._moves
+        return self.reacts() or any(piece.motion is not None for piece in self.pieces.each)
 
+    @once
     def reacts(self) -> bool:
         """Whether impacts move a surface."""
-        return self._reacts
-
-    @cached_property
-    def _moves(self) -> bool:
-        return self._reacts or any(piece.motion is not None for piece in self.pieces.each)
-
-    @cached_property
-    def _reacts(self) -> bool:
         return any(surface.reacts() for surface in self.surfaces)
 
     # --- Made of it ----------------------------------------------------------------------------------

@@ -64,8 +64,7 @@ class ReactingRun(BaseRun):
         births = particles.births
         if births is not None or any(laws.may_end for laws in self._scenery.each_laws()):
             self.state = self.state._replace(starts=np.zeros(n) if births is None else births.time.copy())
-        self._present = Presence(births, n, CHUNK)
-        self._present.start(self.state)
+        self._present = Presence(births, self.state, CHUNK)
         tier = Tier(compile, (self._scenery, gravity), n)
         super().__init__(compiled, method, n, threads, tier, seeding, watched)
         counters = counters_of(self._scene, watched.counters, logs=True)

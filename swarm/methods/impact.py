@@ -17,7 +17,6 @@ from ..kernel.jit import select
 from ..kernel.vector import square
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces.surface import Surface
 from ..surfaces.time_of_impact import flights
 from . import base, contract
 
@@ -115,7 +114,7 @@ class Impact(base.Method):
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         chord = CHORD_NEEDS if self.contact_step > 0.0 else ()
-        return *flights.of_flights(scene.gravity is not None), *sliding.NEEDS, *touching.NEEDS, *chord
+        return "first_hit" if scene.gravity is None else "falling_hit", *sliding.NEEDS, *touching.NEEDS, *chord
 
     def numbers(self, scene: Scene) -> "Reflection":
         size = scene.finite_size()
@@ -146,13 +145,10 @@ class Impact(base.Method):
 
 def _bend(scene: Scene) -> float:
     """The least length on which walls bend, or the size of one that moves [m]; infinite where all are flat and rest."""
-    sizes = [surface.size() for surface in scene.surfaces if not _is_straight(surface)]
+    bent = [one for one in scene.surfaces if one.motion is not None or not all(wall.flat for wall in one.walls())]
+    sizes = [surface.size() for surface in bent]
     least = min(sizes, default=math.inf)
     return least if math.isfinite(least) or not sizes else scene.finite_size()
-
-
-def _is_straight(surface: Surface) -> bool:
-    return surface.motion is None and all(wall.flat for wall in surface.walls())
 
 
 # --- As kernels know it ----------------------------------------------------------------------------------

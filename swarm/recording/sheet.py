@@ -11,7 +11,7 @@ from ..errors import RunError, SceneError
 from ..files import marks
 from ..files.replaced import named_when_whole
 from ..pictures import drawing, graphs, sentences, series, style
-from ..surfaces.plane import across_of
+from ..surfaces.plane import PLANES
 from ..words.amounts import many
 from . import viewer
 from .playback import Playback
@@ -110,7 +110,7 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
 def _frames(top: Any, playback: Playback, frames: list[int], found: list[Any] | None) -> None:
     """The frames: pictures of them that were found, or drawn here."""
     about = playback.about
-    across, cells, packed = across_of(about.get("plane") or None), [], []
+    across, cells, packed = PLANES.get(about.get("plane")), [], []
     for place, k in enumerate(frames):
         at = -(-len(frames) // _COLUMNS), min(_COLUMNS, len(frames)), place + 1
         cells.append(top.add_subplot(*at))

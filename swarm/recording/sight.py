@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from ..pictures.eye import Eye, eye_for
 from ..state import Floats
-from ..surfaces.plane import across_of, along
+from ..surfaces.plane import PLANES, along
 from ..triangles.shape import Shape
 
 # The viewer's angle of view from bottom to top, and the width of the narrowest panel as a part of its height.
@@ -35,7 +35,7 @@ def eye_controls(plane: str | None, shapes: list[Shape], points: Floats, center:
 
 
 def _eye(plane: str | None, low: Floats, high: Floats) -> Eye:
-    across = across_of(plane)
+    across = PLANES.get(plane)
     if across is None:
         return eye_for(low, high)
     right, up = (np.eye(3)[axis] for axis in along(across))

@@ -75,8 +75,7 @@ class Run(BaseRun):
         self._faces = scene.open_faces()
         # Whole chunks, so that a thread observes what it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
-        self._present = Presence(particles.births, n, self._size)
-        self._present.start(self.state)
+        self._present = Presence(particles.births, self.state, self._size)
         self._ticket = np.zeros(1, np.int64)
         self._phase = np.zeros(n, np.int8)
         self._seed = seeding.signed()

@@ -150,7 +150,11 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
     ):  # fmt: skip
         session.prepare(task, watched.log)
         measures = _measures_of(task, session)
-        _require_room(task, session, measures.size() + (watched.tally.size() if watched.tally else 0))
+        options, storage = task.options, task.options.storage
+        options.times.require_room(
+            session.first, options.trajectory, storage.bytes_of(len(task.particles)), len(task.scene.surfaces),
+            storage.compression != "none", measures.size() + (watched.tally.size() if watched.tally else 0),
+        )  # fmt: skip
         runs.append(run := run_of(task, watched))
         compilations.calls = run.calls
         session.restore(run)
@@ -225,13 +229,6 @@ def warn_open() -> None:
 def _meanwhile(session: Session, writer: "Background | None", show: Display) -> tuple[float, float]:
     """For `Run.advance`: the time to write a frame [s], and when to return at the latest."""
     return writer.seconds if writer else 0.0, min(session.latest(writer), time.monotonic() + min(show.every, LOOK))
-
-
-def _require_room(task: Task, session: Session, more: int) -> None:
-    """Raise a SceneError if the frames do not fit on the disk or in memory."""
-    options, storage = task.options, task.options.storage
-    numbers, packed = storage.bytes_of(len(task.particles)), storage.compression != "none"
-    options.times.require_room(session.first, options.trajectory, numbers, len(task.scene.surfaces), packed, more)
 
 
 def read_back(trajectory: Path) -> dict[str, NDArray[Any]]:

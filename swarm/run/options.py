@@ -2,7 +2,7 @@
 
 import os
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -125,12 +125,12 @@ class RunOptions(Validated):
                 f"impact_particles must go with a log of impacts, got {self.impact_particles!r:.100}; give impacts="
             )
 
-    @property
+    @cached_property
     def times(self) -> FrameTimes:
         """The times of the frames."""
         return FrameTimes(self.until, self.every)
 
-    @property
+    @cached_property
     def storage(self) -> Storage:
         """The parts that the trajectory keeps."""
         return Storage(self.frames, self.precision, self.compression)

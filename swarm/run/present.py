@@ -16,7 +16,7 @@ class Presence:
 
     Args:
         births: when particles are born, or None if all are in the scene from the start.
-        n: the number of particles in the end.
+        state: the start, which says what energy each particle from a source brings in.
         size: particles of a draw.
 
     Attributes:
@@ -24,15 +24,11 @@ class Presence:
         order: the numbers of their draws.
     """
 
-    def __init__(self, births: Births | None, n: int, size: int) -> None:
-        self._births, self._size = births, size
-        self.count, self.order = n, np.arange(math.ceil(n / size))
-        self._energy = np.empty(0)
-
-    def start(self, state: State) -> None:
-        """Keep the energy that each particle from a source brings in, from the state at the start."""
-        if self._births is not None:
-            self._energy = np.where(self._births.source >= 0, state.mass * state.energy, 0.0)
+    def __init__(self, births: Births | None, state: State, size: int) -> None:
+        self._births, self._size, self.count = births, size, state.mass.size
+        self.order = np.arange(math.ceil(self.count / size))
+        if births is not None:
+            self._energy = np.where(births.source >= 0, state.mass * state.energy, 0.0)
 
     def reach(self, moment: float) -> None:
         """Those of the frame that ends at a moment [s]."""

@@ -42,7 +42,6 @@ class Session:
         self._saves, self._resumes = options.checkpoint is not None, options.resume
         self._every = math.inf if options.checkpoint is None else options.checkpoint
         self._end = math.inf if options.walltime is None else counted_from + options.walltime
-        self._end = math.inf if options.walltime is None else counted_from + options.walltime
         self._took = 0.0  # seconds of the last checkpoint
         # One half way to the limit says how long they take.
         self._due = self._began + min(self._every, 0.5 * (self._end - self._began) if self._saves else math.inf)

@@ -39,6 +39,10 @@ def state_of(
     """
     n, laws, rows = len(particles), compiled.laws, len(compiled.numbering.surfaces_of_rows)
     period, openings, ends = compiled.cell(), compiled.openings(), laws is not None and laws.may_end
+    # When each particle flies first, None where all do at once and none may wait on a wall later.
+    starts = np.full(n, -math.inf) if ends else None
+    if particles.births is not None:
+        starts = particles.births.time.copy()
     # What soft contacts have stored is lost with a wall that goes, or opens.
     loses = laws is not None or (method.law() is not None and (openings is not None or compiled.scene.has_doors()))
     return State(
@@ -58,19 +62,12 @@ def state_of(
         period,
         None if openings is None else np.full(n, math.nan),
         openings,
-        _starts(particles, ends),
+        starts,
         np.full(n, math.nan) if ends else None,
         np.full(n, -1, np.int32) if ends else None,
         late=np.zeros(n) if (particles.births is not None or ends) and not method.may_slide() else None,
         pressed=np.zeros((rows, n)) if presses else None,
     )
-
-
-def _starts(particles: Particles, wait: bool) -> Floats | None:
-    """When each particle flies first, None where all do at once and none may `wait` on a wall later."""
-    if particles.births is not None:
-        return particles.births.time.copy()
-    return np.full(len(particles), -math.inf) if wait else None
 
 
 def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], lasts: bool, method: Method) -> None:

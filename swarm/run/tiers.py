@@ -8,6 +8,7 @@ process compiles. Of four drums that begin together all take twice as long, 44 s
 and 12 s.)
 """
 
+import functools
 import math
 import threading
 from collections.abc import Iterable
@@ -43,10 +44,11 @@ class Tier:
     """
 
     def __init__(self, choice: str, numbers: Any, particles: int) -> None:
-        patience = 0.0 if particles > _FEW or not _same_bits(numbers) else _PATIENCE
         self._particles = particles
         # Time left for plain Python [s].
-        self.remaining = {"always": 0.0, "never": math.inf}.get(choice, patience)
+        self.remaining = math.inf if choice == "never" else 0.0
+        if choice == "auto" and particles <= _FEW and _same_bits(numbers):
+            self.remaining = _PATIENCE
         self.is_plain = self.remaining > 0.0
         self._missing: list[str] = []
         # What is left after the compiler is imported [s].
@@ -80,10 +82,13 @@ class Tier:
     def kernel(self, kernel: Any) -> Any:
         """The function that this tier calls for a kernel."""
         plain = cache.in_python(kernel)
-        if self.is_plain or plain is kernel:
-            # As in compiled kernels: 1/0 is an infinity, which a select discards.
-            return np.errstate(all="ignore")(plain)
-        return kernel
+        return functools.partial(_in_python, plain) if self.is_plain or plain is kernel else kernel
+
+
+def _in_python(kernel: Any, *arguments: Any) -> Any:
+    """The result of a kernel in plain Python, where 1/0 is an infinity, which a select discards, as when compiled."""
+    with np.errstate(all="ignore"):
+        return kernel(*arguments)
 
 
 def spent(kinds: Iterable[str]) -> float:

@@ -26,7 +26,8 @@ from .wall_law import leave_of, tries_of
 
 Floats = NDArray[np.float64]
 
-PLANES = {"x": 0, "y": 1, "z": 2}
+# The number of the axis across each plane.
+PLANES: dict[str | None, int] = {"x": 0, "y": 1, "z": 2}
 # Points from which places of a wall in the plane are looked for, the steps to them, and what is near to a wall, as a
 # part of the extent of the scene.
 _STARTS, _STEPS, _NEAR = 2048, 40, 1e-9
@@ -34,14 +35,9 @@ _STARTS, _STEPS, _NEAR = 2048, 40, 1e-9
 _ROUND_OFF = 1e-13
 
 
-def across_of(plane: str | None) -> int | None:
-    """The number of the axis across a plane; None without a plane."""
-    return None if plane is None else PLANES[plane]
-
-
 def checked(plane: Any) -> str | None:
     """The argument `plane`."""
-    return None if plane is None else checks.one_of("plane", plane, PLANES)
+    return None if plane is None else checks.one_of("plane", plane, "xyz")
 
 
 def along(across: int) -> tuple[int, int]:
@@ -80,7 +76,7 @@ def _require_pull(plane: str, gravity: Sequence[float]) -> None:
 
 def require_start(scene: Any, particles: Any, mend: str = "") -> None:
     """Raise a `SceneError` where a particle starts out of the plane of a scene, or with what would lead out of it."""
-    across = across_of(scene.plane)
+    across = PLANES.get(scene.plane)
     if across is None:
         return
     for what, rows, unit in (("start", particles.position, "m"), ("velocity", particles.velocity, "m/s")):

@@ -142,12 +142,12 @@ class Walls(Record):
     def shared(self):
         """`numbered` of the walls that are in no union: all particles keep to them."""
         every = self.numbered()
-        return every[: len(every) - self._count_joined()]
+        return every[: len(every) - sum(len(room) for union in self.unions for room in union)]
 
     def joined(self):
         """Of each union its rooms, of each room its walls as (number, wall, 1/the steepness of its level)."""
         every = self.numbered()
-        k = len(every) - self._count_joined()
+        k = len(self.shared())
         found: tuple[Any, ...] = ()
         for union in self.unions:
             rooms: tuple[Any, ...] = ()
@@ -157,9 +157,6 @@ class Walls(Record):
                 k += len(room)
             found = (*found, rooms)
         return found
-
-    def _count_joined(self):
-        return sum(len(room) for union in self.unions for room in union)
 
     def count_in_fields(self):
         """The number of walls of its fields."""

@@ -54,7 +54,7 @@ def _reacting(compiled: CompiledScene, moment: float) -> tuple[Reacting, ...]:
         freedom = _freedom(surface, heavy.index(pieces.owners[p]), scene.gravity or (0.0, 0.0, 0.0))
         laws, mine = _laws_of(piece, scene), np.flatnonzero(numbers == p).tolist()
         absorbs = 1.0 if laws is not None and laws.may_end else None
-        openings = compiled.openings_of([(p, len(mine))], moment)
+        openings = compiled.openings(moment, [(p, len(mine))])
         made += [
             Reacting(wall, freedom, mine[k], int(rows[mine[k]]), piece.restitution, laws, float(k), absorbs, openings)
             for k, wall in enumerate(walls)

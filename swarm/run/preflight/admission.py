@@ -80,8 +80,11 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
     method.span("every", times.every)
     require_start(scene, particles)
     # Particles from sources are born later, inside the walls of that time.
-    if start is not None:
-        _require_place(scene, start, method)
+    if start is not None and balls is not None:
+        engines.wing("events.balls").require_apart(scene, start, method)
+    elif start is not None:
+        require_inside(scene, start, depths_at_start(scene, start, method))
+        _require_normals(scene, start)
     workload.require_few_impacts(compiled, particles, method, times.until, times.every)
     return Task(compiled, particles, method, options)
 
@@ -98,7 +101,7 @@ def _balls(scene: Scene, start: Particles | None, method: Method, options: RunOp
 def _require_laws_applied(compiled: CompiledScene, method: Method) -> None:
     """Raise a `SceneError` where walls have losses or laws that a user-defined method does not apply."""
     laws, name = compiled.laws, type(method).__name__
-    if ALL_METHODS.kind_of(type(method)) is not None or laws is None or not (laws.loses or laws.send_off):
+    if laws is None or not (laws.loses or laws.send_off) or ALL_METHODS.kind_of(type(method)) is not None:
         return
     numbers = method.numbers(compiled.scene)
     if numbers.laws is NONE and numbers.laws_at_ends is None:
@@ -107,15 +110,6 @@ def _require_laws_applied(compiled: CompiledScene, method: Method) -> None:
             "have no `laws`; leave those of the walls out, use Impact, or give the numbers `laws` and apply them in "
             "`contact`, see help(swarm.methods.contract)"
         )
-
-
-def _require_place(scene: Scene, start: Particles, method: Method) -> None:
-    """Raise a `SceneError` where a particle cannot be where it is at the start, or fly from there."""
-    if start.radius is not None:
-        engines.wing("events.balls").require_apart(scene, start, method)
-        return
-    require_inside(scene, start, depths_at_start(scene, start, method))
-    _require_normals(scene, start)
 
 
 def _require_motions(scene: Scene, until: float) -> None:

@@ -3,7 +3,6 @@
 import itertools
 import logging
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from ...compiled_scene import CompiledScene
 from ...kernel.limits import EPSILON
 from ...methods import Impact
 from ...scene import Scene
-from ...surfaces.instant import box_of, gaps_of
+from ...surfaces.instant import box_of, gaps_of, side_of
 from ...surfaces.presence.openings import least_distance
 from ...surfaces.surface import Surface
 from ..options import Task
@@ -43,12 +42,15 @@ def give(task: Task) -> None:
         # About the fastest: of some.
         some = task.particles.velocity[:, _some(len(task.particles))]
         fastest = float(np.sqrt((some**2).sum(axis=0).max()))
-        speed = _speed(task.scene, fastest)
+        # After a fall through the scene.
+        pull = math.hypot(*(task.scene.gravity or (0.0,)))
+        speed = math.hypot(fastest, math.sqrt(2.0 * pull * task.scene.finite_size()))
+        crossing = task.scene.finite_size() / speed if speed > 0.0 else math.inf
         if fastest == 0.0:
             _warn_of_rest(task)
         with np.errstate(all="ignore"):
-            _warn_of_times(task, speed)
-            _warn_of_steps(task, speed)
+            _warn_of_times(task, crossing)
+            _warn_of_steps(task, speed, crossing)
 
 
 def _some(count: int) -> slice:
@@ -91,7 +93,7 @@ def _warn_of_faces(scene: Scene) -> None:
 def _warn_of_counters(task: Task) -> None:
     """Warn where balls leave through an opening before their centres have come to a counter there."""
     scene, counters = task.scene, task.options.counters
-    radii = [_largest_radius(source.radius) for source in task.options.sources]
+    radii = [source.largest() for source in task.options.sources]
     radii += [] if task.particles.radius is None else [float(task.particles.radius.max(initial=0.0))]
     radius = max(radii, default=0.0)
     if radius == 0.0:
@@ -111,11 +113,6 @@ def _warn_of_counters(task: Task) -> None:
                     return
 
 
-def _largest_radius(radius: Any) -> float:
-    """The largest radius of the balls of a source [m]; 0 of points."""
-    return 0.0 if radius is None else float(np.max(radius))
-
-
 def _warn_of_rest(task: Task) -> None:
     """Warn where nothing will move."""
     scene = task.scene
@@ -128,23 +125,13 @@ def _warn_of_rest(task: Task) -> None:
         )  # fmt: skip
 
 
-def _speed(scene: Scene, fastest: float) -> float:
-    """The speed of the fastest particle after a fall through the scene [m/s]."""
-    return math.hypot(fastest, math.sqrt(2.0 * math.hypot(*(scene.gravity or (0.0,))) * scene.finite_size()))
-
-
-def _crossing(scene: Scene, speed: float) -> float:
-    """The time of a crossing of the scene at a speed [s]."""
-    return scene.finite_size() / speed if speed > 0.0 else math.inf
-
-
-def _warn_of_times(task: Task, speed: float) -> None:
+def _warn_of_times(task: Task, crossing: float) -> None:
     """Warn where the last times of a run are so late that float64 does not tell those of impacts apart."""
     scene, until = task.scene, task.options.until
     every = task.options.times.every
     assert every is not None
     kept = float(np.spacing(until))
-    if scene.moves() or kept < _SURELY * _ROUND_OFF * _crossing(scene, speed):
+    if scene.moves() or kept < _SURELY * _ROUND_OFF * crossing:
         return
     between = workload.time_between(task.compiled, task.particles)
     if kept > _ROUND_OFF * between:
@@ -159,7 +146,7 @@ def _warn_of_times(task: Task, speed: float) -> None:
         )  # fmt: skip
 
 
-def _warn_of_steps(task: Task, speed: float) -> None:
+def _warn_of_steps(task: Task, speed: float, crossing: float) -> None:
     """Warn where a step, or a contact with a soft wall, is a large part of the time between impacts."""
     scene, particles, method = task.scene, task.particles, task.method
     name = "contact_step" if isinstance(method, Impact) else "dt"
@@ -167,7 +154,7 @@ def _warn_of_steps(task: Task, speed: float) -> None:
     if not step or scene.moves():
         return
     contact, depth = (0.0, 0.0) if law is None or method.is_rigid() else _contact(task, speed)
-    if max(step / _STEP, contact / _CONTACT) < _SURELY * _crossing(scene, speed):
+    if max(step / _STEP, contact / _CONTACT) < _SURELY * crossing:
         return
     between = workload.time_between(task.compiled, particles)
     period = f"the time between impacts is about T = {between:.2g} s; "
@@ -213,28 +200,19 @@ def _contact(task: Task, speed: float) -> tuple[float, float]:
 
 def warn_of_overlap(scene: Scene) -> None:
     """Warn of the first two cavities, each bounded by itself, of which neither is inside the other."""
-    boxes = [_box_in(scene, one) for one in scene.surfaces]
-    bounded = [(i, one) for i, one in enumerate(scene.surfaces) if _is_cavity(one) and np.isfinite(boxes[i]).all()]
+    boxes = np.array([box_of(one, 0.0) for one in scene.surfaces]).reshape(-1, 2, 3)
+    if (across := scene.across()) is not None:
+        boxes[:, :, across] = 0.0
+    cavities = [(i, one) for i, one in enumerate(scene.surfaces) if not one.is_solid() and side_of(one) > 0.0]
+    bounded = [(i, one) for i, one in cavities if np.isfinite(boxes[i]).all()]
     for (i, one), (j, other) in itertools.combinations(bounded, 2):
-        if _are_there_together(one, other) and _cut_one_another(one, other, np.array([boxes[i], boxes[j]])):
+        if _are_there_together(one, other) and _cut_one_another(one, other, boxes[[i, j]]):
             _LOG.warning(
                 "surfaces[%d] (%s) and surfaces[%d] (%s) overlap only in part: particles are kept in what they have in "
                 'common; a vessel of both is one surface, swarm.Union([...]), in a scene file kind = "union"',
                 i, type(one).__name__, j, type(other).__name__,
             )  # fmt: skip
             return
-
-
-def _is_cavity(surface: Surface) -> bool:
-    return not surface.is_solid() and getattr(surface, "side", "inside") == "inside"
-
-
-def _box_in(scene: Scene, surface: Surface) -> NDArray[np.float64]:
-    """The bounds of a surface at 0 s, and of its part in the plane of a scene of two dimensions."""
-    box = np.array(box_of(surface, 0.0))
-    if (across := scene.across()) is not None:
-        box[:, across] = 0.0
-    return box
 
 
 def _are_there_together(one: Surface, other: Surface) -> bool:

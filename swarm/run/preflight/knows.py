@@ -17,7 +17,6 @@ from ...scene import Scene
 from ...surfaces.in_motion.drive import drive_of
 from ...surfaces.periodic.images import MASS_AND_PERIOD, WITHOUT_PERIOD
 from ...surfaces.pieces import differing_in
-from ...surfaces.surface import Surface
 from ...surfaces.wall_law import lets_wait
 from ..options import RunOptions
 
@@ -78,16 +77,11 @@ def _by_method(method: Method, engines: tuple[str, str, str], other: str) -> str
 Found = Iterator[dict[str, Any]]
 
 
-def _walls(asked: Asked) -> Iterator[tuple[int, Surface]]:
-    """The simple surfaces of a scene, each with the number of the surface that it is a part of."""
-    return asked.scene.pieces.owned()
-
-
 def _of_walls(name: str, without: Any) -> Callable[[Asked], Found]:
     """Walls with an attribute of another value than that of a wall without it."""
 
     def found(asked: Asked) -> Found:
-        for i, wall in _walls(asked):
+        for i, wall in asked.scene.pieces.owned():
             if (got := getattr(wall, name)) != without:
                 shown = f"{got:g}" if isinstance(got, float) else got
                 yield {"i": i, "got": shown, "count": len(got) if isinstance(got, tuple) else 1}
@@ -131,7 +125,7 @@ def _masses(asked: Asked) -> Found:
 
 
 def _rotations(asked: Asked) -> Found:
-    for i, wall in _walls(asked):
+    for i, wall in asked.scene.pieces.owned():
         if wall.motion is not None and drive_of(wall, 0.0).turn is not None:
             yield {"i": i, "got": wall.motion}
 
@@ -141,17 +135,18 @@ def _rotations_of_mean_values(asked: Asked) -> Found:
 
 
 def _waits(asked: Asked) -> Found:
-    for i, wall in _walls(asked):
+    for i, wall in asked.scene.pieces.owned():
         for k, law in enumerate(wall.laws):
             if not isinstance(law, str) and lets_wait(law):
                 yield {"i": i, "k": k, "got": law}
 
 
 def _waits_beside_motions(asked: Asked) -> Found:
-    if any(piece.motion is not None and not asked.scene.surfaces[i].reacts() for i, piece in _walls(asked)):
+    scene = asked.scene
+    if any(piece.motion is not None and not scene.surfaces[i].reacts() for i, piece in scene.pieces.owned()):
         yield from _waits(asked)
     else:
-        yield from (one for one in _waits(asked) if asked.scene.surfaces[one["i"]].reacts())
+        yield from (one for one in _waits(asked) if scene.surfaces[one["i"]].reacts())
 
 
 def _doors(asked: Asked) -> Found:
@@ -160,7 +155,7 @@ def _doors(asked: Asked) -> Found:
 
 
 def _losses_that_fall(asked: Asked) -> Found:
-    for i, wall in _walls(asked):
+    for i, wall in asked.scene.pieces.owned():
         if wall.restitution < 1.0 and asked.scene.gravity is not None:
             yield {"i": i, "got": f"{wall.restitution:g}"}
 
@@ -223,7 +218,7 @@ def _in_fixed_steps_beside_motions(asked: Asked) -> Found:
 
 
 def _sheets(asked: Asked) -> Found:
-    yield from ({"i": i, "got": one} for i, one in _walls(asked) if one.face_noun and getattr(one, "open", False))
+    yield from (one for one in _faces(asked) if getattr(one["got"], "open", False))
 
 
 def _members_of_fields(asked: Asked) -> Found:
@@ -231,7 +226,7 @@ def _members_of_fields(asked: Asked) -> Found:
 
 
 def _faces(asked: Asked) -> Found:
-    yield from ({"i": i, "got": one} for i, one in _walls(asked) if one.face_noun)
+    yield from ({"i": i, "got": one} for i, one in asked.scene.pieces.owned() if one.face_noun)
 
 
 def _groups(asked: Asked) -> Found:

@@ -72,16 +72,15 @@ class Order(NamedTuple):
         """The surfaces of which each wall is one of the scene, in the order of these."""
         return *self.others, *self.joined()
 
-    def rows(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
-        """Of each row of the scene its surface, and the number of its walls: the members of a field, else one."""
-        return self._listed(surfaces, [(i, 1) for group in self.groups for i in group])
+    def rows(self, surfaces: Sequence[Surface], together: bool = False) -> list[tuple[int, int]]:
+        """Of each row of the scene its surface, and the number of its walls: the members of a field, else one.
 
-    def spans(self, surfaces: Sequence[Surface]) -> list[tuple[int, int]]:
-        """Walls in a row that have the same laws: their surface, the first one of a group, and their number."""
-        return self._listed(surfaces, [(group[0], len(group)) for group in self.groups])
-
-    def _listed(self, surfaces: Sequence[Surface], groups: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        With groups `together` it is walls in a row that have the same laws: a group counts as its first surface.
+        """
         fields = [(i, surfaces[i].wall_count(self.of_balls)) for i in self.fields]
+        groups = [(group[0], len(group)) for group in self.groups]
+        if not together:
+            groups = [(i, 1) for group in self.groups for i in group]
         return [*fields, *groups, *((i, 1) for i in self.alone() for _wall in surfaces[i].walls())]
 
 
