@@ -114,7 +114,7 @@ class Impact(base.Method):
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
         chord = CHORD_NEEDS if self.contact_step > 0.0 else ()
-        return "first_hit" if scene.gravity is None else "falling_hit", *sliding.NEEDS, *touching.NEEDS, *chord
+        return *flights.of_flights(scene.gravity is not None), *sliding.NEEDS, *touching.NEEDS, *chord
 
     def numbers(self, scene: Scene) -> "Reflection":
         size = scene.finite_size()

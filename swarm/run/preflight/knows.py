@@ -116,6 +116,13 @@ def _argument(name: str, *without: Any) -> Callable[[Asked], Found]:
     return found
 
 
+def _where(
+    holds: Callable[[Asked], Any], found: Callable[[Asked], Found] = lambda asked: iter([{}])
+) -> Callable[[Asked], Found]:
+    """What is found of a run for which a condition holds."""
+    return lambda asked: found(asked) if holds(asked) else iter(())
+
+
 def _masses(asked: Asked) -> Found:
     for i, one in enumerate(asked.scene.surfaces):
         if one.reacts():
@@ -128,10 +135,6 @@ def _rotations(asked: Asked) -> Found:
     for i, wall in asked.scene.pieces.owned():
         if wall.motion is not None and drive_of(wall, 0.0).turn is not None:
             yield {"i": i, "got": wall.motion}
-
-
-def _rotations_of_mean_values(asked: Asked) -> Found:
-    yield from _rotations(asked) if getattr(asked.method, "gradient", "") == "mean-value" else ()
 
 
 def _waits(asked: Asked) -> Found:
@@ -147,11 +150,6 @@ def _waits_beside_motions(asked: Asked) -> Found:
         yield from _waits(asked)
     else:
         yield from (one for one in _waits(asked) if scene.surfaces[one["i"]].reacts())
-
-
-def _doors(asked: Asked) -> Found:
-    if asked.scene.has_doors():
-        yield {}
 
 
 def _losses_that_fall(asked: Asked) -> Found:
@@ -199,14 +197,6 @@ def _unions_beside_own(asked: Asked) -> Found:
         yield from _unions(asked)
 
 
-def _repeated_rooms(asked: Asked) -> Found:
-    yield from _rooms(asked) if asked.scene.period is not None else ()
-
-
-def _rooms_of_a_plane(asked: Asked) -> Found:
-    yield from _rooms(asked) if asked.scene.plane is not None else ()
-
-
 def _fields(asked: Asked) -> Found:
     yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().fields())
 
@@ -219,10 +209,6 @@ def _in_fixed_steps_beside_motions(asked: Asked) -> Found:
 
 def _sheets(asked: Asked) -> Found:
     yield from (one for one in _faces(asked) if getattr(one["got"], "open", False))
-
-
-def _members_of_fields(asked: Asked) -> Found:
-    yield from _fields(asked) if asked.options.member_impacts else ()
 
 
 def _faces(asked: Asked) -> Found:
@@ -251,11 +237,6 @@ def _period(asked: Asked) -> Found:
         yield {"got": asked.scene.period}
 
 
-def _no_walls(asked: Asked) -> Found:
-    if not asked.scene.surfaces:
-        yield {}
-
-
 def _duration(asked: Asked) -> Found:
     pairs = asked.scene.pairs
     if pairs is not None and pairs.contact_duration is not None:
@@ -266,20 +247,6 @@ def _rolls(asked: Asked) -> Found:
     pairs = asked.scene.pairs
     if pairs is not None and pairs.rolling > 0.0:
         yield {"got": f"{pairs.rolling:g}"}
-
-
-def _spins(asked: Asked) -> Found:
-    if isinstance(asked.particles, Particles) and asked.particles.spin is not None:
-        yield {}
-
-
-def _any(_asked: Asked) -> Found:
-    yield {}
-
-
-def _no_step(asked: Asked) -> Found:
-    if getattr(asked.method, "dt", None) is None:
-        yield {}
 
 
 def _cuts_at_impacts(asked: Asked) -> str | None:
@@ -315,28 +282,18 @@ def _lossy_cavities(asked: Asked) -> Found:
     yield from (one for one in _cavities(asked) if one["got"].restitution != 1.0 or one["got"].friction != 0.0)
 
 
-def _members_beside_cavities(asked: Asked) -> Found:
-    if asked.options.member_impacts and any(_cavities(asked)):
-        yield {}
-
-
 def _part_of_particles(asked: Asked) -> Found:
     if asked.options.frames not in ("all", "none"):
         yield {"got": asked.options.frames}
 
 
 def _on_cluster(found: Callable[[Asked], Found]) -> Callable[[Asked], Found]:
-    return lambda asked: found(asked) if asked.options.cluster is not None else iter(())
+    return _where(lambda asked: asked.options.cluster is not None, found)
 
 
 def _several_shards(asked: Asked) -> Found:
     if (got := asked.options.shards) is not None and got > 1:
         yield {"got": got}
-
-
-def _no_trajectory(asked: Asked) -> Found:
-    if asked.options.trajectory is None:
-        yield {}
 
 
 def _recorded(asked: Asked) -> Found:
@@ -366,7 +323,6 @@ class Refusal(NamedTuple):
 
 
 _TO_MOTION = "give that wall a motion instead of a mass"
-_TO_POINTS = "use particles without a radius"
 _TO_EXACT = "use Impact() with contact_step = 0"
 _TO_ROOMS = "use Impact, or AugmentedLagrangian with adaptive=True"
 _NO_STEP = "leave contact_step out"
@@ -438,13 +394,15 @@ class Capability(NamedTuple):
 
 # In the order in which they are looked for.
 CAPABILITIES = (
-    Capability("method", _any, {
+    Capability("method", _where(lambda asked: True), {
         (OTHER_BODIES,): _NO_METHOD,
         (OTHER_BALLS,): Refusal(
             "radius of the particles must be None with {method}, got radii", "use Impact or Penalty"
         ),
     }, True),
-    Capability("no step", _no_step, {(BODIES,): _NO_METHOD}, True),
+    Capability("no step", _where(lambda asked: getattr(asked.method, "dt", None) is None), {
+        (BODIES,): _NO_METHOD,
+    }, True),
     Capability("source", _option("sources"), {
         (SOFT_BODIES, PAPER_BODIES): Refusal(
             "sources must be left out with bodies and {method}, got {count}: a body is born at any time, not at the "
@@ -499,11 +457,11 @@ CAPABILITIES = (
             "{got!r:.200}", "use a body without them",
         ),
     }, within="union"),
-    Capability("union in a cell that repeats", _repeated_rooms, {
+    Capability("union in a cell that repeats", _where(lambda asked: asked.scene.period, _rooms), {
         (GRAINS,): _of_one_room(f"{_WITH_PENALTY} and a period", "leave the period out, or use one room"),
         (BALLS,): _of_one_room(f"{_WITH_IMPACT} and a period", "leave the period out, or use one room"),
     }, within="union"),
-    Capability("union in a plane", _rooms_of_a_plane, {
+    Capability("union in a plane", _where(lambda asked: asked.scene.plane, _rooms), {
         (GRAINS,): _of_one_room(f"{_WITH_PENALTY} and a plane", "leave the plane out, or use one room"),
     }, within="union"),
     Capability("field", _fields, {
@@ -568,7 +526,7 @@ CAPABILITIES = (
         ),
         (MASSIVE, HEAVY): Refusal(f"surfaces[{{i}}].{MASS_AND_PERIOD}", WITHOUT_PERIOD),
     }),
-    Capability("no wall", _no_walls, {
+    Capability("no wall", _where(lambda asked: not asked.scene.surfaces), {
         _ALONE: Refusal(
             "surfaces must hold at least one surface for particles without a radius, got none: such particles do not "
             "meet one another", "give walls, or give the particles a radius",
@@ -590,7 +548,7 @@ CAPABILITIES = (
             "overlap", "leave it out, or use Impact",
         ),
     }, within="law of pairs"),
-    Capability("spin", _spins, {
+    Capability("spin", _where(lambda asked: getattr(asked.particles, "spin", None) is not None), {
         _ALONE: Refusal(
             "spin must be None without a radius, got spins: a point does not turn",
             "give the particles a radius",
@@ -687,7 +645,7 @@ CAPABILITIES = (
         (SOFT_BODIES, PAPER_BODIES): _with_method("openings", "left out", "count"),
         (BASELINE,): _with_method("openings", "left out", "count"),
     }),
-    Capability("opening for a time", _doors, {
+    Capability("opening for a time", _where(lambda asked: asked.scene.has_doors()), {
         (CHORDS,): _CHANGES,
     }, within="opening"),
     Capability("present", _of_walls("present", None), {
@@ -715,7 +673,9 @@ CAPABILITIES = (
             "use Penalty or Impact, or a rotation that leaves the surface as it is",
         ),
     }, within="motion"),
-    Capability("rotation with the mean-value form", _rotations_of_mean_values, {
+    Capability("rotation with the mean-value form", _where(
+        lambda asked: getattr(asked.method, "gradient", "") == "mean-value", _rotations
+    ), {
         (SOFT, PAPER): Refusal(
             'gradient must be "composite" where surfaces[{i}].motion turns the surface, got "mean-value"',
             "leave it out",
@@ -740,13 +700,15 @@ CAPABILITIES = (
         ),
     }),
     Capability("impacts on members", _option("member_impacts"), {}),
-    Capability("impacts on members of a field", _members_of_fields, {
+    Capability("impacts on members of a field", _where(lambda asked: asked.options.member_impacts, _fields), {
         (SOFT,): Refusal(
             "member_impacts must be False with {method} at surfaces[{i}], got True: a soft wall is one spring, in "
             "which several of its members may take part", "leave it out, or use Impact",
         ),
     }, within="impacts on members"),
-    Capability("impacts on members beside cavities", _members_beside_cavities, {
+    Capability("impacts on members beside cavities", _where(
+        lambda asked: asked.options.member_impacts and any(_cavities(asked))
+    ), {
         _EVERY_BODY: Refusal(
             "member_impacts must be False with bodies that have cavities, got True: a cavity is no surface of the "
             "scene", "leave it out",
@@ -773,7 +735,7 @@ CAPABILITIES = (
             "depends on all others", "leave it out",
         ),
     }),
-    Capability("cluster without a trajectory", _on_cluster(_no_trajectory), {
+    Capability("cluster without a trajectory", _on_cluster(_where(lambda asked: asked.options.trajectory is None)), {
         ENGINES: Refusal(
             "trajectory must be given with a cluster, got none: it joins the files of the shards", "give trajectory="
         ),

@@ -28,8 +28,13 @@ _MOST_ROOMS = 1000
 NEVER = Hit(math.inf, 0.0)
 
 
+def of_flights(falls):
+    """The methods of a wall that free flights ask for, with gravity or without."""
+    return ("falling_hit" if falls else "first_hit",)
+
+
 def of_steps(falls):
-    """The methods of a wall that whole steps, some of which are jumped over, ask for, with gravity or without."""
+    """The same for whole steps, some of which are jumped over."""
     # The loops of a fall are compiled for every method.
     free = ("safe_time", "falling_hit") if falls else ("first_hit",)
     return *free, "inner", "level_of"
