@@ -20,13 +20,12 @@ from .particles import Particles
 from .surfaces import plane as planes
 from .surfaces import required
 from .surfaces import rotation as rotations
-from .surfaces.instant import box_of, distances_of, gaps_of, gradient_of, has_room, planes_of
+from .surfaces.instant import distances_of, gaps_of, gradient_of, has_room, planes_of
 from .surfaces.periodic.images import Lengths, cell_of, into_cell, is_same_along, lengths_of
 from .surfaces.pieces import Images, Pieces, pieces_of
-from .surfaces.polyhedron import polyhedron_bounds
 from .surfaces.presence.doors import instants_of
 from .surfaces.presence.openings import require_few
-from .surfaces.room import lasting
+from .surfaces.room import lasting, room_bounds
 from .surfaces.surface import UNBOUNDED, Box, Surface, held_opening
 from .surfaces.union import Place
 
@@ -347,14 +346,7 @@ class Scene:
 
     def _box_of(self, surfaces: Sequence[Surface], time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The box of `bounds_of`, of surfaces that are each taken as a whole."""
-        boxes = np.array([box_of(surface, time) for surface in surfaces] or [UNBOUNDED])
-        low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
-        if self.period is not None:
-            corners = np.array(cell_of(self.period))
-            low, high = np.maximum(low, corners[0]), np.minimum(high, corners[1])
-        planes = [plane for surface in surfaces for plane in planes_of(surface, surface.half_spaces(), time)]
-        if planes:
-            low, high = polyhedron_bounds(planes, low, high)
+        low, high = room_bounds(surfaces, time, UNBOUNDED if self.period is None else cell_of(self.period))
         if (across := self.across()) is not None:
             low[across] = high[across] = 0.0
         return low, high

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from ..common.catalog import LENGTHS, OBSERVABLES
+from ..common.catalog import OBSERVABLES
 from ..common.signature import show_in_lines
 from ..errors import FileError, SceneError
 from ..files.paths import target_of
@@ -235,10 +235,9 @@ _JOINED = {"sum": "the sum of the shards", "largest": "the largest of the shards
 
 def _of_observable(name: str) -> Entry:
     one = OBSERVABLES[name]
-    axes = (str(LENGTHS.get(axis, f"{axis[:-1]}ies" if axis.endswith("y") else f"{axis}s")) for axis in one.axes)
     facts = {
         "unit": "a number" if one.unit == "1" else one.unit,
-        "shape": f"({', '.join(['frames', *axes])}{',' * (not one.axes)})",
+        "shape": f"({', '.join(one.axes_in_words())}{',' * (not one.axes)})",
         "of a run in shards": _JOINED[one.joined],
     }  # fmt: skip
     facts |= {"NaN": "where it has no value"} if one.may_be_nan else {}

@@ -22,7 +22,7 @@ from ..surfaces.shapes.slab import Slab
 from ..surfaces.surface import Surface
 from . import covering
 from .births import with_born
-from .body import Body
+from .body import Body, squares_between
 from .copies import Bodies
 
 _LOG = logging.getLogger("swarm")
@@ -101,9 +101,7 @@ def _warn_of_turns(bodies: Bodies, dt: float) -> None:
     ends, r, v = bodies.body.links, bodies.position, bodies.velocity
     if not len(ends):
         return
-    length2 = ((r[:, ends[:, 0]] - r[:, ends[:, 1]]) ** 2).sum(axis=0)
-    speed2 = ((v[:, ends[:, 0]] - v[:, ends[:, 1]]) ** 2).sum(axis=0)
-    turns = dt * np.sqrt(speed2 / length2)  # (L, n)
+    turns = dt * np.sqrt(squares_between(v, ends) / squares_between(r, ends))  # (L, n)
     link, copy = np.unravel_index(int(np.argmax(turns)), turns.shape)
     if turns[link, copy] > _FAR_TURN:
         _LOG.warning(

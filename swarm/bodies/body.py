@@ -58,11 +58,15 @@ class Strain:
 
     def energy(self, points: Floats) -> Floats:
         """V [J] of points (3, P), or of n copies (3, P, n)."""
-        i, j = self.edges.T
         rows = np.asarray(points, dtype=np.float64)
         shape = (-1,) + (1,) * (rows.ndim - 2)
-        excess = ((rows[:, i] - rows[:, j]) ** 2).sum(axis=0) - self.rest.reshape(shape)
+        excess = squares_between(rows, self.edges) - self.rest.reshape(shape)
         return np.asarray(0.5 * (excess * np.tensordot(self.stiffness, excess, 1)).sum(axis=0))
+
+
+def squares_between(rows: Floats, pairs: Pairs) -> Floats:
+    """The squares of the differences (L, ...) of rows (3, P, ...) between two points, for all pairs of points."""
+    return np.asarray(((rows[:, pairs[:, 0]] - rows[:, pairs[:, 1]]) ** 2).sum(axis=0))
 
 
 def _shaped(name: str, value: Floats, shape: tuple[int, ...]) -> Floats:

@@ -28,6 +28,7 @@ from ..run.tiers import Tier
 from ..scene import Scene
 from ..state import Floats, State
 from .births import BodyFeed
+from .body import squares_between
 from .copies import Bodies
 from .energies import BodyEnergies, summed
 from .lanes.advance import advance_bodies
@@ -259,8 +260,7 @@ class BodyRun(BaseRun):
         r, ends = self._bodies.position, self._body.links
         if not len(ends):
             return 0.0
-        length2 = ((r[:, ends[:, 0]] - r[:, ends[:, 1]]) ** 2).sum(axis=0)
-        return float(0.5 * np.abs(length2 / self._link_lengths()[:, None] ** 2 - 1.0).max())
+        return float(0.5 * np.abs(squares_between(r, ends) / self._link_lengths()[:, None] ** 2 - 1.0).max())
 
     def _link_lengths(self) -> Floats:
         tied = self._body.points[self._body.links]

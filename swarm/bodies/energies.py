@@ -10,7 +10,7 @@ from ..contact.energy import contact_energy
 from ..kernel.vector import column
 from ..observables import COUNTED, of_counters
 from ..state import Floats
-from .body import Body
+from .body import Body, squares_between
 from .lanes.body_arrays import Ties
 from .numbers import led_points
 
@@ -51,8 +51,7 @@ class BodyEnergies:
             total += 0.5 * k * (np.sqrt(((r[:, i] - r[:, j]) ** 2).sum(axis=0)) - length) ** 2
         if self._body.strain is not None:
             edges = self._body.strain.edges
-            strain = ((r[:, edges[:, 0]] - r[:, edges[:, 1]]) ** 2).sum(axis=0)
-            strain = strain - self._ties.rest[-len(edges) :, None]
+            strain = squares_between(r, edges) - self._ties.rest[-len(edges) :, None]
             total += 0.5 * (strain * (self._body.strain.stiffness @ strain)).sum(axis=0)
         return total
 

@@ -9,7 +9,8 @@ from ..common import checks
 from ..errors import SceneError
 from ..motion import Motion
 from ..state import Floats
-from ..surfaces.surface import SIDES, Surface
+from ..surfaces.instant import side_of
+from ..surfaces.surface import Surface
 from .checked import each, point
 
 # How far from its surface a guided point may start, relative to the surface's size.
@@ -83,7 +84,7 @@ def cavities(rows: Iterable[Any], places: Floats) -> tuple[tuple[Surface, int, i
         carrier, held = (point(f"{row}[{n}]", given[n], len(places)) for n in (1, 2))
         if carrier == held:
             raise SceneError(f"{row} must name a carrier and another point, got {carrier} for both")
-        gap = SIDES[getattr(surface, "side", "inside")] * surface.phi((places[held] - places[carrier])[:, None])[0]
+        gap = side_of(surface) * surface.phi((places[held] - places[carrier])[:, None])[0]
         if not gap <= 0.0:
             raise SceneError(
                 f"{row}: point {held} must start on the admissible side of its surface, got a gap of "

@@ -7,6 +7,7 @@ from ..errors import SceneError
 from ..placing.filling import bounding_box
 from ..scene import Scene
 from ..state import Floats
+from ..surfaces.area_samples import directions
 from .body import Body
 from .copies import Bodies
 
@@ -58,10 +59,10 @@ def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float =
     turns, middles = _places(scene, probes, n, random)
     middle = probes.mean(axis=0)
     position = _turned(turns, body.points - middle) + middles[:, None]
-    velocity = np.zeros_like(position) + speed * _directions(random, n)[:, None]
+    velocity = np.zeros_like(position) + speed * directions(random, n)[:, None]
     weights = body.mass_matrix.sum(axis=1)
     arms = _turned(turns, body.points - weights @ body.points / weights.sum())
-    return Bodies(body, position, velocity + spin * np.cross(_directions(random, n)[:, None], arms, axis=0))
+    return Bodies(body, position, velocity + spin * np.cross(directions(random, n)[:, None], arms, axis=0))
 
 
 def _probes(scene: Scene, body: Body) -> Floats:
@@ -124,9 +125,3 @@ def _turned(turns: Floats, arms: Floats) -> Floats:
     x, y, z = arms.T[:, :, None]
     # Not by BLAS: its last bit depends on the processor.
     return np.asarray(turns[:, 0, None] * x + turns[:, 1, None] * y + turns[:, 2, None] * z)
-
-
-def _directions(random: np.random.Generator, n: int) -> Floats:
-    """(3, n) uniform on the sphere."""
-    normal = random.standard_normal((3, n))
-    return np.asarray(normal / np.sqrt((normal**2).sum(axis=0)))

@@ -10,6 +10,7 @@ from ..errors import SceneError
 from ..kernel.limits import EPSILON
 from ..motion import Led, Motion, led
 from ..state import Floats
+from ..surfaces.rotation import normalized
 from ..surfaces.surface import Surface
 from .checked import Pairs, modes_unless_above
 
@@ -54,14 +55,10 @@ def ties(links: Pairs, guides: Sequence[tuple[int, Surface]], position: Floats) 
     """The links and guides of n copies with points at `position` (3, P, n)."""
     # One at a time: of many copies each is large.
     for k, (i, j) in enumerate(links.tolist()):
-        yield Tie(f"links[{k}]", (i, j), _unit(position[:, i] - position[:, j]))
+        yield Tie(f"links[{k}]", (i, j), normalized(position[:, i] - position[:, j]))
     for k, (point, surface) in enumerate(guides):
         slope = surface.gradient(np.ascontiguousarray(position[:, point]))
-        yield Tie(f"guides[{k}]", (point,), _unit(slope), surface)
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.maximum(np.sqrt((vectors**2).sum(axis=0)), np.finfo(np.float64).tiny))
+        yield Tie(f"guides[{k}]", (point,), normalized(slope), surface)
 
 
 def require_independent(
@@ -128,8 +125,7 @@ def _dependences(given: Sequence[Tie], anchors: Mapping[int, Any]) -> Floats:
         for point, sign in tie.ends():
             if point in place:
                 row[place[point]] = sign * tie.normal[:, 0]
-    rows = directions.reshape(len(given), 3 * len(free))
-    rows /= np.maximum(np.sqrt((rows**2).sum(axis=1)), np.finfo(np.float64).tiny)[:, None]
+    rows = normalized(directions.reshape(len(given), 3 * len(free)), 1)
     # All clearly independent where no eigenvalue is below this, round-off and all.
     bound = 10.0 * _DEPENDENT + 8.0 * len(given) * EPSILON
     modes = modes_unless_above(bound, rows @ rows.T) if given else None

@@ -44,6 +44,11 @@ class Observable(NamedTuple):
         """The shape of an entry, where `lengths` has the lengths of axes such as "surface"; None: any length."""
         return tuple((LENGTHS | lengths).get(axis) for axis in self.axes)
 
+    def axes_in_words(self) -> list[str]:
+        """The lengths of its axes, in words where they differ between runs."""
+        plural = {axis: f"{axis[:-1]}ies" if axis.endswith("y") else f"{axis}s" for axis in self.axes}
+        return ["frames", *(str(LENGTHS.get(axis, plural[axis])) for axis in self.axes)]
+
 
 # In the order in which a sweep shows them.
 OBSERVABLES: dict[str, Observable] = {
@@ -154,12 +159,11 @@ def markdown() -> list[str]:
     """
     rows: list[Any] = [("observable", "unit", "shape", "meaning"), ("---",) * 4]
     for name, one in OBSERVABLES.items():
-        axes = (str(LENGTHS.get(axis, f"{axis[:-1]}ies" if axis.endswith("y") else f"{axis}s")) for axis in one.axes)
         rows.append(
             (
                 f"`{name}`",
                 "" if one.unit == "1" else one.unit,
-                ", ".join(["frames", *axes]),
+                ", ".join(one.axes_in_words()),
                 one.meaning.replace("|", r"\|"),
             )
         )

@@ -20,7 +20,7 @@ from ..surfaces.presence.rooms import Rooms, depth_behind, leads_on, other_side
 from ..surfaces.walls import Field
 from .crossing import block_of_path
 from .events import TOUCH
-from .path import BEFORE, PLACES, at_part, first_true, members_of
+from .path import BEFORE, PLACES, at_part, first_true, members_of, reach_of
 from .reflection import relative, wall_velocity
 
 # Steps of the search for the least distance to an opening between three places of a step.
@@ -167,7 +167,7 @@ def may_be_absent(openings, walls, active, path, near):
     for opening in openings or ():
         enters = False
         for volume in opening.volumes:
-            enters = enters | _over_bodies(volume, path, 0.0, False, _may_enter, _reach(path))
+            enters = enters | _over_bodies(volume, path, 0.0, False, _may_enter, reach_of(path))
         for wall in active:
             here = opening.is_of(wall) & enters
             found = found | (here & _may_lead_on(walls, wall, path) if opening.between else here)
@@ -221,11 +221,6 @@ def _lets_out_at(openings, rules, walls, wall, path, near, part):
 # --- Into volumes ----------------------------------------------------------------------------------------
 
 
-def _reach(path):
-    """Twice the length of a step: what is farther from its end, by a distance of first order, is not on its way."""
-    return norm(path.r1 - path.r0) + path.h * (norm(path.v0) + norm(path.v1))
-
-
 def _over_bodies(volume, path, near, found, ask, given):
     """`found` after ask(found, volume, path, given), of a field for each body that a step may come near to."""
     if isinstance(volume, Field):
@@ -254,7 +249,7 @@ def _way_into(first, volume, path, near):
 
 @outlined
 def _way_in(volume, path, near):
-    if not outside(volume, path.r1) <= _reach(path):
+    if not outside(volume, path.r1) <= reach_of(path):
         return math.inf
     return first_true(_is_in, (volume, path), BEFORE, near, 0.0, _nearest)
 
@@ -262,7 +257,7 @@ def _way_in(volume, path, near):
 def _nearest(volume, path, near, low, part, high):
     """The part of a step at which it is nearest to a volume, between two others, if it may be in it there."""
     here = outside(volume, at_part(path, part))
-    if here < -near or not here <= _reach(path) / PLACES:
+    if here < -near or not here <= reach_of(path) / PLACES:
         return part
     for _third in range(_THIRDS):
         one, other = low + (high - low) / 3.0, high - (high - low) / 3.0

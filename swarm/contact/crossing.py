@@ -14,7 +14,7 @@ from ..surfaces.in_motion.moving import Carried
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.presence.patched import Patched
 from ..surfaces.walls import Field
-from .path import StepPath, at_part, first_true, members_of
+from .path import StepPath, at_part, first_true, members_of, reach_of
 from .rooms import leaving
 
 _EPSILON = 2.220446049250313e-16
@@ -78,7 +78,7 @@ def _meets_body(found, m, field, ends, number, active, paths, near):
     m, (path, own) = float(m), paths
     # In the frame of a field that moves: a particle that rests on a patch comes through no other, however fast they go.
     patches = members_of(field)
-    if isinstance(patches, Patched) and not patches.is_ahead(m, own.r0, own.r1, _reach(own) + near):
+    if isinstance(patches, Patched) and not patches.is_ahead(m, own.r0, own.r1, reach_of(own) + near):
         return found
     return found or ((not _is_held(field, number, m, active)) and _may_meet(field.wall(m), ends.wall(m), path, near))
 
@@ -91,11 +91,6 @@ def _is_held(field, number, m, active):
             is_of = (one >= number) & (one < number + field.count())
             held = held | (is_of & field.goes_on(one - number, m))
     return held
-
-
-def _reach(path):
-    """No place of a step is farther from its end than this."""
-    return norm(path.r1 - path.r0) + path.h * (norm(path.v0) + norm(path.v1))
 
 
 def own_path(field, ends, path):

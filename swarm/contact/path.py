@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from ..kernel.record import Record
-from ..kernel.vector import Vec
+from ..kernel.vector import Vec, norm
 from ..surfaces.in_motion.moving import Moving
 from ..surfaces.in_motion.posed import Posed
 
@@ -22,6 +22,14 @@ class StepPath(Record):
     r1: Vec
     v1: Vec
     h: Any
+
+
+def reach_of(path):
+    """No place of a step is farther from its end than this.
+
+    It is twice the length of the step: what is farther from its end, by a distance of first order, is not on its way.
+    """
+    return norm(path.r1 - path.r0) + path.h * (norm(path.v0) + norm(path.v1))
 
 
 def first_true(question, given, start, surely, about, closer=None):

@@ -18,6 +18,7 @@ from ..common.checks import count, listed, number, one_of
 from ..errors import SceneError
 from ..scene import Scene
 from ..serialization.plugins import allowed, checked_modules
+from ..serialization.tables import files_in
 
 # More runs than this are a mistake in a list: their files alone would be a burden to a folder.
 _MOST = 1_000_000
@@ -29,8 +30,6 @@ STEM = re.compile(rf"[0-9a-f]{{{_DIGITS}}}")
 COMBINE, WAYS = "combine", ("product", "zip")
 # Keys of a document that make its scene.
 _SCENE = ("surface", "gravity", "period", "plane", "pairs")
-# Keys of a document that name files; their content is part of what is computed.
-_FILES = ("from", "file")
 
 Document = dict[str, Any]
 
@@ -274,7 +273,7 @@ def _digest(document: Document, path: Path, contents: dict[Path, str]) -> str:
     """The digest of a run: of its tables, and of the contents of the files that they name."""
     what = {**document, "run": {key: value for key, value in document["run"].items() if key not in _WITHOUT_EFFECT}}
     files = []
-    for name in _named_files(document):
+    for name in files_in(document):
         file = path.parent / name
         if file not in contents:
             contents[file] = hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
@@ -284,14 +283,6 @@ def _digest(document: Document, path: Path, contents: dict[Path, str]) -> str:
 
 def _digest_of(tables: Any) -> str:
     return hashlib.sha256(json.dumps(tables, sort_keys=True, default=str).encode()).hexdigest()
-
-
-def _named_files(place: Any) -> Iterator[str]:
-    for key, value in place.items() if isinstance(place, dict) else enumerate(place):
-        if isinstance(value, (dict, list)):
-            yield from _named_files(value)
-        elif key in _FILES and isinstance(value, str):
-            yield value
 
 
 def _unnumbered(value: Any) -> Any:

@@ -10,10 +10,10 @@ import tomli_w
 
 from ..errors import SceneError
 from ..files.storage import Storage
-from ..serialization.tables import NamedMethod
+from ..serialization.tables import FILES, NamedMethod, files_in
 
 # User code in a scene file, and the keys of files.
-_CODE, _FILES = re.compile(r"([A-Za-z_][\w.]*):[A-Za-z_]\w*"), ("from", "file")
+_CODE = re.compile(r"([A-Za-z_][\w.]*):[A-Za-z_]\w*")
 # What stands for a long array, which a scene file does not have.
 _ARRAY = "sha256:"
 _SAME = (
@@ -75,7 +75,7 @@ def _of_scene_file(trajectory: Any, text: str) -> Again:
     document = tomllib.loads(text)
     name = f"{trajectory.path.stem}.toml"
     notes = [f"It was run from a scene file, which this page holds. Save it as {name}, then"]
-    if files := sorted(set(_files_of(document))):
+    if files := sorted(set(files_in(document))):
         notes.insert(0, f"The scene file reads other files, which must be beside it: {', '.join(files)}.")
     again = shlex.join(["swarm", "run", name, "-o", "again.h5"]) + plugins_of(document)
     if "--plugins" in again:
@@ -94,16 +94,8 @@ def _texts_of(place: Any, key: str = "") -> Iterator[str]:
     if isinstance(place, (dict, list)):
         for name, value in place.items() if isinstance(place, dict) else enumerate(place):
             yield from _texts_of(value, str(name))
-    elif isinstance(place, str) and key not in _FILES and _CODE.fullmatch(place) and not place.startswith(_ARRAY):
+    elif isinstance(place, str) and key not in FILES and _CODE.fullmatch(place) and not place.startswith(_ARRAY):
         yield place
-
-
-def _files_of(place: Any) -> Iterator[str]:
-    for key, value in place.items() if isinstance(place, dict) else enumerate(place):
-        if isinstance(value, (dict, list)):
-            yield from _files_of(value)
-        elif key in _FILES and isinstance(value, str):
-            yield value
 
 
 # --- From the first frame --------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from ..bodies.body import Body
 from ..bodies.checked import Pairs
 from ..particles import Particles
 from ..state import Floats, State
+from ..surfaces.rotation import normalized
 from .colours import Colours, Scale, Values
 
 # Triangles with normals that differ by less lie in one face of a polyhedron, without a line between them.
@@ -81,8 +82,7 @@ def _lines(body: Body) -> Pairs:
     if not len(body.faces):
         return np.unique(np.sort(body.bonds(), axis=1), axis=0)
     corners = (body.contacts @ body.points)[body.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.sqrt((normals**2).sum(axis=1, keepdims=True)), np.finfo(np.float64).tiny)
+    normals = normalized(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), 1)
     beside: dict[tuple[int, ...], list[Floats]] = {}
     for face, normal in zip(body.faces.tolist(), normals, strict=True):
         for k in range(3):

@@ -37,18 +37,19 @@ def eye_at(azimuth: float, elevation: float) -> Eye:
     return Eye(right, np.cross(near, right), near)
 
 
+def _between(part: float, first: float, middle: float, last: float) -> float:
+    """The first of three angles at -1 and below, the middle one at 0, and the last one at 1 and above."""
+    return middle + min(1.0, abs(part)) * ((last if part > 0.0 else first) - middle)
+
+
 def eye_for(low: Floats, high: Floats, below: bool = False) -> Eye:
     """The eye from which the two largest extents of a box show, from above, or from below."""
     x, y, z = np.maximum(high - low, _NOTHING * float((high - low).max()) or 1.0).tolist()
     ratio = math.log(x / y) / math.log(_MUCH)
-    azimuth = _AZIMUTH + (
-        min(1.0, ratio) * (_WIDE - _AZIMUTH) if ratio > 0.0 else min(1.0, -ratio) * (_DEEP - _AZIMUTH)
-    )
+    azimuth = _between(ratio, _DEEP, _AZIMUTH, _WIDE)
     if min(max(x, y), z) > _THIN * min(x, y):
         elevation = _BOARD
     else:
         steep = math.log(z / math.sqrt(x * y)) / math.log(_MUCH)
-        elevation = _ELEVATION + (
-            min(1.0, steep) * (_TALL - _ELEVATION) if steep > 0.0 else min(1.0, -steep) * (_FLAT - _ELEVATION)
-        )
+        elevation = _between(steep, _FLAT, _ELEVATION, _TALL)
     return eye_at(azimuth, -elevation if below else elevation)

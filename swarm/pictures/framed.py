@@ -73,7 +73,7 @@ def eye_of(shapes: list[Shape], found: list[Floats]) -> Eye:
 def window(eye: Eye, found: list[Floats]) -> tuple[Floats, Floats]:
     """The corners of what an eye sees of some points, without any room."""
     seen = [eye.seen(one)[:, :2] for one in found]
-    low, high = np.min([one.min(axis=0) for one in seen], axis=0), np.max([one.max(axis=0) for one in seen], axis=0)
+    low, high = box_of_points(seen)
     wide = float((high - low).max())
     room = np.where(high - low < 0.05 * wide, 0.05 * wide, 0.0) if wide > 0.0 else 0.5 * (float(np.abs(low).max()) or 1)
     return low - room, high + room

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..state import Floats
+from ..surfaces.rotation import normalized
 from .eye import Eye
 
 # The light comes from above on the left, from behind the eye: to the right, up, and towards the eye.
@@ -152,8 +153,7 @@ def lit(colour: Floats, normals: Floats) -> Floats:
 def corners_of(eye: Eye, faces: Floats, colour: Floats) -> tuple[Floats, Indices, Floats]:
     """Faces (T, 3, 3) of colours (T, 3) as `Raster.triangles` takes them, each with the light on it."""
     seen = eye.seen(faces)
-    normal = np.cross(seen[:, 1] - seen[:, 0], seen[:, 2] - seen[:, 0])
-    normal /= np.maximum(np.sqrt((normal**2).sum(axis=1, keepdims=True)), 1e-300)
+    normal = normalized(np.cross(seen[:, 1] - seen[:, 0], seen[:, 2] - seen[:, 0]), 1)
     normal *= np.where(normal[:, 2:] < 0.0, -1.0, 1.0)
     tints = np.repeat(lit(colour, normal), 3, axis=0)
     return seen.reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3), tints

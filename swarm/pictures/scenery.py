@@ -12,6 +12,7 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from ..state import Floats
+from ..triangles.curves import runs
 from ..triangles.shape import Shape
 from .balls import colours_of
 from .colours import Colours
@@ -120,8 +121,8 @@ class Scenery:
             seen = self._fine(curve)
             moved = seen - (0.0, 0.0, 2.0 * self._on)
             is_near = ~self._back.hides(moved) & self._covered(seen)
-            before += _runs_of(seen, is_near)
-            behind += _runs_of(seen, ~is_near)
+            before += runs(seen, is_near)
+            behind += runs(seen, ~is_near)
         return before, behind
 
     def _covered(self, seen: Floats) -> NDArray[np.bool_]:
@@ -135,7 +136,7 @@ class Scenery:
         found = []
         for curve in curves:
             seen = self._fine(curve)
-            found += _runs_of(seen, ~raster.hides(seen, self._on))
+            found += runs(seen, ~raster.hides(seen, self._on))
         return found
 
     def _fine(self, curve: Floats) -> Floats:
@@ -157,7 +158,7 @@ class Scenery:
         self._lines(self._cut_seen(self._near_curves), CAVITY_LINE, 0.8, 0.7, 4.0, self.front)
 
     def _cut_seen(self, curves: list[Floats]) -> list[Floats]:
-        return [run for seen in curves for run in _runs_of(seen, ~self.opaque.hides(seen, self._on))]
+        return [run for seen in curves for run in runs(seen, ~self.opaque.hides(seen, self._on))]
 
     def _lines(self, curves: list[Floats], colour: Any, wide: float, alpha: float, order: float, to: list[Any]) -> None:
         if curves:
@@ -238,9 +239,3 @@ def _glass(normals: Floats) -> Floats:
     part = part * (1.0 - 0.25 * normals[:, 1:2])
     paper, tint = (np.array(to_rgb(colour)) for colour in backdrop())
     return np.asarray((1.0 - part) * paper + part * tint)
-
-
-def _runs_of(seen: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
-    """The parts of a curve with points that are kept, two points or more each."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
-    return [seen[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]

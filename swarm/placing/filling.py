@@ -3,7 +3,7 @@
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -147,7 +147,7 @@ def room_of(scene: Scene, random: np.random.Generator, user: str) -> VolumeBox:
         random.bit_generator.advance(len(axes) * _BATCH)  # type: ignore[attr-defined]
         return VolumeBox(low, high, functools.partial(float, box))
     while found < _POINTS:
-        found += sum(int(scene.admits(trial).sum()) for trial in _trials(scene, low, high, random, _BATCH))
+        found += _admitted(scene, low, high, random, _BATCH)
         random.bit_generator.advance(len(axes) * _BATCH)  # type: ignore[attr-defined]
         tried += _BATCH
         _require_share(scene, user, (low, high), found, tried)
@@ -162,7 +162,7 @@ def _roomy(scene: Scene, radius: Floats, random: np.random.Generator) -> VolumeB
     low, high = bounding_box(scene, "fill", _INSTEAD)
     if _is_its_box(scene, low, high):
         return None
-    found = sum(int(scene.admits(trial).sum()) for trial in _trials(scene, low, high, random, _SOME))
+    found = _admitted(scene, low, high, random, _SOME)
     share = found / _SOME
     off = _CERTAIN * math.sqrt(share * (1.0 - share) / _SOME) + _CERTAIN / _SOME
     least, most = (math.ceil(1.0 / max(share + way * off, 1e-6)) for way in (1.0, -1.0))
@@ -189,9 +189,12 @@ def _is_its_box(scene: Scene, low: Floats, high: Floats) -> bool:
     return bool(scene.admits(corners).all())
 
 
-def _trials(scene: Scene, low: Floats, high: Floats, random: np.random.Generator, count: int) -> Iterator[Floats]:
-    """The first points of a batch, of which the generator draws none: some at a time, which fit into the cache."""
-    draws = []
+def _admitted(scene: Scene, low: Floats, high: Floats, random: np.random.Generator, count: int) -> int:
+    """How many of the first points of a batch are admissible, of which the generator draws none.
+
+    They are some at a time, which fit into the cache.
+    """
+    draws, found = [], 0
     for k in range(len(scene.axes())):
         bits = np.random.PCG64()
         bits.state = random.bit_generator.state  # type: ignore[assignment]
@@ -200,7 +203,8 @@ def _trials(scene: Scene, low: Floats, high: Floats, random: np.random.Generator
         trial = np.zeros((3, _AT_ONCE))
         for axis, draw in zip(scene.axes(), draws, strict=True):
             trial[axis] = low[axis] + (high - low)[axis] * draw.random(_AT_ONCE)
-        yield trial
+        found += int(scene.admits(trial).sum())
+    return found
 
 
 def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]:

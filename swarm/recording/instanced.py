@@ -11,7 +11,8 @@ import numpy as np
 import rerun as rr
 
 from ..state import Floats
-from ..triangles.solids import Solids, curves, matrices
+from ..surfaces.rotation import matrices
+from ..triangles.solids import Solids, curves
 
 # Bytes of a ball, and of another solid.
 _BALL_BYTES, _SOLID_BYTES = 16, 40

@@ -6,7 +6,7 @@ Every error names the key by its full path, such as surface[1].radius.
 import dataclasses
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar
 
 import msgspec
@@ -29,6 +29,8 @@ from . import plugins
 T = TypeVar("T")
 # What in the table of a surface are tables of surfaces.
 NESTED = ("openings", "part")
+# Keys of a document that name files.
+FILES = ("from", "file")
 # Types of msgspec in the words of TOML.
 _WORDS = {
     "float": "a number", "int": "a whole number", "str": "a text", "bool": "true or false", "array": "a list",
@@ -41,6 +43,15 @@ _ELSEWHERE = {
 }
 # An array of more numbers is not written as text: HDF5 loses texts of 100 MB, and a million balls take 10 s to write.
 _LONG, _ARRAY = 1000, "sha256:"
+
+
+def files_in(document: Any) -> Iterator[str]:
+    """The names of the files of a document, which are a part of what it describes."""
+    for key, value in document.items() if isinstance(document, dict) else enumerate(document):
+        if isinstance(value, (dict, list)):
+            yield from files_in(value)
+        elif key in FILES and isinstance(value, str):
+            yield value
 
 
 def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None, pairs: Any = None) -> Scene:

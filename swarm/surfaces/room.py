@@ -1,13 +1,13 @@
 """A room, the intersection of the admissible sides of surfaces: its bounds, its gaps, and whether it has a volume."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .instant import box_of, has_room, planes_of, side_of
+from .instant import box_of, gaps_of, gradient_of, has_room, planes_of
 from .polyhedron import polyhedron_bounds
-from .surface import UNBOUNDED, Surface
+from .surface import UNBOUNDED, Box, Surface
 
 Floats = NDArray[np.float64]
 Room = tuple[Surface, ...]
@@ -16,17 +16,12 @@ Room = tuple[Surface, ...]
 _REACH = 2.0
 
 
-def room_bounds(room: Sequence[Surface], time: float = 0.0) -> tuple[Floats, Floats]:
-    """The corners of a box around a room at a time [s], infinite where it is open."""
-    boxes = np.array([box_of(surface, time) for surface in room] or [UNBOUNDED])
+def room_bounds(room: Sequence[Surface], time: float = 0.0, within: Box = UNBOUNDED) -> tuple[Floats, Floats]:
+    """The corners of a box around what of a room is `within` another box at a time [s], infinite where it is open."""
+    boxes = np.array([*(box_of(surface, time) for surface in room), within])
     low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
     planes = [plane for surface in room for plane in planes_of(surface, surface.half_spaces(), time)]
     return polyhedron_bounds(planes, low, high) if planes else (low, high)
-
-
-def room_gaps(room: Sequence[Surface], points: Floats, time: float = 0.0) -> Floats:
-    """The gap of every surface of a room at points (3, N)."""
-    return np.array([side_of(surface) * surface.phi(points, time) for surface in room])
 
 
 def lasting(room: Sequence[Surface]) -> tuple[Surface, ...]:
@@ -44,8 +39,14 @@ def has_volume(room: Room) -> bool:
     """Whether a room has a point inside."""
     room = lasting(room)
     low, high = _ends(room)
-    gaps, gradients = _gaps_of(room), _gradients_of(room)
-    return not room or (bool((low < high).all()) and has_room(low[:, None], high[:, None], gaps, gradients))
+    if not room:
+        return True
+    return bool((low < high).all()) and has_room(
+        low[:, None],
+        high[:, None],
+        lambda points: gaps_of(room, points, 0.0),
+        lambda i, points: gradient_of(room[i : i + 1], points),
+    )
 
 
 def _ends(room: Room) -> tuple[Floats, Floats]:
@@ -53,11 +54,3 @@ def _ends(room: Room) -> tuple[Floats, Floats]:
     low, high = room_bounds(room)
     reach = _REACH * max((surface.extent() for surface in room), default=0.0) or 1.0
     return np.maximum(low, -reach), np.minimum(high, reach)
-
-
-def _gaps_of(room: Room) -> Callable[[Floats], Floats]:
-    return lambda points: room_gaps(room, points)
-
-
-def _gradients_of(room: Room) -> Callable[[int, Floats], Floats]:
-    return lambda i, points: side_of(room[i]) * room[i].gradient(points)

@@ -127,18 +127,28 @@ def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
 Direction = Annotated[Vector, unit]
 
 
+def normalized(vectors: NDArray[np.float64], axis: int = 0) -> NDArray[np.float64]:
+    """Vectors along an axis of an array, divided by their lengths; one of length 0 stays 0."""
+    lengths = np.sqrt((vectors**2).sum(axis=axis, keepdims=True))
+    return np.asarray(vectors / np.maximum(lengths, np.finfo(np.float64).tiny))
+
+
 def matrix(turn: Quaternion | None) -> NDArray[np.float64]:
     """The rotation matrix of a unit quaternion: from the surface's own frame to the scene's."""
-    if turn is None:
-        return np.eye(3)
-    w, x, y, z = turn
-    return np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )
+    return np.eye(3) if turn is None else np.array(_matrix_of(*turn))
+
+
+def matrices(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
+    return np.moveaxis(np.array(_matrix_of(*turns.T)), 2, 0)
+
+
+def _matrix_of(w: Any, x: Any, y: Any, z: Any) -> list[list[Any]]:
+    return [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
 
 
 def onto(axis: Vector) -> Quaternion | None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..state import Floats
+from ..surfaces.rotation import normalized
 
 Indices = NDArray[np.int64]
 
@@ -51,8 +52,7 @@ def _sides(points: Floats, triangles: Indices) -> _Sides:
     begins = np.flatnonzero(np.diff(key[order], prepend=-1))
     is_pair = np.diff(begins, append=len(order)) == 2
     a, b, c = np.moveaxis(points[triangles], 1, 0)
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.sqrt((normal**2).sum(axis=1, keepdims=True)), 1e-300)
+    normal = normalized(np.cross(b - a, c - a), 1)
     mine, other = order[begins[is_pair]] // 3, order[begins[is_pair] + 1] // 3
     return _Sides(sides[order[begins]], is_pair, mine, other, (normal[mine] * normal[other]).sum(axis=1))
 

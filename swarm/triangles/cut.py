@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from ..state import Floats
+from ..surfaces.rotation import normalized
 
 Indices = NDArray[np.int64]
 Level = Callable[[Floats], Floats]
@@ -44,8 +45,7 @@ class SmoothSurface(NamedTuple):
     def normals(self, points: Floats) -> Floats:
         """The unit gradient; 0 where the gradient is 0 or NaN."""
         with np.errstate(all="ignore"):
-            slope = np.nan_to_num(self.gradient(points))
-            return np.asarray(slope / np.maximum(np.sqrt((slope**2).sum(axis=1, keepdims=True)), 1e-300))
+            return normalized(np.nan_to_num(self.gradient(points)), 1)
 
     def distance(self, points: Floats) -> Floats:
         """phi as a distance to first order."""

@@ -5,6 +5,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..state import Floats
+from ..surfaces.rotation import normalized
 from .curves import Indices, neighbours
 
 # Points around the tube of a torus and along it, parts of the height of an outline, and points of a line on it.
@@ -26,8 +27,7 @@ def without_gaps(normals: Floats, triangles: Indices) -> Floats:
     sums = np.zeros_like(normals)
     for k in range(3):
         np.add.at(sums, triangles[:, k], normals[triangles].sum(axis=1))
-    lengths = np.maximum(np.sqrt((sums**2).sum(axis=1, keepdims=True)), np.finfo(np.float64).tiny)
-    return np.where(missing[:, None], sums / lengths, normals)
+    return np.where(missing[:, None], normalized(sums, 1), normals)
 
 
 def shaded(points: Floats, triangles: Indices) -> tuple[Floats, Indices, Floats]:
@@ -48,5 +48,4 @@ def shaded(points: Floats, triangles: Indices) -> tuple[Floats, Indices, Floats]
     made, normals = np.empty((number, 3)), np.zeros((number, 3))
     made[corner] = points[triangles.ravel()]
     np.add.at(normals, corner, np.repeat(normal, 3, axis=0))
-    normals /= np.maximum(np.sqrt((normals**2).sum(axis=1, keepdims=True)), 1e-300)
-    return made, corner.reshape(-1, 3).astype(np.int64), normals
+    return made, corner.reshape(-1, 3).astype(np.int64), normalized(normals, 1)

@@ -10,6 +10,7 @@ from ..state import Floats
 from ..surfaces.instant import box_of
 from ..surfaces.plane import along
 from ..surfaces.presence.openings import are_open
+from ..surfaces.rotation import normalized
 from ..surfaces.surface import Surface
 from .curves import runs
 from .cut import Level, SmoothSurface
@@ -124,8 +125,7 @@ class PlaneWalls:
             k = first + np.arange(n - 1)
             triangles += [np.stack([k, k + 1, k + n], axis=1), np.stack([k + 1, k + n + 1, k + n], axis=1)]
             ahead = np.gradient(curve, axis=0)
-            beside = np.cross(ahead, up)
-            normals += [beside / np.maximum(np.sqrt((beside**2).sum(axis=1, keepdims=True)), 1e-300)] * 2
+            normals += [normalized(np.cross(ahead, up), 1)] * 2
             first += 2 * n
         return np.concatenate(vertices), np.concatenate(triangles), np.concatenate(normals)
 
@@ -150,8 +150,7 @@ class PlaneWalls:
             owner = np.asarray(np.nan_to_num(gaps, nan=-np.inf).argmax(axis=0))
             for k, *volumes in zip(pieces.owners, pieces.volumes, pieces.doorways, strict=True):
                 owner[(owner == k) & are_open((*volumes[0], *volumes[1]), curve.T, self._time)] = -1
-            ends = np.flatnonzero(np.diff(np.concatenate([[False], owner == i, [False]]).astype(np.int8)))
-            found += [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]
+            found += runs(curve, owner == i)
         return found
 
     def _around(self, solid: Surface) -> list[Floats]:

@@ -11,7 +11,7 @@ import numpy as np
 from ..motion import Pose
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces.rotation import after, onto
+from ..surfaces.rotation import after, matrices, normalized, onto
 from ..surfaces.surface import Surface
 
 # A field of more solids is shown so.
@@ -54,31 +54,15 @@ def _placed(i: int, surface: Any, at: Pose) -> Solids:
     n, still = len(surface), np.array([1.0, 0.0, 0.0, 0.0])
     turns: Any = np.broadcast_to(still, (n, 4))
     if getattr(surface, "rotations", None) is not None:
-        turns = _unit(surface.rotations)
+        turns = normalized(surface.rotations, 1)
     elif hasattr(surface, "axes"):
-        axes, which = np.unique(_unit(surface.axes), axis=0, return_inverse=True)
+        axes, which = np.unique(normalized(surface.axes, 1), axis=0, return_inverse=True)
         turns = np.array([onto(tuple(axis)) or still for axis in axes.tolist()])[which.ravel()]
     if not np.array_equal(at.turn, np.eye(3)):
         several, which = np.unique(turns, axis=0, return_inverse=True)
         turns = np.array([after(at.quaternion, tuple(turn)) or still for turn in several.tolist()])[which.ravel()]
     kind = type(surface).__name__.lower()
     return Solids(i, kind, at.placed(surface.centers.T).T, surface.halves(), np.asarray(turns))
-
-
-def _unit(rows: Floats) -> Floats:
-    """Vectors, or quaternions, of any length, as those of length 1."""
-    return np.asarray(rows / np.sqrt((rows**2).sum(axis=1, keepdims=True)))
-
-
-def matrices(turns: Floats) -> Floats:
-    """The rotations (n, 3, 3) of quaternions (n, 4)."""
-    w, x, y, z = turns.T
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def curves(solids: Solids, most: int = MANY) -> list[Floats]:

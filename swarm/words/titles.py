@@ -110,6 +110,10 @@ def _laws(scene: Scene) -> str:
 # --- What runs -------------------------------------------------------------------------------------------
 
 
+def _so_many(count: int, noun: str) -> str:
+    return f"1 {noun}" if count == 1 else f"{many(count)} {plural_of(noun)}"
+
+
 def of_particles(content: Any) -> str:
     """What runs: so many particles, balls or bodies.
 
@@ -119,11 +123,11 @@ def of_particles(content: Any) -> str:
     if body is not None:
         copies = count // len(body)
         noun = noun_of_body(body)
-        return f"1 {noun}" if copies == 1 else f"{many(copies)} {plural_of(noun)}"
+        return _so_many(copies, noun)
     noun = "particle"
     if radius is not None:
         noun = "ball" if content.scene.plane is None else "disc"
-    text = f"1 {noun}" if count == 1 else f"{many(count)} {plural_of(noun)}"
+    text = _so_many(count, noun)
     if radius is not None and len(radius):
         low, high = float(np.nanmin(radius)), float(np.nanmax(radius))
         size = amount(low, "m") if low == high else amounts([low, high], "m").replace(" and ", " to ")

@@ -11,6 +11,7 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 import swarm
 from swarm.recording import playback, recorded
 from swarm.recording import writer as recording
+from swarm.surfaces.rotation import matrices
 from swarm.triangles import solids
 
 RANDOM = np.random.default_rng(3)
@@ -51,7 +52,7 @@ def test_corners_of_the_axes_are_on_the_wall(kind, time):
     alone = swarm.Scene([FIELDS[kind]])
     (found,) = solids.solids_of(alone, time)
     assert len(found.centers) == N
-    axes = solids.matrices(found.turns)
+    axes = matrices(found.turns)
     (at,) = alone.poses(time)
     for i in (0, 1, 2, 5, N - 1):
         ends = [found.centers[i] + sign * found.halves[i, k] * axes[i, :, k] for sign in (-1.0, 1.0) for k in range(3)]

@@ -15,7 +15,7 @@ from ...state import CROSSED, Crossed, State
 from ...surfaces.counted import Counted, ReversedCounter, Walled
 from ...surfaces.counter import Counter
 from ...surfaces.facets.mesh import Mesh
-from ...surfaces.instant import side_of
+from ...surfaces.instant import distances_of
 from ...surfaces.part import other_side
 from ...surfaces.periodic.images import images_of
 from ...surfaces.presence.openings import volumes_in, volumes_of_counter
@@ -178,13 +178,6 @@ def crossed_of(counters: Counters, given: tuple[Counter, ...], scene: Scene, pos
         surface = _whole(scene, f"counters[{k}]", counter.surface)
         for first in range(0, n, _AT_ONCE):
             some = slice(first, first + _AT_ONCE)
-            side[k, some] = _distance(surface, position[:, some]) > one.near
+            side[k, some] = distances_of((surface,), position[:, some], 0.0)[0] > one.near
     rows = 2 * len(given)
     return Crossed(side, np.zeros((rows, n), np.int64), np.zeros((CROSSED * rows, n)))
-
-
-def _distance(surface: Surface, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The distance out of the admissible side of a surface, to first order."""
-    slope = np.sqrt((surface.gradient(points) ** 2).sum(axis=0))
-    with np.errstate(over="ignore"):
-        return np.asarray(side_of(surface) * surface.phi(points) / np.maximum(slope, np.finfo(np.float64).tiny))

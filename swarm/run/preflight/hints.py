@@ -184,8 +184,7 @@ def _contact(task: Task, speed: float) -> tuple[float, float]:
     Of m g'' = -alpha s^2 g^a, s the slope of phi: see `contact_time` of grains.
     """
     scene, particles, method = task.scene, task.particles, task.method
-    a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
-    mass, p = float(particles.mass[_some(len(particles))].min()), 1.0 / (a + 1.0)
+    mass, p = particles.mass[_some(len(particles))].min(), 1.0 / (method.exponent + 1.0)  # type: ignore[attr-defined]
     if speed == 0.0:
         return 0.0, 0.0
     some = particles.position[:, _some(len(particles))]
@@ -194,7 +193,7 @@ def _contact(task: Task, speed: float) -> tuple[float, float]:
     slope = float(np.median(np.array(slopes)[nearest, np.arange(some.shape[1])]))
     if not 0.0 < slope < math.inf:
         return 0.0, 0.0
-    depth = math.pow(0.5 * mass * speed * speed * (a + 1.0) / alpha, p) / slope
+    depth = float(softness.depths_of(method, mass, speed)) / slope
     return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + p) / math.gamma(0.5 + p) * depth / speed, depth
 
 

@@ -12,7 +12,8 @@ from ...particles import Particles
 from ...scene import Scene
 from ...state import Floats, State
 from ...surfaces.in_motion.drive import drive_of
-from ...surfaces.surface import Surface, side_sign
+from ...surfaces.instant import side_of
+from ...surfaces.surface import Surface
 from ..options import Task
 
 _LOG = logging.getLogger("swarm")
@@ -34,7 +35,7 @@ def warn_of_depths(task: Task) -> None:
 # --- Depths ----------------------------------------------------------------------------------------------
 
 
-def depths_of(method: Method, mass: Floats, speed: Floats, restitution: float = 1.0) -> Floats:
+def depths_of(method: Method, mass: Floats, speed: Floats | float, restitution: float = 1.0) -> Floats:
     """The largest overlaps [m] of contacts that begin at these speeds [m/s], of masses that move alone [kg].
 
     Without losses that of the energy, alpha d^(a + 1)/(a + 1) = m v^2/2. Phi(d) then is the amplitude of an oscillator
@@ -192,13 +193,13 @@ def of_passing(scene: Scene, method: Method, state: State, particle: int, moment
 
 def _stored(method: Method, surface: Surface, place: Floats, moment: float) -> float:
     """The energy that a wall stores by a point at this place (3, 1) [J]."""
-    gap = side_sign(getattr(surface, "side", "inside")) * float(surface.phi(place, moment)[0])
+    gap = side_of(surface) * float(surface.phi(place, moment)[0])
     return float(method.law().stored_energy(gap)) if gap > 0.0 else 0.0
 
 
 def _entry(surface: Surface, place: Floats, velocity: Floats, moment: float) -> tuple[Floats, Floats]:
     """About where a straight way to a place came through the wall, and the unit normal there that leads in."""
-    side, way = side_sign(getattr(surface, "side", "inside")), velocity / math.hypot(*velocity)
+    side, way = side_of(surface), velocity / math.hypot(*velocity)
     # From near to far: it may have begun in the wall.
     lengths = np.concatenate([[-1.0, 0.0], np.geomspace(1e-4, 10.0, 2000)]) * surface.size()
     back = place[:, None] - lengths * way[:, None]

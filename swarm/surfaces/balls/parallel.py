@@ -29,7 +29,8 @@ class Parallel(Surface):
 
     def by_foot(self, largest: float) -> ByFoot:
         """What balls up to a radius meet, in the frame of `numbers`."""
-        raise NotImplementedError
+        numbers = self.numbers()
+        return foot_of(numbers, numbers.hessian_bounds(None)[0], self.tightest()[0])
 
     def framed_alike(self, wall: Any) -> Any:
         """A wall in the frame of `numbers` as the scene has it."""
@@ -63,13 +64,18 @@ def foot_of(numbers: Any, most: float, bend: float, box: Box = UNBOUNDED, known:
     return ByFoot(numbers, 0.0, float(most), float(bend), low, high, float(known))
 
 
+def _nearer(points: Floats, value: Any, slope: Any) -> Floats:
+    """Newton's step of points (3, N) onto a surface along the gradient."""
+    normal = slope(points)
+    with np.errstate(all="ignore"):
+        return np.asarray(points - value(points) / (normal**2).sum(axis=0) * normal)
+
+
 def onto(points: Floats, value: Any, slope: Any) -> Floats:
     """Points (3, N) moved onto a surface along the gradient; those that come to it near where they were."""
     size, to = np.ptp(points, axis=1).max(), points
     for _move in range(_ONTO):
-        normal = slope(to)
-        with np.errstate(all="ignore"):
-            to = to - value(to) / (normal**2).sum(axis=0) * normal
+        to = _nearer(to, value, slope)
     with np.errstate(all="ignore"):
         found = np.abs(value(to)) <= _NEAR * size * np.sqrt((slope(to) ** 2).sum(axis=0))
     return to[:, found & (np.abs(to - points).max(axis=0) <= 0.1 * size)]
@@ -86,9 +92,7 @@ def tightest_of(points: Floats, value: Any, slope: Any, most: float) -> tuple[fl
     while step > _SHORTEST * float(np.abs(points).max()):
         trial = best + step * random.normal(size=best.shape)
         for _move in range(_MOVES):
-            normal = slope(trial)
-            with np.errstate(all="ignore"):
-                trial = trial - value(trial) / (normal**2).sum(axis=0) * normal
+            trial = _nearer(trial, value, slope)
         there = np.sqrt((slope(trial) ** 2).sum(axis=0))
         less = (there < steep) & (np.abs(value(trial)) <= near)
         best, steep = np.where(less, trial, best), np.where(less, there, steep)

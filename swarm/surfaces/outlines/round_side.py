@@ -3,7 +3,6 @@
 import math
 from typing import Any
 
-from ...kernel.gravity import as_vector
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, either, norm, square, times
 from .. import contract
@@ -117,9 +116,6 @@ class RoundSide(contract.Smooth):
 
     def falling_hit(self, r, v, pull):
         return _first_fall(self, r, v, pull)
-
-    def entry(self, gravity, r, v):
-        return self.first_hit(r, v) if gravity is None else self.falling_hit(r, v, as_vector(gravity))
 
     def safe_time(self, r, v, pull):
         return self.falling_hit(r, v, pull)[0]

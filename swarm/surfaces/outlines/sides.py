@@ -3,7 +3,6 @@
 import math
 
 from ...kernel.arrays import index
-from ...kernel.gravity import as_vector
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, dot, norm, square, times
 from ..fields.members import Members, SignedDistance, member
@@ -45,14 +44,8 @@ class Side(Unturned):
     def steps(self, gravity, r, v):
         return None
 
-    def entry(self, gravity, r, v):
-        return self.first_hit(r, v) if gravity is None else self.falling_hit(r, v, as_vector(gravity))
-
     def safe_time(self, r, v, pull):
         return self.falling_hit(r, v, pull)[0]
-
-    def straight_hit(self, end, r0, r1):
-        return self.first_hit(r0, r1 - r0)
 
     def is_within(self, d, room):
         """Whether a point of the quadric, from the start of the side, is of the side, or nearer to it than that."""

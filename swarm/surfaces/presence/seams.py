@@ -16,7 +16,7 @@ from ...errors import SceneError
 from ..fields.many import Many
 from ..instant import side_of
 from ..room import Floats, Room, room_bounds
-from ..rotation import matrix
+from ..rotation import matrix, normalized
 from ..shapes.box import Box
 from ..shapes.capsule import Capsule
 from ..shapes.cylinder import Cylinder
@@ -67,8 +67,7 @@ class Face(NamedTuple):
         """Unit normals out of the admissible side (3, N)."""
         if self.plane is not None:
             return np.repeat(self.plane[0][:, None], points.shape[1], axis=1)
-        slopes = side_of(self.level) * self.level.gradient(points)
-        return np.asarray(slopes / np.maximum(np.sqrt((slopes**2).sum(axis=0)), np.finfo(np.float64).tiny))
+        return normalized(side_of(self.level) * self.level.gradient(points))
 
     def onto(self, points: Floats) -> Floats:
         """Points moved onto it."""

@@ -7,8 +7,7 @@ from typing import Any
 
 from ...common.checks import Vector
 from ...common.validated import Length
-from ..balls.by_foot import ByFoot
-from ..balls.parallel import Parallel, foot_of
+from ..balls.parallel import Parallel
 from ..rotation import Direction, rotated
 from ..surface import UNBOUNDED, Box, HalfSpace, farthest
 from .quadratic import QuadricNumbers, quadric_numbers
@@ -49,10 +48,6 @@ class Paraboloid(Revolved, Parallel):
 
     def tightest(self) -> tuple[float, Vector | None]:
         return (math.inf, None) if self.is_solid() else (2.0 * self.focal_length, self.center)
-
-    def by_foot(self, largest: float) -> ByFoot:
-        numbers = self.numbers()
-        return foot_of(numbers, numbers.hessian_bounds(None)[0], self.tightest()[0])
 
     def framed_alike(self, wall: Any) -> Any:
         return rotated(self.turn(), wall)

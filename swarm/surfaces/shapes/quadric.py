@@ -12,8 +12,7 @@ from ...common.checks import Vector, entries, vector
 from ...common.validated import Number, Point
 from ...errors import SceneError
 from .. import rotation as rotations
-from ..balls.by_foot import ByFoot
-from ..balls.parallel import Parallel, foot_of
+from ..balls.parallel import Parallel
 from ..surface import UNBOUNDED, Box, box_around, extents, farthest, side_sign
 from .quadratic import QuadricNumbers, quadric_numbers
 
@@ -185,10 +184,6 @@ class Quadric(Parallel):
             return radius, None
         x, y, z = (np.array(self.center) + rotations.product(rotations.matrix(self.rotation), where)).tolist()
         return radius, (x, y, z)
-
-    def by_foot(self, largest: float) -> ByFoot:
-        numbers = self.numbers()
-        return foot_of(numbers, numbers.hessian_bounds(None)[0], self.tightest()[0])
 
     def framed_alike(self, wall: Any) -> Any:
         return rotations.framed(self._axes(), wall)
