@@ -42,12 +42,8 @@ _REACH_OF_STEPS = 0.05
 
 def _surfaces(value: Any) -> tuple[Surface, ...]:
     """The argument `surfaces`, checked."""
-    given = (value,) if isinstance(value, Surface) else checks.parts_of(value)
-    if given is None:
-        raise SceneError(
-            f"surfaces must be a list of surfaces such as swarm.Sphere(radius=0.5), got {checks.shown(value)}"
-            f"{checks.brackets(value)}"
-        )
+    expected = "surfaces such as swarm.Sphere(radius=0.5)"
+    given = (value,) if isinstance(value, Surface) else checks.list_of("surfaces", value, expected)
     for i, surface in enumerate(given):
         if not isinstance(surface, Surface):
             raise SceneError(
@@ -334,19 +330,15 @@ class Scene:
         self, surfaces: Sequence[Surface], time: float = 0.0
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A box around the volume that some of the surfaces leave, and the cell that repeats."""
-        low, high = self._box_of(surfaces, time)
+        cell = UNBOUNDED if self.period is None else cell_of(self.period)
+        low, high = room_bounds(surfaces, time, cell)
         for k, union in enumerate(surfaces):
-            if len(union.rooms) > 1 and not np.isfinite(high - low).all():
+            if len(union.rooms) > 1 and not np.isfinite(high - low)[self.axes()].all():
                 # Another surface may close each of its rooms, such as a lid over a cone.
                 others = [*surfaces[:k], *surfaces[k + 1 :]]
-                boxes = [self._box_of([*others, *lasting(room)], time) for room in union.rooms]
+                boxes = [room_bounds([*others, *lasting(room)], time, cell) for room in union.rooms]
                 low = np.maximum(low, np.min([least for least, _most in boxes], axis=0))
                 high = np.minimum(high, np.max([most for _least, most in boxes], axis=0))
-        return low, high
-
-    def _box_of(self, surfaces: Sequence[Surface], time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The box of `bounds_of`, of surfaces that are each taken as a whole."""
-        low, high = room_bounds(surfaces, time, UNBOUNDED if self.period is None else cell_of(self.period))
         if (across := self.across()) is not None:
             low[across] = high[across] = 0.0
         return low, high

@@ -244,6 +244,14 @@ def parts_of(value: Any) -> tuple[Any, ...] | None:
         return None
 
 
+def list_of(name: str, value: Any, expected: str, *one: type[Any]) -> tuple[Any, ...]:
+    """`value` as a tuple of what is `expected`; an object of the class of `one` of them is no list."""
+    given = None if isinstance(value, one) else parts_of(value)
+    if given is None:
+        raise SceneError(f"{name} must be a list of {expected}, got {shown(value)}{brackets(value)}")
+    return given
+
+
 def brackets(value: Any) -> str:
     """A hint where a class came in place of an object, or nothing.
 

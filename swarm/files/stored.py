@@ -5,7 +5,7 @@ import functools
 import gc
 import operator
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Self
 
@@ -86,8 +86,7 @@ class Stored:
     @property
     def seed(self) -> int:
         """The seed of thermal walls; 0 if the file has no seed, as in versions without thermal walls."""
-        with self._reading("its seed") as file:
-            return int(self._checked.constant("parameters/seed")) if "parameters/seed" in file else 0
+        return int(self._constant("seed", int, 0))
 
     @property
     def counters_text(self) -> str:
@@ -123,6 +122,11 @@ class Stored:
     def _has(self, name: str) -> bool:
         with self._reading(f"its {name}") as file:
             return name in file
+
+    def _constant(self, name: str, kind: Callable[[Any], Any], missing: Any) -> Any:
+        """A constant of the run, of a kind; `missing` where the file has none of this name."""
+        with self._reading(f"its {name}") as file:
+            return kind(self._checked.constant(f"parameters/{name}")) if f"parameters/{name}" in file else missing
 
     def _text(self, name: str) -> str:
         with self._reading(f"its {name.replace('_', ' ')}"):

@@ -443,14 +443,14 @@ class Trajectory(Stored):
     @property
     def until(self) -> float | None:
         """The end that the run was to reach [s]; None in files of older versions, and of runs on clusters."""
-        with self._reading("its end") as file:
-            return float(finite(self._checked.constant("parameters/until"))) if "parameters/until" in file else None
+        found: float | None = self._constant("until", lambda end: float(finite(end)), None)
+        return found
 
     @property
     def threads(self) -> int | None:
         """The threads of the last session of the run; None as for `until`."""
-        with self._reading("its threads") as file:
-            return int(self._checked.constant("parameters/threads")) if "parameters/threads" in file else None
+        found: int | None = self._constant("threads", int, None)
+        return found
 
     @property
     def wall_times(self) -> NDArray[np.float64] | None:

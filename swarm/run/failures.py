@@ -13,6 +13,7 @@ from ..kernel.vector import ZERO, column
 from ..methods.base import Method
 from ..scene import Scene
 from ..state import State
+from ..surfaces.surface import shown
 from ..surfaces.wall_law import leave_of, mirrored, sentence_of, why_wrong
 from .preflight import softness
 from .starting_state import Seeding
@@ -46,7 +47,7 @@ def after(before: float, particle: int, status: Status, place: Any, moment: floa
     """The sentence about a frame after a time [s] that ended with this particle at its place at a moment [s]."""
     return (
         f"the frame after {before:g} s failed at particle {particle}: {status.sentence}; it is at "
-        f"({', '.join(f'{x:.6g}' for x in place)}) m at {moment:.9g} s"
+        f"{shown(place, 6)} m at {moment:.9g} s"
     )
 
 
@@ -77,10 +78,10 @@ def sentence_of_coming(
 ) -> str:
     """The sentence about a particle that is so deep [m] in a wall that comes, `found` as (surface, particle)."""
     wall, particle = found
-    place = ", ".join(f"{x:.6g}" for x in state.position[:, particle])
+    place = shown(state.position[:, particle], 6)
     return (
         f"{_named(scene, wall)} must come where no particle is: at {instant:g} s particle {first + particle} is "
-        f"{depth:.3g} m inside, at ({place}) m; let it come later or elsewhere, or start that particle elsewhere"
+        f"{depth:.3g} m inside, at {place} m; let it come later or elsewhere, or start that particle elsewhere"
     )
 
 
@@ -89,7 +90,7 @@ def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
     remaining = 0.0 if state.contacts is None else state.contacts.remaining[particle]
     place, found = state.position[:, particle], moment - remaining
     wall = int(np.argmax(scene.distances_outside(place[:, None], found)[:, 0]))
-    where = f"({', '.join(f'{x:.6g}' for x in place)}) m, at {_named(scene, wall)}"
+    where = f"{shown(place, 6)} m, at {_named(scene, wall)}"
     return f"; it is at {where}" + (f" at {found:.9g} s" if remaining > 0.0 else "")
 
 

@@ -10,7 +10,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
-from ..common.checks import closest, parts_of, shown
+from ..common.checks import closest, list_of, shown
 from ..errors import SceneError
 
 _ALLOWED: ContextVar[tuple[str, ...]] = ContextVar("_ALLOWED", default=())
@@ -28,9 +28,7 @@ def checked_modules(given: Any) -> tuple[str, ...]:
     Raises:
         SceneError: one is no name of a module.
     """
-    modules = parts_of(given)
-    if modules is None:
-        raise SceneError(f'plugins must be a list of names of modules, such as ["mylaws"], got {shown(given)}')
+    modules = list_of("plugins", given, 'names of modules, such as ["mylaws"]')
     found = []
     for one in modules:
         for name in one.split(",") if isinstance(one, str) else [one]:

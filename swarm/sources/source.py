@@ -217,13 +217,11 @@ def checked_sources(name: str, value: Any) -> tuple[Source, ...]:
     """The argument `sources` of a run, checked."""
     if value is None:
         return ()
-    given = [value] if isinstance(value, Source) else list(value) if isinstance(value, (list, tuple)) else None
-    if given is None:
-        raise SceneError(f"{name} must be a list of swarm.Source, got {checks.shown(value)}")
+    given = (value,) if isinstance(value, Source) else checks.list_of(name, value, "swarm.Source")
     for k, one in enumerate(given):
         if not isinstance(one, Source):
             raise SceneError(f"{name}[{k}] must be a swarm.Source, got {one!r:.200}")
-    return tuple(given)
+    return given
 
 
 def _as_text(value: Any) -> str:

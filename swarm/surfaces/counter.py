@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..common.checks import parts_of, shown
+from ..common.checks import list_of, shown
 from ..errors import SceneError
 from .surface import Surface
 
@@ -53,9 +53,7 @@ def require_bare(name: str, given: Any, why: str) -> None:
 
 def checked_counters(name: str, value: Any) -> tuple[Counter, ...]:
     """The argument `counters`: each as a `Counter`."""
-    given = None if isinstance(value, (Surface, Counter)) else parts_of(value)
-    if given is None:
-        raise SceneError(f"{name} must be a list of surfaces such as swarm.Plane, got {shown(value)}")
+    given = list_of(name, value, "surfaces such as swarm.Plane", Surface, Counter)
     found = []
     for k, one in enumerate(given):
         if not isinstance(one, Counter):

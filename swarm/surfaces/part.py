@@ -17,9 +17,7 @@ _HANDED_DOWN = (
 
 def checked_parts(value: Any, name: str) -> tuple[Surface, ...]:
     """The argument `parts`, checked."""
-    given = None if isinstance(value, Surface) else checks.parts_of(value)
-    if given is None:
-        raise SceneError(f"parts must be a list of surfaces such as swarm.Sphere, got {checks.shown(value)}")
+    given = checks.list_of("parts", value, "surfaces such as swarm.Sphere", Surface)
     if not given:
         raise SceneError(f"parts must hold at least one surface of the {name}, got none")
     for k, part in enumerate(given):

@@ -20,7 +20,7 @@ from .fields.many import Many
 from .outlines.outlined import Outlined
 from .shapes.slab import AXES
 from .shapes.sphere import Sphere
-from .surface import Surface
+from .surface import Surface, shown
 from .upright import upright
 from .wall_law import leave_of, tries_of
 
@@ -127,7 +127,7 @@ def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> Non
             name = type(surface).__name__
             raise SceneError(
                 f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got {name}: its '
-                f"normal at {_as_text(places[:, k])} is {_size(part[k])} out of the plane and would send particles out "
+                f"normal at {shown(places[:, k])} m is {_size(part[k])} out of the plane and would send particles out "
                 f"of it; {_mended(surface, across)}"
             )
 
@@ -137,17 +137,13 @@ def _require_upright(plane: str, i: int, surface: Outlined) -> None:
     if surface.across != PLANES[plane]:
         raise SceneError(
             f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got '
-            f"{type(surface).__name__} with its axis along {_as_text(surface.frame[:, 2])[:-2]}; give it axis = "
+            f"{type(surface).__name__} with its axis along {shown(surface.frame[:, 2])}; give it axis = "
             f"{tuple(float(name == plane) for name in PLANES)}, and turn it about that"
         )
 
 
 def _size(part: float) -> str:
     return f"{math.degrees(math.asin(min(1.0, abs(part)))):.3g} degrees"
-
-
-def _as_text(point: Any) -> str:
-    return f"({', '.join(f'{x:.4g}' for x in point)}) m"
 
 
 def _mended(surface: Surface, across: int) -> str:
@@ -229,8 +225,8 @@ def _require_laws(plane: str, where: str, surface: Surface) -> None:
             if stays and after[across] != 0.0:
                 raise SceneError(
                     f'{where}[{k}] must send particles along the plane where plane = "{plane}": {plane} = 0 of the '
-                    f"velocity that leave returns; {law} returned {checks.shown(after)} for v = {_as_text(v)[:-2]} "
-                    f"and n = {_as_text(n)[:-2]}"
+                    f"velocity that leave returns; {law} returned {checks.shown(after)} for v = {shown(v)} "
+                    f"and n = {shown(n)}"
                 )
 
 

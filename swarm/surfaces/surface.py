@@ -36,9 +36,7 @@ LevelSet = tuple[Callable[[Any], Any], Callable[[Any], Any]]
 
 def _openings(name: str, value: Any) -> "tuple[Surface | Opening, ...]":
     """`value` as a tuple of openings."""
-    given = None if isinstance(value, (Surface, Opening)) else checks.parts_of(value)
-    if given is None:
-        raise SceneError(f"{name} must be a list of surfaces such as swarm.Sphere, got {checks.shown(value)}")
+    given = checks.list_of(name, value, "surfaces such as swarm.Sphere", Surface, Opening)
     for k, one in enumerate(given):
         opening = one.surface if isinstance(one, Opening) else one
         if not isinstance(opening, Surface):
@@ -526,9 +524,9 @@ def extents(axes: NDArray[np.float64], semi_axes: Any) -> Vector:
     return x, y, z
 
 
-def shown(point: Any) -> str:
-    """A point as errors write it."""
-    return "(" + ", ".join(f"{part:.4g}" for part in point) + ")"
+def shown(point: Any, digits: int = 4) -> str:
+    """A point as errors write it, with so many digits."""
+    return f"({', '.join(f'{part:.{digits}g}' for part in point)})"
 
 
 def farthest(point: Vector) -> float:

@@ -17,7 +17,7 @@ from ...kernel.vector import vec
 from .. import rotation as rotations
 from ..balls.by_foot import ByFoot
 from ..balls.parallel import Parallel, foot_of, onto, tightest_of
-from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, side_sign
+from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, shown, side_sign
 from . import spline
 from .arrays import read_samples
 from .flight import SampledNumbers
@@ -299,9 +299,9 @@ def _require_resolved(values: Floats, width: Floats, origin: Floats) -> None:
                 ends = np.array([at, at])
                 ends[1, 0] += 1
                 start, end = np.moveaxis(ends[:, [*range(1, axis + 1), 0, *range(axis + 1, 3)]], 0, 0)
-                where = ", ".join(f"{x:.4g}" for x in origin + width * 0.5 * (start + end))
+                where = shown(origin + width * 0.5 * (start + end))
                 raise SceneError(
                     f"values must resolve the surface, got a grid that is too coarse: between values{start.tolist()} = "
-                    f"{first[at]:.4g} and values{end.tolist()} = {last[at]:.4g}, at ({where}), phi changes its sign "
+                    f"{first[at]:.4g} and values{end.tolist()} = {last[at]:.4g}, at {where}, phi changes its sign "
                     "twice; sample it with a smaller spacing"
                 )

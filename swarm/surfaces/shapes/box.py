@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from ...common.checks import Vector, one_of, parts_of, shown
+from ...common.checks import Vector, list_of, one_of
 from ...common.validated import Lengths
 from ...errors import SceneError
 from ...kernel.vector import vec
@@ -22,9 +22,7 @@ FACES = tuple(sign + axis for axis, sign in itertools.product("xyz", "-+"))
 
 def _faces(name: str, value: Any) -> tuple[str, ...]:
     """`value` as the faces of a box that have no wall."""
-    given = parts_of(value)
-    if given is None:
-        raise SceneError(f"{name} must be a list of faces such as '+x', got {shown(value)}")
+    given = list_of(name, value, "faces such as '+x'")
     faces = tuple(one_of(f"{name}[{i}]", face, FACES) for i, face in enumerate(given))
     for i, face in enumerate(faces):
         if face in faces[:i]:
