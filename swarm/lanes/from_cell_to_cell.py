@@ -193,7 +193,9 @@ class Maybe(Record):
         for n in range(some):
             j, k = index(self.place[n] // BLOCK), index(self.place[n] % BLOCK)
             self.lane[n], self.facet[n] = looks.lane[j], facets.grid.known.facets[index(looks.block[j]), k]
-            ask_for(facets.table, self.facet[n], facets.table.shape[1])
+            facets.ask_for(index(self.facet[n]))
+        for n in range(some):
+            facets.ask_for_corners(index(self.facet[n]))
 
 
 def maybe_met():

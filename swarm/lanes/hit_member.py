@@ -59,7 +59,7 @@ def of_lane(walls, picked, i):
     if not picked:
         return walls
     fields = (
-        Field(Picked(gathered(field.members.like, rows, i, 0), field.count()))
+        Field(Picked(gathered(field.members.as_met(), rows, i, 0), field.count()))
         for (_number, field), rows in zip(_fields(walls), picked, strict=True)
     )
     return Walls((*fields, *walls.others().each))

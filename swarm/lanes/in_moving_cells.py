@@ -153,7 +153,7 @@ def _step_to(facet, seen, longest) -> Any:
         return Hit(time, _BEHIND)
     # How deep a flight may be at the end of the step
     left = 2.0 * sixth * ahead * time * time
-    if (left <= room) & (time < longest) and facet.within(_place(seen, time)) >= 0.0:
+    if (left <= room) & (time < longest) and not facet.is_beyond(_place(seen, time), 0.0):
         return Hit(time, 0.0)
     within = facet.within(seen.r)
     if within < 0.0:
@@ -190,7 +190,7 @@ def _misses(facet, seen, longest):
     is_near = begin < longest
     begin, end = select(is_near, begin, 0.0), select(stays & (end < longest), end, longest)
     beside = 0.5 * bounds.speed * (end - begin) + k * end * end + room
-    return (c <= room) & ((not is_near) | (facet.within(_place(seen, 0.5 * (begin + end))) < -beside))
+    return (c <= room) & ((not is_near) | facet.is_beyond(_place(seen, 0.5 * (begin + end)), beside))
 
 
 @outlined

@@ -12,7 +12,7 @@ from ...kernel.vector import Vec
 from ..balls.facet import RoundTriangle
 from ..fields.many import field_of
 from ..fields.members import Members
-from .facet import OVERLAP, THIN
+from .facet import THIN
 from .free_room import CLOSED, FREE, KIND, rooms_of, with_blocks
 from .members import Facets
 from .mesh_files import Floats, Soup
@@ -72,25 +72,21 @@ def sorted_by_place(mesh: Closed) -> Closed:
         for axis in range(3):
             keys |= (places[:, axis] >> bit & 1) << (3 * bit + axis)
     order = np.lexsort((keys, mesh.group))
-    return mesh._replace(triangles=np.ascontiguousarray(mesh.triangles[order]), group=mesh.group[order])
+    triangles: Any = np.ascontiguousarray(mesh.triangles[order], np.int32)
+    group: Any = mesh.group[order].astype(np.int32)
+    return mesh._replace(triangles=triangles, group=group)
 
 
-def table_of_facets(corners: Floats, beyond: float = 0.0) -> Floats:
-    """The numbers of facets with these corners (T, 3, 3), one in each row, so much larger at each edge [m]."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    normal = _normals(a, b, c)
-    columns = [normal, (normal * corners.mean(axis=1)).sum(axis=1)[:, None]]
-    for p, q in ((a, b), (b, c), (c, a)):
-        inwards = np.cross(normal, q - p)
-        inwards /= np.linalg.norm(inwards, axis=1)[:, None]
-        columns += [inwards, ((inwards * p).sum(axis=1) - beyond)[:, None]]
-    return aligned_copy(np.concatenate(columns, axis=1))
+def table_of_facets(corners: Floats) -> Floats:
+    """The normals and the offsets of facets with these corners (T, 3, 3), one in each row."""
+    normal = _normals(*np.moveaxis(corners, 1, 0))
+    return aligned_copy(np.concatenate([normal, (normal * corners.mean(axis=1)).sum(axis=1)[:, None]], axis=1))
 
 
 def table_of_sides(corners: Floats, room: float) -> Floats:
     """The numbers of both sides of sheets with these corners (T, 3, 3), side by side; `room` is round-off [m]."""
-    table = aligned_copy(np.repeat(table_of_facets(corners, (OVERLAP - 1.0) * room), 2, axis=0))
-    table[1::2, :4] *= -1.0
+    table = aligned_copy(np.repeat(table_of_facets(corners), 2, axis=0))
+    table[1::2] *= -1.0
     table[:, 3] -= THIN * room
     return table
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ...kernel.arrays import index
+from ...kernel.arrays import fetch, index
 from ...kernel.gravity import accelerated, displacement
 from ...kernel.grid import cell_of, entries_at, entries_of, until_next, until_out
 from ...kernel.jit import outlined
@@ -33,6 +33,20 @@ class Facets(Members, Patched):
     def gone(self):
         without, known = Members.gone(self).grid, self.grid.known
         return self._replace(grid=without._replace(known=known._replace(starts=np.zeros_like(known.starts))))
+
+    def ask_for(self, m):
+        """Ask for what is known of a facet, before its corners."""
+        fetch(self.table, m * self.table.shape[1])
+        fetch(self.like.corners.triangles, self.like.corners.row(m) * 3)
+
+    def ask_for_corners(self, m):
+        """Ask for its corners."""
+        corners = self.like.corners
+        for k in range(3):
+            fetch(corners.vertices, index(corners.triangles[corners.row(m), k]) * 3)
+
+    def as_met(self):
+        return self.like._replace(corners=None)
 
     def field_hit(self, gravity, r, v):
         return _first_hit(self, gravity, r, v)

@@ -25,7 +25,7 @@ from ..fields.members import Members
 from ..fields.one_wall import OneWall, one_wall
 from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
-from .facet import OVERLAP, ROOM, THIN, FacetNumbers, Shared, SheetSide
+from .facet import OVERLAP, ROOM, THIN, CornersOf, CornersOfSides, FacetNumbers, Shared, SheetSide
 from .facet_cells import MOVING_MARGIN, cells_around
 from .made import given_arrays, sorted_by_place, table_of_facets, table_of_sides, triangles_of_balls, with_room
 from .members import Facets
@@ -189,6 +189,8 @@ class Mesh(Surface):
     @cached_property
     def corners(self) -> Floats:
         """The vertices (V, 3) where they are in the scene [m]."""
+        if self.rotation is None and not any(self.center):
+            return np.asarray(self.vertices)
         turned = self.vertices @ rotations.matrix(self.rotation).T if self.rotation is not None else self.vertices
         return np.ascontiguousarray(turned + np.array(self.center))
 
@@ -197,12 +199,14 @@ class Mesh(Surface):
         """The facets as kernels take them."""
         corners = self.corners[self.triangles if self.side == "inside" else self.triangles[:, ::-1]]
         zero, room = Vec(0.0, 0.0, 0.0), self._room
-        numbers = zero, 0.0, 3 * ((zero, 0.0),), Shared(room)
+        shared = self.corners, self.triangles, side_sign(self.side)
         if self.open:
-            like, table = SheetSide(*numbers), table_of_sides(corners, room)
+            like = SheetSide(zero, 0.0, CornersOfSides(*shared, (OVERLAP - 1.0) * room), Shared(room))
+            table = table_of_sides(corners, room)
             grid = cells_around(like, table, np.repeat(corners, 2, axis=0), OVERLAP * room, self._margin)
             return with_room(Facets(like, table, grid), None, True)
-        like, table = FacetNumbers(*numbers), table_of_facets(corners)
+        like = FacetNumbers(zero, 0.0, CornersOf(*shared, 0.0), Shared(room))
+        table = table_of_facets(corners)
         grid = cells_around(like, table, corners, margin=self._margin)
         return with_room(Facets(like, table, grid), self._tree, self.is_solid())
 

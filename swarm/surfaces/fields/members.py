@@ -12,7 +12,7 @@ from ...kernel.grid import Grid, cell_of, entries_at, entries_of, layer_of, numb
 from ...kernel.jit import Array, kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, column, norm, put
-from ..facets.facet import Shared
+from ..facets.facet import CornersOf, Shared
 from ..rotation import Rotated
 from ..shapes.capsule import CapsuleNumbers
 from ..shapes.quadratic import QuadricNumbers
@@ -94,6 +94,10 @@ class Members(Record):
     def is_gone(self):
         """Whether none of the bodies is there."""
         return self.grid.entries.shape[0] == 0
+
+    def as_met(self):
+        """`like` of one that is met: what only says where it is met is left out."""
+        return self.like
 
     def count(self):
         """Their number."""
@@ -222,6 +226,8 @@ def _taken(like, table, m, k):
         return made(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3]), k + 4
     if isinstance(like, Shared):
         return like, k
+    if isinstance(like, CornersOf):
+        return like.of(m), k
     if isinstance(like, AXES):
         return type(like)(1.0), k + 1  # type: ignore[arg-type]
     parts: tuple[Any, ...] = ()
@@ -237,7 +243,7 @@ def width(like):
         return 0 if like is None else 1
     if isinstance(like, GrownLike):
         return width(like.body)
-    if isinstance(like, (SphereNumbers, Shared)):
+    if isinstance(like, (SphereNumbers, Shared, CornersOf)):
         return 4 if isinstance(like, SphereNumbers) else 0
     return sum(map(width, like))
 
