@@ -26,11 +26,14 @@ _AREA, _DOUBLES, _FEW, _MANY = 1.5, math.log10(2.0), 1e3, 1e5
 _CELLS_EACH, _MOST_CELLS = 32.0, 100_000_000
 # Cells of few facets.
 _LEAST_CELLS = 64
-# A plane in a cell is known by four whole numbers up to this one, and so to these parts of the cell's diagonal and of a
+# A plane in a cell is known by whole numbers up to this one, and so to these parts of the cell's diagonal and of a
 # speed; so many are made at once.
-_FULL, _OFF, _OFF_SPEED, _TOGETHER = 32767.0, 6e-5, 6e-5, 1_000_000
-# A ball around a facet is known where its middle and its radius are within so many diagonals.
+_FULL, _OFF, _OFF_SPEED, _TOGETHER = 32767.0, 1.5e-4, 6e-5, 1_000_000
+# A ball around a facet is known where its middle and its radius are within so many diagonals: its middle then by half
+# of one of these whole numbers along each axis, and the plane by 3 diagonals times the round-off of the normal more.
 _REACH = 2.0
+# The halves of balls are known by three digits to this base, above this zero, and by no more than this length.
+_BASE, _ZERO, _LONGEST = 32.0, 16.0, 26.0
 # The first of these parts in the unit of the balls, and times the length of whole normals.
 _NEAR_PLACE = _OFF * _FULL / _REACH
 _NEAR = _NEAR_PLACE * _FULL
@@ -46,8 +49,8 @@ _SOME = 60
 BLOCK = 8
 
 
-# A plane that hardly a flight comes through: far ahead, with no normal.
-_NO_PLANE = np.array([0, 0, 0, -32767, 0, 0, 0, 0], np.int16)
+# A plane that hardly a flight comes through: far ahead of it, it is behind it.
+_NO_PLANE = np.array([-32767, 0, 0, 0, 32767, 0, 0, 0], np.int16)
 
 
 class FacetCells(Record):
@@ -55,7 +58,7 @@ class FacetCells(Record):
 
     starts: Array  # (cells + 2) int32, where the blocks of a cell begin: each has its entries from a block's begin on
     facets: Array  # (blocks, BLOCK) int32, the last one of a cell again and again where a block is not full
-    planes: Array  # (blocks, 8, BLOCK) int16, of each the normal, and from the middle of the cell: `passes`
+    planes: Array  # (blocks, 8, BLOCK) int16, of each the normal, the half and the ball: `passes`
     room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
 
 
@@ -114,24 +117,68 @@ def _cells(corners: Floats, low: Floats, high: Floats, margin: float) -> tuple[F
 def _planes(
     grid: Grid, table: Floats, corners: Floats, facets: NDArray[np.int32], cells: NDArray[np.int64]
 ) -> NDArray[np.int16]:
-    """The planes and the balls of facets, each in the cell with this number."""
+    """The planes and the half balls of facets, each in the cell with this number."""
     width = np.array(grid.width)
     diagonal = float(np.linalg.norm(width))
+    unit, none = _FULL / (_REACH * diagonal), _digits(np.zeros(3))
     made = np.zeros((len(cells), 8), np.int16)
-    middles = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
-    radii = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+    middles, radii, halves = _half_balls(corners)
     for first in range(0, len(cells), _TOGETHER):
         some = slice(first, min(first + _TOGETHER, len(cells)))
         places = np.stack(np.unravel_index(cells[some], tuple(int(n) for n in grid.shape)), axis=1)
         normal, offset = table[facets[some], :3], table[facets[some], 3]
         middle = np.array(grid.low) + (places + 0.5) * width
         made[some, :3] = np.rint(normal * _FULL)
-        made[some, 3] = np.rint((offset - (normal * middle).sum(axis=1)) * (_FULL / diagonal))
         away, radius = middles[facets[some]] - middle, radii[facets[some]]
         near = (np.abs(away).max(axis=1) < _REACH * diagonal) & (radius < 0.9 * _REACH * diagonal)
-        made[some, 4:7] = np.where(near[:, None], np.rint(away * (_FULL / (_REACH * diagonal))), 0.0)
-        made[some, 7] = np.where(near, np.ceil(radius * (_FULL / (_REACH * diagonal))) + 2.0, _FULL)
+        # Of what is not, a place of the plane, and no half
+        foot = (offset - (normal * middle).sum(axis=1))[:, None] * normal
+        made[some, 3] = np.where(near, _digits(halves[facets[some]]), none)
+        made[some, 4:7] = np.rint(np.where(near[:, None], away, foot) * unit)
+        made[some, 7] = np.where(near, np.ceil(radius * unit) + 2.0, _FULL)
     return made
+
+
+def _half_balls(corners: Floats) -> tuple[Floats, Floats, Floats]:
+    """The least ball around each facet: its middle in the plane, its radius, and its half.
+
+    That is a vector h, of digits: where h.(r - middle) is less than -radius is nothing of the facet, but beyond its
+    longest edge. The half of a ball around a triangle with a right angle is twice as large as that.
+    """
+    sides, every = np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), np.arange(len(corners))
+    squares = (sides**2).sum(axis=2)
+    k = squares.argmax(axis=1)
+    begin, way = corners[every, (k + 1) % 3], -sides[every, k]
+    # The circumcentre by its weights, or the middle of the longest edge where that is beyond it
+    weights = squares * (squares.sum(axis=1)[:, None] - 2.0 * squares)
+    acute = weights.min(axis=1) > 0.0
+    sums = np.where(acute, weights.sum(axis=1), 1.0)
+    around = (weights[:, :, None] * corners).sum(axis=1) / sums[:, None]
+    middle = np.where(acute[:, None], around, begin + 0.5 * way)
+    places = corners - middle[:, None]
+    radius = np.linalg.norm(places, axis=2).max(axis=1)
+    into = places[every, k] - places[every, (k + 1) % 3]
+    into -= ((into * way).sum(axis=1) / squares[every, k])[:, None] * way
+    into /= np.maximum(np.abs(into).max(axis=1), np.finfo(np.float64).tiny)[:, None]
+    half = np.zeros_like(into)
+    for length in range(1, int(_ZERO)):
+        longer = np.rint(into * length)
+        good = (longer[:, None] * places).sum(axis=2).min(axis=1) >= -radius
+        half[good] = longer[good]
+    return middle, radius, half
+
+
+def _digits(half: Floats) -> Floats:
+    """A half as one number."""
+    return np.asarray((half + _ZERO) @ np.array([_BASE * _BASE, _BASE, 1.0]))
+
+
+def _half(digits):
+    """The half of a number."""
+    x = np.floor(digits * (1.0 / (_BASE * _BASE)))
+    rest = digits - _BASE * _BASE * x
+    y = np.floor(rest * (1.0 / _BASE))
+    return Vec(x - _ZERO, y - _ZERO, rest - _BASE * y - _ZERO)
 
 
 def blocks_of(cells, number):
@@ -190,25 +237,33 @@ def flight_in(cells, at, v, pull, span, bounds=None):
 
 
 def passes(cells, block, k, here):
-    """Whether a flight may come through the plane of an entry in its cell, and there through a ball around the facet.
+    """Whether a flight may come through the plane of an entry in its cell, there through the half ball of the facet.
 
     Most do not, and no facet is looked up. What is known of the entry is round-off of whole numbers, and so long is its
     normal. Without a branch: which entries a flight passes no processor foresees.
     """
     rows = cells.known.planes
     normal = _row(rows, block, 0, k)
-    depth, rate = dot(normal, here.at) - float(rows[block, 3, k]) * (_FULL / _REACH), dot(normal, here.way)
-    center, radius, beyond = _row(rows, block, 4, k), float(rows[block, 7, k]), rate + here.slow
+    half, radius = _half(float(rows[block, 3, k])), float(rows[block, 7, k])
+    at = here.at - _row(rows, block, 4, k)
+    depth, rate = dot(normal, at), dot(normal, here.way)
     if here.bent is None:
+        beyond = rate + here.slow
         meets = (beyond > 0.0) & (depth <= _NEAR) & (depth + beyond >= -_NEAR)
         # All lengths times the speed along the normal, so that nothing is divided: a third of such tests.
-        away = rate * (here.at - center) - depth * here.way
-        beside = radius * rate + 2.0 * _BESIDE * _NEAR_PLACE * here.slow
-        return meets & (not ((rate > 2.0 * here.slow) & (square(away) > beside * beside)))
-    return _passes_in_curve(here, (depth, rate, dot(normal, here.bent)), center, radius)
+        away = rate * at - depth * here.way
+        reach, off = radius * rate, 2.0 * _BESIDE * _NEAR_PLACE * here.slow
+        return meets & (not ((rate > 2.0 * here.slow) & _is_beside(away, half, reach, off, rate)))
+    return _passes_in_curve(here, at, (depth, rate, dot(normal, here.bent)), half, radius)
 
 
-def _passes_in_curve(here, level, center, radius):
+def _is_beside(away, half, reach, off, unit):
+    """Whether a place is not in a half ball with this reach, where it is known but for so much, and the middle too."""
+    ball = reach + off
+    return (square(away) > ball * ball) | (dot(half, away) < -(reach + _LONGEST * (off + unit)))
+
+
+def _passes_in_curve(here, at, level, half, radius):
     """As `passes` of a parabola, or of what is near to one: its level is depth + rate s + bend s^2 at the part s."""
     (depth, rate, bend), jerk, farther = level, 0.0, 0.0
     if here.curve is not None:
@@ -228,17 +283,17 @@ def _passes_in_curve(here, level, center, radius):
     is_known = (rate > 0.0) & (below > more * (more + 4.0 * abs(bend))) & (not turns)
     root = np.sqrt(select(is_known, below, 0.0))
     part = -depth / select(is_known, b + root, 1.0)
-    away = here.at + part * (here.way + part * here.bent) - center
+    away = root * (at + part * (here.way + part * here.bent))
     # Times the root, so that little is divided.
     length = (here.slow + 2.0 * here.weak) * (1.0 / (_FULL * _OFF_SPEED))
-    beside = (radius + farther + _NEAR_PLACE) * root + length * more
-    meets = meets & (not (is_known & (square(away) * below > beside * beside)))
+    off = (farther + _NEAR_PLACE) * root + length * more
+    meets = meets & (not (is_known & _is_beside(away, half, radius * root, off, root)))
     if here.curve is None:
         return meets
     # Around its middle it is in a ball of half its length.
-    middle, half = here.at + 0.5 * here.way - center, radius + here.curve.curved + _NEAR_PLACE
-    half = half + 0.5 * math.sqrt(square(here.way))
-    return meets & (square(middle) <= half * half)
+    middle, reach = at + 0.5 * here.way, radius + here.curve.curved + _NEAR_PLACE
+    reach = reach + 0.5 * math.sqrt(square(here.way))
+    return meets & (square(middle) <= reach * reach)
 
 
 def _row(rows, block, first, k):
