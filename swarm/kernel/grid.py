@@ -1,6 +1,7 @@
 """A uniform grid of cells: which cell a point is in, what is in a cell, and when a flight is in the next one.
 
-The entries of a cell are `entries[first[cell]:first[cell + 1]]`, in the order in which they were entered.
+The entries of a cell are `entries[first[cell]:first[cell + 1]]`, in the order in which they were entered; where more
+is known of cells, without the last of these, of which it says how many are `spare`.
 """
 
 import math
@@ -98,7 +99,8 @@ def _place(d, inverse, count):
 def entries_of(grid, number):
     """The begin and the end of the entries of the cell with this number."""
     cell = index(number)
-    return grid.first[cell], grid.first[cell + index(1)]
+    begin, end = grid.first[cell], grid.first[cell + index(1)]
+    return begin, end if grid.known is None else end - grid.known.spare(cell)
 
 
 def entries_at(grid, r):

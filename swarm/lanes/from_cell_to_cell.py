@@ -192,7 +192,7 @@ class Maybe(Record):
         """Look up so many."""
         for n in range(some):
             j, k = index(self.place[n] // BLOCK), index(self.place[n] % BLOCK)
-            self.lane[n], self.facet[n] = looks.lane[j], facets.grid.known.facets[index(looks.block[j]), k]
+            self.lane[n], self.facet[n] = looks.lane[j], facets.grid.entries[index(looks.block[j] * BLOCK) + k]
             facets.ask_for(index(self.facet[n]))
         for n in range(some):
             facets.ask_for_corners(index(self.facet[n]))

@@ -18,6 +18,7 @@ from ...kernel.jit import Array, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, square, total
 from ..fields.grid import enter_bodies
+from .free_room import rows_of, spare_of
 
 # Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
 # ones more are crossed. It doubles with ten times as many facets, from the first number of facets to the second: what
@@ -56,10 +57,12 @@ _NO_PLANE = np.array([-32767, 0, 0, 0, 32767, 0, 0, 0], np.int16)
 class FacetCells(Record):
     """What is known of the cells of facets: `Grid.known`."""
 
-    starts: Array  # (cells + 2) int32, where the blocks of a cell begin: each has its entries from a block's begin on
-    facets: Array  # (blocks, BLOCK) int32, the last one of a cell again and again where a block is not full
     planes: Array  # (blocks, 8, BLOCK) int16, of each the normal, the half and the ball: `passes`
-    room: Array  # (cells + 1, 8) int8, of each what is free around it: see room.py
+    room: Array  # (cells + 1, 8) int8, of each what is free around it: see free_room.py
+
+    def spare(self, cell):
+        """How many of the last entries of a cell are there again, to fill its last block."""
+        return spare_of(self.room, cell)
 
 
 def cells_around(like, table: Floats, corners: Floats, beyond: float = 0.0, margin: float = MARGIN) -> Grid:
@@ -78,14 +81,17 @@ def cells_around(like, table: Floats, corners: Floats, beyond: float = 0.0, marg
     enter = cache.in_python(enter_bodies) if len(table) <= _SOME else enter_bodies
     cells = _cells(corners, low.min(axis=1), high.max(axis=1), margin)
     grid = filled_grid(*cells, partial(enter, like, table, (low, high)), margin)
-    return grid._replace(known=_in_blocks(grid, table, corners))
+    return _in_blocks(grid, table, corners)
 
 
-def _in_blocks(grid: Grid, table: Floats, corners: Floats) -> FacetCells:
-    """The entries of a grid in blocks, without what is free around its cells."""
+def _in_blocks(grid: Grid, table: Floats, corners: Floats) -> Grid:
+    """The grid with the entries of each cell in blocks of their own, without what is free around its cells.
+
+    The last one of a cell is there again and again where a block is not full.
+    """
     counts = np.diff(grid.first)
     blocks = -(-counts // BLOCK)
-    starts = np.concatenate([[0], np.cumsum(blocks)]).astype(np.int32)
+    starts = np.concatenate([[0], np.cumsum(blocks)])
     cells = np.repeat(np.arange(len(counts)), blocks)
     # The places of the entries of each block among those of its cell
     places = BLOCK * (np.arange(len(cells)) - starts[cells])[:, None] + np.arange(BLOCK)
@@ -94,7 +100,8 @@ def _in_blocks(grid: Grid, table: Floats, corners: Floats) -> FacetCells:
     planes = _planes(grid, table, corners, facets.ravel(), np.repeat(cells, BLOCK))
     planes[(places > last).ravel()] = _NO_PLANE
     planes = planes.reshape(-1, BLOCK, 8).swapaxes(1, 2)
-    return FacetCells(starts, aligned_copy(facets), aligned_copy(planes), np.empty((0, 8), np.int8))
+    known = FacetCells(aligned_copy(planes), rows_of(counts, BLOCK * blocks))
+    return grid._replace(first=(BLOCK * starts).astype(np.int32), entries=aligned_copy(facets.ravel()), known=known)
 
 
 def _cells(corners: Floats, low: Floats, high: Floats, margin: float) -> tuple[Floats, Floats, Floats]:
@@ -183,8 +190,8 @@ def _half(digits):
 
 def blocks_of(cells, number):
     """The begin and the end of the blocks of entries of the cell with this number."""
-    cell, starts = index(number), cells.known.starts
-    return starts[cell], starts[cell + index(1)]
+    cell, first = index(number), cells.first
+    return index(first[cell]) // BLOCK, index(first[cell + index(1)]) // BLOCK
 
 
 # --- Which planes a flight passes ------------------------------------------------------------------------

@@ -1,7 +1,8 @@
 """What is free around each cell of a grid of facets: most cells are empty, and a flight leaps through blocks of these.
 
 A row of `FacetCells.room` are eight whole numbers. Of an empty cell: how many cells before and behind it along x, y, z
-are empty too, all together a block, and whether it is admissible. Of a cell with facets: a cone of their normals.
+are empty too, all together a block, and whether it is admissible. Of a cell with facets: a cone of their normals, and
+how many of its entries are spare.
 """
 
 import numpy as np
@@ -12,8 +13,9 @@ from ...kernel.jit import kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, dot, norm
 
-# The seventh number, of cells that hold facets, that are admissible and that are not; the eighth of a cone.
-KIND, SINE = 6, 7
+# The seventh number, of cells that hold facets, that are admissible and that are not; the eighth of a cone, and the
+# fourth of a cell with facets.
+KIND, SINE, _SPARE = 6, 7, 3
 FULL, FREE, CLOSED = 0, 1, -1
 _FULL = 127.0
 # A sine that no cone has: normals in all directions. Of the others a little more than they are, for whole numbers.
@@ -58,29 +60,50 @@ def cone_of(rows, cell):
     return NormalCone(select(is_full, 1.0, 0.0) * axis, select(is_full, float(rows[cell, SINE]), _LEFT))
 
 
-def rooms_of(held: NDArray[np.bool_], normals: NDArray[np.float64], starts: NDArray[np.int32]) -> NDArray[np.int8]:
-    """The rows of a grid, those of its empty cells without their blocks, as free ones.
+def spare_of(rows, cell):
+    """How many entries of a cell are spare."""
+    return select(rows[cell, KIND] == FULL, int(rows[cell, _SPARE]), 0)
+
+
+def rows_of(counts: NDArray[np.int32], places: NDArray[np.int32]) -> NDArray[np.int8]:
+    """The rows of cells with so many entries in so many places: empty ones have no room."""
+    rows = np.zeros((len(counts), 8), np.int8)
+    rows[:, KIND] = np.where(counts > 0, FULL, FREE)
+    rows[:, _SPARE] = places - counts
+    return rows
+
+
+def without_entries(rows: NDArray[np.int8]) -> NDArray[np.int8]:
+    """The rows where no cell has an entry."""
+    rows = rows.copy()
+    rows[rows[:, KIND] == FULL, _SPARE] = 0
+    return rows
+
+
+def with_cones(
+    rows: NDArray[np.int8], normals: NDArray[np.float64], entries: NDArray[np.int32], first: NDArray[np.int32]
+) -> None:
+    """Write the cones of the cells with facets.
 
     Args:
-        held: (nx, ny, nz) which cells hold facets.
-        normals: (E, 3) of the entries.
-        starts: where the entries of each cell begin.
+        rows: those of all cells.
+        normals: (T, 3) of the facets.
+        entries: of all cells.
+        first: where those of each cell begin.
     """
-    rows = np.zeros((held.size + 1, 8), np.int8)
-    rows[:, KIND] = FREE
-    full = np.flatnonzero(held)
-    rows[full, KIND] = FULL
-    first = starts[full]
+    full = np.flatnonzero(rows[:, KIND] == FULL)
+    counts = (first[1:] - first[:-1])[full] - rows[full, _SPARE]
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    places = np.arange(starts[-1]) + np.repeat(first[full] - starts[:-1], counts)
+    normals, first = normals[entries[places]], starts[:-1]
     axis = np.add.reduceat(normals, first, axis=0)
     length = np.linalg.norm(axis, axis=1)
     axis /= np.maximum(length, 1e-300)[:, None]
-    counts = starts[full + 1] - first
     cosine = np.minimum.reduceat((normals * np.repeat(axis, counts, axis=0)).sum(axis=1), first)
     sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
     sine = np.where((cosine > 0.1) & (length > 0.1), np.minimum(np.ceil(_FULL * sine) + _MORE, _FULL), _FULL)
     rows[full, :3] = np.rint(axis * _WIDEST)
     rows[full, SINE] = sine
-    return rows
 
 
 def with_blocks(rows: NDArray[np.int8], held: NDArray[np.bool_]) -> None:

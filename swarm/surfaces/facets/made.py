@@ -13,7 +13,7 @@ from ..balls.facet import RoundTriangle
 from ..fields.many import field_of
 from ..fields.members import Members
 from .facet import THIN
-from .free_room import CLOSED, FREE, KIND, rooms_of, with_blocks
+from .free_room import CLOSED, FREE, KIND, with_blocks, with_cones
 from .members import Facets
 from .mesh_files import Floats, Soup
 from .nearest import nearest
@@ -116,9 +116,8 @@ def with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
     grid = facets.grid
     shape = tuple(int(n) for n in grid.shape)
     held = np.diff(grid.first[:-1]).reshape(shape) > 0
-    normals, starts = np.asarray(facets.table[grid.entries, :3], np.float64), np.asarray(grid.first, np.int32)
-    rows = rooms_of(held, normals, starts)
-    facets = facets._replace(grid=grid._replace(known=grid.known._replace(room=rows)))
+    rows = grid.known.room
+    with_cones(rows, facets.table[:, :3], grid.entries, grid.first)
     parts, count = label(~held)
     if mesh is None:
         with_blocks(rows, held)

@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from ...kernel.arrays import fetch, index
 from ...kernel.gravity import accelerated, displacement
 from ...kernel.grid import cell_of, entries_at, entries_of, until_next, until_out
@@ -15,7 +13,7 @@ from ..shapes.plane import PlaneNumbers
 from ..time_of_impact import flights
 from .facet import ROOM, Shared
 from .facet_cells import BLOCK, blocks_of, flight_in, from_middle, passes
-from .free_room import FULL, KIND, room_of
+from .free_room import FULL, KIND, room_of, without_entries
 from .nearest import foot_on
 
 # So many cells and blocks of cells are crossed before a flight is said to be free so far.
@@ -32,7 +30,7 @@ class Facets(Members, Patched):
 
     def gone(self):
         without, known = Members.gone(self).grid, self.grid.known
-        return self._replace(grid=without._replace(known=known._replace(starts=np.zeros_like(known.starts))))
+        return self._replace(grid=without._replace(known=known._replace(room=without_entries(known.room))))
 
     def ask_for(self, m):
         """Ask for what is known of a facet, before its corners."""

@@ -99,9 +99,9 @@ def _nearest(facets, mesh, r):
 def _away(boxes, k, r):
     """The squared distance of a point from a box."""
     k = index(k)
-    x = max(boxes[k, 0] - r.x, r.x - boxes[k, 3])
-    y = max(boxes[k, 1] - r.y, r.y - boxes[k, 4])
-    z = max(boxes[k, 2] - r.z, r.z - boxes[k, 5])
+    x = max(float(boxes[k, 0]) - r.x, r.x - float(boxes[k, 3]))
+    y = max(float(boxes[k, 1]) - r.y, r.y - float(boxes[k, 4]))
+    z = max(float(boxes[k, 2]) - r.z, r.z - float(boxes[k, 5]))
     return square(Vec(max(x, 0.0), max(y, 0.0), max(z, 0.0)))
 
 
@@ -175,4 +175,7 @@ def boxes_of(corners):
         leaves //= 2
         boxes[leaves : 2 * leaves, :3] = pairs[:, :, :3].min(axis=1)
         boxes[leaves : 2 * leaves, 3:] = pairs[:, :, 3:].max(axis=1)
-    return boxes
+    # Rounded outwards, so that none is smaller than what it holds
+    rounded, less = boxes.astype(np.float32), np.array(3 * [-np.inf] + 3 * [np.inf], np.float32)
+    inwards = np.where(less < 0.0, rounded > boxes, rounded < boxes)
+    return np.where(inwards, np.nextafter(rounded, less), rounded)
