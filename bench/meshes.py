@@ -118,7 +118,7 @@ def main(quick: bool) -> None:
         size = _bytes(mesh)
         rows += [
             Row(f"{name} of {len(mesh)} triangles, scene", seconds, seconds, "s", "3"),
-            Row("  memory of a triangle", size, size, "bytes", "400"),
+            Row("  memory of a triangle", size, size, "bytes", "200"),
             Row("  an impact, one thread, processor time", *figures["straight"], "ns", "250"),
             Row("  the same under gravity", *figures["falling"], "ns"),
         ]

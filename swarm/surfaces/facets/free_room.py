@@ -5,6 +5,8 @@ are empty too, all together a block, and whether it is admissible. Of a cell wit
 how many of its entries are spare.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -80,9 +82,7 @@ def without_entries(rows: NDArray[np.int8]) -> NDArray[np.int8]:
     return rows
 
 
-def with_cones(
-    rows: NDArray[np.int8], normals: NDArray[np.float64], entries: NDArray[np.int32], first: NDArray[np.int32]
-) -> None:
+def with_cones(rows: NDArray[np.int8], normals: NDArray[Any], entries: NDArray[Any], first: NDArray[Any]) -> None:
     """Write the cones of the cells with facets.
 
     Args:
