@@ -8,6 +8,7 @@ import pytest
 
 import swarm
 from swarm.kernel.vector import vec
+from swarm.surfaces.time_of_impact import safe
 
 H, ALPHA, RATE = 0.01, 300.0, 2.0
 TURN = swarm.Rotation((0.3, 0.5, 1.0), RATE, (0.02, -0.01, 0.0))
@@ -94,6 +95,19 @@ def test_the_loop_of_multipliers_ends_on_a_wall_that_turns():
     assert imbalance(result) <= 1e-11
     # The wall goes down there, by 0.5 rad/s times 0.2 m, and takes what it does not give back.
     assert result.observables["wall_work"][-1].sum() < -0.1
+
+
+# --- What is asked ---------------------------------------------------------------------------------------
+
+
+def test_a_step_in_a_contact_asks_for_no_safe_step(monkeypatch):
+    asked, whole = [], safe.free_time_moving
+    monkeypatch.setattr(safe, "free_time_moving", lambda *given: asked.append(1) or whole(*given))
+    # A contact of pi sqrt(m/alpha) takes 18 steps.
+    result = run(WALLS["box"](TURN), swarm.Penalty(H, ALPHA), 4.0)
+    impacts = result.observables["impacts"][-1]
+    assert impacts >= 10
+    assert impacts <= len(asked) <= 6 * impacts
 
 
 # --- Against other ways to compute it --------------------------------------------------------------------
