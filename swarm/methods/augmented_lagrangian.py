@@ -134,6 +134,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
             fixed_step.check_reach("dt", self.dt, scene, particles.fastest())
         else:
             fixed_step.check_instants(scene, self.dt)
+            fixed_step.check_turns(self, scene)
             fixed_step.check_solids(scene, particles, self.dt)
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:

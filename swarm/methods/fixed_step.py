@@ -23,6 +23,7 @@ from ..kernel.vector import Vec, dot, square
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.in_motion.drive import drive_of
+from ..surfaces.required import require
 from ..surfaces.surface import Surface
 from ..surfaces.time_of_impact import flights, safe
 from . import base, contract
@@ -46,6 +47,7 @@ class SoftWalls(base.Method):
         if particles.radius is None:
             base.check_bends(scene)
             check_instants(scene, self.dt)
+            check_turns(self, scene)
         check_solids(scene, particles, self.dt)
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
@@ -122,6 +124,16 @@ def check_instants(scene: Scene, dt: float) -> None:
                 f"walls must come and go, and openings open and shut, at whole steps, got {time:g} s with dt = {dt:g} "
                 f"s, which is {time / dt:.6g} steps; give times that are multiples of dt, another dt, or Impact"
             )
+
+
+def check_turns(method: base.Method, scene: Scene) -> None:
+    """Raise a `SceneError` where a wall that turns does not give what its steps are made of."""
+    purpose = f"{type(method).__name__} at a wall that turns"
+    for i, surface in enumerate(scene.surfaces):
+        if surface.motion is None or drive_of(surface, 0.0).turn is None:
+            continue
+        if any(wall.flat_normal() is None for wall in surface.walls()):
+            require([surface], purpose, ("turned_push",), f"surfaces[{i}]")
 
 
 def check_solids(scene: Scene, particles: Particles, dt: float) -> None:

@@ -355,6 +355,14 @@ class Smooth(AtRest):
         """q1 - q0 = D.(r1 - r0) of the step, without cancellation, and its derivative by kappa."""
         return newton.rise(self, r0, p, kappa)
 
+    def turned_push(self, r0, p, kappa, tilt):
+        """The end of r1 = r0 + p - kappa (D - tilt x D), the step of a wall that turns: see in_motion/turned.py."""
+        return newton.push(self, r0, p, kappa, tilt)
+
+    def turned_rise(self, r0, p, kappa, tilt):
+        """As `rise` of that step."""
+        return newton.rise(self, r0, p, kappa, tilt)
+
     def resolve(self, r, strength):
         """The point s with s + strength grad q(s) = r, for the mean-value form."""
         return newton.resolve(self, r, strength)

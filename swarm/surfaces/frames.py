@@ -45,6 +45,8 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("step_normal", ("place", "end"), "normal"),
     ("push", ("place", "way", None), "end"),
     ("rise", ("place", "way", None), None),
+    ("turned_push", ("place", "way", None, "vector"), "end"),
+    ("turned_rise", ("place", "way", None, "vector"), None),
     ("resolve", ("place", None), "place"),
     ("chord_guess", ("place", "way"), None),
     ("chord_improve", ("place", "way", None), None),

@@ -1,39 +1,44 @@
-"""Steps in contact by Newton's method, from `hessian`."""
+"""Steps in contact by Newton's method, from `hessian`; of a wall that turns with its tilt, see in_motion/turned.py."""
 
 import math
 
 from ..kernel.jit import outlined
 from ..kernel.limits import EPSILON
-from ..kernel.vector import Vec, dot, largest
+from ..kernel.vector import Vec, cross, dot, largest
 
 # Newton steps; changes below this part of a step may be noise.
 _ITERATIONS = 50
 _NOISE = 1e-12
 
 
-def push(surface, r0, p, kappa):
+def push(surface, r0, p, kappa, tilt=None):
     """The end of the step."""
-    return r0 + _moved(surface, r0, p, kappa)
+    return r0 + _moved(surface, r0, p, kappa, tilt)
 
 
-def rise(surface, r0, p, kappa):
+def rise(surface, r0, p, kappa, tilt=None):
     """q1 - q0 of the step, and its derivative by kappa."""
-    d = _moved(surface, r0, p, kappa)
+    d = _moved(surface, r0, p, kappa, tilt)
     r1 = r0 + d
     g = surface.discrete_gradient(r0, r1)
     # dr1/dkappa = -(I + kappa H)^-1 D, H of the midpoint: the derivative is as good as the step is short.
-    f = _unpushed(surface.step_bend(r0, d), kappa, g)
+    f = _unpushed(surface.step_bend(r0, d), kappa, _tilted(g, tilt))
     return dot(g, d), -dot(f, surface.inner_gradient(r1))
 
 
+def _tilted(g, tilt):
+    """Q g = g - tilt x g"""
+    return g if tilt is None else g - cross(tilt, g)
+
+
 @outlined
-def _moved(surface, r0, p, kappa):
-    """r1 - r0 = p - kappa D(r0, r1) with the H of the midpoint; NaN where it does not converge."""
+def _moved(surface, r0, p, kappa, tilt):
+    """r1 - r0 = p - kappa Q D(r0, r1) with the H of the midpoint; NaN where it does not converge."""
     d = _unpushed(surface.hessian(r0), kappa, p)
     size, previous = largest(p), math.inf
     for _i in range(_ITERATIONS):
         g = surface.discrete_gradient(r0, r0 + d)
-        f = _unpushed(surface.step_bend(r0, d), kappa, d - p + kappa * g)
+        f = _unpushed(surface.step_bend(r0, d), kappa, d - p + kappa * _tilted(g, tilt))
         d, change = d - f, largest(f)
         if _converged(change, previous, max(size, abs(kappa) * largest(g))):
             return d

@@ -31,7 +31,7 @@ _MADE_OF = {
     "outward_acceleration": ("inner_gradient", "hessian", "side"),
     "discrete_gradient": ("inner_gradient", "inner"),
     "step_normal": ("discrete_gradient", "side"),
-    **dict.fromkeys(("push", "rise", "resolve"), ("discrete_gradient", "hessian")),
+    **dict.fromkeys(("push", "rise", "turned_push", "resolve"), ("discrete_gradient", "hessian")),
     "chord_guess": ("chord_improve",),
     "chord_improve": ("rise",),
     "chord_normal": ("push", "side"),

@@ -33,6 +33,8 @@ Five runs of a formula of degree 4 that is convex were written again when guesse
 along a flight bends the other way: the same hits, to round-off, 6e-13 at their ends.
 The cell of grains where pairs rub was written again when twists were summed as contacts begin: 1e-4 at its end, which
 is what friction is solved to. That end is 2.5e-5 from one with friction solved to 1e-9, and was 8.8e-5 from it.
+One cell of points, `Penalty` and planes that turn was written again when what a wall carries its points by took
+Cayley's form, turned.py: nothing at its end, the last bits of its work.
 Twelve cells of a user-defined surface were written again when straight flights to it looked from both sides: hits to
 round-off.
 

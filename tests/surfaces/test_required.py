@@ -96,6 +96,8 @@ DEFINITIONS = {
     "is_quartic": True,
     "inner": lambda self, r: square(r),
     "course": _course,
+    "push": lambda self, r0, p, kappa: ((1.0 - kappa) * r0 + p) / (1.0 + kappa),
+    "rise": lambda self, r0, p, kappa: (0.0, 1.0),
 }
 LEVEL = ("phi", "gradient")
 PARTICLES = swarm.Particles([[0.1], [0.2], [0.3]], [[0.5], [0.0], [0.1]])
@@ -225,6 +227,15 @@ def test_what_each_method_needs(name, gravity):
 def test_no_hessian_and_no_farthest_push_are_named_together():
     message = refused(ball_like(*LEVEL, "first_hit")(), swarm.Penalty(dt=0.1, penalty=1.0))
     assert "farthest_push() and hessian()" in message
+
+
+def test_a_closed_push_is_that_of_a_wall_that_does_not_turn():
+    given = (*LEVEL, "first_hit", "hessian_bounds", "farthest_push", "push", "rise")
+    resting, turning = ball_like(*given)(), ball_like(*given)(motion=swarm.Rotation((0.0, 0.0, 1.0), 1.0))
+    soft = swarm.Penalty(dt=0.1, penalty=1.0)
+    methods.check_surfaces(soft, swarm.Scene([resting]))
+    soft.check(swarm.Scene([resting]), PARTICLES)
+    assert "hessian()" in refused(turning, soft)
 
 
 def test_no_first_hit():

@@ -90,6 +90,12 @@ class OneWall(Smooth):
     def rise(self, r0, p, kappa):
         return newton.rise(self, r0, p, kappa) if kappa != 0.0 else _free_rise(self, r0, r0 + p)
 
+    def turned_push(self, r0, p, kappa, tilt):
+        return newton.push(self, r0, p, kappa, tilt) if kappa != 0.0 else r0 + p
+
+    def turned_rise(self, r0, p, kappa, tilt):
+        return newton.rise(self, r0, p, kappa, tilt) if kappa != 0.0 else _free_rise(self, r0, r0 + p)
+
 
 def one_wall(surface: _Field) -> _Field:
     """The same field, of which kernels take all as one wall."""

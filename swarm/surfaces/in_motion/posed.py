@@ -6,7 +6,6 @@ In the frame of a wall that is displaced by d(t) and does not turn a step goes f
 rho1 - rho0 = r1 - r0 - (d1 - d0): it is that at a wall at rest, with the free displacement p - (d1 - d0).
 """
 
-import math
 from typing import Any
 
 from ...kernel.angle import sine_and_versine
@@ -103,9 +102,9 @@ class Posed(Framed):
         # rho1 - rho0 = M^-1 (r1 - r0 - way) with M = (A0 + A1)/2, so n becomes M^-T n = M S^-2 n, where S is cos(a/2)
         # across the axis and 1 along it, with the angle a of the step.
         k = self.drive.turn.axis
-        half = math.sin(0.5 * self.drive.turn.rate * (self.remaining - self.after))
+        _sine, versine = sine_and_versine(self.drive.turn.rate * (self.remaining - self.after))
         along = dot(k, n) * k
-        n = along + (n - along) * (1.0 / (1.0 - half * half))
+        n = along + (n - along) * (1.0 / (1.0 - 0.5 * versine))
         return 0.5 * (self.pose.out(n) + self.end.out(n))
 
     # --- At this instant ---

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...common.checks import Vector
 from ...kernel.jit import select
+from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, absolute, cross, dot, largest, norm, square, times, total, vec
 from .. import contract
 from ..surface import side_sign
@@ -19,6 +20,20 @@ from ..time_of_impact.rising import CORE, Level, passage_of
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
 _CHORD_SWEEPS = 12
 _TINY = float(np.finfo(np.float64).tiny)
+
+
+class Columns(Record):
+    """The columns of a matrix."""
+
+    x: Vec
+    y: Vec
+    z: Vec
+
+    def solve(self, b):
+        """The vector that it turns into b."""
+        across = cross(self.y, self.z)
+        inverse = 1.0 / dot(self.x, across)
+        return inverse * Vec(dot(across, b), dot(cross(self.z, self.x), b), dot(cross(self.x, self.y), b))
 
 
 class QuadricNumbers(contract.Smooth):
@@ -180,6 +195,26 @@ class QuadricNumbers(contract.Smooth):
         # dr1/dkappa = -D/(1 + kappa A), and grad q(r1) = D + A (r1 - r0)
         return dot(n, e), -total(times(times(n + times(self.a, e), n), w))
 
+    def turned_push(self, r0, p, kappa, tilt):
+        return r0 + self._turned_step(kappa, tilt).solve(p - kappa * _tilted(self.gradient(r0), tilt))
+
+    def turned_rise(self, r0, p, kappa, tilt):
+        # (1 + kappa Q A) (r1 - r0) = p - kappa Q G with G = grad q(r0), and D = G + A (r1 - r0)
+        step, g = self._turned_step(kappa, tilt), self.gradient(r0)
+        e = step.solve(p - kappa * _tilted(g, tilt))
+        bent = times(self.a, e)
+        n = g + bent
+        # dr1/dkappa = -(1 + kappa Q A)^-1 Q D, and grad q(r1) = D + A (r1 - r0)
+        return dot(n, e), -dot(n + bent, step.solve(_tilted(n, tilt)))
+
+    def _turned_step(self, kappa, tilt):
+        """1 + kappa Q A, of the step of a wall that turns."""
+        x, y, z = kappa * self.a
+        return Columns(
+            Vec(1.0 + x, -x * tilt.z, x * tilt.y), Vec(y * tilt.z, 1.0 + y, -y * tilt.x),
+            Vec(-z * tilt.y, z * tilt.x, 1.0 + z),
+        )  # fmt: skip
+
     def farthest_push(self):
         # The first pole of 1/(1 + kappa A) on the side to which the surface pushes
         side, a = self.side, self.a
@@ -240,6 +275,11 @@ def quadric_numbers(center: Vector, curvatures: Any, linear: Any, level: float, 
     sign = side_sign(side)
     kind = ConvexQuadric if min(sign * a) >= 0.0 else QuadricNumbers
     return kind(vec(center), a, b, level, scale, sign)
+
+
+def _tilted(n, tilt):
+    """Q n = n - tilt x n"""
+    return n - cross(tilt, n)
 
 
 def form(a, u, v):
