@@ -227,7 +227,7 @@ def _guess(surface, law, step):
     """kappa if the wall were flat and the spring linear."""
     q0 = surface.inner(step.r)
     g0 = surface.gap_of(q0)
-    rise, drise = surface.rise(step.r, step.p, 0.0)
+    rise, drise = surface.free_rise(step.r, step.p)
     slope, _dslope = surface.gap_slope(q0, q0 + rise)
     gf = g0 + slope * rise
     # There g1 = gf - e kappa, and with C = c alpha/2 g[q0, q1] e equation (K) is one of

@@ -355,6 +355,10 @@ class Smooth(AtRest):
         """q1 - q0 = D.(r1 - r0) of the step, without cancellation, and its derivative by kappa."""
         return newton.rise(self, r0, p, kappa)
 
+    def free_rise(self, r0, p):
+        """`rise` of the step that is not pushed, for a guess: its derivative may be near."""
+        return self.rise(r0, p, 0.0)
+
     def turned_push(self, r0, p, kappa, tilt):
         """The end of r1 = r0 + p - kappa (D - tilt x D), the step of a wall that turns: see in_motion/turned.py."""
         return newton.push(self, r0, p, kappa, tilt)

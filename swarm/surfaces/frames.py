@@ -45,6 +45,7 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("step_normal", ("place", "end"), "normal"),
     ("push", ("place", "way", None), "end"),
     ("rise", ("place", "way", None), None),
+    ("free_rise", ("place", "way"), None),
     ("turned_push", ("place", "way", None, "vector"), "end"),
     ("turned_rise", ("place", "way", None, "vector"), None),
     ("resolve", ("place", None), "place"),

@@ -98,6 +98,15 @@ def test_a_rise_is_that_of_the_push(name, kappa):
         assert slope == pytest.approx((ahead - behind) / (2.0 * change), rel=within, abs=within * 1e-2)
 
 
+@pytest.mark.parametrize("name", [*FLAT, *CURVED])
+def test_the_rise_of_a_free_step_is_that_without_a_push(name):
+    wall, steps = long_steps((FLAT | CURVED)[name])
+    for r, p in steps:
+        (free, guessed), (rise, slope) = wall.free_rise(r, p), wall.rise(r, p, 0.0)
+        assert free == pytest.approx(rise, abs=1e-14)
+        assert guessed == pytest.approx(slope, rel=0.5, abs=0.05)
+
+
 @pytest.mark.parametrize("name", CURVED)
 def test_what_a_wall_carries_its_points_by_is_the_rest_of_the_step(name):
     """D.(r1 - r0 - w) is the change of q of any step: what its force does not give the wall gives."""

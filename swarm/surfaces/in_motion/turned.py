@@ -43,6 +43,11 @@ class Turned(Posed):
             return self.body.turned_rise(start, free, kappa, self.tilt())
         return self.body.rise(start, free, kappa)
 
+    def free_rise(self, r, p):
+        # As if the body were at rest: the tilt changes the derivative alone.
+        start = self.own_place(r)
+        return self.body.free_rise(start, self.own_end(r + p) - start)
+
     def chord_guess(self, r, p):
         start = self.own_place(r)
         return self.body.chord_guess(start, self.own_end(r + p) - start)
