@@ -234,9 +234,9 @@ class Reflection(contract.MethodNumbers):
         if not self.laws.change_energy:
             return speed <= part * lane.own.slow
         # By the velocity with which it comes: such walls change that. One of both is 0.
-        speed2 = (square(lane.v) + self.fall2) / (self.size * self.size)
-        by_time, by_length = self.shortest_flight * self.size * speed2, self.shortest_length
-        return speed * speed <= (part * part) * (by_time * by_time + by_length * by_length * speed2)
+        speed2, by_time, by_length = square(lane.v) + self.fall2, self.shortest_flight, self.shortest_length
+        slow2 = speed2 * ((by_time * by_time * speed2 + by_length * by_length) * (1.0 / (self.size * self.size)))
+        return speed * speed <= (part * part) * slow2
 
 
 class Chord(Reflection):
