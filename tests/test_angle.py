@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import compiled
 
-from swarm.kernel.angle import sine_and_cosine, sine_and_versine
+from swarm.kernel.angle import nearly_sine_and_versine, sine_and_cosine, sine_and_versine
 
 EPSILON = np.finfo(np.float64).eps
 RNG = np.random.default_rng(7)
@@ -39,6 +39,12 @@ def test_beyond_the_error_is_that_of_the_rounded_angle():
             sine, versine = sine_and_versine(angle)
             assert abs(sine - mpmath.sin(mpmath.mpf(angle))) <= EPSILON * angle
             assert abs(versine - 1 + mpmath.cos(mpmath.mpf(angle))) <= EPSILON * angle
+
+
+@pytest.mark.parametrize("angles", ANGLES.values(), ids=ANGLES)
+def test_for_a_guess_six_digits_do(angles):
+    for angle in angles.tolist():
+        assert nearly_sine_and_versine(angle) == pytest.approx(sine_and_versine(angle), abs=1e-6)
 
 
 @pytest.mark.parametrize("angles", ANGLES.values(), ids=ANGLES)

@@ -14,7 +14,7 @@ from .field_hits import hit_of_lane, keep_hit, seek
 from .in_moving_cells import go_through_moving
 from .lane_arrays import Flying
 from .periodic import cut_steps
-from .table import STRIDE, LaneView, Rows, copy_lane, marked_lanes
+from .table import EIGHT, STRIDE, LaneView, Rows, copy_lane, marked_lanes
 
 # Safe steps to walls in any motion that all lanes take in a pass after the first.
 _STRIDES = 3
@@ -23,11 +23,10 @@ _MANY = 8
 
 
 _named = Rows()
-_named.take(strides.KNOWN)
 
 
 class Open(LaneView):
-    """A lane without a proven hit: what its strides know, where it starts, and how much of the frame is left."""
+    """A lane without a proven hit: where it starts, and how much of the frame is left."""
 
     r, v, remaining = _named.vector(), _named.vector(), _named.number()
     COUNT = _named.count
@@ -169,15 +168,15 @@ def _aim_at_moving(walls, gravity, lanes, live):
         aim.start(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
     for _round in range(aim.AIMS):
         for i in range(index(live)):
-            aim.put_waves(walls, course, i, lanes.lane(i).remaining)
+            aim.put_waves(walls, course, i, lanes.lane(i).remaining, False)
         for i in range(index(live)):
             lane = lanes.lane(i)
             aim.improve(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
     for i in range(index(live)):
-        aim.put_waves(walls, course, i, lanes.lane(i).remaining)
+        aim.put_waves(walls, course, i, lanes.lane(i).remaining, True)
     for i in range(index(live)):
         lane = lanes.lane(i)
-        aim.prove(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
+        aim.prove(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)
     return _mark_open(lanes, live)
 
 
@@ -191,18 +190,26 @@ def _mark_open(lanes, live):
 
 @outlined
 def _stride_open(walls, gravity, lanes, some):
-    """The first safe step of so many lanes, those in `lanes.order`, to walls in any motion.
+    """The proof by series, or else the first safe step, of so many lanes, those in `lanes.order`.
 
-    Side by side in a table of their own: one lane alone takes as long as a vector of them.
+    Side by side in tables of their own: one lane alone takes as long as a vector of them, which the last one fills.
     """
-    course, beside = lanes.course, unwritten((Open.COUNT, STRIDE), np.float64)
-    for k in range(index(some)):
-        i, one = index(lanes.order[k]), Open(beside, k)
+    course, starts = lanes.course, unwritten((Open.COUNT, STRIDE), np.float64)
+    beside, count = unwritten((aim.rows(walls), STRIDE), np.float64), EIGHT * ((some + EIGHT - 1) // EIGHT)
+    for k in range(index(count)):
+        i, one = index(lanes.order[index(min(k, some - 1))]), Open(starts, k)
         lane = lanes.lane(i)
-        copy_lane(course, i, beside, k, strides.KNOWN)
+        copy_lane(course, i, beside, k, aim.rows(walls))
         one.r, one.v, one.remaining = lane.r, lane.v, lane.remaining
-    for k in range(index(some)):
-        one = Open(beside, k)
+    if aim.has_series(walls):
+        for k in range(index(count)):
+            one = Open(starts, k)
+            aim.start_series(walls, gravity, beside, k, one.r, one.v, one.remaining)
+        for k in range(index(count)):
+            one = Open(starts, k)
+            aim.prove(walls, gravity, beside, k, one.r, one.v, one.remaining, True)
+    for k in range(index(count)):
+        one = Open(starts, k)
         strides.stride(walls, gravity, beside, k, one.r, one.v, one.remaining, True)
     for k in range(index(some)):
         copy_lane(beside, k, course, index(lanes.order[k]), strides.FOUND)

@@ -34,7 +34,7 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("course", ("place", "velocity", "vector"), None),
     ("level_along", ("seen",), None),
     ("moving_step", ("seen", None), None),
-    ("passage", ("place", "velocity", None), None),
+    ("passage", ("place", "velocity", "swings"), None),
     ("outward_acceleration", ("place", "velocity", "vector"), None),
     ("steps", ("gravity", "place", "velocity"), None),
     ("refined", ("place", "velocity", None), None),
@@ -135,5 +135,5 @@ class Unturned(Framed):
     def _same(self, given):
         return given
 
-    place_in = end_in = velocity_in = vector_in = way_in = gravity_in = _same
+    place_in = end_in = velocity_in = vector_in = way_in = gravity_in = swings_in = _same
     place_out = end_out = vector_out = normal_out = _same

@@ -203,6 +203,10 @@ class Rotated(Framed):
     place_in = end_in = velocity_in = way_in = vector_in
     place_out = end_out = normal_out = vector_out
 
+    def swings_in(self, swings):
+        """The swings of a wall in the frame of the body."""
+        return swings.turned(self.vector_in)
+
     def seen_in(self, seen):
         # What bounds the flight along a direction, too, is of the motion in the frame of the body.
         drive = seen.drive

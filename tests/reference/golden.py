@@ -37,6 +37,8 @@ One cell of points, `Penalty` and planes that turn was written again when what a
 Cayley's form, turned.py: nothing at its end, the last bits of its work.
 Twelve cells of a user-defined surface were written again when straight flights to it looked from both sides: hits to
 round-off.
+One of samples beside a wall that moves was written again when most flights to walls that swing were proven by where
+they pass, not by series: 1e-15 at its end.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,

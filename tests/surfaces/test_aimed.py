@@ -9,6 +9,7 @@ import pytest
 import swarm
 from swarm.kernel.vector import dot, vec
 from swarm.lanes import flight as flights_of_lanes
+from swarm.surfaces.in_motion.drive import Swing, Swings
 from swarm.surfaces.in_motion.moving import Aimed
 from swarm.surfaces.time_of_impact import aim, strides
 from swarm.surfaces.time_of_impact.flights import COURSE
@@ -23,7 +24,7 @@ MOTIONS = {
 }
 # More angles than a lane of one wall has rows for.
 MOTIONS["many swings"] = sum(
-    (swarm.Oscillation((0.03, 0.0, 0.02), frequency=frequency) for frequency in (0.3, 0.4)), MOTIONS["swing"]
+    (swarm.Oscillation((0.03, 0.0, 0.02), frequency=frequency) for frequency in (0.3, 0.4, 0.5)), MOTIONS["swing"]
 )
 CAVITIES = {
     "sphere": lambda motion: swarm.Sphere(0.5, (0.1, -0.05, 0.02), motion=motion),
@@ -44,10 +45,13 @@ def aimed_hit(walls, flight):
     with np.errstate(all="ignore"):
         aim.start(walls, None, course, 0, *flight)
         for _round in range(aim.AIMS):
-            aim.put_waves(walls, course, 0, flight[2])
+            aim.put_waves(walls, course, 0, flight[2], False)
             aim.improve(walls, None, course, 0, *flight)
-        aim.put_waves(walls, course, 0, flight[2])
-        aim.prove(walls, None, course, 0, *flight)
+        aim.put_waves(walls, course, 0, flight[2], True)
+        aim.prove(walls, None, course, 0, *flight, False)
+        if aim.is_open(course, 0, flight[2]) and aim.has_series(walls):
+            aim.start_series(walls, None, course, 0, *flight)
+            aim.prove(walls, None, course, 0, *flight, True)
         return None if aim.is_open(course, 0, flight[2]) else strides.met(course, 0)
 
 
@@ -194,3 +198,53 @@ def _plane_in_digits(given, offset, r, v, at):
         return mpmath.fdot(n, r + v * t - amplitude * wave) - offset
 
     return level
+
+
+def _levels(surface, swings, r, v, times):
+    """phi along a flight at some times, in the frame of the middle of swings."""
+    places = np.array(r)[:, None] + np.array(v)[:, None] * times
+    for swing in swings:
+        c, s = np.array(swing.cosine)[:, None], np.array(swing.sine)[:, None]
+        places = places - c * np.cos(swing.rate * times) - s * np.sin(swing.rate * times)
+    return surface.phi(places)
+
+
+FLIGHTS_ONCE = 120
+BODIES = {
+    "sphere": swarm.Sphere(0.5, (0.1, -0.05, 0.02)),
+    "ellipsoid": swarm.Ellipsoid((0.5, 0.6, 0.4)),
+    "slab": swarm.Slab((0.6, 0.0, 0.8), 0.3),
+    "plane": swarm.Plane((0.0, 0.6, 0.8), 0.3),
+}
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_a_passage_that_meets_its_wall_once_does(name):
+    """Each flight is as slow as one may be of which that is said."""
+    rng, proven, surface = np.random.default_rng(5), 0, BODIES[name]
+    (body,) = surface.walls()
+    for _flight in range(FLIGHTS_ONCE):
+        strength, rate = rng.choice([0.02, 0.1]), rng.uniform(1.0, 12.0)
+        cosine, sine = rng.normal(0.0, strength, 3), rng.normal(0.0, strength, 3)
+        # Along a line, or an ellipse
+        sine = 2.0 * cosine if rng.random() < 0.5 else sine
+        each = (Swing(vec(cosine), vec(sine), rate),)
+        if rng.random() < 0.3:
+            each = (*each, Swing(vec(rng.normal(0.0, 0.02, 3)), vec(rng.normal(0.0, 0.02, 3)), 2.3 * rate))
+        swings, r, way = Swings(each), rng.uniform(-0.6, 0.6, 3), rng.standard_normal(3)
+        if _levels(surface, each, r, way, np.zeros(1)) > 0.0:
+            continue
+
+        def is_once(speed, swings=swings, r=r, way=way):
+            return body.passage(vec(r), vec(speed * way), swings).once
+
+        low, high = 0.0, 64.0
+        if not is_once(high):
+            continue
+        for _half in range(30):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if is_once(middle) else (middle, high)
+        v, proven = high * way, proven + 1
+        level = _levels(surface, each, r, v, np.linspace(0.0, 3.0 / math.hypot(*v), 1000))
+        assert ((level[:-1] <= 0.0) & (level[1:] > 0.0)).sum() <= 1
+    assert proven >= FLIGHTS_ONCE // 8

@@ -71,8 +71,8 @@ class AtRest(Record):
 
     # --- Overridden by a shape: safe steps in the frame of a wall that moves other than uniformly; see rising.py ---
 
-    def passage(self, r, v, depth):
-        """The `Passage` of a straight flight through what lies so deep that walls displaced by less never reach it.
+    def passage(self, r, v, swings):
+        """The `Passage` of a straight flight through what lies so deep that a wall with these swings never reaches it.
 
         It is known where the surface `has_core`.
         """

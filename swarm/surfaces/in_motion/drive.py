@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ... import motion as motions
-from ...kernel.angle import sine_and_versine
+from ...kernel.angle import nearly_sine_and_versine, sine_and_versine
 from ...kernel.jit import Array, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec, cross, dot, square, vec
@@ -81,14 +81,14 @@ class Swing(Record):
     sine: Vec
     rate: float
 
-    def added(self, wave, d, v, a):
-        """A displacement and its first two derivatives with those of the swing added, from the `Wave` of its angle."""
+    def at(self, wave):
+        """Its displacement and the first two derivatives, from the `Wave` of its angle."""
         s, versine = wave
         c = 1.0 - versine
         return (
-            d + self.sine * s - self.cosine * versine,
-            v + self.rate * (self.sine * c - self.cosine * s),
-            a - (self.rate * self.rate) * (self.sine * s + self.cosine * c),
+            self.sine * s - self.cosine * versine,
+            self.rate * (self.sine * c - self.cosine * s),
+            -(self.rate * self.rate) * (self.sine * s + self.cosine * c),
         )
 
     def amplitude(self):
@@ -102,6 +102,48 @@ class Swing(Record):
         angle = self.rate * middle
         here = self.sine * math.cos(angle) - self.cosine * math.sin(angle)
         return (self.rate * _sinc(0.5 * self.rate * h)) * here
+
+
+class Swings(Record):
+    """All swings of a motion, s(t) = sum_k C_k (cos - 1) + S_k sin from their middle on, and what bounds them.
+
+    |s|^2 + |s'|^2/w^2 of one swing is |C|^2 + |S|^2 = Q^2 at any time.
+    """
+
+    each: tuple[Any, ...]
+
+    def turned(self, vector_in):
+        """The swings in a frame that is turned."""
+        each: tuple[Any, ...] = ()
+        for swing in self.each:
+            each = (*each, Swing(vector_in(swing.cosine), vector_in(swing.sine), swing.rate))
+        return Swings(each)
+
+    def amplitude(self):
+        """Bound of |s|."""
+        found = 0.0
+        for swing in self.each:
+            found += swing.amplitude()
+        return found
+
+    def along(self, n):
+        """Bounds of |n.s| and |n.s'|."""
+        amplitude = speed = 0.0
+        for swing in self.each:
+            c, s = dot(n, swing.cosine), dot(n, swing.sine)
+            mine = math.sqrt(c * c + s * s)
+            amplitude, speed = amplitude + mine, speed + abs(swing.rate) * mine
+        return amplitude, speed
+
+    def moments(self):
+        """sum_k Q_k w_k^p for p = 0 to 3"""
+        found = 0.0, 0.0, 0.0, 0.0
+        for swing in self.each:
+            rate, mine = abs(swing.rate), math.sqrt(square(swing.cosine) + square(swing.sine))
+            first = rate * mine
+            second = rate * first
+            found = found[0] + mine, found[1] + first, found[2] + second, found[3] + rate * second
+        return found
 
 
 class Track(Record):
@@ -161,6 +203,13 @@ class Turn(Record):
         return (self.rate * _sinc(0.5 * self.rate * h)) * cross(self.axis, turned)
 
 
+def _sum(some, others):
+    """The sums of a displacement and its derivatives; what is None is 0, and no addition of a lane."""
+    if some is None or others is None:
+        return others if some is None else some
+    return tuple(b if a is None else a + b for a, b in zip(some, others, strict=True))
+
+
 def _sinc(x):
     return select(abs(x) > 0.0, math.sin(x) / select(abs(x) > 0.0, x, 1.0), 1.0)
 
@@ -192,16 +241,22 @@ class Drive(Record):
         """The `Wave` of each angle when so much of the frame is left [s]."""
         return tuple(wave_of(rate * -remaining) for rate in self.rates())
 
+    def nearly_waves_at(self, remaining):
+        """The same to some 1e-7."""
+        return tuple(Wave(*nearly_sine_and_versine(rate * -remaining)) for rate in self.rates())
+
     def pose(self, remaining):
         """The `PoseDerivatives` when so much of the frame is left [s]."""
-        t = -remaining
-        d, v, a = ZERO, ZERO, ZERO
         waves = self.waves_at(remaining) if self.waves is None else self.waves
-        for k, swing in enumerate(self.swings):
-            d, v, a = swing.added(waves[k], d, v, a)
-        e, w, b = (ZERO, ZERO, ZERO) if self.track is None else self.track.at(t)
         turn = None if self.turn is None else self.turn.at(waves[len(self.swings)])
-        return PoseDerivatives(self.shift + t * self.velocity + d + e, self.velocity + v + w, a + b, turn)
+        swung: Any = None
+        for k, swing in enumerate(self.swings):
+            swung = _sum(swung, swing.at(waves[k]))
+        moved = _sum((self.shift - remaining * self.velocity, self.velocity, None), swung)
+        if self.track is not None:
+            moved = _sum(moved, self.track.at(-remaining))
+        d, v, a = moved
+        return PoseDerivatives(d, v, ZERO if a is None else a, turn)
 
     def mean_velocity(self, middle, h):
         """The mean of d' over a time h around the middle."""
@@ -211,15 +266,6 @@ class Drive(Record):
         for swing in self.swings:
             swings = swings + swing.mean_velocity(middle, h)
         return self.velocity + swings + (ZERO if self.track is None else self.track.mean_velocity(middle, h))
-
-    def swing_amplitude(self):
-        """How far swings take the wall at most from where it would be without them; None if it moves in other ways."""
-        if self.turn is not None or self.track is not None:
-            return None
-        amplitude = 0.0
-        for swing in self.swings:
-            amplitude += swing.amplitude()
-        return amplitude
 
     def swing_center(self, t):
         """Its displacement without swings at a time since the end of the frame, if it moves in no other ways."""
@@ -233,10 +279,13 @@ class Drive(Record):
 
         None where the surface has no core, or moves in other ways than swings.
         """
-        within = self.swing_amplitude()
-        if within is None or not body.has_core:
+        if not self.only_swings() or not body.has_core:
             return None
-        return body.passage(r - self.swing_center(-remaining), v - self.velocity, within)
+        return body.passage(r - self.swing_center(-remaining), v - self.velocity, Swings(self.swings))
+
+    def only_swings(self):
+        """Whether it moves uniformly but for swings."""
+        return self.turn is None and self.track is None
 
     def angular_speed(self):
         """The angular speed of the surface [rad/s]."""

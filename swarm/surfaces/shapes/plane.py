@@ -140,15 +140,17 @@ class PlaneNumbers(Flat):
     leaves_once = has_core = True
     degree = 1
 
-    def passage(self, r, v, depth):
-        place, u = dot(self.normal, r), dot(self.normal, v)
+    def passage(self, r, v, swings):
+        place, u, (depth, speed) = dot(self.normal, r), dot(self.normal, v), swings.along(self.normal)
         c = (place - self.offset) + depth + (1.0 - CORE) * (abs(place) + abs(self.offset))
         moves = abs(u) > 0.0
         inverse = select(moves, 1.0 / select(moves, u, 1.0), 0.0)
         # A flight that goes along is there for ever, or never.
         enters, leaves = select(u < 0.0, -c * inverse, -math.inf), select(u > 0.0, -c * inverse, math.inf)
         enters = select(moves | (c < 0.0), enters, math.inf)
-        return Passage(enters, leaves, select(u > 0.0, (self.offset - place) * inverse, math.inf))
+        hits = select(u > 0.0, (self.offset - place) * inverse, math.inf)
+        # A particle faster than the wall comes nearer to it all the time, or leaves it.
+        return Passage(enters, leaves, hits, CORE * abs(u) > speed)
 
     def reversible(self):
         return self if type(self) is PlaneNumbers else None

@@ -15,7 +15,7 @@ from ...kernel.vector import Symmetric, Vec, absolute, cross, dot, largest, norm
 from .. import contract
 from ..surface import side_sign
 from ..time_of_impact.course import Quartic, level_and_window, rise_time_by, rise_time_inside
-from ..time_of_impact.rising import CORE, Level, passage_of
+from ..time_of_impact.rising import Level, passage_of
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
 _CHORD_SWEEPS = 12
@@ -241,15 +241,11 @@ class QuadricNumbers(contract.Smooth):
         steepness = (level + select(q > level, q, level)) * math.sqrt(most / size)
         return Level(self.level_of(self.inner(seen.r)), half, side * bend, steepness, most, False)
 
-    def passage(self, r, v, depth):
-        # An ellipsoid holds its own image that is smaller by a part, with a ball about each point of that of this part
-        # of its smallest half-axis.
-        d, level, most = r - self.center, self.side * self.level, largest(self.a)
-        width = CORE - depth * math.sqrt(select(level > 0.0, most / select(level > 0.0, level, 1.0), 1.0))
-        width = select((width > 0.0) & (level > 0.0), width, 0.0)
-        magnitude = absolute(self.a)
+    def passage(self, r, v, swings):
+        # In lengths |rho|^2 = rho.A rho
+        d, magnitude = r - self.center, absolute(self.a)
         c, b, a = form(magnitude, d, d), form(magnitude, d, v), form(magnitude, v, v)
-        return passage_of(c, b, a, level, width * width * level)
+        return passage_of(c, b, a, self.side * self.level, math.sqrt(largest(self.a)), swings)
 
     def hessian_bounds(self, r):
         a, side = self.a, self.side

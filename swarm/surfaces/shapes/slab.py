@@ -282,14 +282,16 @@ class SlabNumbers(Distance, ExactChord):
 
     has_core = proves = True
 
-    def passage(self, r, v, depth):
+    def passage(self, r, v, swings):
         x, u = self.off(r), self.along(v)
-        moves = abs(u) > 0.0
+        moves, (depth, speed) = abs(u) > 0.0, swings.along(self.scaled(1.0))
         inverse = select(moves, 1.0 / select(moves, u, 1.0), 0.0)
         middle, width = -x * inverse, CORE * self.radius - depth
         inverse = abs(inverse)
         half = select(width > 0.0, width, 0.0) * inverse
-        return Passage(middle - half, middle + half, select(moves, middle + self.radius * inverse, math.inf))
+        hits = select(moves, middle + self.radius * inverse, math.inf)
+        # A particle faster than the wall comes nearer to one plane all the time, and leaves the other.
+        return Passage(middle - half, middle + half, hits, CORE * abs(u) > speed)
 
     def moving_step(self, seen, longest):
         x, side = self.off(seen.r), self.side

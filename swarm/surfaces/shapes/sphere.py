@@ -12,7 +12,7 @@ from ...kernel.vector import ZERO, Vec, absolute, dot, highest, norm, square, to
 from ..area_samples import AreaSample, Region, directions
 from ..surface import Box, Surface, box_around, farthest, is_on_axis, side_sign
 from ..time_of_impact.course import Quartic, ball_rise_time, level_and_window, rise_time, rise_time_inside
-from ..time_of_impact.rising import CORE, Bounds, Level, passage_of
+from ..time_of_impact.rising import Bounds, Level, passage_of
 from .common import Distance, ExactChord
 
 # Trials of a time for which the fall is bounded.
@@ -226,10 +226,9 @@ class SphereCavity(SphereNumbers):
         # 2 R |d| <= R^2 + |d|^2: no square root
         return (self.radius2 + select(q > self.radius2, q, self.radius2)) * self.curvature, 1.0, False
 
-    def passage(self, r, v, depth):
-        d, width = r - self.center, CORE * self.radius - depth
-        width = select(width > 0.0, width, 0.0)
-        return passage_of(square(d), dot(d, v), square(v), self.radius2, width * width)
+    def passage(self, r, v, swings):
+        d = r - self.center
+        return passage_of(square(d), dot(d, v), square(v), self.radius2, 1.0, swings)
 
     may_be_far = False
     leaves_once = True

@@ -1,9 +1,11 @@
 """First hits in lanes with walls in any motion: a guess, Newton's steps of second order, and a proof.
 
-A guess of the first hit is improved without bounds. Two Taylor polynomials, one from the start of the flight on and one
-from its end back, with a bound of the third derivative as their rest, then prove that no wall is met before: each holds
-for half of the way, or as far as what lies so deep that no wall ever comes there. What is not proven is left to the
-safe steps of strides.py, which begin anew.
+A guess of the first hit is improved without bounds, and then proven: that it is a root to round-off, by a bound of the
+third derivative, and that no wall is met before. Of a wall that only swings a flight says that wherever the wall is at
+its start: most pass so deep, or so fast, that the level rises through 0 at most once (see `passage_of`). Of other
+walls, and other flights, it is proven by series: two Taylor polynomials, one from the start of the flight on and one
+from its end back, each for half of the way, or as far as what lies so deep that no wall ever comes there. What is not
+proven is left to the safe steps of strides.py, which begin anew.
 """
 
 import math
@@ -14,14 +16,15 @@ from ...kernel.jit import select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import ZERO, norm
 from ..in_motion.drive import Wave
+from ..in_motion.moving import Moving
 from .flights import COURSE
 from .rising import ThirdDerivativeBound, flight_of, nearest_root
 from .safe import closed_hit, seen_by_walls
-from .strides import AHEAD, CLOSED, MET, OTHER, SPEED, TIME, pace
+from .strides import CLOSED, MET, OTHER, SPEED, TIME
 
-# Of a lane besides what its strides know: the guess, and of each wall the polynomial at the start, when the flight
-# enters what the wall never reaches, infinite if it does not, and when it leaves that.
-_GUESS, WALLS, _OF_WALL, _ENTERS, _LEAVES = 5, 6, 5, 3, 4
+# Of a lane besides what its strides know: the guess, and of each wall until when its passage is free, or else the
+# polynomial at the start.
+_GUESS, WALLS, _OF_WALL = 5, 6, 3
 # After the walls are the sine and the versine of each angle at the guess.
 _OF_WAVE = 2
 # Improvements of the guess before the last.
@@ -29,38 +32,43 @@ AIMS = 2
 
 
 def start(walls, gravity, course, lane, r, v, remaining):
-    """The guess of a lane's first hit, and how far the polynomial from its start proves it free."""
+    """The guess of a lane's first hit, and what its start says of all of its flight."""
     found, speed = closed_hit(walls.at(remaining), gravity, r, v), norm(v)
     course[TIME, lane], course[MET, lane] = 0.0, -1.0
     course[CLOSED, lane], course[OTHER, lane], course[SPEED, lane] = found.time, found.wall, speed
     longest = select(found.time < remaining, found.time, remaining)
-    known = _known(walls, gravity, speed, r, v, remaining, 0.0)
-    ahead = AHEAD * pace(walls)
     guess = math.inf
-    passages: tuple[Any, ...] = ()
+    starts: tuple[Any, ...] = ()
+    known = _known(walls, gravity, speed, r, v, remaining, 0.0)
     for _number, one in known:
-        mine = one.level.own_rise()
-        way = one.seen.drive.passage(one.body, r, v, remaining)
-        if way is not None:
-            across = (way.enters < way.leaves) & (way.leaves > 0.0) & (mine > 0.5 * ahead)
-            mine = select(across, way.hits, mine)
-        guess, passages = select(mine < guess, mine, guess), (*passages, way)
+        way, level = one.seen.drive.passage(one.body, r, v, remaining), one.level
+        mine = level.own_rise() if way is None else way.hits
+        guess = select(mine < guess, mine, guess)
+        # A wall without others is met or not: until when it is not met does not matter.
+        free = () if way is None else (way.free() if len(known) > 1 else select(way.once, math.inf, 0.0),)
+        starts = (*starts, free or (level[0], level[1], level[2]))
     course[_GUESS, lane] = select(guess < longest, guess, longest)
-    for k, (way, (_number, one)) in enumerate(zip(passages, known, strict=True)):
-        at = WALLS + k * _OF_WALL
+    for k, kept in enumerate(starts):
+        for i, number in enumerate(kept):
+            course[WALLS + k * _OF_WALL + i, lane] = number
+
+
+def start_series(walls, gravity, course, lane, r, v, remaining):
+    """The polynomials of all walls at the start of a lane."""
+    for k, (_number, one) in enumerate(_known(walls, gravity, course[SPEED, lane], r, v, remaining, 0.0)):
         for i in range(3):
-            course[at + i, lane] = one.level[i]
-        if way is not None:
-            across = (way.enters < way.leaves) & (way.leaves > 0.0)
-            course[at + _ENTERS, lane] = select(across, way.enters, math.inf)
-            course[at + _LEAVES, lane] = way.leaves
+            course[WALLS + k * _OF_WALL + i, lane] = one.level[i]
 
 
-def put_waves(walls, course, lane, remaining):
-    """The waves of all motions at the guess of a lane, in a loop of its own: two short loops are sooner than a long."""
+def put_waves(walls, course, lane, remaining, is_last):
+    """The waves of all motions at the guess of a lane, in a loop of its own: two short loops are sooner than a long.
+
+    Before the last improvement an error of a guess leaves its third power.
+    """
     guess, at = course[_GUESS, lane], _first_wave(walls)
     for drive in _known_drives(walls):
-        for wave in drive.waves_at(remaining - guess):
+        left = remaining - guess
+        for wave in drive.waves_at(left) if is_last else drive.nearly_waves_at(left):
             course[at, lane], course[at + 1, lane] = wave
             at += _OF_WAVE
 
@@ -99,8 +107,8 @@ def improve(walls, gravity, course, lane, r, v, remaining):
     course[_GUESS, lane] = select((guess > 0.0) & (after > 0.0), after, guess)
 
 
-def prove(walls, gravity, course, lane, r, v, remaining):
-    """The hit of a lane, if it is proven."""
+def prove(walls, gravity, course, lane, r, v, remaining, by_series):
+    """The hit of a lane, if it is proven: for walls that only swing by their passages, or `by_series` as for others."""
     guess, closed = course[_GUESS, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining)
     known = _known(_at_guess(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
@@ -111,21 +119,42 @@ def prove(walls, gravity, course, lane, r, v, remaining):
     far, proven = abs(way), (guess > 0.0) & (time > 0.0)
     for k, (number, one) in enumerate(known):
         mine, level = meets & (wall == number), one.level
-        at = WALLS + k * _OF_WALL
-        ahead = since = 0.5 * time
-        if one.body.has_core and one.seen.drive.swing_amplitude() is not None:
-            enters, leaves = course[at + _ENTERS, lane], course[at + _LEAVES, lane]
-            across = enters < time
-            ahead, since = select(across, enters, ahead), select(across, leaves, since)
-            ahead, since = select(ahead > 0.0, ahead, 0.0), select(since < time, since, time)
-        back = time - since
+        at, end = WALLS + k * _OF_WALL, level.moved(way, mine)
         sixth = one.third(time + far) * (1.0 / 6.0)
         near = sixth * far * far * far <= EPSILON * one.seen.coordinates * level.steepness
-        start = type(level)(*(course[at + i, lane] for i in range(3)), *level[3:])
-        proven = proven & (near | (not mine)) & start.is_below(1.0, sixth, ahead, True)
-        proven = proven & level.moved(way, mine).is_below(-1.0, sixth, back, mine)
+        passage = one.seen.drive.passage(one.body, r, v, remaining)
+        if passage is not None and not by_series:
+            free = course[at, lane]
+            once = (free == math.inf) & end.is_admissible()
+            once = once | end.is_below(-1.0, sixth, time, mine)
+            proven = proven & ((once & near) | ((not mine) & (time <= free) & (free < math.inf)))
+        else:
+            ahead = since = 0.5 * time
+            if passage is not None:
+                across = (passage.enters < passage.leaves) & (passage.leaves > 0.0) & (passage.enters < time)
+                ahead, since = select(across, passage.enters, ahead), select(across, passage.leaves, since)
+                ahead, since = select(ahead > 0.0, ahead, 0.0), select(since < time, since, time)
+            start = type(level)(*(course[at + i, lane] for i in range(3)), *level[3:])
+            proven = proven & (near | (not mine)) & start.is_below(1.0, sixth, ahead, True)
+            proven = proven & end.is_below(-1.0, sixth, time - since, mine)
     course[TIME, lane] = select(proven, time, 0.0)
     course[MET, lane] = select(proven & meets, wall, -1.0)
+
+
+def has_series(walls):
+    """Whether the proof by series says more than that by passages, of which some walls have one."""
+    found = False
+    for wall in walls.each:
+        if isinstance(wall, Moving) and wall.accelerates and wall.drive.only_swings() and wall.body.has_core:
+            found = True
+    return found
+
+
+def rows(walls):
+    """How many rows of the course of a lane are used."""
+    drives = _known_drives(walls)
+    count = sum(len(drive.rates()) for drive in drives)
+    return _first_wave(walls) + count * _OF_WAVE
 
 
 def is_open(course, lane, remaining):

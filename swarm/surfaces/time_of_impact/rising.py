@@ -99,21 +99,47 @@ CORE = 1.0 - 1e-12
 class Passage(Record):
     """When a straight flight enters what a wall never reaches, and leaves it, and when it meets the wall on average.
 
-    It misses it if it does not enter it before it leaves it.
+    It misses it if it does not enter it before it leaves it. The level may rise through 0 at most `once`: after that
+    it is above 0 at all times, if the flight goes on.
     """
 
     enters: float
     leaves: float
     hits: float
+    once: Any
+
+    def free(self):
+        """Until when no hit is possible; infinite where the level rises through 0 at most once, whenever that is."""
+        return select(self.once, math.inf, select(self.enters <= 0.0, self.leaves, 0.0))
 
 
-def passage_of(c, b, a, level, core):
-    """The `Passage` of a flight along which q is c + 2 b t + a t^2, of a wall where it is `level`, at its `core`."""
-    moves = a > 0.0
+def passage_of(c, b, a, level, depth, swings):
+    """The `Passage` of a flight along which q is c + 2 b t + a t^2, of a wall where it is `level`.
+
+    The wall swings by s(t), and q = |rho|^2 in lengths of which swings have `depth` to one of the scene. With the
+    velocity u in the frame of the middle and sums of all swings over |s|^2 + |s'|^2/w^2 = Q^2, the level f has
+        f'/2 = (rho - s).(u - s') = rho.u - s.u - (rho - s).s',   |s.u + (rho - s).s'| <= sum Q sqrt(u^2 + L w^2),
+        f''/2 = |u - s'|^2 - (rho - s).s'' >= u^2 - sum w Q sqrt(4 u^2 + L w^2),
+    as |rho - s|^2 <= L until the wall is met. Where f'' > 0 it rises through 0 once. So it does where |rho.u| is above
+    the first bound at both ends of the core: f falls on the way there, and rises from there on.
+    """
+    moves, wide = a > 0.0, select(level > 0.0, level, 0.0)
+    radius, amplitude = math.sqrt(wide), depth * swings.amplitude()
+    width, farthest = CORE * radius - amplitude, radius + amplitude
+    width = select(width > 0.0, width, 0.0)
+    q0, q1, q2, q3 = swings.moments()
+    q0, q1, q2, q3 = depth * q0, depth * q1, depth * q2, depth * q3
     inverse = select(moves, 1.0 / select(moves, a, 1.0), 0.0)
-    middle = -b * inverse
-    half, out = _root(b * b - a * (c - core)) * inverse, _root(b * b - a * (c - level)) * inverse
-    return Passage(middle - half, middle + half, select(moves, middle + out, math.inf))
+    middle, in_core = -b * inverse, b * b - a * (c - width * width)
+    half = _root(in_core) * inverse
+    # A flight from beyond the mean wall that misses the core is short: from beyond its end the guess gets there.
+    out = _root(b * b - a * (c - select((c > level) & (in_core < 0.0), farthest * farthest, level)))
+    # (sum Q x)^2 <= sum Q sum Q x^2
+    is_convex = CORE * (a * a) > q1 * (4.0 * a * q1 + wide * q3)
+    once = moves & (is_convex | ((width > 0.0) & (in_core > q0 * (a * q0 + wide * q2))))
+    # Outwards from beyond the mean wall it is met some time later: as for the way back, for a guess.
+    hits = select(out > b, out - b, b) * inverse
+    return Passage(middle - half, middle + half, select(moves, hits, math.inf), once)
 
 
 # --- Levels with a known second derivative: below c + 2 b t + a t^2 + k t^3, with a bound k of f'''/6 -------
@@ -152,6 +178,10 @@ class Level(Majorant):
         here = self.a2 * way
         return self._replace(c=select(meets, 0.0, self.c + way * (2.0 * self.b + here)), b=self.b + here)
 
+    def is_admissible(self):
+        """Whether it is not above 0 here."""
+        return self.c <= 0.0
+
     def is_below(self, sign, sixth, within, at_wall):
         """Whether it is surely below 0 for so long, ahead or, with a sign of -1, back, but for here, at a wall."""
         return _is_below(self.c, 2.0 * sign * self.b, self.a2, sixth, within, at_wall)
@@ -187,6 +217,10 @@ class Between(Record):
         here = self.bend * way
         place = select(meets, self.radius, self.place + way * (2.0 * self.half + here))
         return self._replace(place=place, half=self.half + here)
+
+    def is_admissible(self):
+        """As of a `Level`."""
+        return abs(self.place) <= self.radius
 
     def is_below(self, sign, sixth, within, at_wall):
         """As of a `Level`."""
