@@ -46,6 +46,9 @@ from .vessel import SweptWall, moves, sweep_of
 # A sweep after which the next one would change no impulse by more than this part is the last one; also one that gains
 # no more than half of the one before, if that is round-off of what many large impulses leave of one another.
 _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
+# Where friction acts at every contact, and a damper: a thousandth of `_RUBBED`, which is what errors are made of. They
+# are the same to four digits as with normal impulses to round-off, of positions and velocities in piles that fall and lie.
+_BESIDE_FRICTION = 1e-11
 # A sweep is not counted on to change less than this part of what the one before did.
 _LEAST_RATIO = 0.1
 # Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them.
@@ -235,6 +238,7 @@ def _solve(matter, walls, world):
     # Friction first, to fewer digits: then it is given, and what is to be exact depends on the others alone.
     if matter.rubs and not _solve_friction(matter, walls, world):
         lags = 1
+    solved = _BESIDE_FRICTION if matter.damped and matter.rubs_everywhere else _SOLVED
     before, worst, sweeps, share, best, since = 1.0, 1.0, 0, 1.0, math.inf, 0
     while sweeps < _MOST_SWEEPS:
         worst = _sweep(matter, walls, world, share)
@@ -242,7 +246,7 @@ def _solve(matter, walls, world):
         # What the next one would change, by the ratio of the last two; where only dampers act, as what they take is
         # booked by what they did.
         follows = worst * max(worst / before, _LEAST_RATIO) if matter.damped and sweeps > 1 else worst
-        if follows <= _SOLVED or (worst <= _NEARLY and worst >= _GAIN * before):
+        if follows <= solved or (worst <= _NEARLY and worst >= _GAIN * before):
             break
         if worst <= _LAGGING and share <= _LEAST_SHARE:
             break
