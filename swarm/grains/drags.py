@@ -15,22 +15,13 @@ _FACES = 1 << 31
 
 
 class Drags(NamedTuple):
-    """What is not 0, by their pairs of particles, in ascending order; and those at walls."""
+    """What is not 0, by both particles of a pair, on the first one; and at walls, in ascending order of their numbers."""
 
-    pair: NDArray[np.int64]
-    drag: NDArray[np.float64]  # (pairs, columns) on the particle with the smaller number
+    one: NDArray[np.int64]
+    other: NDArray[np.int64]
+    drag: NDArray[np.float64]  # (pairs, columns)
     at_wall: NDArray[np.int64]
     wall_drag: NDArray[np.float64]
-
-
-def _pairs(world: Any) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Of each listed pair a number that only it has, and 1 or -1 where its first particle has the larger number."""
-    number, near, most = world.grains.number, world.near, world.books.impacts.size
-    first, count = near.first, int(near.first[-1])
-    one = number[np.repeat(np.arange(len(number)), np.diff(first))]
-    other = number[near.mate[:count]]
-    key = np.minimum(one, other) * most + np.maximum(one, other)
-    return key, np.where(one < other, 1.0, -1.0)
 
 
 def _at_walls(world: Any) -> NDArray[np.int64]:
@@ -48,11 +39,12 @@ def kept_drags(world: Any) -> Drags | None:
     near = world.near
     if near.drag is None:
         return None
-    key, sign = _pairs(world)
-    at = _in_order(key, near.drag)
+    number, acts = world.grains.number, _acts(near.drag[: int(near.first[-1])])
+    first = np.repeat(np.arange(len(number)), np.diff(near.first))[acts]
     at_wall = _at_walls(world)
-    here = _in_order(at_wall, near.wall_drag)
-    return Drags(key[at], _turned(near.drag[at], sign[at]), at_wall[here], near.wall_drag[here])
+    here = _acts(near.wall_drag[: at_wall.size])
+    here = here[np.argsort(at_wall[here])]
+    return Drags(number[first], number[near.mate[acts]], near.drag[acts], at_wall[here], near.wall_drag[here])
 
 
 def _turned(drag: NDArray[np.float64], sign: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -60,11 +52,10 @@ def _turned(drag: NDArray[np.float64], sign: NDArray[np.float64]) -> NDArray[np.
     return np.concatenate([drag[:, :_TURNS] * sign[:, None], drag[:, _TURNS:]], axis=1)
 
 
-def _in_order(key: NDArray[np.int64], drag: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The places of those that are not 0 in the order of their keys."""
+def _acts(drag: NDArray[np.float64]) -> NDArray[np.int64]:
+    """The places of those that are not 0."""
     # Column by column: of rows of three NumPy takes ten times as long.
-    acts = np.flatnonzero(functools.reduce(np.logical_or, (one != 0.0 for one in drag[: key.size].T)))
-    return np.asarray(acts[np.argsort(key[acts])])
+    return np.flatnonzero(functools.reduce(np.logical_or, (one != 0.0 for one in drag.T)))
 
 
 def set_drags(world: Any, kept: Drags | None) -> None:
@@ -72,14 +63,32 @@ def set_drags(world: Any, kept: Drags | None) -> None:
     if kept is None:
         return
     near = world.near
-    key, sign = _pairs(world)
-    at, old = _found(key, kept.pair)
-    near.drag[: key.size] = 0.0
-    near.drag[at] = _turned(kept.drag[old], sign[at])
+    row = np.full(world.books.impacts.size, -1)
+    row[world.grains.number] = np.arange(len(world.grains.number))
+    one, other = row[kept.one], row[kept.other]
+    at = _listed(near, np.minimum(one, other), np.maximum(one, other))
+    old = np.flatnonzero(at >= 0)
+    near.drag[: int(near.first[-1])] = 0.0
+    near.drag[at[old]] = _turned(kept.drag[old], np.where(one < other, 1.0, -1.0)[old])
     key = _at_walls(world)
     at, old = _found(key, kept.at_wall)
     near.wall_drag[: key.size] = 0.0
     near.wall_drag[at] = kept.wall_drag[old]
+
+
+def _listed(near: Any, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The place in the lists of each pair of rows i < j, -1 of one that is not listed, or of a row -1."""
+    place = np.full(i.size, -1)
+    left = np.flatnonzero((i >= 0) & (near.first[i] < near.first[i + 1]))
+    at, end = near.first[i], near.first[i + 1]
+    # All at once, one place further each time: a ball has few.
+    while left.size:
+        here = at[left]
+        found = near.mate[here] == j[left]
+        place[left[found]] = here[found]
+        at[left] += 1
+        left = left[~found & (at[left] < end[left])]
+    return place
 
 
 def _found(key: NDArray[np.int64], known: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
