@@ -7,6 +7,7 @@ from grains_runs import ROOM, cloud, ran
 import swarm
 from swarm.errors import RunError, SceneError
 from swarm.files import checkpoint
+from swarm.grains.drags import kept_drags
 from swarm.grains.grains_run import GrainsRun
 from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched
@@ -64,6 +65,28 @@ def test_a_run_that_is_restored_goes_on_with_the_same_bits(tmp_path):
             assert (getattr(whole.state, name) == getattr(second.state, name)).all()
         assert whole.seen()["largest_overlap"] == second.seen()["largest_overlap"] > 0.0
         assert whole.seen()["pressure"] == second.seen()["pressure"] or not whole.seen()["pressure"] > 0.0
+
+
+def frictions(run):
+    """The impulses of friction that a run keeps, by both particles, on the one with the smaller number."""
+    grains, near = run._world.grains, run._world.near
+    first = np.repeat(np.arange(len(grains.number)), np.diff(near.first))
+    one, other = grains.number[first], grains.number[near.mate[: first.size]]
+    kept = near.drag[: first.size] * np.where(one < other, 1.0, -1.0)[:, None]
+    pairs = zip(np.minimum(one, other), np.maximum(one, other), strict=True)
+    return {pair: tuple(drag) for pair, drag in zip(pairs, kept, strict=True) if drag.any()}
+
+
+def test_friction_is_that_of_the_same_pairs_when_lists_are_made_anew():
+    with started() as run:
+        advanced(run, 1)
+        before, kept = frictions(run), kept_drags(run._world)
+        # In reverse, so that of each pair the other ball comes first.
+        for rows in run._world.grains:
+            rows[:] = rows[::-1].copy()
+        run._list_with(kept)
+        assert frictions(run) == before
+        assert len(before) > 1
 
 
 def test_a_run_does_not_depend_on_its_frames():
