@@ -20,14 +20,19 @@ from .grain_arrays import (
     AFTER,
     BEFORE,
     DAMPING,
+    EXTENT,
+    FROM,
     LAST,
     LIGHTNESS,
     LOST,
+    MOVE,
     ONE,
     OTHER,
     PLACE,
     RADIUS,
+    YIELDING,
     X,
+    set_vector,
     vector_at,
 )
 
@@ -228,20 +233,46 @@ def _note(rows, c, a, b, k):
     rows[c, ONE], rows[c, OTHER], rows[c, PLACE] = a, b, k
 
 
+def foresee(matter, grains, course, i):
+    """Write the course of a ball in the step, by its velocities at both ends."""
+    place, speed = grains.place, grains.speed
+    set_vector(course, i, FROM, vector_at(place, i, X))
+    set_vector(course, i, MOVE, 0.5 * matter.h * (vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)))
+    course[i, EXTENT], course[i, YIELDING] = place[i, RADIUS], place[i, LIGHTNESS]
+
+
+def _approach_of(matter, course, ball, j):
+    """`_approach` by the courses of both balls, that of the first one as it was read: for what round-off decides."""
+    here, move, extent, yielding = ball
+    s0 = nearest(matter.period, here, vector_at(course, j, FROM))
+    q0, q1 = square(s0), square(s0 + (move - vector_at(course, j, MOVE)))
+    nearest_one, reach = select(q1 < q0, q1, q0), extent + course[j, EXTENT]
+    if matter.holds is None:
+        return nearest_one, reach
+    return select(yielding + course[j, YIELDING] > 0.0, nearest_one, math.inf), reach
+
+
+@outlined
+def _foresee_all(matter, grains, touches):
+    """Write the courses of all balls."""
+    for k in range(grains.place.shape[0]):
+        foresee(matter, grains, touches.course, index(k))
+
+
 @outlined
 def find_pairs(matter, grains, near, touches):
     """Find the pairs that are in contact at an end of the step, and those that miss one another by the margin or less.
 
     How many contacts are new.
     """
-    place, speed, found, missed = grains.place, grains.speed, touches.found, touches.missed
+    course, found, missed = touches.course, touches.found, touches.missed
     known, count, passed, margin = touches.used[0], touches.used[0], 0, touches.margin[0]
-    for a in range(place.shape[0]):
+    for a in range(course.shape[0]):
         i = index(a)
-        ball = i, vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)
+        ball = vector_at(course, i, FROM), vector_at(course, i, MOVE), course[i, EXTENT], course[i, YIELDING]
         for k in range(near.first[i], near.first[i + 1]):
             b, was_on = near.mate[index(k)], near.is_on[index(k)]
-            q, reach = _approach(matter, grains, ball, index(b))
+            q, reach = _approach_of(matter, course, ball, index(b))
             # Without a branch, which would go either way: a row that does not count is written over.
             is_on = was_on | (q < reach * reach)
             near.is_on[index(k)] = is_on
@@ -272,21 +303,39 @@ def _find_missed(matter, grains, near, touches):
     return count - known
 
 
+class Travel(Record):
+    """How far balls are at the end of a step from where they were to be, from where they were listed, and moved."""
+
+    off_course: Any  # with the last step's change, at most [m]
+    from_list: Any  # their squares, at most [m^2]
+    longest: Any
+
+
 @outlined
-def _off_course(matter, grains):
-    """How far a ball is at the end of the step from where it was to be with the last step's change, at most [m]."""
-    speed, most = grains.speed, 0.0
-    for k in range(speed.shape[0]):
+def travel_of(matter, grains):
+    """The `Travel` of all balls."""
+    place, speed, listed, half = grains.place, grains.speed, grains.listed, 0.5 * matter.h
+    off, farthest, longest = 0.0, 0.0, 0.0
+    for k in range(place.shape[0]):
         i = index(k)
-        foreseen = vector_at(speed, i, BEFORE) + vector_at(grains.change, i, LAST)
-        most = worse(square(vector_at(speed, i, AFTER) - foreseen), most)
-    return 0.5 * matter.h * math.sqrt(most)
+        v, end = vector_at(speed, i, BEFORE), vector_at(speed, i, AFTER)
+        off = worse(square(end - (v + vector_at(grains.change, i, LAST))), off)
+        move = (v + end) * half
+        farthest = worse(square(vector_at(place, i, X) + move - vector_at(listed, i, X)), farthest)
+        longest = worse(square(move), longest)
+    return Travel(half * math.sqrt(off), farthest, longest)
 
 
-def find_more_pairs(matter, grains, near, touches):
-    """Find the pairs that are in contact by what has been solved, and were not before; how many."""
+def find_more_pairs(matter, grains, near, touches, off_course):
+    """Find the pairs that are in contact by what has been solved, and were not before; how many.
+
+    `off_course` is that of the `Travel`.
+    """
     # Two balls are nearer than foreseen by no more than this.
-    off = 2.0 * _off_course(matter, grains)
+    off = 2.0 * off_course
     is_known = off <= _SURE * touches.margin[0]
     touches.margin[0] = off * _WIDER
-    return _find_missed(matter, grains, near, touches) if is_known else find_pairs(matter, grains, near, touches)
+    if is_known:
+        return _find_missed(matter, grains, near, touches)
+    _foresee_all(matter, grains, touches)
+    return find_pairs(matter, grains, near, touches)

@@ -15,7 +15,7 @@ _FACES = 1 << 31
 
 
 class Drags(NamedTuple):
-    """What is not 0, by both particles of a pair, on the first one; and at walls, in ascending order of their numbers."""
+    """What is not 0, by both particles of a pair, on the first one; and at walls, in the order of their numbers."""
 
     one: NDArray[np.int64]
     other: NDArray[np.int64]

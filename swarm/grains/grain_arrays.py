@@ -35,6 +35,9 @@ SCALE, NEARNESS, EASES, LEVERS, COLUMNS_OF_LANES = 15, 24, 25, 27, 29
 LANES = 8
 # Columns of `Touches.found`: both balls, and the place in the lists. Rows of `Tile.ends`: both balls.
 ONE, OTHER, PLACE, FOUND, ENDS = 0, 1, 2, 3, 2
+# Columns of `Touches.course`: the centre at the start of a step, the radius, the move in the step, and 1/mass: what is
+# asked of every pair that is listed is then in one line.
+FROM, EXTENT, MOVE, YIELDING = 0, 3, 4, 7
 # Columns of `Neighbours.drag`: where the angular impulse of the resistance to rolling is kept; and in a run with a log
 # of contacts when each has begun, the sum of its normal impulses, the largest force, what friction has taken, and the
 # velocity, of a pair that of the particle with the smaller number, and the slip at its start.
@@ -100,6 +103,7 @@ class Touches(NamedTuple):
     lanes: Array  # (groups,) int64, how many contacts each group has
     splits: Array  # (groups,) int64, the lanes, as bits, where a part begins: no ball is twice in a part of a group
     marks: Array  # (N,) int64, of each ball the last part that it is in
+    course: Array  # (N, 8)
     stirred: Array  # (N,) int32, of each ball the last sweep for friction in which one of its contacts was not solved
     used: Array  # (2,) how many contacts of pairs there are, and how many groups
     found: Array  # (room + 1, FOUND) int32, the contacts of pairs as they were found
@@ -220,7 +224,8 @@ def touches_of(n: int, walls: int, pairs: int, touching: int, is_kept: bool = Fa
         aligned(groups * COLUMNS_OF_LANES * LANES).reshape(-1, LANES), np.zeros((groups * ENDS, LANES), np.int32)
     )  # fmt: skip
     return Touches(
-        tile, np.zeros(groups, np.int64), np.zeros(groups, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int32),
+        tile, np.zeros(groups, np.int64), np.zeros(groups, np.int64), np.zeros(n, np.int64),
+        aligned(8 * n).reshape(n, 8), np.zeros(n, np.int32),
         np.zeros(2, np.int64), np.zeros((pairs + 1, FOUND), np.int32), np.zeros((pairs + 1, FOUND), np.int32),
         np.zeros(1, np.int64), np.zeros(1),
         np.zeros((touching, columns)), np.zeros(touching, np.int32), np.zeros((2, walls), np.int64),

@@ -16,7 +16,7 @@ from ..kernel.vector import ZERO, square
 from ..lanes.watching.log import is_full
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall, count_members
-from .contacts import ContactSweep, find_more_pairs, find_pairs, worse
+from .contacts import ContactSweep, find_more_pairs, find_pairs, foresee, travel_of, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, rub_wall, twist_wall
 from .grain_arrays import (
@@ -47,7 +47,8 @@ from .vessel import SweptWall, moves, sweep_of
 # no more than half of the one before, if that is round-off of what many large impulses leave of one another.
 _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 # Where friction acts at every contact, and a damper: a thousandth of `_RUBBED`, which is what errors are made of. They
-# are the same to four digits as with normal impulses to round-off, of positions and velocities in piles that fall and lie.
+# are the same to four digits as with normal impulses to round-off: of positions and velocities in piles that fall, and
+# that lie.
 _BESIDE_FRICTION = 1e-11
 # A sweep is not counted on to change less than this part of what the one before did.
 _LEAST_RATIO = 0.1
@@ -90,13 +91,20 @@ class World(NamedTuple):
 
 
 @outlined
-def _begin(matter, grains, skin):
-    """The velocities at the end of a step with the last one's change; whether all may move on within the lists."""
+def _begin(matter, grains, touches, skin):
+    """The velocities at the end of a step with the last one's change; whether all may move on within the lists.
+
+    No impulses of pairs are summed yet, and the spins are those of a step without contacts.
+    """
     place, speed, listed, farthest = grains.place, grains.speed, grains.listed, 0.0
     for k in range(place.shape[0]):
         i = index(k)
         v = vector_at(speed, i, BEFORE)
         set_vector(speed, i, AFTER, v + vector_at(grains.change, i, LAST))
+        set_vector(grains.change, i, GIVEN, ZERO)
+        if grains.spin is not None:
+            set_vector(grains.spin, i, AFTER, vector_at(grains.spin, i, BEFORE))
+        foresee(matter, grains, touches.course, i)
         farthest = worse(square(vector_at(place, i, X) + v * matter.h - vector_at(listed, i, X)), farthest)
     return farthest <= 0.25 * skin * skin
 
@@ -128,11 +136,14 @@ def _fly(matter, grains):
         set_vector(speed, i, AFTER, v + vector_at(grains.change, i, GIVEN))
 
 
-def _gather(matter, walls, world, is_first):
-    """Add the contacts, first by where balls are to be, then by where they come; how many are new."""
+def _gather(matter, walls, world, travel):
+    """Add the contacts, first by where balls are to be, then by their `Travel`; how many are new."""
     grains, near, touches = world.grains, world.near, world.touches
     known = touches.used[0]
-    new = find_pairs(matter, grains, near, touches) if is_first else find_more_pairs(matter, grains, near, touches)
+    if travel is None:
+        new = find_pairs(matter, grains, near, touches)
+    else:
+        new = find_more_pairs(matter, grains, near, touches, travel.off_course)
     if new > 0:
         group_pairs(matter, grains, near, touches, known)
     for k, wall in enumerate(walls.each):
@@ -270,20 +281,6 @@ def _forget(walls, world):
 
 
 @outlined
-def _moved(matter, grains):
-    """The squares of how far a ball is at the end of a step from where it was listed, and of its move, at most."""
-    place, speed, listed, half, farthest, longest = (
-        grains.place, grains.speed, grains.listed, 0.5 * matter.h, 0.0, 0.0
-    )  # fmt: skip
-    for k in range(place.shape[0]):
-        i = index(k)
-        move = (vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)) * half
-        farthest = worse(square(vector_at(place, i, X) + move - vector_at(listed, i, X)), farthest)
-        longest = worse(square(move), longest)
-    return farthest, longest
-
-
-@outlined
 def _arrive(matter, grains):
     """All at the end of the step."""
     place, speed, half = grains.place, grains.speed, 0.5 * matter.h
@@ -393,28 +390,26 @@ def _swept(matter, walls, listed, grains, skin):
 def _step(matter, walls, listed, world, skin):
     """One step but for its end: its `Status`; LEASE_ENDED where the lists do not hold over it, nothing has changed."""
     grains = world.grains
-    if not _begin(matter, grains, skin):
+    if not _begin(matter, grains, world.touches, skin):
         return Status.LEASE_ENDED.value
     if not _swept(matter, walls, listed, grains, skin).farthest <= 0.25 * skin * skin:
         return Status.LEASE_ENDED.value
     if matter.openings is not None:
         _open(matter, walls, world)
     _forget(walls, world)
-    _forget_given(grains)
-    _forget_spins(grains)
-    _gather(matter, walls, world, True)
+    _gather(matter, walls, world, None)
     _push(matter, walls, world)
     _twist_at_walls(matter, walls, world)
     while True:
         if not _solve(matter, walls, world):
             return Status.UNSOLVED.value
         _push_again(matter, walls, world)
-        if _gather(matter, walls, world, False) == 0:
+        travel = travel_of(matter, grains)
+        if _gather(matter, walls, world, travel) == 0:
             break
         _push_again(matter, walls, world)
-    farthest, longest = _moved(matter, grains)
     sweep = _swept(matter, walls, listed, grains, skin)
-    farthest, longest = worse(sweep.farthest, farthest), worse(sweep.longest, longest)
+    farthest, longest = worse(sweep.farthest, travel.from_list), worse(sweep.longest, travel.longest)
     if not farthest <= 0.25 * skin * skin:
         return Status.LEASE_ENDED.value
     deepest, limits = _book(matter, walls, world), matter.limits
