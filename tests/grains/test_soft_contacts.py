@@ -9,9 +9,12 @@ from grains_runs import ran
 import swarm
 from swarm import RunError, SceneError
 from swarm.commands.summary import numbers, of_trajectory
-from swarm.grains import contacts
+from swarm.grains import contacts, step
+from swarm.grains.grains_run import GrainsRun
 from swarm.pictures.series import lines_of
 from swarm.run.preflight import softness
+from swarm.run.starting_state import Seeding
+from swarm.run.tally import Watched
 from swarm.words.content import Content
 from swarm.words.verdicts import judged
 
@@ -371,18 +374,24 @@ def test_balls_meet_across_the_faces_of_a_cell():
         ran(scene, start, SOFT, 0.01)
 
 
-@pytest.mark.parametrize(("friction", "off"), [(0.0, 1e-10), (0.5, 1e-7)])
-def test_overlaps_where_dampers_act_are_those_of_sweeps_to_round_off(friction, off, monkeypatch):
-    """There sweeps end early, as energy is booked by what dampers did: overlaps stay the same to a part of a radius.
-
-    Friction is solved to fewer digits, and more sweeps of it lead to another slip.
-    """
+def heap(friction):
+    """Eight balls that are about to fall on the floor of a box."""
     laws = {"restitution": 0.3, "friction": friction}
     box = swarm.Box((0.0106, 0.0106, 0.1), (0.0, 0.0, 0.1), **laws)
     scene = swarm.Scene([box], gravity=(0.0, 0.0, -9.81), pairs=swarm.Pairs(**laws))
     k, wobble = np.arange(8), np.random.default_rng(0).uniform(-1.5e-4, 1.5e-4, (3, 8))
     places = 0.0103 * np.array([k % 2 - 0.5, k // 2 % 2 - 0.5, k // 4 + 0.55]) + wobble
     start = swarm.Particles(places, np.zeros((3, 8)), 1.3e-3, radius=0.005)
+    return scene, start
+
+
+@pytest.mark.parametrize(("friction", "off"), [(0.0, 1e-10), (0.5, 1e-7)])
+def test_overlaps_where_dampers_act_are_those_of_sweeps_to_round_off(friction, off, monkeypatch):
+    """There sweeps end early, as energy is booked by what dampers did: overlaps stay the same to a part of a radius.
+
+    Friction is solved to fewer digits, and more sweeps of it lead to another slip.
+    """
+    scene, start = heap(friction)
 
     def overlaps():
         run = swarm.simulate(scene, start, swarm.Penalty(2e-4, 1600.0, 1.0), until=0.02, every=2e-3, compile="never")
@@ -392,3 +401,26 @@ def test_overlaps_where_dampers_act_are_those_of_sweeps_to_round_off(friction, o
     monkeypatch.setattr(contacts, "_DAMPED", 1.0)
     assert found.max() > 5e-5
     np.testing.assert_allclose(found, overlaps(), rtol=0.0, atol=off * 0.005)
+
+
+def test_beside_friction_sweeps_end_where_they_would_not_make_the_end_more_exact(monkeypatch):
+    """Normal impulses to a thousandth of friction's tolerance change ends by less than a hundredth of its error."""
+    (scene, start), found, rubs = heap(0.5), {}, (step._RUBBED, step._STIRRING)
+    tolerances = {
+        "exact": (1e-12, 0.0, step._SOLVED),
+        "to round-off": (*rubs, step._SOLVED),
+        "as it is": (*rubs, step._BESIDE_FRICTION),
+    }
+    for name, (rubbed, stirring, beside) in tolerances.items():
+        monkeypatch.setattr(step, "_RUBBED", rubbed)
+        monkeypatch.setattr(step, "_STIRRING", stirring)
+        monkeypatch.setattr(step, "_BESIDE_FRICTION", beside)
+        with GrainsRun(
+            scene.compiled(), start.copy(), swarm.Penalty(2e-4, 1600.0, 1.0), 1, None, "never", Seeding(), Watched()
+        ) as run:
+            run.observe()
+            assert run.advance(100.0, 0.02)
+            found[name] = run.state.position.copy(), int(run._world.books.sweeps[0])
+    (exact, _), (whole, many), (short, few) = found.values()
+    assert abs(short - whole).max() < 1e-2 * abs(whole - exact).max()
+    assert few < 0.9 * many
