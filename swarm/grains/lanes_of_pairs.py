@@ -137,6 +137,8 @@ def _begin_group(matter, grains, near, touches, group):
         i, j = balls_of(ends, e, lane)
         # Of the second ball in the next group, which has been laid; the first one is often that of this group.
         _fetch_ball(grains, index(ends[e + ENDS + 1, lane]))
+        if near.drag is not None:
+            fetch(near.drag, int(rows[q + COLUMNS_OF_LANES + LISTED, lane]) * near.drag.shape[1])
         v, u = vector_at(speed, i, BEFORE), vector_at(speed, j, BEFORE)
         set_vector_in(rows, q + START, lane, apart(matter, place, i, j))
         set_vector_in(rows, q + COAST, lane, v - u)

@@ -52,10 +52,10 @@ _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 _BESIDE_FRICTION = 1e-11
 # A sweep is not counted on to change less than this part of what the one before did.
 _LEAST_RATIO = 0.1
-# Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them. More digits are
-# dear, for nearly all contacts of a pile stick: a sweep changes 0.985 of what the one before did where 1000 grains lie,
-# and 0.998 where 10 000 do. (Rejected: Anderson's acceleration, 80 sweeps to 4e-7 and 300 to 1e-6 there, and 20 to 1e-8
-# where 1000 fall, which now take 2.4; Nesterov's, twice as many; to begin with friction as it goes on: no fewer sweeps.)
+# Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them. More digits
+# are dear, for nearly all contacts of a pile stick: a sweep changes 0.985 of what the one before did where 1000 grains
+# lie, and 0.998 where 10 000 do. (Rejected: Anderson's acceleration, 80 sweeps to 4e-7 and 300 to 1e-6 there, and 20 to
+# 1e-8 where 1000 fall, which now take 2.4; Nesterov's, twice as many; friction that is extrapolated: no fewer sweeps.)
 _RUBBED = 1e-2
 # A contact that a sweep for friction changed by less leaves the others of its balls as they are. The largest errors are
 # then 0.6 to 1.6 of those of sweeps over all contacts.
