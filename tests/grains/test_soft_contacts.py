@@ -374,11 +374,10 @@ def test_balls_meet_across_the_faces_of_a_cell():
         ran(scene, start, SOFT, 0.01)
 
 
-def heap(friction):
-    """Eight balls that are about to fall on the floor of a box."""
-    laws = {"restitution": 0.3, "friction": friction}
-    box = swarm.Box((0.0106, 0.0106, 0.1), (0.0, 0.0, 0.1), **laws)
-    scene = swarm.Scene([box], gravity=(0.0, 0.0, -9.81), pairs=swarm.Pairs(**laws))
+def heap(of_walls, of_pairs):
+    """Eight balls that are about to fall on the floor of a box, with friction."""
+    box = swarm.Box((0.0106, 0.0106, 0.1), (0.0, 0.0, 0.1), restitution=0.3, friction=of_walls)
+    scene = swarm.Scene([box], gravity=(0.0, 0.0, -9.81), pairs=swarm.Pairs(restitution=0.3, friction=of_pairs))
     k, wobble = np.arange(8), np.random.default_rng(0).uniform(-1.5e-4, 1.5e-4, (3, 8))
     places = 0.0103 * np.array([k % 2 - 0.5, k // 2 % 2 - 0.5, k // 4 + 0.55]) + wobble
     start = swarm.Particles(places, np.zeros((3, 8)), 1.3e-3, radius=0.005)
@@ -391,7 +390,7 @@ def test_overlaps_where_dampers_act_are_those_of_sweeps_to_round_off(friction, o
 
     Friction is solved to fewer digits, and more sweeps of it lead to another slip.
     """
-    scene, start = heap(friction)
+    scene, start = heap(friction, friction)
 
     def overlaps():
         run = swarm.simulate(scene, start, swarm.Penalty(2e-4, 1600.0, 1.0), until=0.02, every=2e-3, compile="never")
@@ -403,9 +402,26 @@ def test_overlaps_where_dampers_act_are_those_of_sweeps_to_round_off(friction, o
     np.testing.assert_allclose(found, overlaps(), rtol=0.0, atol=off * 0.005)
 
 
+@pytest.mark.parametrize(("of_walls", "of_pairs"), [(0.5, 0.0), (0.0, 0.5)], ids=["walls", "pairs"])
+def test_where_some_contacts_alone_have_friction_no_sweep_skips_a_contact(of_walls, of_pairs, monkeypatch):
+    """The same bits whatever counts as solved, and the error of friction as where all contacts have it."""
+    scene, start = heap(of_walls, of_pairs)
+
+    def ends(rubbed, stirring):
+        monkeypatch.setattr(step, "_RUBBED", rubbed)
+        monkeypatch.setattr(step, "_STIRRING", stirring)
+        run = swarm.simulate(scene, start, swarm.Penalty(2e-4, 1600.0, 1.0), until=0.02, compile="never")
+        assert np.abs(run.particles.spin).max() > 1.0
+        return run.particles.position
+
+    found = ends(step._RUBBED, step._STIRRING)
+    assert (found == ends(step._RUBBED, 1e3)).all()
+    np.testing.assert_allclose(found, ends(1e-9, 0.0), rtol=0.0, atol=1e-6 * 0.005)
+
+
 def test_beside_friction_sweeps_end_where_they_would_not_make_the_end_more_exact(monkeypatch):
     """Normal impulses to a thousandth of friction's tolerance change ends by less than a hundredth of its error."""
-    (scene, start), found, rubs = heap(0.5), {}, (step._RUBBED, step._STIRRING)
+    (scene, start), found, rubs = heap(0.5, 0.5), {}, (step._RUBBED, step._STIRRING)
     tolerances = {
         "exact": (1e-12, 0.0, step._SOLVED),
         "to round-off": (*rubs, step._SOLVED),

@@ -83,8 +83,10 @@ def a_scene(seed):
     else:
         start = swarm.fill(scene, n, speed=float(random.choice([0.0, 1.0, 3.0])), seed=seed, radius=radius)
     start.mass = [np.full(n, 1.0), 1000.0 * np.broadcast_to(radius, n) ** 3][random.integers(2)]
-    method = swarm.Penalty(float(random.choice([2e-3, 1e-3, 5e-4])), 2e4, float(random.choice([1.0, 1.5, 2.0])))
-    return scene, start, method
+    dt, exponent = float(random.choice([2e-3, 1e-3, 5e-4])), float(random.choice([1.0, 1.5, 2.0]))
+    # With each exponent the force at this overlap is the same: below it a larger one alone would be much softer.
+    overlap = 0.005
+    return scene, start, swarm.Penalty(dt, 2e4 * overlap ** (1.0 - exponent), exponent)
 
 
 def ends(seed, steps, compile):

@@ -243,7 +243,7 @@ def _along(edge: RoomEdge, x: Vec) -> Vec:
 
 
 def _meeting(walls: tuple[Any, ...], x: Vec) -> Vec:
-    """The place where three walls meet, by Newton's method; another place where it finds none."""
+    """The place where three walls meet, by Newton's method; where it does not converge, a place off the walls."""
     for _sweep in range(_SWEEPS):
         normals = [outward(wall, x) for wall in walls]
         step = ZERO

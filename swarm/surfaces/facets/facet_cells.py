@@ -149,8 +149,8 @@ def _planes(
 def _half_balls(corners: Floats) -> tuple[Floats, Floats, Floats]:
     """The least ball around each facet: its middle in the plane, its radius, and its half.
 
-    That is a vector h, of digits: where h.(r - middle) is less than -radius is nothing of the facet, but beyond its
-    longest edge. The half of a ball around a triangle with a right angle is twice as large as that.
+    The half is a vector h, of digits: the facet has no point r with h.(r - middle) less than -radius, which is beyond
+    its longest edge. The half of a ball around a triangle with a right angle is twice as large as the triangle.
     """
     sides, every = np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), np.arange(len(corners))
     squares = (sides**2).sum(axis=2)
@@ -176,7 +176,7 @@ def _half_balls(corners: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _digits(half: Floats) -> Floats:
-    """A half as one number."""
+    """The three digits of a half as one number."""
     return np.asarray((half + _ZERO) @ np.array([_BASE * _BASE, _BASE, 1.0]))
 
 
@@ -265,7 +265,15 @@ def passes(cells, block, k, here):
 
 
 def _is_beside(away, half, reach, off, unit):
-    """Whether a place is not in a half ball with this reach, where it is known but for so much, and the middle too."""
+    """Whether a place is surely outside of a half ball.
+
+    Args:
+        away: the place less the middle of the ball.
+        half: the vector of the half.
+        reach: the radius of the ball.
+        off: the largest error of the place.
+        unit: the largest error of the middle, in the unit of the others.
+    """
     ball = reach + off
     return (square(away) > ball * ball) | (dot(half, away) < -(reach + _LONGEST * (off + unit)))
 
