@@ -411,7 +411,7 @@ def test_where_some_contacts_alone_have_friction_no_sweep_skips_a_contact(of_wal
         monkeypatch.setattr(step, "_RUBBED", rubbed)
         monkeypatch.setattr(step, "_STIRRING", stirring)
         run = swarm.simulate(scene, start, swarm.Penalty(2e-4, 1600.0, 1.0), until=0.02, compile="never")
-        assert np.abs(run.particles.spin).max() > 1.0
+        assert np.abs(run.particles.spin).max() > 0.1
         return run.particles.position
 
     found = ends(step._RUBBED, step._STIRRING)
