@@ -245,6 +245,34 @@ def test_impacts_in_a_sphere_that_swings(amplitude):
     assert result.observables["max_penetration"].max() <= 4.0 * np.finfo(float).eps
 
 
+def test_a_flight_that_meets_a_swinging_sphere_shortly_before_the_end_of_a_frame():
+    """The guess of its hit, far before the end, has a parabola that does not rise: it says nothing of the end."""
+    swing = swarm.Oscillation(
+        (-0.003087541204373585, -0.01702616347965316, 0.018383069471157365), 5.518599487061708, 3.000632198286409
+    )
+    start, speed = np.array([0.09397534, -0.40219669, 0.18057715]), np.array([0.03310402, 0.28129611, -0.52388501])
+    until, turn, wide = 1.7225642320962407, 2.0 * math.pi * swing.frequency, np.array(swing.amplitude)
+
+    def center(t):
+        return wide * (math.sin(turn * t + swing.phase) - math.sin(swing.phase))
+
+    def gap(t):
+        return np.linalg.norm(start + speed * t - center(t)) - 0.5
+
+    # It is 3 mm outside at 1.29 s, where a frame ends.
+    assert max(gap(t) for t in np.linspace(0.0, 1.228, 20_001)) < 0.0
+    hit = brentq(gap, 1.228, 1.23, xtol=1e-15)
+    normal = (start + speed * hit - center(hit)) / 0.5
+    off = speed - turn * wide * math.cos(turn * hit + swing.phase)
+    after = speed - 2.0 * (off @ normal) * normal
+    particle = swarm.Particles(start, speed)
+    scene = swarm.Scene([swarm.Sphere(0.5, motion=swing)])
+    run = swarm.simulate(scene, particle, swarm.Impact(), until=until, every=until / 4, compile="never")
+    assert run.observables["impacts"][-1] == 1
+    exact = start + speed * hit + after * (until - hit)
+    np.testing.assert_allclose(run.particles.position[:, 0], exact, rtol=0.0, atol=1e-13)
+
+
 def test_a_hit_of_a_wall_that_comes_and_goes():
     """A floor that swings just up to a particle which stands still, or just not."""
     amplitude, rest = 0.25, Vec(0.0, 0.0, 0.0)

@@ -121,6 +121,7 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
         mine, level = meets & (wall == number), one.level
         at, end = WALLS + k * _OF_WALL, level.moved(way, mine)
         sixth = one.third(time + far) * (1.0 / 6.0)
+        # What is said of the end is said by the parabola at the guess.
         near = sixth * far * far * far <= EPSILON * one.seen.coordinates * level.steepness
         passage = one.seen.drive.passage(one.body, r, v, remaining)
         if passage is not None and not by_series:
@@ -135,7 +136,7 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
                 ahead, since = select(across, passage.enters, ahead), select(across, passage.leaves, since)
                 ahead, since = select(ahead > 0.0, ahead, 0.0), select(since < time, since, time)
             start = type(level)(*(course[at + i, lane] for i in range(3)), *level[3:])
-            proven = proven & (near | (not mine)) & start.is_below(1.0, sixth, ahead, True)
+            proven = proven & near & start.is_below(1.0, sixth, ahead, True)
             proven = proven & end.is_below(-1.0, sixth, time - since, mine)
     course[TIME, lane] = select(proven, time, 0.0)
     course[MET, lane] = select(proven & meets, wall, -1.0)
