@@ -86,7 +86,7 @@ def a_scene(seed):
     dt, exponent = float(random.choice([2e-3, 1e-3, 5e-4])), float(random.choice([1.0, 1.5, 2.0]))
     # With each exponent the force at this overlap is the same: below it a larger one alone would be much softer.
     overlap = 0.005
-    return scene, start, swarm.Penalty(dt, 2e4 * overlap ** (1.0 - exponent), exponent)
+    return scene, start, swarm.Penalty(dt, 5e4 * overlap ** (1.0 - exponent), exponent)
 
 
 def ends(seed, steps, compile):
