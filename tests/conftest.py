@@ -97,11 +97,11 @@ def pytest_collection_modifyitems(config, items):
     """Slow tests are marked, and the files that take longest come first: no core waits for the last of them.
 
     The tests of a file stay together, for a fixture of a module is torn down where a test of another module follows.
-    A test that is named by itself runs, however slow it is.
+    A test that is named by itself runs, however slow it is, and so does one that is marked as quick.
     """
     is_named = any("::" in argument for argument in config.args)
     seconds = {} if is_named else durations.known()[0]
-    measured = (item.nodeid for item in items if not any(map(item.get_closest_marker, ("slow", "long"))))
+    measured = (item.nodeid for item in items if not any(map(item.get_closest_marker, ("slow", "long", "quick"))))
     slow = set() if is_named else durations.slow_ones(measured)
     for item in items:
         if item.nodeid in slow:

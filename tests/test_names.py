@@ -1,6 +1,7 @@
 """A word means one thing: what two modules of a package define by one name is one interface."""
 
 import ast
+import functools
 import re
 import tokenize
 from collections import Counter, defaultdict
@@ -10,11 +11,15 @@ import pytest
 
 import swarm
 
+pytestmark = pytest.mark.quick
+
 ROOT = Path(swarm.__file__).parent
 PACKAGES = sorted({path.parent.relative_to(ROOT) for path in ROOT.rglob("*.py")}, key=str)
 FILES = [path for name in ("swarm", "tests", "bench", "examples") for path in (ROOT.parent / name).rglob("*.py")]
 DEFINITIONS = ast.FunctionDef | ast.ClassDef
 NAMES = re.compile(r"(^|_)(who|whom|told|said)(_|$)", re.IGNORECASE)
+# What a file with such a name has in its text.
+IN_TEXT = re.compile(r"(?<![a-z0-9])(who|whom|told|said)(?![a-z0-9])", re.IGNORECASE)
 # Turns of phrase that a reader has to decode: a function returns -1, and particles are no people.
 TURNS = re.compile(
     r"\b([Ww]ho|[Ww]hom|[Ww]hoever|[Nn]obody|[Kk]nows? no|of one's own|(is|are) none|ha(s|ve) gone)\b(?![/|])",
@@ -37,11 +42,16 @@ PAGES = [
 ]
 
 
+@functools.cache
+def parsed(path):
+    return ast.parse(path.read_text("utf-8"))
+
+
 def definitions(package):
     """Name -> (module, arguments of the function, or of the methods of the class) of what modules define for others."""
     found = defaultdict(list)
     for path in sorted((ROOT / package).glob("*.py")):
-        for node in ast.parse(path.read_text()).body:
+        for node in parsed(path).body:
             if isinstance(node, DEFINITIONS) and not node.name.startswith("_"):
                 found[node.name].append((path.name, arguments(node)))
     return found
@@ -63,7 +73,7 @@ def test_a_class_name_stands_once():
     """In the whole package, so that a search for it finds the class."""
     found = defaultdict(list)
     for path in sorted(ROOT.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.ClassDef):
                 found[node.name].append(str(path.relative_to(ROOT)))
     assert {name: places for name, places in found.items() if len(places) > 1} == {}
@@ -106,7 +116,9 @@ def test_names_say_what_they_hold():
     """A text, a message, a title: `told` and `said` may be any of them."""
     found = []
     for path in (path for path in FILES if path.relative_to(ROOT.parent).parts[0] in ("swarm", "tests")):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if not IN_TEXT.search(path.read_text("utf-8")):
+            continue
+        for node in ast.walk(parsed(path)):
             is_bound = isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store)
             name = getattr(node, "id", "") or getattr(node, "attr", "") if is_bound else ""
             name = name or (node.arg if isinstance(node, ast.arg) else "")

@@ -1,4 +1,4 @@
-"""Methods whose value is computed once."""
+"""Methods that compute their value once."""
 
 import functools
 from collections.abc import Callable

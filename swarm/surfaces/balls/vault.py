@@ -28,8 +28,8 @@ _SLACK, _FAR = 1e-11, 1e6
 # Places from which edges are looked for, and most rooms; of the smallest radius of curvature at these places, what is
 # taken for certain.
 _PLACES, _MOST, _ROUND = 24, 64, 0.5
-# Newton's steps to a tip, at most; one that is so many roundings of a place is the last. Walls whose normals span no
-# more than this do not meet at a point.
+# Newton's steps to a tip, at most; one that is so many roundings of a place is the last. Walls do not meet at a point
+# where their normals span no more than this.
 _SWEEPS, _STILL, _PARALLEL = 30, 4.0 * EPSILON, 1e-9
 # What all parts of a union that balls meet have in common: laws, and how the whole moves, comes and goes, and opens.
 _LAWS = "restitution", "friction", "temperature", "accommodation", "laws"

@@ -162,7 +162,7 @@ def hidden(rooms, own, place, n):
 
     Args:
         rooms: the walls of each room of the union.
-        own: the numbers of the rooms whose walls these are.
+        own: the numbers of the rooms that the face or the edge belongs to.
         place: the place.
         n: a unit normal, or 0.
     """
@@ -263,7 +263,7 @@ def _to_edge(wall, edge, p, w, pull):
 
 
 def _rim_of(wall, tip, p):
-    """A tip as a ball at a place sees it: as it sees a straight edge, whose foot stays where it is."""
+    """A tip as a ball at a place sees it: a straight edge with a foot that stays where it is."""
     return Rim(math.inf, tip, norm(tip - p), wall.radius)
 
 

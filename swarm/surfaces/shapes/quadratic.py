@@ -22,7 +22,7 @@ _CHORD_SWEEPS = 12
 _TINY = float(np.finfo(np.float64).tiny)
 
 
-class Columns(Record):
+class MatrixColumns(Record):
     """The columns of a matrix."""
 
     x: Vec
@@ -210,7 +210,7 @@ class QuadricNumbers(contract.Smooth):
     def _turned_step(self, kappa, tilt):
         """1 + kappa Q A, of the step of a wall that turns."""
         x, y, z = kappa * self.a
-        return Columns(
+        return MatrixColumns(
             Vec(1.0 + x, -x * tilt.z, x * tilt.y), Vec(y * tilt.z, 1.0 + y, -y * tilt.x),
             Vec(-z * tilt.y, z * tilt.x, 1.0 + z),
         )  # fmt: skip
