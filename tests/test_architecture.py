@@ -17,6 +17,8 @@ from swarm import moved, surfaces
 from swarm.methods import ALL_METHODS
 from swarm.surfaces.laws import ALL_LAWS
 
+pytestmark = pytest.mark.quick
+
 PACKAGE = Path(swarm.__file__).parent
 # From the top down; a module imports only from layers below its own, or from its own package. `check` and `numbers` of
 # a method take the Scene and the Particles, so these are below.
@@ -67,17 +69,23 @@ def modules():
     return {path.relative_to(PACKAGE).with_suffix("").parts: path for path in PACKAGE.rglob("*.py")}
 
 
+def statements(body):
+    """Every statement in a body and in what it holds, but what is there for types alone."""
+    for node in body:
+        yield node
+        for inner in ("body", "orelse", "finalbody", "handlers", "cases"):
+            if inner != "body" or not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)):
+                yield from statements(getattr(node, inner, ()))
+
+
 @functools.cache
 def imported(parts):
     """The modules of the package that a module imports, at its top or inside a function, but for types alone."""
     known, found = modules(), []
-    tree = ast.parse(known[parts].read_text())
-    branches = [node for node in ast.walk(tree) if isinstance(node, ast.If)]
-    of_types = {id(node) for one in branches if "TYPE_CHECKING" in ast.unparse(one.test) for node in ast.walk(one)}
-    for node in ast.walk(tree):
+    for node in statements(ast.parse(known[parts].read_text()).body):
         if isinstance(node, ast.Import):
             assert not any(alias.name.split(".")[0] == "swarm" for alias in node.names), "relative imports only"
-        if isinstance(node, ast.ImportFrom) and node.level and id(node) not in of_types:
+        if isinstance(node, ast.ImportFrom) and node.level:
             home = (*parts[: len(parts) - node.level], *(node.module.split(".") if node.module else ()))
             for alias in node.names:
                 targets = [(*home, alias.name), (*home, alias.name, "__init__"), home, (*home, "__init__")]
