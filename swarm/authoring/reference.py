@@ -28,7 +28,6 @@ _HERE, _PACKAGE = Path(__file__).parent, sys.modules[__package__.partition(".")[
 # A topic and names of it, and names on the next lines, in the docstring of the package.
 _TOPIC = re.compile(r"(?m)^ {4}(\S[\w ]*?) {2,}(.*(?:\n {10,}.*)*)")
 _SECTIONS = ("Returns", "Raises", "Conserves", "Order", "Cost", "Source", "Reference")
-_SMALLEST = 1e-9
 _WITH_ENTRIES = ("Args", "Attributes", "Raises")
 
 

@@ -113,7 +113,7 @@ class TrajectoryWriter(AppendedFile):
         # The end, the threads and the clock of the run, set before the context begins.
         self.course: Course | None = None
         self._wall_time: Any = None
-        self._radius, self._turns = particles.radius, particles.spin is not None
+        self._radius = particles.radius
         # That of points is not written, and would be computed to be asked for.
         self._volume = None if particles.radius is None else particles.volume
         self._columns = columns_of(scene, particles, storage)

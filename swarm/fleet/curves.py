@@ -10,8 +10,8 @@ from ..pictures import style
 from ..words.amounts import plain
 from .folder import SweepFolder
 
-# Graphs of each parameter, curves of another parameter in one, and values of a parameter that are numbers on an axis.
-_MOST, _CURVES, _LABELS = 6, 6, 12
+# Graphs of each parameter, and curves of another parameter in one.
+_MOST, _CURVES = 6, 6
 # Numbers that differ by less, as a part of the largest, are one; errors below are those of round-off.
 _SAME, _ROUND_OFF = 1e-9, 1e-12
 _REPEATS = "seed"

@@ -260,7 +260,7 @@ def _foresee_all(matter, grains, touches):
 
 
 @outlined
-def find_pairs(matter, grains, near, touches):
+def find_pairs(matter, near, touches):
     """Find the pairs that are in contact at an end of the step, and those that miss one another by the margin or less.
 
     How many contacts are new.
@@ -338,4 +338,4 @@ def find_more_pairs(matter, grains, near, touches, off_course):
     if is_known:
         return _find_missed(matter, grains, near, touches)
     _foresee_all(matter, grains, touches)
-    return find_pairs(matter, grains, near, touches)
+    return find_pairs(matter, near, touches)

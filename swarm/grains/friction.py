@@ -40,8 +40,6 @@ from .grain_arrays import (
 )
 from .vessel import met, moves
 
-_TINY = 1e-300
-
 
 def across(a, n):
     """What of a vector is across another one."""

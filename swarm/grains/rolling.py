@@ -115,7 +115,7 @@ def _spin_of(wall, grains, touches, c, i):
 
 
 @outlined
-def roll_wall(matter, law, wall, grains, touches, number, sweep):
+def roll_wall(law, wall, grains, touches, number, sweep):
     """Improve the angular impulse of each ball at a wall; the largest change, as for pairs."""
     rows, place, spin, begin, worst = touches.wall_rows, grains.place, grains.spin, touches.wall_spans[0, number], 0.0
     for k in range(begin, begin + touches.wall_spans[1, number]):

@@ -144,7 +144,7 @@ def _gather(matter, walls, world, travel):
     grains, near, touches = world.grains, world.near, world.touches
     known = touches.used[0]
     if travel is None:
-        new = find_pairs(matter, grains, near, touches)
+        new = find_pairs(matter, near, touches)
     else:
         new = find_more_pairs(matter, grains, near, touches, travel.off_course)
     if new > 0:
@@ -216,7 +216,7 @@ def _rub(matter, walls, world, sweep):
         else:
             worst = worse(rub_wall(matter, matter.walls[k], wall, grains, touches, k, sweep), worst)
         if matter.walls[k].rolling is not None:
-            worst = worse(roll_wall(matter, matter.walls[k], wall, grains, touches, k, sweep), worst)
+            worst = worse(roll_wall(matter.walls[k], wall, grains, touches, k, sweep), worst)
     return worst
 
 

@@ -193,7 +193,7 @@ def carry(method, walls, gravity, state, i, p):
                 tries += 1
                 continue
         if used == 0.0:
-            _stop(laws, now, gravity, state, i, p, active, start.u)
+            _stop(now, gravity, state, i, p, active, start.u)
         _book(walls, gravity, state, i, active, (start, half, end), (r1, h, remaining == h))
         used += h
         remaining = 0.0 if remaining == h else remaining - h
@@ -208,7 +208,7 @@ def carry(method, walls, gravity, state, i, p):
 
 
 @outlined
-def _stop(laws, now, gravity, state, i, p, active, u):
+def _stop(now, gravity, state, i, p, active, u):
     """Book what the walls take of a velocity that is not theirs."""
     a, b, c = _normals(now, active, p.r)
     taken, mass = _parts(a, b, c, p.v - u), state.mass[i]

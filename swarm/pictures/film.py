@@ -35,8 +35,8 @@ _LEAST, _MOST = 64, 8192
 # Pixels an inch, in which letters have the size of those of a plot; fewer where a side has less than these pixels: the
 # letters would leave no room for the axes.
 _DPI, _ROOM = 120, 240
-# Hundredths of a second, in which a GIF counts; viewers take less than 2 for 10.
-_HUNDREDTHS, _FASTEST = 100.0, 50.0
+# A GIF counts in hundredths of a second, and viewers take less than 2 for 10.
+_FASTEST = 50.0
 
 
 # Matplotlib's writers draw every frame anew, twice; these take what `_Film` has drawn.

@@ -8,11 +8,6 @@ from ..state import Floats
 from ..surfaces.rotation import normalized
 from .curves import Indices, neighbours
 
-# Points around the tube of a torus and along it, parts of the height of an outline, and points of a line on it.
-_AROUND, _ALONG, _HIGH, _FINE = 32, 96, 8, 201
-# Parts of the height of a cone.
-_RINGS = 32
-
 Triangles = tuple[Floats, Indices]
 
 

@@ -287,11 +287,11 @@ def wall_at(walls, span, j, c):
     """One of these walls."""
     if (len(walls.fields()) == 0 and len(walls.unions) == 0) or span[0] > 0:
         return span[0] + j
-    return _wall_of_cells(walls, span, j, c)
+    return _wall_of_cells(walls, j, c)
 
 
 @outlined
-def _wall_of_cells(walls, span, j, c):
+def _wall_of_cells(walls, j, c):
     """The same of a scene with fields, or unions."""
     for number, field in walls.fields():
         here = int(field.members.count_in_cell(c))

@@ -14,7 +14,7 @@ from .window import OUT
 def aim_again(box, flock, i, now):
     """Find all that is next for a ball with a velocity that has changed."""
     until_exit(box.grid, box.pull, flock, i, now)
-    forget_wall(box, flock, i)
+    forget_wall(flock, i)
     find_wall(box, flock, i, now)
     find_partner(box, flock, i, now)
 

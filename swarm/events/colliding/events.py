@@ -107,7 +107,7 @@ def _at_wall(box, flock, books, clock, i, now):
 
 
 def _look_for_wall(box, flock, i, now):
-    forget_wall(box, flock, i)
+    forget_wall(flock, i)
     find_wall(box, flock, i, now)
     requeue(flock, i)
 
@@ -160,7 +160,7 @@ def _enter(box, flock, books, clock, i, now):
             books.image[index(which), index(i)] += turns
         if turns != 0:
             # There it meets other images of the walls.
-            forget_wall(box, flock, i)
+            forget_wall(flock, i)
             if flock.kept is not None:
                 flock.kept.keep(i, NO_PARTNER, 0.0)
         found = look_ahead(box, flock, i, now)
@@ -200,7 +200,7 @@ def begin(box, flock, now, first, last):
         if flock.event[index(FLOATS * i + WALL)] <= OUT:
             continue
         if box.window is not None and now >= 0.0:
-            forget_wall(box, flock, i)
+            forget_wall(flock, i)
             find_wall(box, flock, i, now)
         else:
             aim_again(box, flock, i, 0.0)

@@ -315,7 +315,7 @@ def tell_partner(flock, i):
     return partner
 
 
-def forget_wall(box, flock, i):
+def forget_wall(flock, i):
     """The next wall of a ball is not known any more."""
     flock.event[index(FLOATS * i + DUE)], flock.event[index(FLOATS * i + WALL)] = math.inf, UNKNOWN
 

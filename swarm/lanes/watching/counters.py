@@ -169,7 +169,7 @@ class Counters(Record):
                 step = back.images - images
             else:
                 return
-            self._settle_all(gravity, share, p, ParticleMoment(end, after, remaining - time), images)
+            self._settle_all(share, p, ParticleMoment(end, after, remaining - time), images)
             images = images + step
             r = Vec(
                 beyond_face(period.x, end.x, step.x),
@@ -236,9 +236,9 @@ class Counters(Record):
     @outlined
     def settle(self, share, p, there):
         """Count particle p, a `ParticleMoment`, at a counter, if it goes on from there without another look."""
-        self._settle_all(None, share, p, there, ZERO)
+        self._settle_all(share, p, there, ZERO)
 
-    def _settle_all(self, gravity, share, p, there, images):
+    def _settle_all(self, share, p, there, images):
         for c, one in enumerate(self.each):
             sign = sign_of_side(share.state, c, p)
             d, ahead = distances_ahead(one, there.r, there.v)
