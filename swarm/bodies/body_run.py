@@ -17,7 +17,7 @@ from ..methods.base import Method
 from ..motion import pose
 from ..observables import CHUNK
 from ..particles import Particles
-from ..run.base import Arrays, BaseRun, named
+from ..run.base import BaseRun
 from ..run.doors import comers
 from ..run.impacts import ThreadLog
 from ..run.observed import gone_of
@@ -363,11 +363,9 @@ class BodyRun(BaseRun):
                 "walls"
             )
 
-    def _arrays(self) -> Arrays:
-        crossed = {} if self._bodies.crossed is None else named("crossed", self._bodies.crossed)
-        kept = self._bodies._replace(watchers=None, mass=None, crossed=None)._asdict()
-        kept |= {} if self._feed is None else {"scale": self._scale}
-        return crossed | {name: array for name, array in kept.items() if array is not None}
+    def _arrays(self) -> dict[str, Any]:
+        kept = self._bodies._replace(watchers=None, mass=None)._asdict()
+        return kept | {"scale": None if self._feed is None else self._scale}
 
 
 def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:

@@ -16,7 +16,7 @@ from ..kernel.arrays import aligned_copy
 from ..methods.base import Method
 from ..particles import Particles
 from ..run import failures
-from ..run.base import Arrays, BaseRun, named
+from ..run.base import Arrays, BaseRun
 from ..run.doors import comers, require_free
 from ..run.feeding import Feed, There
 from ..run.impacts import ThreadLog
@@ -263,26 +263,21 @@ class CollidingRun(BaseRun):
     def _share_done(self, span: float) -> float:
         return min(1.0, max(0.0, (self._now() - self._frame_before) / span))
 
-    def _arrays(self) -> Arrays:
-        flock, state = self._flock, self.state
-        found = {
+    def _arrays(self) -> dict[str, Any]:
+        flock, state, kept = self._flock, self.state, self._flock.kept
+        return {
             "flight": flock.flight, "event": flock.event, "node": flock.node, "key": flock.key, "item": flock.item,
             "room": flock.room,
             "impulse": state.impulse, "dissipated": state.dissipated, "impacts": state.impacts,
             "collisions": self._balls.collisions, "virial": self._books.virial, "clock": self._clock,
             "start": self._start, "position": state.position, "velocity": state.velocity,
-        }  # fmt: skip
-        kept = flock.kept
-        some = {
             "last": flock.last, "followed": flock.followed, "image": state.image, "heat": state.heat,
             "escape_time": state.escape_time,
             "kept": None if kept is None else kept.twice, "kept_stamp": None if kept is None else kept.stamp,
             "spin": self._balls.spin, "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
             "window": None if self._windows is None else self._windows.numbers,
-            "held": None if flock.holds is None else self._box.kinds.mass,
+            "held": None if flock.holds is None else self._box.kinds.mass, "crossed": state.crossed,
         }  # fmt: skip
-        crossed = {} if state.crossed is None else named("crossed", state.crossed)
-        return found | crossed | {name: array for name, array in some.items() if array is not None}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()

@@ -7,7 +7,6 @@ import numpy as np
 from ..compiled_scene import CompiledScene
 from ..contact.laws import Laws
 from ..kernel.vector import ZERO, vec
-from ..run.base import Arrays, named
 from ..run.observed import Observed
 from ..scene import Scene
 from ..state import Floats
@@ -74,7 +73,7 @@ class HeavyRun(CollidingRun):
     def _scale_of(self, seen: dict[str, Any]) -> float:
         return super()._scale_of(seen) + float(self._observed.kinetic.sum())
 
-    def _arrays(self) -> Arrays:
+    def _arrays(self) -> dict[str, Any]:
         heavy = self._heavy._asdict()
         own = {f"heavy.{name}": heavy[name] for name in ("counts", "near", "listed", "close")}
-        return {**super()._arrays(), **named("walls", self._freedoms), **own}
+        return {**super()._arrays(), "walls": self._freedoms, **own}

@@ -17,7 +17,7 @@ from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import Particles
 from ..run import failures
-from ..run.base import Arrays, BaseRun, named
+from ..run.base import Arrays, BaseRun
 from ..run.doors import comers, require_free
 from ..run.impacts import ThreadLog
 from ..run.observed import Observed
@@ -34,8 +34,6 @@ from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule, SceneWalls
 
 # Of a clock, how many events were taken where no lease is made yet: so much less for each particle that is predicted.
 _ALL_AHEAD = -1.0
-# Of a queue, what a checkpoint has under other names, or finds again.
-_NOT_KEPT = "heap", "mass", "heat", "crossed", "watchers", "image", "absorbed", "escape_time", "starts"
 
 
 class ReactingRun(BaseRun):
@@ -204,15 +202,13 @@ class ReactingRun(BaseRun):
     def _share_done(self, span: float) -> float:
         return float(self._clock[NOW] / span)
 
-    def _arrays(self) -> Arrays:
-        queue = {name: array for name, array in self._queue._asdict().items() if name not in _NOT_KEPT}
-        queue |= {} if self.state.crossed is None else named("crossed", self.state.crossed)
-        queue |= {} if self.state.heat is None else {"heat": self.state.heat}
-        absorbed = self.state.absorbed
-        queue |= {} if absorbed is None else {"absorbed_time": absorbed.time, "absorbed_wall": absorbed.wall}
-        queue |= {} if self.state.starts is None else {"starts": self.state.starts}
-        queue |= {} if self.state.escape_time is None else {"escape_time": self.state.escape_time}
-        return {**queue, **named("walls", self._freedoms), "key": self._queue.heap.key, "clock": self._clock}
+    def _arrays(self) -> dict[str, Any]:
+        queue: Any = self._queue
+        return {
+            **queue._replace(heap=None, mass=None, watchers=None, image=None, absorbed=None)._asdict(),
+            "absorbed_time": self.state.absorbed_time, "absorbed_wall": self.state.absorbed_wall,
+            "walls": self._freedoms, "key": queue.heap.key, "clock": self._clock,
+        }  # fmt: skip
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()

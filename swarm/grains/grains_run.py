@@ -20,7 +20,7 @@ from ..methods import Penalty
 from ..methods.base import Method
 from ..methods.fixed_step import steps_within
 from ..particles import Particles
-from ..run.base import OUTSIDE, Arrays, BaseRun, named
+from ..run.base import OUTSIDE, Arrays, BaseRun
 from ..run.doors import comers, require_free
 from ..run.feeding import Feed, There
 from ..run.preflight.counting import counters_of, crossed_of, with_counters
@@ -451,17 +451,16 @@ class GrainsRun(BaseRun):
     def _share_done(self, span: float) -> float:
         return float(self._clock[DONE] / self._steps_in(span))
 
-    def _arrays(self) -> Arrays:
-        kept = {"clock": self._clock, "image": self._image}
-        for name in ("grains", "near", "books"):
-            kept |= named(name, getattr(self._world, name))
-        if self._world.held is not None:
-            kept |= named("held", self._world.held._replace(mass=None))
-        if self.state.escape_time is not None or self.state.absorbed_time is not None:
+    def _arrays(self) -> dict[str, Any]:
+        world, state = self._world, self.state
+        kept = {
+            "clock": self._clock, "image": self._image, "grains": world.grains, "near": world.near,
+            "books": world.books, "held": None if world.held is None else world.held._replace(mass=None),
+            "crossed": state.crossed,
+        }  # fmt: skip
+        if state.escape_time is not None or state.absorbed_time is not None:
             # Where those are that are gone, and how fast.
-            kept |= {"position": self.state.position, "velocity": self.state.velocity}
-            kept |= {} if self.state.spin is None else {"spin": self.state.spin}
-        kept |= {} if self.state.crossed is None else named("crossed", self.state.crossed)
+            kept |= {"position": state.position, "velocity": state.velocity, "spin": state.spin}
         return kept
 
     def may_grow(self, name: str) -> bool:

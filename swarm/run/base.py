@@ -4,7 +4,7 @@ import bisect
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Self, TypeVar
 
@@ -146,8 +146,8 @@ class BaseRun:
         """The particle of a frame that was cut short with the most time left, and where it is [m]; None: not known."""
         return None
 
-    def _arrays(self) -> Arrays:
-        """The arrays of `arrays` that only this engine has."""
+    def _arrays(self) -> dict[str, Any]:
+        """The arrays of `arrays` that only this engine has, as `arrays_of` takes them."""
         raise NotImplementedError
 
     def _begin(self) -> None:
@@ -244,7 +244,7 @@ class BaseRun:
 
     def arrays(self) -> Arrays:
         """The arrays that `restore` needs for the same bits, not copied; to be called between calls of `advance`."""
-        found = self._arrays()
+        found = arrays_of(self._arrays())
         if self._instants is not None:
             found |= {"piece.begun": self._begun, "piece.done": self._done}
         for more in (self._ball_numbers, self._tally, self._feed):
@@ -365,14 +365,21 @@ class BaseRun:
         return min(latest, time.monotonic() + self._tier.remaining) if self._tier.is_plain else latest
 
 
-def named(prefix: str, arrays: Any) -> Arrays:
-    """The arrays of a named tuple, for `BaseRun.arrays`.
+def arrays_of(found: Mapping[str, Any]) -> Arrays:
+    """The arrays among these, for `BaseRun.arrays`: None is left out, and those of a named tuple have its name first.
 
     >>> from swarm.state import Absorbed
-    >>> list(named("absorbed", Absorbed(np.zeros(1), np.zeros(1, np.int32))))
-    ['absorbed.time', 'absorbed.wall']
+    >>> absorbed = Absorbed(np.zeros(1), np.zeros(1, np.int32))
+    >>> list(arrays_of({"impacts": np.zeros(1), "heat": None, "absorbed": absorbed}))
+    ['impacts', 'absorbed.time', 'absorbed.wall']
     """
-    return {f"{prefix}.{name}": array for name, array in arrays._asdict().items() if array is not None}
+    arrays: Arrays = {}
+    for name, value in found.items():
+        if isinstance(value, tuple):
+            arrays |= arrays_of({f"{name}.{part}": array for part, array in value._asdict().items()})  # type: ignore[attr-defined]
+        elif value is not None:
+            arrays[name] = value
+    return arrays
 
 
 def result_of(share: "Future[T]", latest: float, halt: Callable[[], None]) -> T:

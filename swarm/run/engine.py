@@ -23,9 +23,9 @@ from ..lanes.share import Draws, Share, take
 from ..lanes.watching import log as impact_log
 from ..methods.base import Method
 from ..particles import Particles
-from ..state import Contacts, Crossed, Multipliers, State
+from ..state import State
 from . import failures
-from .base import Arrays, BaseRun, named, result_of
+from .base import Arrays, BaseRun, result_of
 from .impacts import ThreadLog
 from .preflight.counting import counters_of, with_counters
 from .present import Presence
@@ -278,14 +278,9 @@ class Run(BaseRun):
         super()._choose_tier()
         self._pace = math.inf
 
-    def _arrays(self) -> Arrays:
-        found: Arrays = {}
-        for name, value in {"phase": self._phase, "halted": self._halted, **self.state._asdict()}.items():
-            if isinstance(value, (lanes.Halted, Contacts, Crossed, Multipliers)):
-                found |= named(name, value)
-            elif isinstance(value, np.ndarray):
-                found[name] = value
-        return found
+    def _arrays(self) -> dict[str, Any]:
+        state = self.state._replace(period=None, openings=None)
+        return {"phase": self._phase, "halted": self._halted, **state._asdict()}
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self._halted = lanes.Halted(arrays["halted.particle"], arrays["halted.rows"])
