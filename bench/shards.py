@@ -14,7 +14,7 @@ import swarm
 from swarm import observables
 from swarm.bodies import body_run
 from swarm.events import walls_run
-from swarm.fleet import jobs, joined, shard_run, sharded_run, shards
+from swarm.fleet import jobs, joined, sharded_run, shards
 from swarm.run.machine import RunEnd
 from swarm.run.measures import Measures
 from swarm.run.options import Task
@@ -39,7 +39,7 @@ def carry_out(task: Task, session: sharded_run.Sharded) -> RunEnd:
         session.prepare_shards(task)
         folder, bounds = session.begin(task, sharded_run.shards_of(task, 1))
         for k in range(len(bounds) - 1):
-            outcome = jobs.carried_out(shard_run.run_shard, (folder, k))
+            outcome = jobs.carried_out(sharded_run.run_shard, (folder, k))
             if outcome["state"] != "done":
                 raise swarm.RunError(f"shard {k} {outcome['state']}: {outcome.get('error')}")
         measures = Measures(task.options.observables, task.options.until)

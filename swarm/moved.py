@@ -72,6 +72,11 @@ _FOLDERS = [
     ("output", "pages", "page.html=html page.pictures=pictures page.reproduce=reproduce page.run=of_run"),
     ("output", "run", "sequence"),
     ("output", "triangles", "curves cut given gridded parts planar shape shapes sharp solids"),
+    ("fleet", "fleet", "shard_run=sharded_run sharded=sharded_run"),
+    ("kernel.trace", "kernel.trace", "expressions=twins"),
+    ("surfaces", "surfaces", "polyhedron=room"),
+    ("triangles", "triangles", "given=sharp"),
+    ("events", "events.colliding", "resting"),
     ("output", "words", "amounts content facts gone named nouns verdicts words=titles"),
 ]
 
@@ -99,7 +104,9 @@ def present_name(name: str) -> str | None:
     'swarm.events.colliding.cells'
     """
     folder, _, leaf = name.rpartition(".")
-    return MOVED.get(name) or (f"{_WHOLE[folder]}.{leaf}" if folder in _WHOLE else None)
+    present = MOVED.get(name) or (f"{_WHOLE[folder]}.{leaf}" if folder in _WHOLE else None)
+    # Some moved more than once.
+    return present and (present_name(present) or present)
 
 
 class _Finder:

@@ -13,7 +13,7 @@ import pytest
 from bench import cells, outcomes
 from bench.cells import Cell
 from swarm.fleet import shards
-from swarm.fleet.sharded import Sharded
+from swarm.fleet.sharded_run import Sharded
 from swarm.run.preflight import knows
 
 FOLDER = Path(__file__).parent / "reference"

@@ -10,7 +10,7 @@ from conftest import SURFACES, scene_of
 from swarm import Box, Cone, Ellipsoid, Plane, Scene, SceneError, Sphere, fill
 from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import vec
-from swarm.surfaces import polyhedron
+from swarm.surfaces import room
 
 
 def cube(half=1.0):
@@ -220,7 +220,7 @@ def test_a_cone_that_is_a_plane_to_round_off_is_refused():
 
 def test_many_planes_have_the_bounds_of_their_corners(monkeypatch):
     """More triples of planes than are intersected at once, against one corner after the other."""
-    monkeypatch.setattr(polyhedron, "_TRIPLES", 100)
+    monkeypatch.setattr(room, "_TRIPLES", 100)
     normals = np.random.default_rng(2).normal(size=(24, 3))
     normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
     corners = [np.linalg.solve(normals[list(three)], np.ones(3)) for three in itertools.combinations(range(24), 3)]

@@ -32,8 +32,8 @@ from .colliding.box import CollisionRule, CollisionTotals
 from .colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
 from .colliding.described import described, epoch_of, put_in, reach_of, there_at, with_room
 from .colliding.queue import FIRST
+from .colliding.resting import warn_of_rest
 from .colliding.window import END
-from .resting import warn_of_rest
 from .windows import windows_of
 
 

@@ -15,25 +15,97 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ..common import interrupt
 from ..common.frames import Frame
-from ..errors import RunError, WallTimeError
+from ..errors import RunError, SceneError, WallTimeError
+from ..files import checkpoint, paths
+from ..files.lock import only_writer
+from ..run import machine
 from ..run.machine import RunEnd, start_of, warn_open
 from ..run.measures import Measures
 from ..run.options import Task
 from ..run.preflight import hints
 from ..run.progress import Display, display
-from . import connection, jobs, joined, shard_run, shards
-from .sharded import Sharded
-
-__all__ = ["Sharded", "carry_out"]
+from ..run.session import Session
+from . import connection, jobs, joined, shards
+from .jobs import PATIENCE, JobEnd, Reporter, session_of
 
 # Seconds between checkpoints of a shard if the options give no time; and between looks at the frames of the shards.
 _SAVED, _FOLLOWS = 60.0, 1.0
 # To read frames of many shards takes at most about this part of the time.
 _READING = 0.1
+
+
+class Sharded(Session):
+    """As `Session`; its checkpoint holds the bounds of the shards, which have checkpoints of their own."""
+
+    # Those of the session before, or of this one once it has begun.
+    _bounds: Any = None
+
+    def prepare_shards(self, task: Task) -> None:
+        """Find where this session starts, as `Session.prepare`.
+
+        Raises:
+            SceneError, CompleteError, FileError: as there.
+        """
+        self._hold(task, None)
+        self._times = np.array([task.options.times.until, task.options.times.every])
+        if self._resumes and self._path.exists():
+            self._find_shards()
+        elif task.options.overwrite:
+            return
+        elif self._resumes and self._trajectory.exists():
+            self._refuse_to_restart(task.options.until)
+        elif (folder := shards.folder_of(self._trajectory)).exists():
+            raise SceneError(
+                f"{folder} holds the shards of another run; resume that with --resume, choose another name for the "
+                "trajectory, or overwrite it (--overwrite, overwrite=True)"
+            )
+
+    def _find_shards(self) -> None:
+        path, (saved, arrays) = self._path, checkpoint.read(self._path)
+        if checkpoint.SHARDS not in arrays:
+            raise SceneError(f"{path} is of a run without a cluster; resume it without one")
+        saved.require_same(self._job, path)
+        # Sums that the shards have written have rows of walls too.
+        checkpoint.require_owners(path, arrays, self._owners)
+        if (was := arrays["times"]).tolist() != self._times.tolist():
+            raise SceneError(
+                f"{path} is of a run with until = {was[0]:g} s and every = {was[1]:g} s, got {self._times[0]:g} and "
+                f"{self._times[1]:g} s; leave them as they were"
+            )
+        self._bounds, self._job = arrays[checkpoint.SHARDS].tolist(), saved
+
+    @property
+    def end(self) -> float:
+        """When the wall time limit is reached [s of time.monotonic]."""
+        return self._end
+
+    def begin(self, task: Task, count: int) -> tuple[Path, list[int]]:
+        """The folder of the shards and their bounds, those of the session before or so many new ones."""
+        folder = shards.folder_of(self._trajectory)
+        if self._bounds is None:
+            self._bounds = shards.bounds_of(task.count, count)
+            shards.clear(folder)
+            self._trajectory.unlink(missing_ok=True)
+            self.keep(0, 0.0)
+        shards.prepare(folder, task, self._bounds, self.identity["start"])
+        return folder, self._bounds
+
+    def keep(self, frame: int, moment: float) -> None:
+        """Save what a later session needs besides the checkpoints of the shards."""
+        job = dataclasses.replace(self._job, frame=frame, time=moment, wall_time=self.wall_time())
+        checkpoint.save(
+            self._path, job, {checkpoint.SHARDS: np.array(self._bounds), "times": self._times}, self._owners
+        )
+
+    def finish(self) -> None:
+        """Remove what only an unfinished run needs."""
+        paths.checkpoint_of(self._trajectory).unlink(missing_ok=True)
+        shards.tidy(shards.folder_of(self._trajectory), len(self._bounds) - 1)
 
 
 def carry_out(task: Task, session: Sharded) -> RunEnd:
@@ -98,7 +170,7 @@ class _Shards:
                 stop.because("walltime")
             self._look()
 
-        made = (jobs.FleetJob(k, shard_run.run_shard, (self._folder, k)) for k in range(self._count))
+        made = (jobs.FleetJob(k, run_shard, (self._folder, k)) for k in range(self._count))
         self._fleet.run(made, ended, glance)
         seen = joined.join(self._folder, self._task, self._bounds, self._session.identity, measures)
         self._follow()
@@ -135,3 +207,25 @@ class _Shards:
         for count, seen, particles in joined.seen_of(self._folder, self._task, self._bounds, self._seen):
             self._show.frame(Frame(self._seen, seen["time"], until, seen, count, particles))
             self._seen += 1
+
+
+# --- On a worker -----------------------------------------------------------------------------------------
+
+
+def run_shard(reporter: Reporter, folder: Path, k: int) -> JobEnd:
+    """Run shard k of a folder."""
+    if shards.end_of(folder, k).exists():
+        return {}
+    task = shards.task_of(folder, k)
+    target = task.options.trajectory
+    resumes = paths.checkpoint_of(target).exists()
+    options = dataclasses.replace(
+        task.options, progress=reporter.display(), resume=resumes, overwrite=not resumes, threads=1
+    )
+    with session_of(options, reporter.token) as session:
+        # The system of a worker that died may still hold it.
+        with only_writer(target, patience=PATIENCE):
+            pass
+        end = machine.carry_out_task(dataclasses.replace(task, options=options), session)
+        shards.write_end(shards.end_of(folder, k), end)
+    return {}

@@ -7,14 +7,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from ..motion import Pose, pose
 from ..state import Floats
 from ..surfaces import Cone
 from ..surfaces.facets.mesh import Mesh
-from ..surfaces.rotation import matrix
+from ..surfaces.rotation import matrix, normalized
 from ..surfaces.surface import Surface
-from . import curves, given
+from . import curves
+from .curves import neighbours
 from .cut import MOST_BODIES, Cut, Indices, SmoothSurface, cut, found_in
 from .parts import Cover, Part
 
@@ -77,7 +80,7 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
     inwards = 1.0 if part.solid else -1.0
     for found, wall in _pieces(placed) if (low < high).all() else ():
         points.append(found.points)
-        normal = given.without_gaps(wall.normals(found.points), found.triangles)
+        normal = without_gaps(wall.normals(found.points), found.triangles)
         triangles.append(first + _turned_to(found.points, found.triangles, inwards * normal))
         normals.append(inwards * normal)
         edges += curves.joined(found.points, found.rims)
@@ -108,12 +111,12 @@ def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
     if surface.open:
         return _both_sides(points, triangles), edges
     # Triangles go round the normals out of the mesh.
-    return given.shaded(points, triangles if part.solid else triangles[:, ::-1]), edges
+    return shaded(points, triangles if part.solid else triangles[:, ::-1]), edges
 
 
 def _both_sides(points: Floats, triangles: Indices) -> tuple[Floats, Indices, Floats]:
     """The triangles of sheets, each seen from both sides."""
-    sides = [given.shaded(points, turned) for turned in (triangles, triangles[:, ::-1])]
+    sides = [shaded(points, turned) for turned in (triangles, triangles[:, ::-1])]
     (here, cells, normals), (there, others, opposite) = sides
     return (
         np.concatenate([here, there]),
@@ -237,3 +240,38 @@ def _turned_to(points: Floats, triangles: Indices, normals: Floats) -> NDArray[n
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     wrong = (np.cross(b - a, c - a) * normals[triangles].sum(axis=1)).sum(axis=1) < 0.0
     return np.where(wrong[:, None], triangles[:, ::-1], triangles)
+
+
+def without_gaps(normals: Floats, triangles: Indices) -> Floats:
+    """Unit normals (V, 3) without gaps.
+
+    A point without a normal, such as the apex of a cone, gets the mean normal of its triangles, normalised.
+    """
+    missing = np.asarray((normals == 0.0).all(axis=1))
+    if not missing.any():
+        return normals
+    sums = np.zeros_like(normals)
+    for k in range(3):
+        np.add.at(sums, triangles[:, k], normals[triangles].sum(axis=1))
+    return np.where(missing[:, None], normalized(sums, 1), normals)
+
+
+def shaded(points: Floats, triangles: Indices) -> tuple[Floats, Indices, Floats]:
+    """Triangles with normals at their corners: those at which edges meet are a corner for each side of an edge."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    normal = np.cross(b - a, c - a)
+    # Corners of two triangles at a point are one where these meet smoothly at a side.
+    mine, other = neighbours(points, triangles)
+    every = np.arange(3 * len(triangles)).reshape(-1, 3)
+    pairs = [
+        (every[mine, i], every[other, j])
+        for i in range(3) for j in range(3)
+    ]  # fmt: skip
+    same = [triangles[mine, k // 3] == triangles[other, k % 3] for k in range(9)]
+    first, second = (np.concatenate([pair[k][here] for pair, here in zip(pairs, same, strict=True)]) for k in (0, 1))
+    graph = coo_matrix((np.ones(len(first), np.int8), (first, second)), shape=2 * (every.size,))
+    number, corner = connected_components(graph, directed=False)
+    made, normals = np.empty((number, 3)), np.zeros((number, 3))
+    made[corner] = points[triangles.ravel()]
+    np.add.at(normals, corner, np.repeat(normal, 3, axis=0))
+    return made, corner.reshape(-1, 3).astype(np.int64), normalized(normals, 1)

@@ -16,7 +16,7 @@ from test_cli import command
 
 import swarm
 from swarm import scene_file
-from swarm.fleet import connection, jobs, local, shard_run, sharded_run, shards
+from swarm.fleet import connection, jobs, local, sharded_run, shards
 from swarm.run import machine
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
@@ -417,5 +417,5 @@ def test_what_a_worker_compiles_is_reported(tmp_path, monkeypatch):
         machine, "carry_out_task", lambda task, session: task.options.progress.compiling("compiling it")
     )
     monkeypatch.setattr(shards, "write_end", lambda path, end: None)
-    assert jobs.carried_out(shard_run.run_shard, (tmp_path, 0), tell=sentences.append) == {"state": "done"}
+    assert jobs.carried_out(sharded_run.run_shard, (tmp_path, 0), tell=sentences.append) == {"state": "done"}
     assert sentences == [{"compiling": "compiling it"}]

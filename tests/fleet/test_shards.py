@@ -12,7 +12,7 @@ from bench.shards import carry_out
 from bench.shards import same as the_same
 from swarm import scene_file
 from swarm.files import paths
-from swarm.fleet.sharded import Sharded
+from swarm.fleet.sharded_run import Sharded
 from swarm.run import machine
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
@@ -273,8 +273,8 @@ def test_a_flipped_bit_of_a_shard_is_reported(case, on_a_cluster, tmp_path):
 KILLED = """
 import os, signal, sys
 import numpy as np, swarm
-from swarm.fleet import jobs, joined, shard_run
-from swarm.fleet.sharded import Sharded
+from swarm.fleet import jobs, joined, sharded_run
+from swarm.fleet.sharded_run import Sharded
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
 
@@ -300,7 +300,7 @@ with session:
     session.prepare_shards(task)
     folder, bounds = session.begin(task, 2)
     for k in range(2):
-        assert jobs.carried_out(shard_run.run_shard, (folder, k)) == {"state": "done"}
+        assert jobs.carried_out(sharded_run.run_shard, (folder, k)) == {"state": "done"}
     joined.join(folder, task, bounds, session.identity)
     session.finish()
 """

@@ -4,6 +4,7 @@ Hard spheres that lie on one another or on a wall collide without end. Impacts a
 finds the same on any machine, with any number of threads, and after it was resumed.
 """
 
+import logging
 import math
 from typing import Any
 
@@ -13,11 +14,15 @@ from ...kernel.jit import outlined
 from ...kernel.record import Record
 from .clock import IMPACTS, RESTED, SINCE, SLOW, moment_of
 
+_LOG = logging.getLogger("swarm")
 # Balls rest that have more impacts than this in the time in which one falls its radius R, nearly all of them slow: with
 # a part of the speed of that fall at most. Balls of that speed have so many where gaps are less than R/500: in no gas.
 LEAST_RATE, _SHARE, _PART = 100.0, 0.9, 0.1
 # So many impacts a ball are looked at in a row; of few balls so many in all, since one that crosses a corner has some.
 _COUNTED, _FEWEST = 32, 256
+# The contact duration that is proposed, as a part of the time of a fall: a heap of 200 balls then takes as many impacts
+# in a second as it does while it falls.
+_LONGER = 0.05
 
 
 class Repose(Record):
@@ -46,3 +51,26 @@ def repose_of(pull: float, radius: Any) -> Repose:
     n, counted = len(radius), float(max(_COUNTED * len(radius), _FEWEST))
     fall = math.sqrt(2.0 * float(np.min(radius)) / pull)
     return Repose(fall, (_PART * pull * fall) ** 2, counted, counted / (n * LEAST_RATE) * fall)
+
+
+def warn_of_rest(box: Any, clock: Any) -> bool:
+    """Warn where balls of a run rest: whether they do."""
+    if box.repose is None or clock[RESTED] == 0.0:
+        return False
+    fall = box.repose.fall
+    longer = f"Pairs(contact_duration={_LONGER * fall:.1g})"
+    if box.loss is None and not box.laws.send_off:
+        remedy = f"start them elsewhere, or give pairs and walls a restitution below 1, with {longer} or with Penalty"
+    elif box.loss is None:
+        remedy = f"give these walls a restitution in place of a law or a temperature, with {longer} or with Penalty"
+    else:
+        remedy = (
+            f"use Penalty (its contacts last), or a longer contact_duration, such as {longer}, "
+            f"in place of {box.loss.duration:.2g} s"
+        )
+    _LOG.warning(
+        "balls rest on one another or on walls, at %.6g s for the first time: hard spheres at rest collide without "
+        "end, these more than %.2g times a second each; the run goes on, and takes the longer the more balls rest; %s",
+        clock[RESTED], LEAST_RATE / fall, remedy,
+    )  # fmt: skip
+    return True
