@@ -72,6 +72,7 @@ _FOLDERS = [
     ("output", "pages", "page.html=html page.pictures=pictures page.reproduce=reproduce page.run=of_run"),
     ("output", "run", "sequence"),
     ("output", "triangles", "curves cut given gridded parts planar shape shapes sharp solids"),
+    ("commands", "commands", "export=trajectories info=trajectories report=pictures"),
     ("fleet", "fleet", "shard_run=sharded_run sharded=sharded_run"),
     ("kernel.trace", "kernel.trace", "expressions=twins"),
     ("surfaces", "surfaces", "polyhedron=room"),

@@ -7,17 +7,13 @@ import click
 from ..common import interrupt
 from ..errors import SceneError, SwarmError
 from ..version import VERSION
-from .check import check
 from .docs import docs
-from .export import export
-from .info import info
-from .new import new
 from .options import Group
-from .pictures import animate, plot, record, view
-from .report import report
+from .pictures import animate, plot, record, report, view
 from .run import run
-from .schema import schema
+from .scenes import check, new, schema
 from .sweep import sweep
+from .trajectories import export, info
 
 _FAILED, _BAD_INPUT = 1, 2
 _CODES = "Exit codes: 0 done, 1 a run failed, 2 bad input, 75 the wall time is over (--resume goes on), 130 interrupted"

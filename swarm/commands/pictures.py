@@ -1,4 +1,4 @@
-"""`swarm record`, `swarm view`, `swarm plot` and `swarm animate`: recordings, pictures and films."""
+"""`swarm record`, `view`, `plot`, `report` and `animate`: recordings, pictures, pages and films."""
 
 from pathlib import Path
 from typing import Annotated
@@ -73,6 +73,20 @@ def plot(file: TrajectoryFile, output: Picture = None, overwrite: ReplacesPictur
     with load(file) as trajectory:
         plots.draw_plot(trajectory, target)
     print(f"written to {target}")
+
+
+def report(
+    source: Annotated[Path, Positional(metavar="RUN", help="A trajectory RUN.h5, or the folder of a sweep.")],
+    output: Annotated[
+        Path | None, Option("-o", "--output", metavar="OUT.html", help="Page [default: RUN.html].")
+    ] = None,
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace an existing page.")] = False,
+) -> None:
+    """Make a page of a run or a sweep, one file for any browser: verdicts, pictures, numbers, how to reproduce it."""
+    from ..fleet.report import checked, page_of
+
+    target = checked(source, output, overwrite)
+    written(page_of(source, target).save(target, overwrite=overwrite))
 
 
 def animate(

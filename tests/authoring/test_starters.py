@@ -11,7 +11,7 @@ import swarm
 from swarm import scene_file
 from swarm.authoring.schema import schema_of
 from swarm.authoring.starters import KINDS, begin, text_of
-from swarm.commands.new import new
+from swarm.commands.scenes import new
 
 # Short enough for plain Python [s].
 UNTIL = {"cavity": 0.5, "hopper": 0.03, "billiard": 0.05, "gas": 0.05, "mechanism": 0.04}
