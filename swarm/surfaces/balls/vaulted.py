@@ -210,6 +210,58 @@ def crossing(one, other, y, far):
 _UNFOUND, _LEAST = 0.05, 0.125
 
 
+class AtInstant(Record):
+    """A flight at an instant, and how long it surely stays clear of something."""
+
+    r: Vec
+    v: Vec
+    pull: Vec
+
+    def until_wall(self, grown):
+        """How long it stays clear of a parallel surface."""
+        if self.pull.x == 0.0 and self.pull.y == 0.0 and self.pull.z == 0.0:
+            time, _meets = grown.first_hit(self.r, self.v)
+        else:
+            time, _meets = grown.falling_hit(self.r, self.v, self.pull)
+        return time
+
+    def until_rim(self, rim):
+        """How long it stays clear of an edge."""
+        return march.safe_step(rim, self.r, self.v, self.pull, 0.0)[2]
+
+    def until_gone(self, way):
+        """How long it takes to go so far, at the least."""
+        return march.time_to_travel(norm(self.v), norm(self.pull), way)
+
+
+class AtInstantInFrame(Record):
+    """The same in the frame of a union that moves, for at most the longest time [s]."""
+
+    r: Vec
+    seen: rising.InWallFrame
+    longest: float
+
+    def until_wall(self, grown):
+        return grown.moving_step(self.seen, self.longest).time
+
+    def until_rim(self, rim):
+        return rising.bent_step(rim, self.seen, self.longest).time
+
+    def until_gone(self, way):
+        return Hidden(self.seen, way).longest(self.longest)
+
+
+class Hidden(rising.Ahead):
+    """What is not met on the first part of a way, as the frame sees it."""
+
+    seen: rising.InWallFrame
+    way: float
+
+    def rise(self, within):
+        speed = self.seen.bounds(within).speed
+        return select(speed > 0.0, self.way / select(speed > 0.0, speed, 1.0), math.inf)
+
+
 @outlined
 def _look(wall, r, v, pull, t, is_first):
     """The `SafeStep` of a flight at a time."""
@@ -218,48 +270,59 @@ def _look(wall, r, v, pull, t, is_first):
     room = 2.0 * EPSILON * total(absolute(p))
     if not is_first and away < wall.radius and dot(place - p, w) > 0.0:
         return march.SafeStep(t, 0.0, -1.0, 0.0)
-    step = math.inf
-    for face in wall.faces:
-        step = min(step, _to_face(wall, face, p, w, pull))
-    for edge in wall.edges:
-        step = min(step, _to_edge(wall, edge, p, w, pull))
-    for tip in wall.tips:
-        step = min(step, march.safe_step(_rim_of(wall, tip, p), p, w, pull, 0.0)[2])
+    step = _until_any(wall, AtInstant(p, w, pull), math.inf)
     arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= room
     return march.SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
 
 
 @outlined
-def _to_face(wall, face, p, w, pull):
-    """A time during which a flight surely does not meet a face."""
-    away = face.wall.distance(p)
-    n = outward(face.wall, p)
-    foot = p - away * n
-    depth = hidden(wall.rooms, face.rooms, foot, n if isinstance(face.wall, FLAT) else ZERO)
-    step = 0.0
-    if depth <= wall.slack or away <= -wall.radius:
-        grown = face.wall.grown(wall.radius)
-        if pull.x == 0.0 and pull.y == 0.0 and pull.z == 0.0:
-            step, _meets = grown.first_hit(p, w)
-        else:
-            step, _meets = grown.falling_hit(p, w, pull)
-    if depth <= wall.slack:
-        return step
-    way = _way_of_foot(_round_at(face, foot, n), face.slope, abs(away), depth)
-    return max(step, _unseen(wall, abs(away), way, w, pull))
+def _moving_step(wall, seen, longest):
+    """The `LevelStep` of all faces, edges and tips."""
+    away, place = nearest(wall, seen.r)
+    half = 0.5 * dot((place - seen.r) * (1.0 / select(away > 0.0, away, 1.0)), seen.v)
+    step = _until_any(wall, AtInstantInFrame(seen.r, seen, longest), longest)
+    return rising.LevelStep(wall.radius - away, half, step)
+
+
+def _until_any(wall, flight, longest):
+    """How long, at most the longest time, a flight surely stays clear of all faces, edges and tips."""
+    step = longest
+    for face in wall.faces:
+        step = min(step, _until_face(wall, face, flight))
+    for edge in wall.edges:
+        step = min(step, _until_edge(wall, edge, flight))
+    for tip in wall.tips:
+        step = min(step, flight.until_rim(_rim_of(wall, tip, flight.r)))
+    return step
 
 
 @outlined
-def _to_edge(wall, edge, p, w, pull):
+def _until_face(wall, face, flight):
+    """How long a flight surely stays clear of a face."""
+    p = flight.r
+    away, n = face.wall.distance(p), outward(face.wall, p)
+    foot = p - away * n
+    depth, step = hidden(wall.rooms, face.rooms, foot, n if isinstance(face.wall, FLAT) else ZERO), 0.0
+    if depth <= wall.slack or away <= -wall.radius:
+        step = flight.until_wall(face.wall.grown(wall.radius))
+    if depth <= wall.slack:
+        return step
+    way = _way_of_foot(_round_at(face, foot, n), face.slope, abs(away), depth)
+    return max(step, _until_seen(wall, abs(away), way, flight))
+
+
+@outlined
+def _until_edge(wall, edge, flight):
     """The same of an edge."""
+    p = flight.r
     least = max(abs(edge.one.distance(p)), abs(edge.other.distance(p)))
     foot = crossing(edge.one, edge.other, p, _FAR * wall.radius)
     if max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) > wall.slack:
-        return _unseen(wall, least, _UNFOUND * wall.radius, w, pull)
+        return _until_seen(wall, least, _UNFOUND * wall.radius, flight)
     away, depth = norm(foot - p), hidden(wall.rooms, edge.rooms, foot, ZERO)
     if depth > wall.slack:
-        return _unseen(wall, away, max(_way_of_foot(edge.bend, 0.0, away, depth), _LEAST * depth), w, pull)
-    return march.safe_step(Rim(edge.bend, foot, away, wall.radius), p, w, pull, 0.0)[2]
+        return _until_seen(wall, away, max(_way_of_foot(edge.bend, 0.0, away, depth), _LEAST * depth), flight)
+    return flight.until_rim(Rim(edge.bend, foot, away, wall.radius))
 
 
 def _rim_of(wall, tip, p):
@@ -291,68 +354,6 @@ def _way_of_foot(roundness, slope, away, depth):
     return depth * max(roundness - away, 0.0) / (roundness + (1.0 + slope) * depth)
 
 
-def _unseen(wall, away, way, w, pull):
+def _until_seen(wall, away, way, flight):
     """How long a face or an edge stays hidden, or is farther than a radius, with the way until its foot may be seen."""
-    return march.time_to_travel(norm(w), norm(pull), max(away - wall.radius, min(way, wall.radius)))
-
-
-# --- In the frame of a union that moves ------------------------------------------------------------------
-
-
-class Hidden(rising.Ahead):
-    """What is not met on the first part of a way, as the frame sees it."""
-
-    seen: rising.InWallFrame
-    way: float
-
-    def rise(self, within):
-        speed = self.seen.bounds(within).speed
-        return select(speed > 0.0, self.way / select(speed > 0.0, speed, 1.0), math.inf)
-
-
-@outlined
-def _moving_step(wall, seen, longest):
-    """The `LevelStep` of all faces, edges and tips."""
-    away, place = nearest(wall, seen.r)
-    half = 0.5 * dot((place - seen.r) * (1.0 / select(away > 0.0, away, 1.0)), seen.v)
-    step = longest
-    for face in wall.faces:
-        step = min(step, _moving_to_face(wall, face, seen, longest))
-    for edge in wall.edges:
-        step = min(step, _moving_to_edge(wall, edge, seen, longest))
-    for tip in wall.tips:
-        step = min(step, rising.bent_step(_rim_of(wall, tip, seen.r), seen, longest).time)
-    return rising.LevelStep(wall.radius - away, half, step)
-
-
-@outlined
-def _moving_to_face(wall, face, seen, longest):
-    """As `_to_face`."""
-    away, n = face.wall.distance(seen.r), outward(face.wall, seen.r)
-    foot = seen.r - away * n
-    depth, step = hidden(wall.rooms, face.rooms, foot, n if isinstance(face.wall, FLAT) else ZERO), 0.0
-    if depth <= wall.slack or away <= -wall.radius:
-        step = face.wall.grown(wall.radius).moving_step(seen, longest).time
-    if depth <= wall.slack:
-        return step
-    way = _way_of_foot(_round_at(face, foot, n), face.slope, abs(away), depth)
-    return max(step, _unseen_in_motion(wall, abs(away), way, seen, longest))
-
-
-@outlined
-def _moving_to_edge(wall, edge, seen, longest):
-    """As `_to_edge`."""
-    least = max(abs(edge.one.distance(seen.r)), abs(edge.other.distance(seen.r)))
-    foot = crossing(edge.one, edge.other, seen.r, _FAR * wall.radius)
-    if max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) > wall.slack:
-        return _unseen_in_motion(wall, least, _UNFOUND * wall.radius, seen, longest)
-    away, depth = norm(foot - seen.r), hidden(wall.rooms, edge.rooms, foot, ZERO)
-    if depth > wall.slack:
-        way = max(_way_of_foot(edge.bend, 0.0, away, depth), _LEAST * depth)
-        return _unseen_in_motion(wall, away, way, seen, longest)
-    return rising.bent_step(Rim(edge.bend, foot, away, wall.radius), seen, longest).time
-
-
-def _unseen_in_motion(wall, away, way, seen, longest):
-    """As `_unseen`."""
-    return Hidden(seen, max(away - wall.radius, min(way, wall.radius))).longest(longest)
+    return flight.until_gone(max(away - wall.radius, min(way, wall.radius)))
