@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common import checks
 from ..errors import SceneError
+from ..kernel.limits import TINY
 from ..motion import led
 from ..particles import Births, Particles, TiedParticles
 from ..scene import Scene
@@ -245,7 +246,7 @@ def projected(body: Body, position: Floats, velocity: Floats) -> Floats:
         pushed = np.einsum("pq,aqx->apx", inverse, rows)
         flat = rows.reshape(len(held), -1)
         # In units of each tie's own, so that a light point beside a heavy one is no singularity.
-        unit = 1.0 / np.sqrt(np.maximum((flat * pushed.reshape(flat.shape)).sum(axis=1), np.finfo(np.float64).tiny))
+        unit = 1.0 / np.sqrt(np.maximum((flat * pushed.reshape(flat.shape)).sum(axis=1), TINY))
         system = unit[:, None] * (flat @ pushed.reshape(flat.shape).T) * unit
         for _correction in range(_CORRECTIONS):
             speeds = flat @ made[:, :, copy].T.ravel()

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..common import checks
 from ..errors import SceneError
+from ..kernel.limits import TINY
 from ..motion import Motion
 from ..state import Floats
 from ..surfaces.instant import side_of
@@ -66,7 +67,7 @@ def on_surface(name: str, surface: Surface, places: Floats) -> None:
     """Raise unless places (3, N) are on the surface."""
     slopes = np.sqrt((surface.gradient(places) ** 2).sum(axis=0))
     values = surface.phi(places)
-    off = np.abs(values) / np.maximum(slopes, np.finfo(np.float64).tiny)
+    off = np.abs(values) / np.maximum(slopes, TINY)
     room = np.minimum(surface.size(), np.maximum(surface.extent(), np.abs(places).max(axis=0)))
     for i in np.flatnonzero(~(off <= _ON_SURFACE * room)):
         which = f" of copy {i}" if places.shape[1] > 1 else ""

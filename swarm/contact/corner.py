@@ -7,13 +7,13 @@ looked at for the one that carries. Uzawa's loop, uzawa.py, is around these swee
 """
 
 from ..kernel.jit import outlined
+from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, largest, norm
 from . import impulse as contact_impulse
 from .discrete_gradient import reaction
 from .impulse import Step
 
-_EPSILON = 2.220446049250313e-16
 # Sweeps over the walls; a corner of 90 degrees takes three.
 _SWEEPS = 500
 
@@ -39,7 +39,7 @@ def hold(form, law, multipliers, walls, step, reactions):
         solved = _sweep(walls, form, law, multipliers, step, reactions)
         r = step.r + (step.p - total(reactions))
         size, moved = max(largest(r), largest(step.p)), largest(r - before)
-        if solved and (reactions.shape[0] == 1 or (i > 0 and moved <= 4.0 * _EPSILON * size)):
+        if solved and (reactions.shape[0] == 1 or (i > 0 and moved <= 4.0 * EPSILON * size)):
             return CornerEnd(r, True)
         if i > 0 and moved == 0.0:
             # A wall that is not solved: sweeps from where they began say the same.

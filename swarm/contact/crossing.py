@@ -6,6 +6,7 @@ from typing import Any
 from ..kernel.arrays import index
 from ..kernel.grid import block_of, over_entries
 from ..kernel.jit import outlined
+from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import Vec, dot, highest, lowest, norm, square
 from ..surfaces.fields.foam import Foam
@@ -17,7 +18,6 @@ from ..surfaces.walls import Field
 from .path import StepPath, at_part, first_true, members_of, reach_of
 from .rooms import leaving
 
-_EPSILON = 2.220446049250313e-16
 # Of a speed, the part across a wall of what goes along it.
 _ALONG = 1e-9
 # Fraction of the size of a scene that counts as 0.
@@ -275,4 +275,4 @@ def _is_deep(body, path, depth, part):
 
 def near(rules, r):
     """A distance that counts as 0: round-off."""
-    return _NEAR * rules.size + 8.0 * _EPSILON * (abs(r.x) + abs(r.y) + abs(r.z))
+    return _NEAR * rules.size + 8.0 * EPSILON * (abs(r.x) + abs(r.y) + abs(r.z))

@@ -14,12 +14,12 @@ import math
 from typing import Any, NamedTuple
 
 from ..kernel.jit import outlined
+from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot
 from . import impulse
 from .impulse import Step
 
-_EPSILON = 2.220446049250313e-16
 # Iterations of the mean-value form's two solves; halving alone would end sooner.
 _BETA_ITERATIONS = 200
 _FORCE_ITERATIONS = 200
@@ -72,7 +72,7 @@ def identity_miss(law, surface, r0, r1, beta):
     exact = composite(law, surface, r0, r1)
     miss = dot(gradient - exact, d)
     terms = dot(absolute(gradient) + absolute(exact), absolute(d))
-    return 0.0 if abs(miss) <= 16.0 * _EPSILON * terms else miss
+    return 0.0 if abs(miss) <= 16.0 * EPSILON * terms else miss
 
 
 # --- A step that one wall holds back ---------------------------------------------------------------------
@@ -149,7 +149,7 @@ class _MeanValueStep(Record):
             for _i in range(_BETA_ITERATIONS):
                 beta = illinois(low, f_low, high, f_high)
                 kappa, f = self.pushed(beta)
-                if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
+                if f == 0.0 or high - low <= 2.0 * EPSILON * high:
                     found = True
                     break
                 low, f_low, high, f_high = narrowed(low, f_low, high, f_high, beta, f)
@@ -190,7 +190,7 @@ class _MeanValueStep(Record):
             change_of_k = f * (k - before) / (f - f_before)
             # NaN at the turning point, where both parts of the quotient vanish and (6) holds by itself. Steps that do
             # not shrink are round-off.
-            if not abs(change_of_k) > 4.0 * _EPSILON * abs(k) or previous <= abs(change_of_k) <= _NUDGE * abs(k):
+            if not abs(change_of_k) > 4.0 * EPSILON * abs(k) or previous <= abs(change_of_k) <= _NUDGE * abs(k):
                 change = abs(k - kappa) / abs(kappa) if kappa != 0.0 else 0.0
                 break
             before, f_before, k, previous = k, f, k - change_of_k, abs(change_of_k)
@@ -216,7 +216,7 @@ class _MeanValueStep(Record):
                 kappa = illinois(low, f_low, high, f_high)
                 r, f = self.pushed_with(beta, sign * kappa)
                 low, f_low, high, f_high = narrowed(low, f_low, high, f_high, kappa, sign * f)
-                if f == 0.0 or high - low <= 2.0 * _EPSILON * high:
+                if f == 0.0 or high - low <= 2.0 * EPSILON * high:
                     break
         return sign * kappa, identity_miss(self.law, self.surface, self.step.r, self.step.r + self.step.p - r, beta)
 

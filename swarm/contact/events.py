@@ -4,6 +4,7 @@ import math
 
 from ..kernel.gravity import accelerated
 from ..kernel.jit import outlined
+from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, norm, square
 from ..surfaces.presence.absence import are_one
@@ -29,7 +30,6 @@ _NO_HOP = 1e-7
 _PRESSED, _INSTANT = 1e-12, 1e-9
 # Walls nearer to each other's tangent plane than this (as a sine) have no edge to slide along.
 _SHARPEST = 1e-7
-_EPSILON = 2.220446049250313e-16
 # Walls within this part of the scene's size hold a particle together.
 TOUCH = 1e-10
 
@@ -268,5 +268,5 @@ def off_the_wall(walls, wall, r, v, u):
     u is the velocity of the wall, or None.
     """
     n = _normal(walls, wall, r)
-    b, least = dot(relative(u, v), n), 4.0 * _EPSILON * norm(v)
+    b, least = dot(relative(u, v), n), 4.0 * EPSILON * norm(v)
     return v - (b + least) * n if abs(b) <= least else v

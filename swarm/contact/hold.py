@@ -4,11 +4,10 @@ import math
 from typing import Any
 
 from ..kernel.jit import select
+from ..kernel.limits import TINY
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, cross, dot, square
 from .reflection import relative
-
-_TINY = 2.2250738585072014e-308
 
 
 class HeldVector(Record):
@@ -176,4 +175,4 @@ def edge(n, m):
 
 
 def _inverse(sine2):
-    return 1.0 / select(sine2 > _TINY, sine2, _TINY)
+    return 1.0 / select(sine2 > TINY, sine2, TINY)

@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 from ..kernel.jit import outlined, select
+from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import Vec
 
@@ -26,9 +27,8 @@ _CAREFUL_ITERATIONS = 200
 _NEAR = 1.0 - 1e-12
 # Doublings of a bracket: from the smallest number to the largest.
 _DOUBLINGS = 2100
-_EPSILON = 2.220446049250313e-16
 # A point is on the surface if a change of its coordinates by this part of themselves brings it there.
-_ON_SURFACE = 8.0 * _EPSILON
+_ON_SURFACE = 8.0 * EPSILON
 # The equation and its energy need these of every wall; multipliers need `gap_scale` too.
 NEEDS = (
     "inner", "gap_of", "gap_slope", "gradient", "discrete_gradient", "push",
@@ -180,7 +180,7 @@ class Equation(Record):
             if not (low < trial < high and abs(trial - k) <= 0.5 * previous):
                 trial = 0.5 * (low + high)
             previous = abs(trial - k)
-            if previous <= 2.0 * _EPSILON * trial or high - low <= 2.0 * _EPSILON * high:
+            if previous <= 2.0 * EPSILON * trial or high - low <= 2.0 * EPSILON * high:
                 return sign * trial, True
             k = trial
         return sign * k, False

@@ -4,12 +4,12 @@ import math
 from typing import Any
 
 from ..kernel.jit import outlined, select
+from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, column, cross, dot, largest, norm, put, total
 
-_EPSILON = 2.220446049250313e-16
 # Directions this close to forbidden, relative to |w|, are allowed: round-off of the normals.
-ALLOWED = 64.0 * _EPSILON
+ALLOWED = 64.0 * EPSILON
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
 _SWEEPS = 60
 
@@ -137,7 +137,7 @@ def velocity_along(walls, touch, r, w, h):
         put_normals(walls, touch, touch.touched, r, r1)
         u = project(touch.touched, touch.normal, touch.active, w)
         before, r1 = r1, r + h * u
-        if largest(r1 - before) <= 2.0 * _EPSILON * largest(r):
+        if largest(r1 - before) <= 2.0 * EPSILON * largest(r):
             break
     return u
 

@@ -12,13 +12,13 @@ import math
 
 from ..kernel.gravity import accelerated
 from ..kernel.jit import select
+from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, dot, either, square, total
 from .hold import Two, mean_drift
 from .laws import of_wall
 from .reflection import relative, wall_velocity
 
-_EPSILON = 2.220446049250313e-16
 # p of Suzuki's composition of fourth order
 OUTER = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
 MIDDLE = 1.0 - 4.0 * OUTER
@@ -26,12 +26,12 @@ PARTS = 5
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
 SWEEPS = 40
 # The last sweep but one leaves r1 off by no more than this part of itself, or of what a step may be off.
-_STILL, _SLACK = 64.0 * _EPSILON, 0.1
+_STILL, _SLACK = 64.0 * EPSILON, 0.1
 # A sweep leaves so many times the turn of the velocity in a composed step, over |v|, of what r1 was off: a third of it,
 # half that of the longest part, where the wall is as curved along the path as across.
 _GAIN = 1.5
 # Round-off of what `defect` compares, in units of the last place of a coordinate.
-_NOISE = 8.0 * _EPSILON
+_NOISE = 8.0 * EPSILON
 # The error of a composed step over its defect: the error of ten crossings on the surfaces of the tests is then 1 to 4
 # times what is allowed in one.
 _ERROR = 0.7

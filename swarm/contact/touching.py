@@ -12,6 +12,7 @@ import numpy as np
 from ..kernel.arrays import scratch
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined
+from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, column, dot, largest, moves, norm, put, square, total
 from ..surfaces.time_of_impact import flights
@@ -20,7 +21,6 @@ from .laws import Laws
 from .projection import ALLOWED, Touch, along, project, put_normals, velocity_along
 from .reflection import from_relative, relative
 
-_EPSILON = 2.220446049250313e-16
 # A second wall nearer than this part of the shortest flight is met in the same instant.
 _SAME_INSTANT = 1e-6
 # Exact reflections within one instant: a wedge of 0.05 rad turns a particle around in its edge.
@@ -218,7 +218,7 @@ def inside(walls, r):
     for _sweep in range(_SWEEPS):
         _depths(walls, number, r, outside)
         i = np.argmax(outside)
-        if outside[i] <= _EPSILON * total(absolute(r)):
+        if outside[i] <= EPSILON * total(absolute(r)):
             break
         r = walls.project(number[i], r)
     return r

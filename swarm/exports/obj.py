@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernel.limits import TINY
 from ..pictures import colours
 from ..scene import Scene
 from ..state import Floats
@@ -80,7 +81,7 @@ def outwards(scene: Scene, shape: Shape, time: float) -> NDArray[np.int64]:
     a, b, c = (shape.vertices[shape.triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     size = np.sqrt(np.sqrt((normals**2).sum(axis=1, keepdims=True)))
-    steps = _BESIDE * normals / np.maximum(size, np.finfo(np.float64).tiny)
+    steps = _BESIDE * normals / np.maximum(size, TINY)
     middles = (a + b + c) / 3.0
     with np.errstate(all="ignore"):
         ahead, behind = (_gap(scene, shape.surface, place, time) for place in (middles + steps, middles - steps))

@@ -7,14 +7,13 @@ import numpy as np
 
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
+from ..kernel.limits import TINY
 from ..kernel.vector import dot, norm, square
 from ..methods import Penalty
 from ..pairs import MOST_PRESSED
 from .contacts import apart
 from .grain_arrays import AFTER, BEFORE, LIGHTNESS, RADIUS, X, vector_at
 from .overlaps import BALL, OTHER, SIZE, WALL
-
-_TINY = float(np.finfo(np.float64).tiny)
 
 
 def unsolved(moment: float, dt: float) -> str:
@@ -83,7 +82,7 @@ def _penalty(method: Penalty, matter: Any, grains: Any, ends: tuple[int, int], o
         s = apart(matter, place, i, j)
         stored = matter.law.stored_energy(place[i, RADIUS] + place[j, RADIUS] - norm(s))
         # Along the line of the centres.
-        v = dot(v - vector_at(speed, j, BEFORE), s) / max(square(s), _TINY) * s
+        v = dot(v - vector_at(speed, j, BEFORE), s) / max(square(s), TINY) * s
         ease += place[j, LIGHTNESS]
     energy = stored + 0.5 * square(v) / ease
     return float((method.exponent + 1.0) * energy / math.pow(allowed, method.exponent + 1.0))

@@ -5,6 +5,8 @@ The latter are parts of the numbers that a quantity is made of, such as a coordi
 
 # From 1 to the next number.
 EPSILON = 2.220446049250313e-16
+# The least number above 0 with all of its digits: what may be 0 is divided by no less.
+TINY = 2.2250738585072014e-308
 
 # Of the length of a vector that was scaled to length 1.
 UNIT_LENGTH = 4.0 * EPSILON

@@ -13,6 +13,7 @@ from ..contact.hold import Three
 from ..contact.path import StepPath
 from ..kernel.gravity import accelerated, potential
 from ..kernel.jit import outlined, select
+from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, put, square, total
 
@@ -24,9 +25,8 @@ _FLATTEST = 1e-6
 _NO_SPEED = 1e-13
 # Sweeps until a point is on three walls: one where they are flat.
 _SWEEPS = 20
-_EPSILON = 2.220446049250313e-16
 # Round-off of a velocity that three walls say, over the sum of theirs, where their normals are orthogonal.
-_NO_SLIP = 8.0 * _EPSILON
+_NO_SLIP = 8.0 * EPSILON
 # A step that ends where a wall does not press is tried again so much shorter; one to another wall is cut so often.
 _RETRY, _MOST_TRIES = 0.25, 100
 
@@ -121,7 +121,7 @@ def _find(laws, walls, gravity, r, near, least):
 @outlined
 def _settled(walls, active, r):
     """A point near three walls, moved onto them; whether it is there."""
-    least = 4.0 * _EPSILON * total(absolute(r))
+    least = 4.0 * EPSILON * total(absolute(r))
     for _sweep in range(_SWEEPS):
         a, b, c = _normals(walls, active, r)
         # From the walls as they go on beyond their edges: those of a mesh end in the corner.

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .. import observables
 from ..errors import SceneError
+from ..kernel.limits import TINY
 from ..methods.base import Method
 from ..particles import Particles
 from ..scene import Scene
@@ -118,7 +119,7 @@ def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[
             "record_color must be 'speed' of a trajectory with sources, got 'energy-error': its first frame lacks the "
             "energy of those that come later; record during the run"
         )
-    before, inverse = at_start.total(), 1.0 / np.maximum(scale, np.finfo(np.float64).tiny)
+    before, inverse = at_start.total(), 1.0 / np.maximum(scale, TINY)
 
     def errors(position: Floats, velocity: Floats) -> Floats:
         now = observables.energies(compiled, law, start.mass, position, velocity).total()

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import motion as motions
+from ..kernel.limits import TINY
 from .surface import SIDES, Box, HalfSpace, Surface
 
 Floats = NDArray[np.float64]
@@ -36,7 +37,7 @@ def distances_of(images: Sequence[Surface], points: NDArray[np.float64], time: f
     slopes = [np.sqrt((image.gradient(points, time) ** 2).sum(axis=0)) for image in images]
     # At the centre of a ball the slope is 0, and a point is as far inside as can be.
     with np.errstate(over="ignore"):
-        return np.asarray(gaps_of(images, points, time) / np.maximum(slopes, np.finfo(np.float64).tiny))
+        return np.asarray(gaps_of(images, points, time) / np.maximum(slopes, TINY))
 
 
 def gradient_of(images: Sequence[Surface], points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -92,14 +93,14 @@ def has_room(
         for i in np.unique(worst).tolist():
             outside = worst == i
             slopes = gradient(i, points[:, outside])
-            slope = np.maximum((slopes**2).sum(axis=0), np.finfo(np.float64).tiny)
+            slope = np.maximum((slopes**2).sum(axis=0), TINY)
             points[:, outside] -= _PAST * found[i, outside] / slope * slopes
     points = points[:, np.argsort(gaps(points).max(axis=0))[:_NEAREST]]
     for _ in range(_STEPS):
         # One surface after the other converges slowly along a sharp edge; a Newton step for all near ones does not.
         found = gaps(points)
         gradients = np.array([gradient(i, points) for i in range(len(found))])
-        lengths = np.maximum(np.sqrt((gradients**2).sum(axis=1)), np.finfo(np.float64).tiny)
+        lengths = np.maximum(np.sqrt((gradients**2).sum(axis=1)), TINY)
         found = found / lengths
         worst = found.max(axis=0)
         if (worst <= 0.0).any():

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..common import checks
 from ..errors import SceneError
+from ..kernel.limits import TINY
 from ..kernel.vector import vec
 from ..motion import Guide, Oscillation, Path, Rotation, Translation, parts_of
 from .facets.mesh import Mesh
@@ -163,9 +164,9 @@ def _walls_in(surface: Surface, across: int, reach: float) -> tuple[Floats, Floa
         for _step in range(_STEPS):
             phi, slope = _level(surface, across, points)
             slope[across] = 0.0
-            way = phi / np.maximum((slope**2).sum(axis=0), np.finfo(np.float64).tiny) * slope
+            way = phi / np.maximum((slope**2).sum(axis=0), TINY) * slope
             length = np.sqrt((way**2).sum(axis=0))
-            way = way * np.minimum(1.0, reach / np.maximum(length, np.finfo(np.float64).tiny))
+            way = way * np.minimum(1.0, reach / np.maximum(length, TINY))
             points = points - np.where(np.isfinite(way), way, 0.0)
         phi, slope = _level(surface, across, points)
         steep = np.sqrt((slope**2).sum(axis=0))

@@ -11,7 +11,7 @@ from ..common import rows
 from ..common.checks import Vector, array, number, parts_of, shown, vector
 from ..errors import SceneError
 from ..kernel.gravity import Gravity, as_vector
-from ..kernel.limits import UNIT_LENGTH
+from ..kernel.limits import TINY, UNIT_LENGTH
 from ..kernel.vector import Vec, absolute, dot, vec
 from ..motion.wall import product as product
 from .frames import Framed
@@ -130,7 +130,7 @@ Direction = Annotated[Vector, unit]
 def normalized(vectors: NDArray[np.float64], axis: int = 0) -> NDArray[np.float64]:
     """Vectors along an axis of an array, divided by their lengths; one of length 0 stays 0."""
     lengths = np.sqrt((vectors**2).sum(axis=axis, keepdims=True))
-    return np.asarray(vectors / np.maximum(lengths, np.finfo(np.float64).tiny))
+    return np.asarray(vectors / np.maximum(lengths, TINY))
 
 
 def matrix(turn: Quaternion | None) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..kernel.limits import TINY
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces.instant import box_of, side_of
@@ -67,7 +68,7 @@ class Cover:
         rows = np.ascontiguousarray(points.T)
         with np.errstate(all="ignore"):
             steep = np.sqrt((self.surface.gradient(rows, self.time) ** 2).sum(axis=0))
-            gap = self.side * self.surface.phi(rows, self.time) / np.maximum(steep, np.finfo(np.float64).tiny)
+            gap = self.side * self.surface.phi(rows, self.time) / np.maximum(steep, TINY)
         gap = np.clip(np.where(np.isnan(gap), np.inf, gap), -_FAR * size, _FAR * size)
         return np.asarray(self.sign * gap - _NOTHING * size)
 

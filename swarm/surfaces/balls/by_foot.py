@@ -16,10 +16,8 @@ places within it to the nearest point of the wall, which these bounds are about,
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ...kernel.jit import outlined, select
-from ...kernel.limits import EPSILON
+from ...kernel.limits import EPSILON, TINY
 from ...kernel.vector import ZERO, Symmetric, Vec, dot, norm, square, total
 from .. import contract
 from ..time_of_impact.course import rise_time
@@ -35,7 +33,6 @@ _MOST = 1.0 - 1e-6
 _FAR = 2.0
 # Of the room that is left to the smallest radius of curvature, where H has a bound: up to this part of it.
 _PART = 0.5
-_TINY = float(np.finfo(np.float64).tiny)
 
 
 class Foot(NamedTuple):
@@ -141,7 +138,7 @@ class ByFoot(contract.Smooth):
         size = norm(n)
         # Of all places of the box this is the nearest.
         near = max(_certain(self, r, f, _free(self, r, p, f, n)), norm(r - p))
-        return near, n * (1.0 / select(size > _TINY, size, 1.0))
+        return near, n * (1.0 / select(size > TINY, size, 1.0))
 
     def first_hit(self, r, v):
         return first_impact(self, r, v, ZERO)
@@ -199,8 +196,8 @@ def _foot(wall, y):
     away, size, first = max(_free(wall, y, p, f, n), beside), norm(n), f
     # From there so far along the normal
     ahead = rise_time(f, 0.5 * size, wall.most)
-    ahead = select((ahead < math.inf) & (f < 0.0), ahead, -f / select(size > _TINY, size, 1.0))
-    z = wall.within(p + (ahead / select(size > _TINY, size, 1.0)) * n)
+    ahead = select((ahead < math.inf) & (f < 0.0), ahead, -f / select(size > TINY, size, 1.0))
+    z = wall.within(p + (ahead / select(size > TINY, size, 1.0)) * n)
     largest = select(wall.most > 0.0, 0.5 * _MOST / select(wall.most > 0.0, wall.most, 1.0), math.inf)
     share, sure = 0.0, False
     for sweep in range(_SWEEPS):
@@ -209,11 +206,11 @@ def _foot(wall, y):
         if norm(d) <= wall.known:
             away = max(away, _free(wall, y, z, f, n))
         if sweep == 0:
-            share = min(dot(d, n) / select(n2 > _TINY, n2, 1.0), largest)
+            share = min(dot(d, n) / select(n2 > TINY, n2, 1.0), largest)
         back = inverse(matrix(wall, z, share))
         u, w = applied(back, d - share * n), applied(back, n)
         bottom = dot(n, w)
-        after = min(share + (dot(n, u) - f) / select(abs(bottom) > _TINY, bottom, 1.0), largest)
+        after = min(share + (dot(n, u) - f) / select(abs(bottom) > TINY, bottom, 1.0), largest)
         step = (after - share) * w - u
         share = after
         to = z + step
@@ -225,7 +222,7 @@ def _foot(wall, y):
             break
     f, n = side * body.phi(z), side * body.gradient(z)
     size = norm(n)
-    size = select(size > _TINY, size, 1.0)
+    size = select(size > TINY, size, 1.0)
     here = (dot(z - y, n) - f) / size
     sure = sure & (here <= wall.known)
     return Foot(select(sure, here, max(_certain(wall, y, first, away), beside)), n * (1.0 / size), z, share, sure)

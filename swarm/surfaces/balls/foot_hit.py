@@ -13,10 +13,8 @@ the flight up to it. If the chain does not get there, as where a flight grazes, 
 import math
 from typing import Any
 
-import numpy as np
-
 from ...kernel.jit import outlined, select
-from ...kernel.limits import EPSILON
+from ...kernel.limits import EPSILON, TINY
 from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, absolute, dot, norm, square, total
 from ..time_of_impact import march
@@ -30,7 +28,6 @@ _SAME = 16.0 * EPSILON
 _STEEP = 1e-4
 # Newton's method begins again where the bound ends within this many radii.
 _CLOSE = 0.1
-_TINY = float(np.finfo(np.float64).tiny)
 
 
 class Sure(Record):
@@ -130,7 +127,7 @@ def _touched(wall, sure, y):
     """Where a ball at y touches the edge of the bound by a place."""
     u = sure.n + (2.0 * wall.most) * (y - sure.place)
     size = norm(u)
-    return y + (wall.radius / select(size > _TINY, size, 1.0)) * u
+    return y + (wall.radius / select(size > TINY, size, 1.0)) * u
 
 
 @outlined
@@ -143,7 +140,7 @@ def _impact(wall, flight, t, z):
     z = wall.within(z)
     f, n = side * body.phi(z), side * body.gradient(z)
     size = norm(n)
-    share, time, speed = radius / select(size > _TINY, size, 1.0), t, 0.0
+    share, time, speed = radius / select(size > TINY, size, 1.0), t, 0.0
     for _sweep in range(_SWEEPS):
         y, w = r + time * (v + (0.5 * time) * pull), v + time * pull
         rate, d = dot(n, w), z - y
@@ -152,7 +149,7 @@ def _impact(wall, flight, t, z):
         a = inverse(matrix(wall, z, share))
         u, q = applied(a, d - share * n), applied(a, n)
         later, bottom = (dot(n, d) - f - radius * size) / rate, dot(n, q)
-        more = (dot(n, u) - f - later * dot(q, w)) / select(abs(bottom) > _TINY, bottom, 1.0)
+        more = (dot(n, u) - f - later * dot(q, w)) / select(abs(bottom) > TINY, bottom, 1.0)
         step = more * q - u + later * applied(a, w)
         time, share = time + later, share + more
         z = z + step
@@ -184,7 +181,7 @@ def inverse(a):
     x, y, z = a.yy * a.zz - a.yz * a.yz, a.xx * a.zz - a.zx * a.zx, a.xx * a.yy - a.xy * a.xy
     xy, yz, zx = a.yz * a.zx - a.xy * a.zz, a.xy * a.zx - a.yz * a.xx, a.xy * a.yz - a.zx * a.yy
     whole = a.xx * x + a.xy * xy + a.zx * zx
-    f = 1.0 / select(abs(whole) > _TINY, whole, 1.0)
+    f = 1.0 / select(abs(whole) > TINY, whole, 1.0)
     return Symmetric(f * x, f * y, f * z, f * xy, f * yz, f * zx)
 
 

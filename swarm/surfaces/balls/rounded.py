@@ -12,19 +12,17 @@ import numpy as np
 
 from ...kernel.gravity import Gravity, as_vector, displacement
 from ...kernel.jit import select
-from ...kernel.limits import PLACE
+from ...kernel.limits import PLACE, TINY
 from ...kernel.record import Record
-from ...kernel.vector import Symmetric, Vec, absolute, dot, norm, square, total
+from ...kernel.vector import Vec, absolute, dot, norm, square, total
 from .. import contract
+from ..curvature import SPACING, half_hessian
 from ..time_of_impact.approach import place
 from ..time_of_impact.course import rise_time, under_way
 
 # The last step is shorter than this fraction of the radius plus round-off of a place. The square of the fraction is
 # below round-off.
 _CLOSE = 1e-8
-# Part of a distance over which the normal is differenced: the cube root of the round-off.
-_SPACING = 6e-6
-_TINY = float(np.finfo(np.float64).tiny)
 
 
 class Rounded(contract.Smooth):
@@ -87,13 +85,7 @@ class Rounded(contract.Smooth):
         return -2.0 * self.radius
 
     def hessian(self, r):
-        # By differences of the normal
-        h = _SPACING * (abs(self.phi(r)) + self.radius) + _TINY
-        f = 0.25 / h
-        x = f * (self.gradient(r + Vec(h, 0.0, 0.0)) - self.gradient(r - Vec(h, 0.0, 0.0)))
-        y = f * (self.gradient(r + Vec(0.0, h, 0.0)) - self.gradient(r - Vec(0.0, h, 0.0)))
-        z = f * (self.gradient(r + Vec(0.0, 0.0, h)) - self.gradient(r - Vec(0.0, 0.0, h)))
-        return Symmetric(x.x, y.y, z.z, x.y, y.z, z.x)
+        return half_hessian(self, r, SPACING * (abs(self.phi(r)) + self.radius) + TINY)
 
     def hessian_bounds(self, r):
         # 0 <= H <= 1/(2 d), where d is the distance from the body
@@ -119,7 +111,7 @@ def foot_at(e, depth, face):
     away = np.sqrt(square(e))
     # No select here and below: these may be arrays.
     inside = 1.0 * (away == 0.0)
-    return away + np.minimum(depth, 0.0), e * (1.0 / np.maximum(away, _TINY)) + inside * face
+    return away + np.minimum(depth, 0.0), e * (1.0 / np.maximum(away, TINY)) + inside * face
 
 
 class ToBody(Record):
@@ -179,7 +171,7 @@ class RoundCan(Rounded):
     def foot(self, r):
         d = r - self.center
         across = np.sqrt(d.x * d.x + d.y * d.y)
-        part, out, up = 1.0 / np.maximum(across, _TINY), across - self.wide, np.abs(d.z) - self.half
+        part, out, up = 1.0 / np.maximum(across, TINY), across - self.wide, np.abs(d.z) - self.half
         beside, above = np.maximum(out, 0.0) * part, 1.0 * (up >= out)
         face = Vec((1.0 - above) * part * d.x, (1.0 - above) * part * d.y, np.copysign(above, d.z))
         return foot_at(Vec(beside * d.x, beside * d.y, _beyond(up, d.z)), np.maximum(out, up), face)
@@ -196,7 +188,7 @@ class RoundCone(Rounded):
     def foot(self, r):
         d = r - self.center
         across = np.sqrt(d.x * d.x + d.y * d.y)
-        part = 1.0 / np.maximum(across, _TINY)
+        part = 1.0 / np.maximum(across, TINY)
         # How far from the wall, and how far along it from the tip the nearest point is
         off, along = across * self.cosine - d.z * self.sine, across * self.sine + d.z * self.cosine
         foot = np.maximum(along, 0.0)

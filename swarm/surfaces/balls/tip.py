@@ -4,13 +4,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...kernel.limits import TINY
 from ...kernel.vector import Vec, dot, norm, square
 from ..contract import Smooth
 from ..frames import Unturned
 from ..shapes.plane import PlaneNumbers
 from ..shapes.quadratic import QuadricNumbers
-
-_TINY = float(np.finfo(np.float64).tiny)
 
 
 class OfTip(Unturned):
@@ -60,7 +59,7 @@ class Nappes(OfTip):
     def gradient(self, r):
         d = r - self.body.center
         across = d - dot(d, self.axis) * self.axis
-        return (self.cosine / np.maximum(np.sqrt(square(across)), _TINY)) * across - self.sine * self.axis
+        return (self.cosine / np.maximum(np.sqrt(square(across)), TINY)) * across - self.sine * self.axis
 
     distance = inner = end_inner = phi
     inner_gradient = gradient

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...kernel.fours import Four, over_block, sum_of
 from ...kernel.grid import MARGIN
 from ...kernel.jit import Array, outlined
+from ...kernel.limits import TINY
 from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, absolute, norm, times
 
@@ -144,7 +145,7 @@ class Spline(Record):
         sideways = over_block(table, place, x, _slopes(place.at.y))
         # Outside of the grid phi goes on with the value at its border, and rises.
         away, inside = norm(place.off), Vec(place.off.x == 0.0, place.off.y == 0.0, place.off.z == 0.0)
-        further = (place.off / np.maximum(away, np.finfo(np.float64).tiny)) * self.steepness
+        further = (place.off / np.maximum(away, TINY)) * self.steepness
         slope = Vec(
             inside.x * k.x * sum_of(z, across) + further.x,
             inside.y * k.y * sum_of(z, sideways) + further.y,

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ...common.extras import needed_by
 from ...errors import SceneError
+from ...kernel.limits import TINY
 from ..facets.mending import components, neighbours
 from ..facets.mesh_files import Floats, Indices
 from ..facets.triangles import TriangleMesh
@@ -107,7 +108,7 @@ def _normals(mesh: TriangleMesh) -> tuple[Floats, Floats]:
     a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
     normals = np.cross(b - a, c - a)
     twice = np.linalg.norm(normals, axis=1)
-    return normals / np.maximum(twice, np.finfo(np.float64).tiny)[:, None], 0.5 * twice
+    return normals / np.maximum(twice, TINY)[:, None], 0.5 * twice
 
 
 def _thin_places(mesh: TriangleMesh, normals: Floats, areas: Floats, spacing: float) -> _Thin:

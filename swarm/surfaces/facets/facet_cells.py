@@ -15,6 +15,7 @@ from ...kernel.arrays import aligned_copy, index
 from ...kernel.gravity import as_vector
 from ...kernel.grid import MARGIN, Floats, Grid, filled_grid
 from ...kernel.jit import Array, select
+from ...kernel.limits import TINY
 from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, square, total
 from ..fields.grid import enter_bodies
@@ -166,7 +167,7 @@ def _half_balls(corners: Floats) -> tuple[Floats, Floats, Floats]:
     radius = np.linalg.norm(places, axis=2).max(axis=1)
     into = places[every, k] - places[every, (k + 1) % 3]
     into -= ((into * way).sum(axis=1) / squares[every, k])[:, None] * way
-    into /= np.maximum(np.abs(into).max(axis=1), np.finfo(np.float64).tiny)[:, None]
+    into /= np.maximum(np.abs(into).max(axis=1), TINY)[:, None]
     half = np.zeros_like(into)
     for length in range(1, int(_ZERO)):
         longer = np.rint(into * length)

@@ -9,6 +9,7 @@ from ...kernel import cache
 from ...kernel.arrays import index
 from ...kernel.grid import ENDLESS, MARGIN, Floats, Grid, filled_grid, layer_of, number_of
 from ...kernel.jit import kernel
+from ...kernel.limits import TINY
 from ...kernel.vector import Vec
 from .members import gathered
 
@@ -40,7 +41,7 @@ def cells_of(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) 
         first = np.where(first - repeated[0] < side, repeated[0], first)
         last = np.where(repeated[1] - last < side, repeated[1], last)
         extent = np.where(endless, 1.0, last - first)
-    shape = np.where(endless, 1.0, np.maximum(np.rint(extent / max(side, np.finfo(np.float64).tiny)), 1.0))
+    shape = np.where(endless, 1.0, np.maximum(np.rint(extent / max(side, TINY)), 1.0))
     # A little wider than the bodies, so that a flight from outside comes in before it meets one.
     room = 4.0 * MARGIN * extent
     before = behind = room

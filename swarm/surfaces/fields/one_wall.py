@@ -13,17 +13,16 @@ from typing import Any, TypeVar
 from ...kernel.gravity import Gravity, accelerated, displacement
 from ...kernel.jit import outlined
 from ...kernel.limits import EPSILON
-from ...kernel.vector import Symmetric, Vec, absolute, dot, norm, square, total
+from ...kernel.vector import absolute, dot, norm, square, total
 from .. import newton
 from ..contract import Smooth
+from ..curvature import SPACING, half_hessian
 from ..time_of_impact.rising import LevelStep
 
 _Field = TypeVar("_Field")
 
 # So many parts of a flight are looked at before it is said to be free so far.
 _MOST_PARTS = 1000
-# Part of the coordinates over which the gradient is differenced: the cube root of the round-off.
-_SPACING = 6e-6
 # The cosine of the normals at both ends of a step, at an edge and where a wall is smooth.
 _EDGE, _SMOOTH = 0.5, 0.9
 
@@ -135,14 +134,7 @@ def _free_rise(whole, r0, r1):
 
 @outlined
 def _bend(whole, r):
-    h = _SPACING * total(absolute(r)) + EPSILON
-    x, y, z = _turn(whole, r, Vec(h, 0.0, 0.0)), _turn(whole, r, Vec(0.0, h, 0.0)), _turn(whole, r, Vec(0.0, 0.0, h))
-    f = 0.25 / h
-    return Symmetric(f * x.x, f * y.y, f * z.z, f * x.y, f * y.z, f * x.z)
-
-
-def _turn(whole, r, step):
-    return whole.gradient(r + step) - whole.gradient(r - step)
+    return half_hessian(whole, r, SPACING * total(absolute(r)) + EPSILON)
 
 
 @outlined

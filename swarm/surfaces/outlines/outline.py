@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...common.checks import magnitude, number, parts_of, shown
 from ...errors import SceneError
+from ...kernel.limits import TINY
 from .apart import Edges, along, require_apart
 
 Floats = NDArray[np.float64]
@@ -145,7 +146,7 @@ class Outline:
         steep = np.sqrt(along(grad, grad))
         # The distance to the circle, without cancellation: |grad|^2 = 1 + 2 k level
         signed = 2.0 * level / (1.0 + steep)
-        out = grad / np.maximum(steep, np.finfo(np.float64).tiny)[..., None]
+        out = grad / np.maximum(steep, TINY)[..., None]
         foot = off - signed[..., None] * out
         within = (along(foot, s.ahead) >= 0.0) & (along(foot - (s.end - s.start), s.behind) <= 0.0)
         ends = np.sqrt(np.minimum(along(off, off), along(r - s.end, r - s.end)))
@@ -163,7 +164,7 @@ class Outline:
         corner = ~within[i, k] & (turn != 0)
         found = np.where(corner, turn * distance[i, k], np.where(signed[i, k] < 0.0, -1.0, 1.0) * distance[i, k])
         away = np.where(first[:, None], off, back)
-        size = np.maximum(np.sqrt(along(away, away)), np.finfo(np.float64).tiny)
+        size = np.maximum(np.sqrt(along(away, away)), TINY)
         slope = np.where((corner & (distance[i, k] > 0.0))[:, None], turn[:, None] * away / size[:, None], out[i, k])
         return found, slope.T
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...kernel.jit import select
+from ...kernel.limits import TINY
 from .. import required
 from ..fields.grouped import by_kind
 from ..fields.many import Many, members_of
@@ -34,7 +35,6 @@ from .rooms import leads_on
 _MOST = 24
 # Places of a wall at which a counter is looked for in an opening, and Newton's steps onto the wall for each.
 _PLACES, _NEWTON = 4096, 8
-_TINY = np.finfo(np.float64).tiny
 # A volume without end is searched as far as this many times the wall and what gives the volume extend.
 _REACH = 2.0
 
@@ -232,7 +232,7 @@ def least_distance(surface: Surface, volumes: Sequence[Surface], other: Surface)
     with np.errstate(all="ignore"):
         for _ in range(_NEWTON):
             slopes = surface.gradient(points)
-            points = points - surface.phi(points) / np.maximum((slopes**2).sum(axis=0), _TINY) * slopes
+            points = points - surface.phi(points) / np.maximum((slopes**2).sum(axis=0), TINY) * slopes
         within = np.all([sign_of(volume) * volume.phi(points) <= 0.0 for volume in volumes], axis=0)
         return float(np.abs(distances_of((other,), points[:, within], 0.0)).min(initial=math.inf))
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import SceneError
+from ...kernel.limits import TINY
 from ..fields.many import Many
 from ..instant import side_of
 from ..room import Floats, Room, room_bounds
@@ -277,7 +278,7 @@ class _Rooms(NamedTuple):
                 way = _sign_of(one) * one.gradient(at)
                 # Along the face
                 way = way - (way * normals[:, some]).sum(axis=0) * normals[:, some]
-                length = np.maximum(np.sqrt((way**2).sum(axis=0)), np.finfo(np.float64).tiny)
+                length = np.maximum(np.sqrt((way**2).sum(axis=0)), TINY)
                 points[:, some] -= _PAST * out[some] / length * way
         return points[:, (out <= 0.0) & np.isfinite(points).all(axis=0)]
 
@@ -312,7 +313,7 @@ def _gap(surface: Surface, points: Floats) -> Floats:
 def _distance(surface: Surface, points: Floats) -> Floats:
     """How far points (3, N) are out of the admissible side of a surface, or out of a volume [m], to first order."""
     slopes = np.sqrt((surface.gradient(points) ** 2).sum(axis=0))
-    return np.asarray(_sign_of(surface) * surface.phi(points) / np.maximum(slopes, np.finfo(np.float64).tiny))
+    return np.asarray(_sign_of(surface) * surface.phi(points) / np.maximum(slopes, TINY))
 
 
 # --- Rooms that are joined -------------------------------------------------------------------------------

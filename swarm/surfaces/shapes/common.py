@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from ...kernel.jit import select
+from ...kernel.limits import TINY
 from .. import contract
 
-_TINY = float(np.finfo(np.float64).tiny)
 # Smaller roots of an inner function are replaced by this number: the cube of its inverse is finite.
 _MIDDLE = 1e-100
 # From farther than the root of this many times the radius a flight first goes so much nearer.
@@ -46,7 +46,7 @@ class Distance(contract.Smooth):
 
     def gradient(self, r):
         # Where q = 0 the distance has no gradient, and the answer is 0.
-        return self.inner_gradient(r) * (0.5 / np.maximum(np.sqrt(self.inner(r)), _TINY))
+        return self.inner_gradient(r) * (0.5 / np.maximum(np.sqrt(self.inner(r)), TINY))
 
     def gap_slope(self, q0, q1):
         # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1)), which has no bound in the middle, where no wall

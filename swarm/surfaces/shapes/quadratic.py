@@ -10,6 +10,7 @@ import numpy as np
 
 from ...common.checks import Vector
 from ...kernel.jit import select
+from ...kernel.limits import TINY
 from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, absolute, cross, dot, largest, norm, square, times, total, vec
 from .. import contract
@@ -19,7 +20,6 @@ from ..time_of_impact.rising import Level, passage_of
 
 # Newton's method for the chord doubles its digits from about h|v|/size of relative error: 3 sweeps at 1e-3, 7 at 1.
 _CHORD_SWEEPS = 12
-_TINY = float(np.finfo(np.float64).tiny)
 
 
 class MatrixColumns(Record):
@@ -92,7 +92,7 @@ class QuadricNumbers(contract.Smooth):
     def unit_along(self, n):
         """The unit vector along side n. At the apex of a cone, where n is 0, the answer is 0 and not NaN."""
         n2 = square(n)
-        return n * (self.side / math.sqrt(select(n2 > _TINY, n2, 1.0)))
+        return n * (self.side / math.sqrt(select(n2 > TINY, n2, 1.0)))
 
     def parabola(self, r, v):
         """(c, b, a) of phi(r + v t) = c + 2 b t + a t^2."""
@@ -131,7 +131,7 @@ class QuadricNumbers(contract.Smooth):
 
     def distance(self, r):
         g2 = square(self.gradient(r))
-        return self.gap_of(self.inner(r)) / math.sqrt(select(g2 > _TINY, g2, _TINY))
+        return self.gap_of(self.inner(r)) / math.sqrt(select(g2 > TINY, g2, TINY))
 
     def unit_normal(self, r):
         return self.unit_along(self.gradient(r))
@@ -139,13 +139,13 @@ class QuadricNumbers(contract.Smooth):
     def project(self, r):
         g = self.gradient(r)
         g2 = square(g)
-        return r - (self.phi(r) / select(g2 > _TINY, g2, 1.0)) * g
+        return r - (self.phi(r) / select(g2 > TINY, g2, 1.0)) * g
 
     def outward_acceleration(self, r, v, pull):
         # (2 v.A v + grad q.G)/|grad q|
         g = self.gradient(r)
         g2 = square(g)
-        return self.side * (2.0 * form(self.a, v, v) + dot(g, pull)) / math.sqrt(select(g2 > _TINY, g2, 1.0))
+        return self.side * (2.0 * form(self.a, v, v) + dot(g, pull)) / math.sqrt(select(g2 > TINY, g2, 1.0))
 
     def first_hit(self, r, v):
         c, b, a = self.parabola(r, v)

@@ -11,20 +11,18 @@ import numpy as np
 
 from ...kernel.gravity import displacement
 from ...kernel.jit import select
-from ...kernel.limits import EPSILON
+from ...kernel.limits import EPSILON, TINY
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
 from .. import contract
+from ..curvature import SPACING, half_hessian
 from ..time_of_impact.approach import place
 from ..time_of_impact.course import under_way
 from ..time_of_impact.rising import LevelStep
 
 # A step that is no hit has a length, even if its time is 0.
-_TINY = float(np.finfo(np.float64).tiny)
 # Round-off of a part's level, in units of the last place of its largest terms.
 _ULPS = 32.0
-# Part of the coordinates over which the gradient is differenced: the cube root of the round-off.
-_SPACING = 6e-6
 
 
 class SolidNumbers(contract.Smooth):
@@ -44,7 +42,7 @@ class SolidNumbers(contract.Smooth):
         return _largest(self.parts, r)[1]
 
     def hessian(self, r):
-        h = _SPACING * (total(absolute(r)) + self.extent) + np.finfo(np.float64).tiny
+        h = SPACING * (total(absolute(r)) + self.extent) + TINY
         return _bend_of_largest(self.parts, r, h)[1]
 
     def steps(self, gravity, r, v):
@@ -127,15 +125,8 @@ def _bend_of_largest(parts, r, h):
         sign = -part.side
         here = sign * part.phi(r)
         if not here < most:
-            f = 0.25 * sign / h
-            x, y = _turn(part, r, Vec(h, 0.0, 0.0), f), _turn(part, r, Vec(0.0, h, 0.0), f)
-            z = _turn(part, r, Vec(0.0, 0.0, h), f)
-            most, bend = here, Symmetric(x.x, y.y, z.z, x.y, y.z, x.z)
+            most, bend = here, half_hessian(part, r, h, sign)
     return most, bend
-
-
-def _turn(part, r, step, f):
-    return f * (part.gradient(r + step) - part.gradient(r - step))
 
 
 # --- Flight ----------------------------------------------------------------------------------------------
@@ -165,7 +156,7 @@ class Entering(Record):
         coordinates = total(absolute(p)) + abs(self.r.x) + abs(self.r.y) + abs(self.r.z)
         is_in = found & (moved <= 4.0 * EPSILON * (coordinates + body.extent))
         goes_on = under_way(t, last)
-        length = select(is_in, 0.0, select(wait > 0.0, wait, _TINY))
+        length = select(is_in, 0.0, select(wait > 0.0, wait, TINY))
         return select(goes_on, t + wait, t), select(goes_on, length, last)
 
 

@@ -11,6 +11,7 @@ from ...common.validated import Length
 from ...errors import SceneError
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
+from ...kernel.limits import TINY
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
 from ..area_samples import AreaSample, Floats, Region
 from ..parametrised import Triangles, halved
@@ -162,7 +163,7 @@ class TorusNumbers(Distance):
     def _from_axis(self, r):
         """rho, never 0: on the axis the direction to the tube is not defined."""
         d = r - self.center
-        return np.maximum(np.sqrt(d.x * d.x + d.y * d.y), np.finfo(np.float64).tiny)
+        return np.maximum(np.sqrt(d.x * d.x + d.y * d.y), TINY)
 
     def _nearly(self):
         return _CLOSE * self.major * self.major * self.radius2

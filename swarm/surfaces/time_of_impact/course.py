@@ -8,12 +8,11 @@ and `next_step`, which take a flight from the time that the steps so far have le
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ...kernel.gravity import rise_time as rise_time
 from ...kernel.gravity import rise_time_by as rise_time_by
 from ...kernel.gravity import rise_time_inside as rise_time_inside
 from ...kernel.jit import select
+from ...kernel.limits import TINY
 from ...kernel.record import Record
 from ...kernel.vector import cross, dot, square
 
@@ -27,7 +26,7 @@ _CLOSE = 1e-16
 # such fall on the way, even one that misses, made a fall in a sphere with a small ball 6 times slower.)
 _FAR = 32.0
 # Length of a last step that found no hit: too short to change a time.
-_NO_HIT = float(np.finfo(np.float64).tiny)
+_NO_HIT = TINY
 
 
 class Majorant(Record):
