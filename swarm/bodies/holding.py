@@ -7,10 +7,9 @@ import numpy as np
 
 from ..common import checks
 from ..errors import SceneError
-from ..kernel.limits import TINY
 from ..motion import Motion
 from ..state import Floats
-from ..surfaces.instant import side_of
+from ..surfaces.instant import distances, side_of
 from ..surfaces.surface import Surface
 from .checked import each, point
 
@@ -65,9 +64,7 @@ def guides(rows: Iterable[Any], places: Floats, anchored: Iterable[int]) -> tupl
 
 def on_surface(name: str, surface: Surface, places: Floats) -> None:
     """Raise unless places (3, N) are on the surface."""
-    slopes = np.sqrt((surface.gradient(places) ** 2).sum(axis=0))
-    values = surface.phi(places)
-    off = np.abs(values) / np.maximum(slopes, TINY)
+    values, off = surface.phi(places), np.abs(distances(surface, places))
     room = np.minimum(surface.size(), np.maximum(surface.extent(), np.abs(places).max(axis=0)))
     for i in np.flatnonzero(~(off <= _ON_SURFACE * room)):
         which = f" of copy {i}" if places.shape[1] > 1 else ""

@@ -11,9 +11,9 @@ from ..common.checks import located
 from ..errors import SceneError
 from ..kernel.limits import PUT_ON_SURFACE
 from ..scene import Scene
-from ..surfaces.area_samples import NEAR, AreaSample, Floats, Random, Region, distances, points_of
+from ..surfaces.area_samples import NEAR, AreaSample, Floats, Random, Region, points_of
 from ..surfaces.facets.mesh import Mesh
-from ..surfaces.instant import gaps_of, side_of
+from ..surfaces.instant import distances, gaps_of, side_of
 from ..surfaces.presence.doors import Opening
 from ..surfaces.shapes.plane import Plane
 from ..surfaces.surface import Box, Surface, volume_of

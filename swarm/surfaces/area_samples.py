@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from ..kernel.limits import TINY
 from ..kernel.vector import vec
 
 Floats = NDArray[np.float64]
@@ -37,12 +36,6 @@ class AreaSample(NamedTuple):
 
     area: float
     draw: Draw
-
-
-def distances(surface: Any, points: Floats) -> Floats:
-    """Distances of points from a surface to first order, above 0 outside."""
-    slopes = np.sqrt((surface.gradient(points) ** 2).sum(axis=0))
-    return np.asarray(surface.phi(points) / np.maximum(slopes, TINY))
 
 
 def points_of(samples: list[AreaSample], random: Random, n: int) -> Floats:

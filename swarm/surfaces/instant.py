@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +33,17 @@ def gaps_of(images: Sequence[Surface], points: NDArray[np.float64], time: float)
     return np.array([side_of(image) * image.phi(points, time) for image in images])
 
 
-def distances_of(images: Sequence[Surface], points: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-    """The gap over its gradient of every image of a surface, (images, N) [m]."""
-    slopes = [np.sqrt((image.gradient(points, time) ** 2).sum(axis=0)) for image in images]
+def distances(surface: Any, points: NDArray[np.float64], time: float = 0.0) -> NDArray[np.float64]:
+    """Distances of points (3, N) from a surface to first order [m], above 0 outside."""
+    slopes = np.sqrt((surface.gradient(points, time) ** 2).sum(axis=0))
     # At the centre of a ball the slope is 0, and a point is as far inside as can be.
     with np.errstate(over="ignore"):
-        return np.asarray(gaps_of(images, points, time) / np.maximum(slopes, TINY))
+        return np.asarray(surface.phi(points, time) / np.maximum(slopes, TINY))
+
+
+def distances_of(images: Sequence[Surface], points: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    """The gap over its gradient of every image of a surface, (images, N) [m]."""
+    return np.array([side_of(image) * distances(image, points, time) for image in images])
 
 
 def gradient_of(images: Sequence[Surface], points: NDArray[np.float64]) -> NDArray[np.float64]:

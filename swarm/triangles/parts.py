@@ -6,10 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..kernel.limits import TINY
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces.instant import box_of, side_of
+from ..surfaces.instant import box_of, distances, side_of
 from ..surfaces.part import handed_down
 from ..surfaces.presence.openings import sign_of
 from ..surfaces.surface import Surface
@@ -67,8 +66,7 @@ class Cover:
     def _level(self, points: Floats, size: float) -> Floats:
         rows = np.ascontiguousarray(points.T)
         with np.errstate(all="ignore"):
-            steep = np.sqrt((self.surface.gradient(rows, self.time) ** 2).sum(axis=0))
-            gap = self.side * self.surface.phi(rows, self.time) / np.maximum(steep, TINY)
+            gap = self.side * distances(self.surface, rows, self.time)
         gap = np.clip(np.where(np.isnan(gap), np.inf, gap), -_FAR * size, _FAR * size)
         return np.asarray(self.sign * gap - _NOTHING * size)
 

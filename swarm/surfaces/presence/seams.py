@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import SceneError
 from ...kernel.limits import TINY
 from ..fields.many import Many
-from ..instant import side_of
+from ..instant import distances, side_of
 from ..room import Floats, Room, room_bounds
 from ..rotation import matrix, normalized
 from ..shapes.box import Box
@@ -312,8 +312,7 @@ def _gap(surface: Surface, points: Floats) -> Floats:
 
 def _distance(surface: Surface, points: Floats) -> Floats:
     """How far points (3, N) are out of the admissible side of a surface, or out of a volume [m], to first order."""
-    slopes = np.sqrt((surface.gradient(points) ** 2).sum(axis=0))
-    return np.asarray(_sign_of(surface) * surface.phi(points) / np.maximum(slopes, TINY))
+    return _sign_of(surface) * distances(surface, points)
 
 
 # --- Rooms that are joined -------------------------------------------------------------------------------
