@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .common.status import Status
 from .compiled_scene import CompiledScene
@@ -21,10 +21,9 @@ from .particles import Particles
 from .run.options import RunOptions
 from .run.preflight.knows import Asked, require_known
 from .scene import Scene
+from .state import Floats
 from .surfaces.lowered import lowered
 from .surfaces.time_of_impact import flights
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

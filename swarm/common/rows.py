@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SceneError
+from ..state import Floats
 from .checks import FEW, LARGEST, SMALLEST, array, require_memory
 
-Floats = NDArray[np.float64]
 # What a ball and another body take at most while their table and the grid of cells are made [bytes]: of balls these are
 # arrays (260 measured), of others an object for each first (2000 capsules, 2750 cylinders).
 _BALL, _BODY = 300, 3000

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..state import Floats
 from .arrays import index
 from .gravity import rise_time
 from .jit import Array, select
@@ -22,8 +22,6 @@ from .vector import Vec, vec
 MARGIN = 1e-6
 # An endless direction is one cell of this width, and what has no end has bounds beyond half of it.
 ENDLESS = 1e200
-
-Floats = NDArray[np.float64]
 
 
 class Grid(Record):

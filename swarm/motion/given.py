@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..common import checks
 from ..common.checks import Vector
 from ..common.validated import Bounded, Number, PositiveMagnitude, Validated
 from ..errors import SceneError
-
-Floats = NDArray[np.float64]
+from ..state import Floats
 
 # The largest angle of a motion [rad], where float64 numbers are 1.2e-7 rad apart; of far larger ones a sine is chance.
 LARGEST_ANGLE = 1e9

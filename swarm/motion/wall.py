@@ -19,9 +19,9 @@ from ..common import checks
 from ..common.checks import Vector
 from ..common.validated import Bounded, Magnitude
 from ..errors import SceneError
+from ..state import Floats
 from .given import (
     Axis,
-    Floats,
     Given,
     Led,
     Oscillation,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..state import Floats
+from ..state import Floats, Indices
 from ..surfaces.rotation import normalized
 from .eye import Eye
 
@@ -18,8 +18,6 @@ _SHADOW, _SHINE, _WHITE = 0.45, 24.0, 0.45
 _MOST = 3_000_000
 # The least radius of a ball [pixels].
 _LEAST = 0.6
-
-Indices = NDArray[np.int64]
 
 
 class Raster:

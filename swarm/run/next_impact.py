@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..common import checks
 from ..contact.laws import NONE
@@ -15,6 +15,7 @@ from ..kernel.vector import square, vec
 from ..methods import Impact
 from ..particles import Particles
 from ..scene import Scene
+from ..state import Floats
 from ..surfaces.plane import require_start
 from ..surfaces.time_of_impact import flights
 from .options import RunOptions
@@ -24,8 +25,6 @@ from .starting_state import Seeding
 
 # A fall is known part by part; one of more parts meets no wall.
 _PARTS = 1000
-
-Floats = NDArray[np.float64]
 
 
 class NextImpact(NamedTuple):

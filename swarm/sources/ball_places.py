@@ -7,7 +7,8 @@ import numpy as np
 from ..errors import SceneError
 from ..particles import Particles
 from ..scene import Scene
-from ..surfaces.area_samples import Floats, Random
+from ..state import Floats
+from ..surfaces.area_samples import Random
 from .births import PLACES, VELOCITIES, from_surface, from_volume, require_beam, require_in_plane, stream
 from .places import PointBatches, changes, place_of
 from .source import Source

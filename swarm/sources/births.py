@@ -11,7 +11,8 @@ from ..common import checks
 from ..errors import SceneError
 from ..particles import Births, Particles
 from ..scene import Scene
-from ..surfaces.area_samples import Floats, Random
+from ..state import Floats
+from ..surfaces.area_samples import Random
 from ..surfaces.instant import distances, side_of
 from ..surfaces.plane import along
 from .places import PointBatches, changes, place_of

@@ -11,7 +11,8 @@ from ..common.checks import located
 from ..errors import SceneError
 from ..kernel.limits import PUT_ON_SURFACE
 from ..scene import Scene
-from ..surfaces.area_samples import NEAR, AreaSample, Floats, Random, Region, points_of
+from ..state import Floats
+from ..surfaces.area_samples import NEAR, AreaSample, Random, Region, points_of
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.instant import distances, gaps_of, side_of
 from ..surfaces.presence.doors import Opening

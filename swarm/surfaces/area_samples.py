@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..kernel.vector import vec
+from ..state import Floats
 
-Floats = NDArray[np.float64]
 Random = np.random.Generator
 Region = tuple[Floats, Floats]
 Draw = Callable[[Random, int], Floats]

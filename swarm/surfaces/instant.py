@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from .. import motion as motions
 from ..kernel.limits import TINY
+from ..state import Floats
 from .surface import SIDES, Box, HalfSpace, Surface
-
-Floats = NDArray[np.float64]
 
 # The search for an admissible point: number of starts, and moves of each onto the surface that it violates most.
 _STARTS = 512

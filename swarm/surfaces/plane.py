@@ -9,13 +9,13 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..common import checks
 from ..errors import SceneError
 from ..kernel.limits import TINY
 from ..kernel.vector import vec
 from ..motion import Guide, Oscillation, Path, Rotation, Translation, parts_of
+from ..state import Floats
 from .facets.mesh import Mesh
 from .fields.many import Many
 from .outlines.outlined import Outlined
@@ -24,8 +24,6 @@ from .shapes.sphere import Sphere
 from .surface import Surface, shown
 from .upright import upright
 from .wall_law import leave_of, tries_of
-
-Floats = NDArray[np.float64]
 
 # The number of the axis across each plane.
 PLANES: dict[str | None, int] = {"x": 0, "y": 1, "z": 2}

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..state import Floats
 from .instant import box_of, gaps_of, gradient_of, has_room, planes_of
 from .surface import UNBOUNDED, Box, HalfSpace, Surface
 
-Floats = NDArray[np.float64]
 Room = tuple[Surface, ...]
 
 # Of the extent, how far a room without end is searched for a point in it.

@@ -19,10 +19,11 @@ from numpy.typing import ArrayLike
 from .. import motion as motions
 from ..common.checks import Vector
 from ..errors import SceneError
+from ..state import Floats
 from .area_samples import NEAR, AreaSample, Random, Region
 from .instant import distances, side_of
 from .part import checked_parts, handed_down, other_side
-from .room import Floats, Room, has_volume, lasting, may_have_volume, room_bounds
+from .room import Room, has_volume, lasting, may_have_volume, room_bounds
 from .surface import UNBOUNDED, Box, Surface
 from .surface import Place as Place
 

@@ -6,10 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..state import Floats
+from ..state import Floats, Indices
 from ..surfaces.rotation import normalized
-
-Indices = NDArray[np.int64]
 
 # Neighbours with normals that differ by more than this angle meet at an edge [rad].
 _EDGE = math.radians(30.0)

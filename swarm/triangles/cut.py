@@ -7,13 +7,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
-from ..state import Floats
+from ..state import Floats, Indices
 from ..surfaces.rotation import normalized
 
-Indices = NDArray[np.int64]
 Level = Callable[[Floats], Floats]
 
 # Triangles near a cut are halved until it is this straight, as a part of their width, or there are so many of them.

@@ -11,14 +11,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..motion import Pose, pose
-from ..state import Floats
+from ..state import Floats, Indices
 from ..surfaces import Cone
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.rotation import matrix, normalized
 from ..surfaces.surface import Surface
 from . import curves
 from .curves import neighbours
-from .cut import MOST_BODIES, Cut, Indices, SmoothSurface, cut, found_in
+from .cut import MOST_BODIES, Cut, SmoothSurface, cut, found_in
 from .parts import Cover, Part
 
 # Of the size of what is drawn, a step along edges of a mesh that others may cut.

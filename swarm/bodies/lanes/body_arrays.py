@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from ...kernel.vector import ZERO, column
 from ...lanes.watching.watchers import Watchers
+from ...state import Floats
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 

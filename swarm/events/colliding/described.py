@@ -4,7 +4,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...compiled_scene import CompiledScene
 from ...contact.laws import NONE
@@ -12,6 +11,7 @@ from ...kernel.arrays import aligned, aligned_copy
 from ...pairs import Pairs
 from ...particles import Particles
 from ...scene import Scene
+from ...state import Floats
 from ...surfaces.in_motion.drive import drive_of
 from ..reacting.described import scenery_of
 from .box import Domain
@@ -23,8 +23,6 @@ from .resting import repose_of
 from .rows import CELL, FLOATS, NO_PARTNER, PARTNER, RADIUS, STAMP, TIME, WALL, WHOLES, Flock, Kept
 from .rubbing import BallSpins
 from .window import OUT, UNKNOWN
-
-Floats = NDArray[np.float64]
 
 # Cells are longer than the largest diameter by this part: round-off of places.
 _MARGIN = 1e-9

@@ -4,7 +4,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...compiled_scene import REACTING, CompiledScene
 from ...contact.laws import NONE, Laws
@@ -12,6 +11,7 @@ from ...kernel.vector import Vec, vec
 from ...motion import Guide, Rotation, Translation, pose, unit_axis
 from ...run.observed import Observed
 from ...scene import Scene
+from ...state import Floats
 from ...surfaces.fields.members import Members
 from ...surfaces.presence.doors import walls_then
 from ...surfaces.surface import Surface
@@ -20,8 +20,6 @@ from .freedoms import WIDTH, Freedoms, Shifted
 from .pendulum import TERMS, Hinged, Pendulum
 from .queue import SceneWalls
 from .strikes import Reacting
-
-Floats = NDArray[np.float64]
 
 
 def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:

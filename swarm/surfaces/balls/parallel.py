@@ -4,15 +4,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...common.checks import Vector
 from ...kernel.vector import Vec
+from ...state import Floats
 from ..surface import UNBOUNDED, Box, Surface, shown
 from .by_foot import ByFoot
 from .egg import distances_from
-
-Floats = NDArray[np.float64]
 
 # Points that are moved to where the surface is steepest least, their first step and the last one, in parts of its size.
 _STARTS, _FIRST, _SHORTEST, _SHORTER, _MOVES = 16, 0.05, 1e-6, 0.7, 3

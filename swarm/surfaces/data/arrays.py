@@ -5,12 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...common import checks
 from ...errors import SceneError
-
-Floats = NDArray[np.float64]
+from ...state import Floats
 
 # The highest compression of any HDF5 filter: deflate, 1032 to 1.
 _DENSEST = 1032

@@ -9,8 +9,8 @@ from ...common import checks
 from ...common.checks import path_of
 from ...common.extras import needed_by
 from ...errors import SceneError
+from ...state import Floats
 from ..facets import triangles
-from ..facets.mesh_files import Floats
 from .sampled import Sampled
 from .thickness import require_resolved
 

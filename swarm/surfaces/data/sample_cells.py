@@ -13,8 +13,8 @@ from ...kernel.grid import MARGIN
 from ...kernel.jit import Array
 from ...kernel.limits import COEFFICIENT
 from ...kernel.record import Record
+from ...state import Floats
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Places = NDArray[np.int64]
 

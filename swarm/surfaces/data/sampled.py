@@ -14,6 +14,7 @@ from ...common.checks import Vector
 from ...common.validated import Point
 from ...errors import SceneError
 from ...kernel.vector import vec
+from ...state import Floats
 from .. import rotation as rotations
 from ..balls.by_foot import ByFoot
 from ..balls.parallel import Parallel, foot_of, onto, tightest_of
@@ -23,8 +24,6 @@ from .arrays import read_samples
 from .flight import SampledNumbers
 from .sample_cells import SampleCells, cells_of, eigenvalues, least_at_border, most_bent_within
 from .spline import Spline
-
-Floats = NDArray[np.float64]
 
 # A spline that changes its sign between two samples of the same sign, by more than this part of what phi changes in a
 # cell where it does most, has a feature that the samples do not resolve; by less, as next to an edge, it is a ripple.

@@ -6,7 +6,6 @@ Its pieces are polynomials, one a cell, that join with continuous second derivat
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...kernel.fours import Four, over_block, sum_of
 from ...kernel.grid import MARGIN
@@ -14,8 +13,8 @@ from ...kernel.jit import Array, outlined
 from ...kernel.limits import TINY
 from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, absolute, norm, times
+from ...state import Floats
 
-Floats = NDArray[np.float64]
 # Samples along each axis, at least: the ends of the spline take four.
 LEAST = 4
 

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from ...common.extras import needed_by
 from ...errors import SceneError
 from ...kernel.limits import TINY
+from ...state import Floats, Indices
 from ..facets.mending import components, neighbours
-from ..facets.mesh_files import Floats, Indices
 from ..facets.triangles import TriangleMesh
 from ..surface import shown
 

@@ -8,10 +8,8 @@ put into that plane: from one to the next neither the distance nor the normal ch
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from ...state import Floats, Indices
 
 # The sine of an angle between triangles that are in one plane, and how far from that corners may be, of the size.
 _FLAT, _OFF = 1e-5, 1e-6

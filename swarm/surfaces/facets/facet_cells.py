@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from ...kernel import cache
 from ...kernel.arrays import aligned_copy, index
 from ...kernel.gravity import as_vector
-from ...kernel.grid import MARGIN, Floats, Grid, filled_grid
+from ...kernel.grid import MARGIN, Grid, filled_grid
 from ...kernel.jit import Array, select
 from ...kernel.limits import TINY
 from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, square, total
+from ...state import Floats
 from ..fields.grid import enter_bodies
 from .free_room import rows_of, spare_of
 

@@ -9,13 +9,14 @@ from ...common import checks
 from ...errors import SceneError
 from ...kernel.arrays import aligned_copy
 from ...kernel.vector import Vec
+from ...state import Floats
 from ..balls.facet import RoundTriangle
 from ..fields.many import field_of
 from ..fields.members import Members
 from .facet import THIN
 from .free_room import CLOSED, FREE, KIND, with_blocks, with_cones
 from .members import Facets
-from .mesh_files import Floats, Soup
+from .mesh_files import Soup
 from .nearest import nearest
 from .triangles import TriangleMesh as Closed
 

@@ -9,7 +9,8 @@ import itertools
 
 import numpy as np
 
-from .mesh_files import Floats, Indices, Soup
+from ...state import Floats, Indices
+from .mesh_files import Soup
 
 # Corners of open edges are joined within this part of the diagonal of the mesh, a hundred times what float32 rounds,
 # and within this part of the shortest open edge, so that no edge vanishes.

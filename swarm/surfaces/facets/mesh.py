@@ -19,6 +19,7 @@ from ...errors import SceneError
 from ...kernel.arrays import aligned_copy
 from ...kernel.grid import MARGIN
 from ...kernel.vector import Vec
+from ...state import Floats, Indices
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region, of_triangles
 from ..fields.members import Members
@@ -30,7 +31,7 @@ from .facet_cells import MOVING_MARGIN, cells_around
 from .made import given_arrays, sorted_by_place, table_of_facets, table_of_sides, triangles_of_balls, with_room
 from .members import Facets
 from .mending import sizes
-from .mesh_files import Floats, Indices, read_soup
+from .mesh_files import read_soup
 from .nearest import boxes_of, nearest, within
 from .triangles import closed, sheets
 

@@ -6,14 +6,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...common.extras import needed_by
 from ...errors import SceneError
+from ...state import Floats, Indices
 from ..surface import shown
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _NUMBER = r"\s+([-+.\deEnaifNAIF]+)"
 _CORNER = re.compile(r"vertex" + 3 * _NUMBER, re.IGNORECASE)

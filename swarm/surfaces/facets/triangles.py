@@ -7,9 +7,10 @@ import numpy as np
 
 from ...common.extras import needed_by
 from ...errors import SceneError
+from ...state import Floats, Indices
 from ..surface import shown
 from .mending import edges_of, groups_of, have_area, joined, neighbours, seams_closed, turned_alike, without_flat
-from .mesh_files import Floats, Indices, Soup, read_soup
+from .mesh_files import Soup, read_soup
 
 # Corners of a part that are looked up in another one, about.
 _LOOKED_UP = 16

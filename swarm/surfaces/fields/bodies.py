@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...kernel.arrays import aligned_copy
-from ...kernel.grid import Floats
 from ...kernel.vector import vec
+from ...state import Floats
 from ..shapes.box import Box
 from ..shapes.capsule import Capsule
 from ..shapes.cylinder import Cylinder

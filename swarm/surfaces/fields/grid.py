@@ -7,10 +7,11 @@ import numpy as np
 
 from ...kernel import cache
 from ...kernel.arrays import index
-from ...kernel.grid import ENDLESS, MARGIN, Floats, Grid, filled_grid, layer_of, number_of
+from ...kernel.grid import ENDLESS, MARGIN, Grid, filled_grid, layer_of, number_of
 from ...kernel.jit import kernel
 from ...kernel.limits import TINY
 from ...kernel.vector import Vec
+from ...state import Floats
 from .members import gathered
 
 # Cells for each body: a flight through more of them looks at fewer bodies in each.

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from ... import motion as motions
 from ...common.rows import balls, bodies, directions, kept, lengths, widths
 from ...errors import SceneError
-from ...kernel.grid import Floats, one_cell
+from ...kernel.grid import one_cell
 from ...motion.wall import product
+from ...state import Floats
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region
 from ..presence.patched import Patched

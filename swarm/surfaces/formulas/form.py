@@ -13,6 +13,7 @@ from ...common.checks import Vector
 from ...errors import SceneError
 from ...kernel.limits import EPSILON
 from ...kernel.vector import Vec, vec
+from ...state import Floats
 from .. import rotation as rotations
 from ..balls.by_foot import ByFoot
 from ..balls.parallel import Parallel, foot_of, tightest_of
@@ -34,8 +35,6 @@ _ONTO, _MOVES = 256, 60
 _FLAT, _WRONG = 1e-8, 1e-4
 
 _STRAIGHT = Bend.of_magnitude(0.0)
-
-Floats = NDArray[np.float64]
 
 
 class FormSurface(Parallel):

@@ -6,13 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ...state import Floats
 from ..surface import Box
 from .expression import NonSmoothTerm
 
-Floats = NDArray[np.float64]
 # The functions of the system's library are off by less than this.
 _ULPS = 4
 

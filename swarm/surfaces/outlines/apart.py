@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-
-Floats = NDArray[np.float64]
+from ...state import Floats
 
 
 class Edges(NamedTuple):

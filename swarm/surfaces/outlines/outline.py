@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from ...common.checks import magnitude, number, parts_of, shown
 from ...errors import SceneError
 from ...kernel.limits import TINY
+from ...state import Floats
 from .apart import Edges, along, require_apart
 
-Floats = NDArray[np.float64]
 Row = tuple[float, ...]
 
 # Of the extent, what is no length of a side and no distance of two; of an angle, what is no corner.

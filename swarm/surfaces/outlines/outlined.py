@@ -14,6 +14,7 @@ from ...common.checks import Vector
 from ...kernel.grid import one_cell
 from ...kernel.limits import ON_OUTLINE
 from ...kernel.vector import Vec, vec
+from ...state import Floats
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Draw, Region
 from ..fields.grid import grid_of
@@ -23,7 +24,7 @@ from ..parametrised import Triangles, halved
 from ..rotation import Rotated
 from ..shapes.quadratic import QuadricNumbers
 from ..surface import UNBOUNDED, Box, HalfSpace, LevelSet, Surface, side_sign
-from .outline import Floats, Outline
+from .outline import Outline
 from .round_side import round_side
 from .sides import FewSides, Side, Sides
 

@@ -15,12 +15,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec
+from ...state import Floats
 from ..fields.many import Many
 from ..surface import Surface
 from ..time_of_impact.flights import Hit
@@ -42,8 +42,6 @@ from .axes import (
 )  # fmt: skip
 from .gaps import Beside, Gap, Gaps, longer, over_faces
 from .images import Lengths, extent_of, is_same_along
-
-Floats = NDArray[np.float64]
 
 # Halvings of the part of a step after which it leaves.
 _HALVINGS = 60

@@ -14,9 +14,10 @@ import numpy as np
 
 from ...errors import SceneError
 from ...kernel.limits import TINY
+from ...state import Floats
 from ..fields.many import Many
 from ..instant import distances, side_of
-from ..room import Floats, Room, room_bounds
+from ..room import Room, room_bounds
 from ..rotation import matrix, normalized
 from ..shapes.box import Box
 from ..shapes.capsule import Capsule

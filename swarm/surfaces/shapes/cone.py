@@ -10,8 +10,8 @@ import numpy as np
 from ...common.checks import Vector, number
 from ...errors import SceneError
 from ...kernel.vector import Vec, vec
+from ...state import Floats
 from .. import rotation as rotations
-from ..area_samples import Floats
 from ..balls.rounded import RoundCone
 from ..balls.tip import Nappes, TipPlane
 from ..parametrised import Triangles, halved

@@ -13,7 +13,8 @@ from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.limits import TINY
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
-from ..area_samples import AreaSample, Floats, Region
+from ...state import Floats
+from ..area_samples import AreaSample, Region
 from ..parametrised import Triangles, halved
 from ..rotation import matrix, turned
 from ..surface import Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign
