@@ -1,6 +1,6 @@
 """Operations of kernels beyond Python, on arrays and their elements: arrays of their own, rows, indices, tickets.
 
-Each is an operation of the compiler, by `emission/array_operations.py`, with the same definition in plain Python.
+Each is an operation of the compiler, by `emission.py`, with the same definition in plain Python.
 """
 
 import threading

@@ -27,11 +27,11 @@ from numba.core.caching import FunctionCache
 from numba.extending import typeof_impl
 from numba.np import linalg as blas
 
+from . import emission
 from .cache import base, is_disabled, listeners
 from .compilers import KernelCompiler, LongKernelCompiler, PartCompiler, features_of
 from .deferred import loaded
 from .digest import key_of_kernel, was_compiled
-from .emission import array_operations, sums, vector_operators  # noqa: F401  # each tells Numba of its operations
 from .entries import File, Key, is_own, key_of
 from .jit import Kernel
 from .once import held
@@ -63,7 +63,7 @@ _INLINE: Any = {"forceinline": True, **_OUTLINE}
 # What of a user's functions cannot be traced, and what may make arrays.
 _ALLOCATING: Any = {**_INLINE, "_nrt": True}
 calls.leave = leaving(_ALLOCATING)
-emit_spaced = array_operations.emit_spaced
+emit_spaced = emission.emit_spaced
 
 
 def _find_scipy_only() -> None:

@@ -1,7 +1,8 @@
-"""Instructions of the operations of `kernel/arrays.py`."""
+"""Instructions of operations of kernels, which `arrays.py`, `fours.py` and `vector.py` define in plain Python."""
 
 import functools
 import math
+import operator
 from typing import Any
 
 from llvmlite import ir
@@ -12,8 +13,12 @@ from numba.core import cgutils
 from numba.core.imputils import impl_ret_borrowed
 from numba.np.arrayobj import populate_array
 
-from ..arrays import copy_row, fetch, index, next_of, scratch, unwritten
-from ..trace.calls import INTRINSIC, operation
+from .arrays import copy_row, fetch, index, next_of, scratch, unwritten
+from .fours import Four, over_block
+from .trace.calls import INTRINSIC, operation
+from .vector import Vec
+
+# --- Arrays ----------------------------------------------------------------------------------------------
 
 
 def emit_spaced(known: Any, stride: int) -> None:
@@ -111,3 +116,78 @@ def _emit_fetch(context, builder, signature, args):
 @operation(index, lambda value: types.uintp, types.Any)
 def _emit_index(context, builder, signature, args):
     return context.cast(builder, *args, *signature.args, signature.return_type)
+
+
+# --- Sums -------------------------------------------------------------------------------------------------
+
+
+def _type_of_sums(table, place, x, y):
+    return types.NamedUniTuple(types.float64, 4, Four)
+
+
+@operation(over_block, _type_of_sums, types.Array, *3 * (types.BaseNamedTuple,))
+def _emit_sums(context, builder, signature, args):
+    kind = signature.args[0]
+    table, four = context.make_array(kind)(context, builder, args[0]), ir.VectorType(ir.DoubleType(), 4)
+    first = [builder.extract_value(args[1], axis) for axis in range(3)]
+
+    def weighted(weights, rows):
+        products = []
+        for n, row in enumerate(rows):
+            weight = builder.insert_element(
+                ir.Constant(four, ir.Undefined), builder.extract_value(weights, n), _lane(0)
+            )
+            zeros = ir.Constant(ir.VectorType(ir.IntType(32), 4), [0] * 4)
+            products.append(builder.fmul(builder.shuffle_vector(weight, weight, zeros), row))
+        return builder.fadd(builder.fadd(*products[:2]), builder.fadd(*products[2:]))
+
+    def row(a, b):
+        place = [builder.add(at, at.type(n)) for at, n in zip(first, (a, b, 0), strict=True)]
+        pointer = cgutils.get_item_pointer(context, builder, kind, table, place, wraparound=False)
+        return builder.load(builder.bitcast(pointer, four.as_pointer()), align=8)
+
+    sums = weighted(args[2], [weighted(args[3], [row(a, b) for b in range(4)]) for a in range(4)])
+    parts = [builder.extract_element(sums, _lane(n)) for n in range(4)]
+    return context.make_tuple(builder, signature.return_type, parts)
+
+
+def _lane(n):
+    return ir.Constant(ir.IntType(32), n)
+
+
+# --- Operators of vectors ---------------------------------------------------------------------------------
+
+
+def _is_vector(kind: Any) -> bool:
+    return isinstance(kind, types.BaseNamedTuple) and issubclass(kind.instance_class, Vec)  # type: ignore[attr-defined]
+
+
+_KIND = types.NamedUniTuple(types.float64, 3, Vec)
+
+
+def _emitted(symbol: Any, instruction: str, first: Any, second: Any) -> None:
+    """Let kernels do this operator component by component: no function of its own for the compiler.
+
+    As overloads of the operators they cost up to a tenth of the time to compile.
+    """
+    vectors = [kind is types.BaseNamedTuple for kind in (first, second)]
+
+    def typed(a, b):
+        good = (_is_vector(k) if v else isinstance(k, types.Float) for k, v in zip((a, b), vectors, strict=True))
+        return _KIND if all(good) else None
+
+    @operation(symbol, typed, first, second)
+    def _emit(context, builder, signature, args):
+        one, two = (
+            [builder.extract_value(arg, k) for k in range(3)] if v else 3 * [arg]
+            for arg, v in zip(args, vectors, strict=True)
+        )
+        parts = [getattr(builder, instruction)(*pair) for pair in zip(one, two, strict=True)]
+        return context.make_tuple(builder, signature.return_type, parts)
+
+
+_emitted(operator.add, "fadd", types.BaseNamedTuple, types.BaseNamedTuple)
+_emitted(operator.sub, "fsub", types.BaseNamedTuple, types.BaseNamedTuple)
+_emitted(operator.mul, "fmul", types.BaseNamedTuple, types.Float)
+_emitted(operator.mul, "fmul", types.Float, types.BaseNamedTuple)
+_emitted(operator.truediv, "fdiv", types.BaseNamedTuple, types.Float)

@@ -1,1 +1,0 @@
-"""Instructions of operations of kernels, which modules of `kernel/` define in plain Python."""
