@@ -248,18 +248,26 @@ class Chord(Reflection):
         """The length of the contact step, which the end of the frame cuts."""
         return select(self.contact_step < lane.remaining, self.contact_step, lane.remaining)
 
+    def start(self, gravity, lane):
+        """The start r0 of the step."""
+        return lane.r
+
+    def way(self, gravity, lane):
+        """Its free displacement p."""
+        return displacement(gravity, lane.v, self.step(lane))
+
     # --- The unknown of a contact ---
 
     def most_sweeps(self, walls):
         return walls.chord_sweeps()
 
     def guess(self, walls, gravity, lane, wall):
-        h = self.step(lane)
-        return walls.chord_guess(wall, lane.r, displacement(gravity, lane.v, h)), (wall >= 0.0) & (h > 0.0)
+        kappa = walls.chord_guess(wall, self.start(gravity, lane), self.way(gravity, lane))
+        return kappa, (wall >= 0.0) & (self.step(lane) > 0.0)
 
     def improve(self, walls, gravity, lane, wall, solution, multiplier):
-        p = displacement(gravity, lane.v, self.step(lane))
-        better, more = chord_step(walls, wall, lane.r, p, solution.kappa)
+        r, p = self.start(gravity, lane), self.way(gravity, lane)
+        better, more = chord_step(walls, wall, r, p, solution.kappa)
         return select(solution.unsolved, better, solution.kappa), solution.unsolved & more, contract.NO_RECORD
 
     def turn(self, walls, gravity, lane, wall, kappa):
@@ -268,19 +276,23 @@ class Chord(Reflection):
     # --- Contact ---
 
     def contact(self, walls, gravity, lane, wall, solution):
-        h, turned = self.step(lane), solution.turned
-        r, v, stays = chord_end(walls, gravity, wall, lane.r, lane.v, turned.v, h, lane.own.energy)
-        hit = wall >= 0.0
-        chord = hit & stays & (turned.impulse > lane.own.slow) & (not solution.unsolved)
+        h = self.step(lane)
+        r, v, stays = chord_end(walls, gravity, wall, lane.r, lane.v, solution.turned.v, h, lane.own.energy)
+        return self.ended(lane, wall, solution, (r, v, h), stays)
+
+    def ended(self, lane, wall, solution, end, stays):
+        """The `Contact` of a lane that takes its step to this end, (r1, v1, its time), if it stays inside, or waits."""
+        (r, v, h), impulse, hit = end, solution.turned.impulse, wall >= 0.0
+        step = hit & stays & (impulse > lane.own.slow) & (not solution.unsolved)
         return contract.Contact(
-            select(chord, r, kept(lane.r)),
-            select(chord, v, kept(lane.v)),
-            lane.remaining - select(chord, h, 0.0),
+            select(step, r, kept(lane.r)),
+            select(step, v, kept(lane.v)),
+            lane.remaining - select(step, h, 0.0),
             wall,
-            select(chord, turned.impulse, 0.0),
-            select(chord, 1.0, 0.0),
+            select(step, impulse, 0.0),
+            select(step, 1.0, 0.0),
             lane.own.energy.twice,
-            hit & (not chord),
+            hit & (not step),
         )
 
 
@@ -293,44 +305,24 @@ class Centred(Chord):
         """Half the length of the contact step, which the flight before it and the end of the frame cut."""
         return base.centred_half(self.contact_step, lane)
 
+    def step(self, lane):
+        return 2.0 * self.half(lane)
+
     def start(self, gravity, lane):
-        """The start r0 of the step."""
         return lane.r + displacement(gravity, lane.v, -self.half(lane))
 
-    def way(self, lane):
-        """Its free displacement p = h v0 + h^2 G/2: the velocity at its middle is that of the impact."""
-        return 2.0 * self.half(lane) * lane.v
-
-    # --- The unknown of a contact ---
-
-    def guess(self, walls, gravity, lane, wall):
-        kappa = walls.chord_guess(wall, self.start(gravity, lane), self.way(lane))
-        return kappa, (wall >= 0.0) & (self.half(lane) > 0.0)
-
-    def improve(self, walls, gravity, lane, wall, solution, multiplier):
-        better, more = chord_step(walls, wall, self.start(gravity, lane), self.way(lane), solution.kappa)
-        return select(solution.unsolved, better, solution.kappa), solution.unsolved & more, contract.NO_RECORD
+    def way(self, gravity, lane):
+        # p = h v0 + h^2 G/2: the velocity at its middle is that of the impact.
+        return self.step(lane) * lane.v
 
     def turn(self, walls, gravity, lane, wall, kappa):
         # Gravity turns the velocities at the ends into those at the impact, which are reflected.
-        return chord_turn(walls, None, wall, self.start(gravity, lane), lane.v, 2.0 * self.half(lane), kappa)
-
-    # --- Contact ---
+        return chord_turn(walls, None, wall, self.start(gravity, lane), lane.v, self.step(lane), kappa)
 
     def contact(self, walls, gravity, lane, wall, solution):
-        half, turned = self.half(lane), solution.turned
+        half = self.half(lane)
         speed2, half_inverse = speed2_at(gravity, lane.r, lane.own.energy)
-        w = restore(gravity, turned.v, speed2, half_inverse)
+        w = restore(gravity, solution.turned.v, speed2, half_inverse)
         free = flights.is_free(walls, lane.r, accelerated(gravity, w, 0.5 * half), half)
-        hit = wall >= 0.0
-        step = hit & free & (turned.impulse > lane.own.slow) & (not solution.unsolved)
-        return contract.Contact(
-            select(step, lane.r + displacement(gravity, w, half), kept(lane.r)),
-            select(step, accelerated(gravity, w, half), kept(lane.v)),
-            lane.remaining - select(step, half, 0.0),
-            wall,
-            select(step, turned.impulse, 0.0),
-            select(step, 1.0, 0.0),
-            lane.own.energy.twice,
-            hit & (not step),
-        )
+        end = lane.r + displacement(gravity, w, half), accelerated(gravity, w, half), half
+        return self.ended(lane, wall, solution, end, free)
