@@ -51,24 +51,12 @@ def of_trajectory(trajectory: Any) -> Page:
         SceneError: it is damaged, or holds no frame.
     """
     trajectory.require_frames()
-    content = content_of(trajectory)
-    makers, wall_times = trajectory.makers, trajectory.wall_times
+    content, makers, wall_times = content_of(trajectory), trajectory.makers, trajectory.wall_times
     spent = None if wall_times is None else float(wall_times[-1])
-    about = [trajectory.path.name, *_when(makers, trajectory.path), facts.file_size(trajectory.path)]
-    page = filled(
-        "run.html.j2",
-        title=words.title(content),
-        about=" · ".join(about),
-        notes=_notes(trajectory),
-        **_first_screen(content, spent),
-        places=pictures.of_places(content),
-        series=pictures.of_series(content),
-        scene=facts.of_setting(content),
-        numbers=facts.of_numbers(content.seen),
-        speed=_speed(content, spent, trajectory.threads) + _versions(makers, trajectory.seed),
-        again=reproduce.of_trajectory(trajectory),
-    )
-    return Page(words.title(content), page, (trajectory.path,))
+    about = " · ".join([trajectory.path.name, *_when(makers, trajectory.path), facts.file_size(trajectory.path)])
+    speed = _speed(content, spent, trajectory.threads) + _versions(makers, trajectory.seed)
+    made = _filled(content, spent, about, _notes(trajectory), speed, reproduce.of_trajectory(trajectory))
+    return Page(words.title(content), made, (trajectory.path,))
 
 
 def of_content(content: Content, wall_time: float) -> Page:
@@ -76,20 +64,26 @@ def of_content(content: Content, wall_time: float) -> Page:
     from ..files.provenance import makers
 
     why = "It cannot be reproduced from this page: it was run in Python and has written no trajectory; keep the script."
-    page = filled(
+    speed = _speed(content, wall_time, None) + _versions(makers(), None)
+    made = _filled(content, wall_time, "a run without a trajectory", [], speed, reproduce.Again([why]))
+    return Page(words.title(content), made)
+
+
+def _filled(content: Content, spent: float | None, about: str, notes: list[Note], speed: Any, again: Any) -> str:
+    """The page of a run that took so many seconds, if that is known."""
+    return filled(
         "run.html.j2",
         title=words.title(content),
-        about="a run without a trajectory",
-        notes=[],
-        **_first_screen(content, wall_time),
+        about=about,
+        notes=notes,
+        **_first_screen(content, spent),
         places=pictures.of_places(content),
         series=pictures.of_series(content),
         scene=facts.of_setting(content),
         numbers=facts.of_numbers(content.seen),
-        speed=_speed(content, wall_time, None) + _versions(makers(), None),
-        again=reproduce.Again([why]),
+        speed=speed,
+        again=again,
     )
-    return Page(words.title(content), page)
 
 
 def _first_screen(content: Content, spent: float | None) -> dict[str, Any]:
