@@ -151,9 +151,14 @@ def book(laws, books, place, mass, bounce):
     row, column, i = place
     books.impulse[row, column] += mass * bounce.impulse
     if laws.moving is not None:
-        books.impulse[index(books.impulse.shape[0] // 2) + row, column] += 0.5 * mass * bounce.work
+        give_work(books, row, column, 0.5 * mass * bounce.work)
     books.impacts[i] += bounce.impulse > 0.0
     return book_energy(books, place, mass, bounce)
+
+
+def give_work(books, row, column, work):
+    """Book the work of a wall that moves [J]: its row is as far behind that of the impulse as there are walls."""
+    books.impulse[index(books.impulse.shape[0] // 2) + row, column] += work
 
 
 def book_energy(books, place, mass, bounce):

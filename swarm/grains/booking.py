@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..contact.wall_impact import give_work
 from ..kernel.arrays import index, unwritten
 from ..kernel.jit import Array, outlined
 from ..kernel.vector import dot, norm
@@ -153,7 +154,7 @@ def book_wall(matter, law, wall, grains, touches, books, number):
         if moves(wall):
             # What it gives is what the ball gains and the contact stores or loses.
             given = work + push * way.change
-            books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given / matter.h
+            give_work(books, index(number), one, given / matter.h)
             work = work - given
         if law.damping is not None:
             books.dissipated[one] += _lost(matter, work, gap, way.change)

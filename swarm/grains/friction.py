@@ -13,6 +13,7 @@ slip that turns round may gain a little in that step, which is booked as what is
 
 import math
 
+from ..contact.wall_impact import give_work
 from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, cross, dot, square
@@ -152,4 +153,4 @@ def book_rubbing(matter, wall, grains, near, touches, books, number):
         rows[c, RUBBED] = given - gained
         books.dissipated[one] += given - gained
         if moves(wall):
-            books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given
+            give_work(books, index(number), one, given)

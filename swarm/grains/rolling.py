@@ -7,6 +7,7 @@ of a directional constant torque of Zhou, Wright, Yang, Xu & Yu, Physica A 269 (
 that holds a ball rolls on a plane with a deceleration of 5/7 rolling G.
 """
 
+from ..contact.wall_impact import give_work
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, dot, square
@@ -154,4 +155,4 @@ def book_rolling(wall, grains, near, touches, books, number):
         rows[c, RUBBED] += given - gained
         books.dissipated[one] += given - gained
         if moves(wall):
-            books.impulse[index(books.impulse.shape[0] // 2) + index(number), one] += given
+            give_work(books, index(number), one, given)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..common.status import Status
 from ..contact.reflection import given
-from ..contact.wall_impact import Arriving, RandomSource, book_energy, by_law
+from ..contact.wall_impact import Arriving, RandomSource, book_energy, by_law, give_work
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.record import Record
@@ -99,7 +99,7 @@ def _act(wall, own, world, at, time):
     books.impulse[row, one] += mass * (bounce.impulse - 2.0 * away)
     if moves(wall):
         turned = given(u, v - before)
-        books.impulse[index(books.impulse.shape[0] // 2) + row, one] += 0.5 * mass * (bounce.work - turned)
+        give_work(books, row, one, 0.5 * mass * (bounce.work - turned))
     heat = book_energy(books, (row, one, one), mass, bounce)
     if world.members is not None:
         world.members.counts.give(member, heat, bounce.wait)
