@@ -188,6 +188,19 @@ class State(NamedTuple):
         return found
 
 
+def none_left(n: int, opens: bool, absorbs: bool) -> dict[str, Any]:
+    """The fields of n particles of which none has left: through an opening where walls have any, or into a wall.
+
+    >>> sorted(name for name, array in none_left(2, False, True).items() if array is not None)
+    ['absorbed_time', 'absorbed_wall']
+    """
+    return {
+        "escape_time": np.full(n, math.nan) if opens else None,
+        "absorbed_time": np.full(n, math.nan) if absorbs else None,
+        "absorbed_wall": np.full(n, -1, np.int32) if absorbs else None,
+    }
+
+
 def _of(value: Any, some: NDArray[np.bool_], n: int) -> Any:
     has_each = isinstance(value, np.ndarray) and value.shape[-1] == n
     return np.ascontiguousarray(value[..., some]) if has_each else value

@@ -26,7 +26,7 @@ from ..run.starting_state import UNSEEDED, Seeding
 from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
 from ..scene import Scene
-from ..state import Floats, State
+from ..state import Floats, State, none_left
 from .births import BodyFeed
 from .body import squares_between
 from .copies import Bodies
@@ -78,10 +78,7 @@ class BodyRun(BaseRun):
         self.state = State(
             particles.position, particles.velocity, particles.mass, none, none, np.zeros(points * n, np.int64),
             np.zeros((walls, 0)), none, None,
-            escape_time=None if self._walls[2] is None else np.full(points * n, math.nan),
-            absorbed_time=np.full(points * n, math.nan) if books.absorb else None,
-            absorbed_wall=np.full(points * n, -1, np.int32) if books.absorb else None,
-            image=particles.image,
+            image=particles.image, **none_left(points * n, books.open, books.absorb),
         )  # fmt: skip
         contacts = most_contacts_of(self._touching, soft)
         per_lane = 8 * (24 * points + 10 * rows + rows * rows + 20 * contacts)
@@ -426,11 +423,9 @@ def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, books
         unconverged=whole[4],
         energy=np.zeros(n),
         free=np.zeros((len(body.contacts), n), np.int8) if books.open else None,
-        escape_time=np.full(n, math.nan) if books.open else None,
         wall_work=np.zeros((walls, n)) if books.move else None,
         heat=np.zeros((walls, n)) if books.heat else None,
-        absorbed_time=np.full(n, math.nan) if books.absorb else None,
-        absorbed_wall=np.full(n, -1, np.int32) if books.absorb else None,
+        **none_left(n, books.open, books.absorb),
         mass=np.full(n, body.mass_matrix.sum()),
         image=bodies.image,
     )

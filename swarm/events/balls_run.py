@@ -1,6 +1,5 @@
 """The run of balls that meet one another and walls at instants."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -25,7 +24,7 @@ from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..scene import Scene
-from ..state import Balls, Floats, State
+from ..state import Balls, Floats, State, none_left
 from .colliding import events
 from .colliding.bounce import Gates
 from .colliding.box import CollisionRule, CollisionTotals
@@ -65,9 +64,7 @@ class CollidingRun(BaseRun):
             np.zeros(n, np.int64), np.zeros((2 * rows if scene.moves() else rows, 1)), np.zeros(n if loses else 0),
             None, None, np.zeros((rows, 1)) if any(one.give_heat for one in every) else None,
             image=particles.image, period=compiled.cell(), balls=balls,
-            escape_time=None if openings is None else np.full(n, math.nan), openings=openings,
-            absorbed_time=np.full(n, math.nan) if ends else None,
-            absorbed_wall=np.full(n, -1, np.int32) if ends else None,
+            openings=openings, **none_left(n, openings is not None, ends),
         )  # fmt: skip
         state, self._balls, gates = self.state, balls, None
         feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)

@@ -1,6 +1,5 @@
 """The run of particles and walls that react: all depend on all others."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -26,7 +25,7 @@ from ..run.present import Presence
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
-from ..state import State
+from ..state import State, none_left
 from .reacting import queue as events
 from .reacting.described import freedoms_of, observed, scenery_of, walls_now
 from .reacting.freedoms import TOO_LONG, TOO_SHORT
@@ -54,13 +53,9 @@ class ReactingRun(BaseRun):
             particles.position, particles.velocity, particles.mass, np.asarray(energy) + np.zeros(n), np.zeros(n),
             np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None, heat,
         )  # fmt: skip
-        if any(laws.may_end for laws in self._scenery.each_laws()):
-            absorbed_time, absorbed_wall = np.full(n, math.nan), np.full(n, -1, np.int32)
-            self.state = self.state._replace(absorbed_time=absorbed_time, absorbed_wall=absorbed_wall)
-        if compiled.openings() is not None:
-            self.state = self.state._replace(escape_time=np.full(n, math.nan))
-        births = particles.births
-        if births is not None or any(laws.may_end for laws in self._scenery.each_laws()):
+        births, ends = particles.births, any(laws.may_end for laws in self._scenery.each_laws())
+        self.state = self.state._replace(**none_left(n, compiled.openings() is not None, ends))
+        if births is not None or ends:
             self.state = self.state._replace(starts=np.zeros(n) if births is None else births.time.copy())
         self._present = Presence(births, self.state, CHUNK)
         tier = Tier(compile, (self._scenery, gravity), n)

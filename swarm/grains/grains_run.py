@@ -27,7 +27,7 @@ from ..run.preflight.counting import counters_of, crossed_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
-from ..state import Balls, State
+from ..state import Balls, State, none_left
 from . import energy, lists, refused
 from . import grain_arrays as arrays
 from .booking import ContactTotals, MemberCounts
@@ -82,9 +82,7 @@ class GrainsRun(BaseRun):
             particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
             np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None,
             heat=np.zeros((walls, n)) if laws.give_heat else None, balls=balls,
-            absorbed_time=np.full(n, math.nan) if ends else None,
-            absorbed_wall=np.full(n, -1, np.int32) if ends else None,
-            escape_time=None if openings is None else np.full(n, math.nan), openings=openings,
+            openings=openings, **none_left(n, openings is not None, ends),
         )  # fmt: skip
         if particles.image is not None:
             self.state = self.state._replace(image=particles.image, period=compiled.cell())

@@ -10,7 +10,7 @@ from ..compiled_scene import CompiledScene
 from ..contact.events import ARRIVED, FLYING
 from ..methods.base import Method
 from ..particles import Particles
-from ..state import Contacts, Floats, Multipliers, State
+from ..state import Contacts, Floats, Multipliers, State, none_left
 
 
 class Seeding(NamedTuple):
@@ -60,11 +60,9 @@ def state_of(
         particles.image,
         None if period is None or period.fall is None else np.zeros(n),
         period,
-        None if openings is None else np.full(n, math.nan),
-        openings,
-        starts,
-        np.full(n, math.nan) if ends else None,
-        np.full(n, -1, np.int32) if ends else None,
+        openings=openings,
+        starts=starts,
+        **none_left(n, openings is not None, ends),
         late=np.zeros(n) if (particles.births is not None or ends) and not method.may_slide() else None,
         pressed=np.zeros((rows, n)) if presses else None,
     )
