@@ -9,11 +9,10 @@ import math
 from typing import Any
 
 from ..kernel.arrays import index
-from ..kernel.gravity import accelerated
 from ..kernel.grid import cell_of, until_next, until_out
 from ..kernel.jit import outlined, select
 from ..kernel.limits import EPSILON
-from ..kernel.vector import ZERO, column, dot, norm, put
+from ..kernel.vector import column, dot, norm, put
 from ..surfaces.facets.facet_cells import flight_in
 from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact.course import rise_time
@@ -50,15 +49,14 @@ class UnderWayInMotion(UnderWay):
     def flight(self, gravity, i):
         """The flight of a lane."""
         r, v, rows = column(self.rows, START, i), column(self.rows, SPEED, i), self.rows
-        return flight_of(r, v, accelerated(gravity, ZERO, 1.0), rows[_REMAINING, i], rows[_FAST, i])
+        return flight_of(r, v, gravity, rows[_REMAINING, i], rows[_FAST, i])
 
     def seen(self, mesh, gravity, i):
         """A lane in the frame of the mesh now, as `InWallFrame`."""
-        rows = self.rows
-        weight = norm(accelerated(gravity, ZERO, 1.0))
+        rows, flight = self.rows, self.flight(gravity, i)
         return InWallFrame(
             mesh.drive, column(rows, _PLACE, i), column(rows, _PACE, i), column(rows, _PULL, i),
-            rows[_FAST, i] + self.time[i] * weight, rows[_ARM, i], weight, rows[_COORDINATES, i],
+            flight.fastest(self.time[i]), rows[_ARM, i], flight.weight(), rows[_COORDINATES, i],
         )  # fmt: skip
 
     def facets(self, mesh):

@@ -7,9 +7,7 @@ import math
 from typing import Any
 
 from ...kernel.arrays import index
-from ...kernel.gravity import accelerated
 from ...kernel.jit import outlined, select
-from ...kernel.vector import ZERO
 from ...surfaces.in_motion.posed import Posed
 from ...surfaces.time_of_impact import flights, safe
 from ...surfaces.time_of_impact.flights import Hit
@@ -46,7 +44,7 @@ def _hit_before(walls, gravity, r, v, remaining, longest):
     found = safe.closed_hit(walls.at(remaining), gravity, r, v)
     if walls.accelerate:
         soonest = min(found.time, longest)
-        met = safe.march_moving(walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining), soonest)
+        met = safe.march_moving(walls, flight_of(r, v, gravity, remaining), soonest)
         if met.wall >= 0.0 or met.time < soonest:
             return met
     return found

@@ -114,7 +114,7 @@ class Swaying(Record):
         freedom, walls, time = self.freedom, self.walls, self.start + t
         now = freedom.posed(self.body, walls, time)
         euler = freedom.angle(walls, time).acceleration * cross(freedom.axis, freedom.arm(flight.place(t)))
-        return flight.seen(t, now, flight.pull - euler)._replace(drive=self.drive)
+        return flight.seen(t, now, (ZERO if flight.pull is None else flight.pull) - euler)._replace(drive=self.drive)
 
 
 class Angle(NamedTuple):

@@ -9,9 +9,8 @@ rho1 - rho0 = r1 - r0 - (d1 - d0): it is that at a wall at rest, with the free d
 from typing import Any
 
 from ...kernel.angle import sine_and_versine
-from ...kernel.gravity import accelerated
 from ...kernel.jit import select
-from ...kernel.vector import ZERO, Vec, absolute, cross, dot, norm, times, total
+from ...kernel.vector import Vec, absolute, cross, dot, norm, times, total
 from ..frames import Framed
 from ..time_of_impact import safe
 from ..time_of_impact.rising import flight_of
@@ -137,10 +136,10 @@ class Posed(Framed):
 
     def sees(self, gravity, r, v):
         """A particle in the frame of the wall now, as `Seen`."""
-        return self.seen(flight_of(r, v, accelerated(gravity, ZERO, 1.0), self.remaining), 0.0)
+        return self.seen(flight_of(r, v, gravity, self.remaining), 0.0)
 
     def first_hit(self, r, v):
-        return self.falling_hit(r, v, ZERO)
+        return self.falling_hit(r, v, None)
 
     def falling_hit(self, r, v, pull):
         found = safe.march_alone(Walls((self,)), r, v, pull, self.remaining)
@@ -148,7 +147,7 @@ class Posed(Framed):
 
     def field_hit(self, gravity, r, v):
         """The first `Hit` with the bodies of a field, or how far the flight is surely free."""
-        return safe.march_alone(Walls((Field(self),)), r, v, accelerated(gravity, ZERO, 1.0), self.remaining)
+        return safe.march_alone(Walls((Field(self),)), r, v, gravity, self.remaining)
 
     def until_next_cell(self, r, v):
         """When a straight flight may meet another body of a field."""

@@ -208,8 +208,8 @@ class SphereNumbers(Distance, ExactChord):
         drive = seen.drive
         spin, arm = drive.angular_speed(), norm(self.center - drive.center)
         return Bounds(
-            seen.speed + seen.weight * within + drive.fastest + spin * arm,
-            seen.weight + drive.hardest + spin * spin * arm,
+            seen.fastest(within) + spin * arm,
+            seen.hardest() + spin * spin * arm,
             drive.jerk + spin * spin * spin * arm,
         )
 

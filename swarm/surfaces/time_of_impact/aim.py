@@ -11,10 +11,9 @@ proven is left to the safe steps of strides.py, which begin anew.
 import math
 from typing import Any
 
-from ...kernel.gravity import accelerated
 from ...kernel.jit import select
 from ...kernel.limits import EPSILON
-from ...kernel.vector import ZERO, norm
+from ...kernel.vector import norm
 from ..in_motion.drive import Wave
 from ..in_motion.moving import Moving
 from .flights import COURSE
@@ -165,7 +164,7 @@ def is_open(course, lane, remaining):
 
 
 def _known(walls, gravity, speed, r, v, remaining, t):
-    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining, speed)
+    flight = flight_of(r, v, gravity, remaining, speed)
     return tuple(
         (number, ThirdDerivativeBound(wall.body, seen, wall.body.level_along(seen)))
         for wall, number, seen in seen_by_walls(walls, flight, t)

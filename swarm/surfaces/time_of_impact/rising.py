@@ -12,10 +12,11 @@ import math
 from typing import Any
 
 from ...kernel.gravity import Bounds as Bounds
+from ...kernel.gravity import accelerated, as_vector, displacement
 from ...kernel.grid import MostPull
 from ...kernel.jit import select
 from ...kernel.record import Record
-from ...kernel.vector import Vec, absolute, dot, norm, times, total
+from ...kernel.vector import ZERO, Vec, absolute, dot, norm, times, total
 from .course import Majorant, rise_time
 
 # The bounds of a step hold for at most so many times its length, after so many trials.
@@ -30,25 +31,33 @@ class Flight(Record):
 
     r: Vec
     v: Vec
-    pull: Vec
+    pull: Any  # G, or None: lanes would add zeros
     remaining: float
     speed: float  # |v|
-    weight: float  # |G|
 
     def place(self, t):
         """The place of the particle after a time."""
-        return self.r + t * (self.v + (0.5 * t) * self.pull)
+        return self.r + displacement(self.pull, self.v, t)
 
     def velocity(self, t):
         """Its velocity then."""
-        return self.v + t * self.pull
+        return accelerated(self.pull, self.v, t)
+
+    def weight(self):
+        """|G|, or None"""
+        return None if self.pull is None else norm(self.pull)
+
+    def fastest(self, t):
+        """A bound of its speed until then."""
+        return self.speed if self.pull is None else self.speed + t * norm(self.pull)
 
     def seen(self, t, wall, pull):
-        """The particle after a time as `InWallFrame` in the frame of a wall `Posed` then, where this pulls it."""
+        """The particle after a time as `InWallFrame` in the frame of a wall `Posed` then; this pulls it, or None."""
         p, v = self.place(t), self.velocity(t)
         return InWallFrame(
-            wall.drive, wall.own_place(p), wall.own_velocity(p, v), wall.own_pull(p, v, pull),
-            self.speed + t * self.weight, wall.arm_length(p), self.weight,
+            wall.drive, wall.own_place(p), wall.own_velocity(p, v),
+            wall.own_pull(p, v, ZERO if pull is None else pull),
+            self.fastest(t), wall.arm_length(p), self.weight(),
             total(absolute(p)) + total(absolute(wall.pose.shift)),
         )  # fmt: skip
 
@@ -62,15 +71,25 @@ class InWallFrame(Record):
     a: Vec
     speed: float  # a bound of |v| in the scene
     arm: float  # its distance from the centre of the rotation; 0 without a rotation
-    weight: float  # |G|
+    weight: Any  # |G|, or None
     coordinates: float  # what the round-off of its place is relative to [m]
+
+    def fastest(self, within):
+        """A bound of its speed for so long [s], relative to where the motion carries the centre of the rotation."""
+        own = self.speed if self.weight is None else self.speed + self.weight * within
+        return own + self.drive.fastest
+
+    def hardest(self):
+        """That of its acceleration."""
+        hardest = self.drive.hardest
+        return hardest if self.weight is None else self.weight + hardest
 
     def bounds(self, within):
         """`Bounds` that hold for so long [s]."""
         drive, spin = self.drive, self.drive.angular_speed()
         # Derivatives of A^T (r - c - d), where each of A^T turns by the rate once more
-        speed = self.speed + self.weight * within + drive.fastest
-        arm, hard = self.arm + speed * within, self.weight + drive.hardest
+        speed, hard = self.fastest(within), self.hardest()
+        arm = self.arm + speed * within
         return Bounds(
             speed + spin * arm,
             hard + spin * (2.0 * speed + spin * arm),
@@ -85,9 +104,10 @@ class InWallFrame(Record):
         return tuple(MostPull(min(a + more, most), min(more - a, most)) for a in self.a)
 
 
-def flight_of(r, v, pull, remaining, speed=None):
+def flight_of(r, v, gravity, remaining, speed=None):
     """The flight of a particle, and its speed where that is known."""
-    return Flight(r, v, pull, remaining, norm(v) if speed is None else speed, norm(pull))
+    pull = None if gravity is None else as_vector(gravity)
+    return Flight(r, v, pull, remaining, norm(v) if speed is None else speed)
 
 
 # --- What walls that move never reach --------------------------------------------------------------------

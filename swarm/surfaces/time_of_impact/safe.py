@@ -4,12 +4,10 @@ import math
 from typing import Any
 
 from ...kernel.arrays import index
-from ...kernel.gravity import accelerated
 from ...kernel.grid import cell_of, entries_of
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.record import Record
-from ...kernel.vector import ZERO
 from ..fields.members import member
 from ..presence.rooms import leaving
 from ..walls import Field, Following, Walls
@@ -187,7 +185,7 @@ def first_hit_moving(walls, gravity, r, v, remaining):
         return _first_hit_in_rooms(walls, gravity, r, v, remaining)
     found = closed_hit(walls.at(remaining), gravity, r, v)
     longest = select(found.time < remaining, found.time, remaining)
-    met = march_moving(walls, flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining), longest)
+    met = march_moving(walls, flight_of(r, v, gravity, remaining), longest)
     if met.wall >= 0.0 or met.time < longest:
         return met
     return found

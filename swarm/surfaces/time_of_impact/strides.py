@@ -7,10 +7,9 @@ find goes on in the next pass, from where it is.
 
 import math
 
-from ...kernel.gravity import accelerated
 from ...kernel.jit import select
 from ...kernel.limits import EPSILON
-from ...kernel.vector import ZERO, norm
+from ...kernel.vector import norm
 from ..in_motion.moving import Moving
 from .flights import Hit
 from .rising import ThirdDerivativeBound, flight_of
@@ -36,7 +35,7 @@ def stride(walls, gravity, course, lane, r, v, remaining, is_first):
     """One stride of a lane that has not met a wall."""
     t, met, closed = course[TIME, lane], course[MET, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining) - t
-    flight = flight_of(r, v, accelerated(gravity, ZERO, 1.0), remaining, course[SPEED, lane])
+    flight = flight_of(r, v, gravity, remaining, course[SPEED, lane])
     known = tuple(
         (number, ThirdDerivativeBound(wall.body, seen, wall.body.level_along(seen)))
         for wall, number, seen in seen_by_walls(walls, flight, t)
