@@ -217,8 +217,9 @@ def _sinc(x):
 class Drive(Record):
     """The motion of a wall, as kernels take it in one frame."""
 
-    shift: Vec  # d at the end of the frame
-    velocity: Vec
+    # A motion without the one or the other adds no zeros in lanes.
+    shift: Any  # d at the end of the frame, or None
+    velocity: Any  # of the translation, or None
     swings: tuple[Any, ...]  # each a `Swing`
     track: Any  # None or `Track`
     turn: Any  # None or `Turn`; None also where the rotation leaves the surface as it is
@@ -252,11 +253,10 @@ class Drive(Record):
         swung: Any = None
         for k, swing in enumerate(self.swings):
             swung = _sum(swung, swing.at(waves[k]))
-        moved = _sum((self.shift - remaining * self.velocity, self.velocity, None), swung)
+        moved = _sum((self.middle(-remaining), self.velocity, None), swung)
         if self.track is not None:
             moved = _sum(moved, self.track.at(-remaining))
-        d, v, a = moved
-        return PoseDerivatives(d, v, ZERO if a is None else a, turn)
+        return PoseDerivatives(*(ZERO if one is None else one for one in moved), turn)
 
     def mean_velocity(self, middle, h):
         """The mean of d' over a time h around the middle."""
@@ -265,11 +265,16 @@ class Drive(Record):
         swings = ZERO
         for swing in self.swings:
             swings = swings + swing.mean_velocity(middle, h)
-        return self.velocity + swings + (ZERO if self.track is None else self.track.mean_velocity(middle, h))
+        steady = ZERO if self.velocity is None else self.velocity
+        return steady + swings + (ZERO if self.track is None else self.track.mean_velocity(middle, h))
+
+    def middle(self, t):
+        """Its displacement without swings and spline at a time since the end of the frame, or None."""
+        return self.shift if self.velocity is None else self.shift + t * self.velocity
 
     def swing_center(self, t):
         """Its displacement without swings at a time since the end of the frame, if it moves in no other ways."""
-        middle = self.shift + t * self.velocity
+        middle = self.middle(t)
         for swing in self.swings:
             middle = middle - swing.cosine
         return middle
@@ -281,7 +286,8 @@ class Drive(Record):
         """
         if not self.only_swings() or not body.has_core:
             return None
-        return body.passage(r - self.swing_center(-remaining), v - self.velocity, Swings(self.swings))
+        w = v if self.velocity is None else v - self.velocity
+        return body.passage(r - self.swing_center(-remaining), w, Swings(self.swings))
 
     def only_swings(self):
         """Whether it moves uniformly but for swings."""
@@ -299,14 +305,14 @@ def drive_of(surface: Surface, moment: float) -> Drive:
     """The motion of a surface in the frame that ends at a moment [s]."""
     # A guide says how impacts move a wall, which is at rest before.
     parts = [one for one in motions.parts_of(surface.motion) if not isinstance(one, motions.Guide)]
-    velocity, track, turn, spin, center = np.zeros(3), None, None, None, ZERO
+    velocity, track, turn, spin, center = None, None, None, None, ZERO
     harmonics: list[motions.Led] = []
     shift = motions.pose(surface.motion, moment).shift
     fastest = hardest = jerk = 0.0
     time_scale, jerks = math.inf, np.zeros(3)
     for one in parts:
         if isinstance(one, motions.Translation):
-            velocity = velocity + np.array(one.velocity)
+            velocity = np.array(one.velocity) + (0.0 if velocity is None else velocity)
         elif isinstance(one, motions.Oscillation):
             harmonics.append(one.harmonic((0.0, 0.0, 0.0)))
         elif isinstance(one, motions.Path):
@@ -326,9 +332,8 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             fastest += float(max(np.sqrt((control**2).sum(axis=0)).max() for control in controls))
         else:
             axis = motions.unit_axis(one)
-            direction = tuple(axis.tolist())
+            direction, center, spin = tuple(axis.tolist()), _vector(one.center), _vector(one.rate * axis)
             time_scale = min(time_scale, _SLOW / abs(one.rate)) if one.rate else time_scale
-            center, spin = _vector(one.center), _vector(one.rate * axis)
             if surface.is_unturned_by(direction, one.center):
                 continue
             about = surface.turning_center(direction) if one.rate else None
@@ -348,9 +353,10 @@ def drive_of(surface: Surface, moment: float) -> Drive:
         hardest += amplitude * rate**2
         jerk += amplitude * rate**3
         jerks += np.hypot(led.cosine, led.sine) * rate**3
-    fastest += math.hypot(*velocity)
+    fastest += math.hypot(*(() if velocity is None else velocity))
     bounds = fastest, hardest, jerk, time_scale, fastest * moment, _vector(jerks)
-    return Drive(_vector(shift), _vector(velocity), swings, track, turn, spin, center, *bounds)
+    at_end = None if turn is not None and len(parts) == 1 else shift
+    return Drive(*map(_vector_or_none, (at_end, velocity)), swings, track, turn, spin, center, *bounds)
 
 
 def _swing(led: motions.Led, moment: float) -> Swing:
@@ -362,3 +368,7 @@ def _swing(led: motions.Led, moment: float) -> Swing:
 
 def _vector(values: Any) -> Vec:
     return vec(np.asarray(values, np.float64).tolist())
+
+
+def _vector_or_none(values: Any) -> Vec | None:
+    return None if values is None else _vector(values)

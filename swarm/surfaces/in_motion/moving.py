@@ -196,7 +196,7 @@ def walls_of(surface: Surface, moment: float, largest: float | None = None) -> l
         return [first, *others]
     drive = drive_of(surface, moment)
     if isinstance(first, (Members, OneWall)):
-        first = first.loosened(drive.late + norm(drive.shift) + norm(drive.center))
+        first = first.loosened(drive.late + norm(drive.pose(0.0).shift) + norm(drive.center))
     kind = Translated if _is_uniform(drive) else Moving if drive.turn is None else TurningWall
     return [kind(first, drive), *map(Following, others)]
 

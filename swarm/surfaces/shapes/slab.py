@@ -288,8 +288,9 @@ class SlabNumbers(Distance, ExactChord):
         inverse = select(moves, 1.0 / select(moves, u, 1.0), 0.0)
         middle, width = -x * inverse, CORE * self.radius - depth
         inverse = abs(inverse)
-        half = select(width > 0.0, width, 0.0) * inverse
-        hits = select(moves, middle + self.radius * inverse, math.inf)
+        half, hits = select(width > 0.0, width, 0.0) * inverse, middle + self.radius * inverse
+        # Outwards from beyond the mean wall it is met some time later, if at all: a guess.
+        hits = select(moves, select(hits > 0.0, hits, hits + depth * inverse), math.inf)
         # A particle faster than the wall comes nearer to one plane all the time, and leaves the other.
         return Passage(middle - half, middle + half, hits, CORE * abs(u) > speed)
 
