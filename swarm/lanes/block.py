@@ -14,7 +14,8 @@ from ..kernel.jit import kernel, outlined
 from ..kernel.record import Record
 from ..kernel.vector import put
 from ..methods import contract as methods
-from ..surfaces.in_motion.moving import Carried
+from ..surfaces.in_motion.moving import Aimed, Carried
+from ..surfaces.time_of_impact import aim
 from .accounts import add_to_rows, add_work
 from .contact_ends import end_contacts, end_hard_contacts, impulses_before
 from .escape import meet_openings, step_out, step_out_lanes
@@ -205,9 +206,14 @@ def _count_contacts(method, share, lanes, first, after):
 def _make_contacts(method, walls, gravity, share, lanes, picked, live):
     """The contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
     some_arrived, some_hard, watches = False, False, share.watchers.of_impacts()
+    at_once = method.lands and isinstance(walls, Aimed)
+    if at_once:
+        for i in range(index(live)):
+            aim.put_waves(walls, lanes.course, i, lanes.lane(i).remaining)
     for i in range(index(live)):
         lane, found = lanes.given(method, i), solution(method, lanes, i)
-        here = method.walls_of(lanes.faced(of_lane(walls, picked, i), i), lane.remaining)
+        here = lanes.faced(of_lane(walls, picked, i), i)
+        here = method.walls_of(aim.with_waves(here, lanes.course, i) if at_once else here, lane.remaining)
         contact = method.contact(here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _put_contact(method, lanes, i, contact), (contact.wall <= methods.HARD) & (not method.holds)
         _add_impulse(walls, lanes.impulse, i, contact.wall, contact.impulse)

@@ -168,12 +168,12 @@ def _aim_at_moving(walls, gravity, lanes, live):
         aim.start(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
     for _round in range(aim.AIMS):
         for i in range(index(live)):
-            aim.put_waves(walls, course, i, lanes.lane(i).remaining, False)
+            aim.put_waves_at_guess(walls, course, i, lanes.lane(i).remaining, False)
         for i in range(index(live)):
             lane = lanes.lane(i)
             aim.improve(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
     for i in range(index(live)):
-        aim.put_waves(walls, course, i, lanes.lane(i).remaining, True)
+        aim.put_waves_at_guess(walls, course, i, lanes.lane(i).remaining, True)
     for i in range(index(live)):
         lane = lanes.lane(i)
         aim.prove(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)

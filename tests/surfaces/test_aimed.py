@@ -45,9 +45,9 @@ def aimed_hit(walls, flight):
     with np.errstate(all="ignore"):
         aim.start(walls, None, course, 0, *flight)
         for _round in range(aim.AIMS):
-            aim.put_waves(walls, course, 0, flight[2], False)
+            aim.put_waves_at_guess(walls, course, 0, flight[2], False)
             aim.improve(walls, None, course, 0, *flight)
-        aim.put_waves(walls, course, 0, flight[2], True)
+        aim.put_waves_at_guess(walls, course, 0, flight[2], True)
         aim.prove(walls, None, course, 0, *flight, False)
         if aim.is_open(course, 0, flight[2]) and aim.has_series(walls):
             aim.start_series(walls, None, course, 0, *flight)
@@ -148,6 +148,21 @@ def test_a_sphere_that_goes_along_a_circle_is_met_as_in_fifty_digits():
         assert late <= 4.0 * np.finfo(float).eps * (sum(map(abs, r)) + math.hypot(*v) * hit.time + 1.0)
         assert before < 0.0
     assert found >= FLIGHTS // 2
+
+
+@pytest.mark.parametrize("speed", [0.6, 1.0, 4.0])
+def test_a_flight_outwards_from_beyond_the_mean_planes_is_proven(speed):
+    """The swing has carried one plane beyond the particle, which is above the mean place of it."""
+    swing = swarm.Oscillation((0.08, 0.0, 0.0), frequency=0.5)
+    walls = swarm.Scene([swarm.Slab((1.0, 0.0, 0.0), 0.3, motion=swing)]).compiled().walls(START + SPAN)
+    # A quarter of a period after the start of the swing: half a second of the frame has passed
+    flight = vec((0.33, 0.1, 0.0)), vec((speed, 0.2, 0.0)), START + SPAN - 0.5
+    found, wanted = aimed_hit(walls, flight), strode_hit(walls, flight)
+    assert wanted.wall == 0.0
+    assert found is not None
+    assert found.wall == wanted.wall
+    assert found.time == pytest.approx(wanted.time, rel=1e-11, abs=1e-13)
+    assert 0.0 < found.time < 0.06 / speed
 
 
 def test_lanes_without_a_proof_step_side_by_side_as_each_would_alone(monkeypatch):

@@ -42,7 +42,8 @@ class Moving(Record):
         """The wall over a step; at its start and end so much of the frame is left [s]."""
         start = self.drive.pose(remaining)
         end = start if after is remaining else self.drive.pose(after)
-        return self.posed(self.body, start, end, self.drive, remaining, after)
+        # The waves of this instant are those of no other.
+        return self.posed(self.body, start, end, self.drive._replace(waves=None), remaining, after)
 
     def seen(self, flight, t):
         """A particle as safe steps to the wall see it after a time of its flight, or None if no steps are needed."""

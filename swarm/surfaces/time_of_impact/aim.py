@@ -59,21 +59,25 @@ def start_series(walls, gravity, course, lane, r, v, remaining):
             course[WALLS + k * _OF_WALL + i, lane] = one.level[i]
 
 
-def put_waves(walls, course, lane, remaining, is_last):
-    """The waves of all motions at the guess of a lane, in a loop of its own: two short loops are sooner than a long.
+def put_waves_at_guess(walls, course, lane, remaining, is_last):
+    """The waves of all motions at the guess of a lane.
 
     Before the last improvement an error of a guess leaves its third power.
     """
-    guess, at = course[_GUESS, lane], _first_wave(walls)
+    put_waves(walls, course, lane, remaining - course[_GUESS, lane], not is_last)
+
+
+def put_waves(walls, course, lane, left, nearly=False):
+    """The waves of all motions with so much of the frame left, in a loop of its own: two short loops are sooner."""
+    at = _first_wave(walls)
     for drive in _known_drives(walls):
-        left = remaining - guess
-        for wave in drive.waves_at(left) if is_last else drive.nearly_waves_at(left):
+        for wave in drive.nearly_waves_at(left) if nearly else drive.waves_at(left):
             course[at, lane], course[at + 1, lane] = wave
             at += _OF_WAVE
 
 
-def _at_guess(walls, course, lane):
-    """The walls with the waves of a lane."""
+def with_waves(walls, course, lane):
+    """The walls with the waves that were put for a lane."""
     at = _first_wave(walls)
     waves: tuple[Wave, ...] = ()
     for drive in _known_drives(walls):
@@ -97,7 +101,7 @@ def _known_drives(walls):
 def improve(walls, gravity, course, lane, r, v, remaining):
     """A guess that is nearer to the hit."""
     guess = course[_GUESS, lane]
-    known = _known(_at_guess(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
+    known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
     closed = course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining)
     way, _wall = _nearest_root(known)
@@ -110,7 +114,7 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
     """The hit of a lane, if it is proven: for walls that only swing by their passages, or `by_series` as for others."""
     guess, closed = course[_GUESS, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining)
-    known = _known(_at_guess(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
+    known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
     way, wall = _nearest_root(known)
     meets = guess + way < longest
     way = select(meets, way, longest - guess)
