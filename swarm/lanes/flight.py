@@ -4,6 +4,7 @@ import numpy as np
 
 from ..kernel.arrays import index, unwritten
 from ..kernel.jit import outlined, select
+from ..methods.contract import HARD
 from ..surfaces.in_motion.moving import Aimed, Carried, Leaping, Marched, Strided
 from ..surfaces.periodic.period import cut
 from ..surfaces.presence.rooms import at_the_end, inside_of
@@ -59,18 +60,34 @@ def _step_off(method, walls, gravity, lanes, live):
     for i in range(index(live)):
         lane = lanes.given(method, i)
         lanes.wall[i] = select(lane.remaining > 0.0, method.touched(walls, gravity, lane), -1.0)
-        lanes.marked[i] = lanes.wall[i] < 0.0
+        lanes.marked[i] = (lanes.wall[i] < 0.0) & (lanes.wall[i] > HARD)
     _fly_beside(method, walls, gravity, lanes, marked_lanes(lanes, live))
 
 
 @outlined
 def _fly_beside(method, walls, gravity, lanes, some):
-    """The flights of so many lanes, those in `lanes.order`, side by side in a table of their own."""
-    beside = lanes._replace(rows=unwritten((Flying.ROWS, STRIDE), np.float64), wall=unwritten(STRIDE, np.float64))
+    """The flights of so many lanes, those in `lanes.order`, side by side in a table of their own.
+
+    To walls of which lanes find the first hit together these are known: one safe step of each wall by itself ended far
+    from most, and took half of the time of all steps into walls that turn.
+    """
+    beside = lanes._replace(
+        rows=unwritten((Flying.ROWS, STRIDE), np.float64), wall=unwritten(STRIDE, np.float64),
+        order=unwritten(STRIDE, np.int64),
+    )  # fmt: skip
     for k in range(index(some)):
         copy_lane(lanes.rows, index(lanes.order[k]), beside.rows, k, Flying.ROWS)
+    if isinstance(walls, Strided):
+        for k in range(index(some)):
+            # The search counts what is left of a frame in seconds.
+            lane = beside.lane(k)
+            lane.remaining = method.seconds(lane.remaining)
+        _stride(walls, gravity, beside, some)
+        for k in range(index(some)):
+            beside.lane(k).remaining = lanes.lane(index(lanes.order[k])).remaining
     for k in range(index(some)):
-        _flight(method, walls, gravity, beside, k, flights.NEVER)
+        free = strides.met(beside.course, k) if isinstance(walls, Strided) else None
+        _flight(method, walls, gravity, beside, k, free)
     for k in range(index(some)):
         i = index(lanes.order[k])
         copy_lane(beside.rows, k, lanes.rows, i, Flying.ROWS)
@@ -96,8 +113,10 @@ def _search(met, walls, gravity, lanes, live):
 
 
 def _first_hit(met, walls, gravity, lane, lanes, i):
-    """The first hit of a lane with the walls that the method lands on."""
-    if met is None or not met.each:
+    """The first hit of a lane with the walls that the method lands on; None where it lands on none."""
+    if met is None:
+        return None
+    if not met.each:
         return flights.NEVER
     if _has_fields(met) or _leaps(met):
         return hit_of_lane(lanes, i)
@@ -307,7 +326,7 @@ def _flight(method, walls, gravity, lanes, i, hit):
         if walls.inset is not None:
             end = end._replace(r=inside_of(walls.at(end.remaining), end.wall, end.r))
     else:
-        end = cut_steps(lanes.period, method, walls, gravity, lane, method.flight(walls, gravity, lane))
+        end = cut_steps(lanes.period, method, walls, gravity, lane, method.flight(walls, gravity, lane, hit))
     if method.asks_flown:
         lanes.flown[i] = lane.remaining - end.remaining
     lanes.lane(i).put_end(end)

@@ -185,8 +185,11 @@ class MethodNumbers(Record):
     # Whether contacts ask how long the flight before them was: a constant for the compiler.
     asks_flown = False
 
-    def flight(self, walls, gravity, lane):
-        """The `FlightEnd` to the next contact, or to the end, of a method that finds its contacts by itself."""
+    def flight(self, walls, gravity, lane, hit=None):
+        """The `FlightEnd` to the next contact, or to the end, of a method that finds its contacts by itself.
+
+        `hit` is its first hit, a `flights.Hit`, where it is known.
+        """
         return FlightEnd(lane.r, lane.v, lane.remaining, -1.0)
 
     def land(self, walls, gravity, lane, hit):

@@ -132,8 +132,7 @@ def check_turns(method: base.Method, scene: Scene) -> None:
     for i, surface in enumerate(scene.surfaces):
         if surface.motion is None or drive_of(surface, 0.0).turn is None:
             continue
-        if any(wall.flat_normal() is None for wall in surface.walls()):
-            require([surface], purpose, ("turned_push",), f"surfaces[{i}]")
+        require([surface], purpose, ("turned_push",), f"surfaces[{i}]")
 
 
 def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
@@ -304,11 +303,12 @@ class Steps(contract.MethodNumbers):
         """The work of a force of this wall in a step with these walls and ends, r0 and r1; 0 where no wall moves."""
         return 0.0 if self.moving is None else dot(force, over.swept(wall, *ends))
 
-    def flight(self: Any, walls, gravity, lane):
+    def flight(self: Any, walls, gravity, lane, hit=None):
         """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""
-        dt = self.dt
+        dt, left = self.dt, lane.remaining * self.dt
+        free = safe.free_time_moving(walls, gravity, lane.r, lane.v, left) if hit is None else hit.time
         # One too many by round-off starts a contact 1e-16 deep: harmless.
-        steps = np.floor(safe.free_time_moving(walls, gravity, lane.r, lane.v, lane.remaining * dt) * (1.0 / dt))
+        steps = np.floor(free * (1.0 / dt))
         return self.flown(walls, gravity, lane, select(steps < lane.remaining, steps, lane.remaining))
 
     def flown(self: Any, walls, gravity, lane, steps):

@@ -40,8 +40,8 @@ class Penalty(fixed_step.SoftWalls):
     through the edge of a solid that is shorter than |v| dt. A particle that gets through the middle of a solid ends
     the run with an error, which names a penalty that holds it.
 
-    Walls that move: the step is that of the frame of each wall. A contact with one that turns costs two to four times
-    one at rest. Where walls move in any way but uniformly, free steps are jumped over in several parts.
+    Walls that move: the step is that of the frame of each wall. A contact with one that turns costs two to three times
+    one at rest. Where walls move in any way but uniformly, free steps may be jumped over in several parts.
 
     Cells that repeat: a particle that leaves the cell comes back at the end of its step. Among solids that have images
     a step may go a twentieth of the shortest period.

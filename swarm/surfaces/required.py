@@ -100,7 +100,8 @@ def _lacking(wall: Any, name: str) -> Iterator[str]:
         yield from () if hasattr(wall, "side") else ("the field `side`",)
     elif name == "falling_hit" and wall.is_quartic:
         yield from () if wall.gives("course") else ("course()",)
-    elif wall.gives(name):
+    elif wall.gives(name) or (name == "turned_push" and wall.flat_normal() is not None):
+        # A flat wall is pushed as at rest, however it turns.
         return
     elif name in _OF_PHI and wall.gives("inner"):
         yield f"{name}() for its `inner`"

@@ -8,7 +8,7 @@ import pytest
 
 import swarm
 from swarm.kernel.vector import dot, vec
-from swarm.surfaces.time_of_impact import safe
+from swarm.surfaces.time_of_impact import strides
 
 H, ALPHA, RATE = 0.01, 300.0, 2.0
 TURN = swarm.Rotation((0.3, 0.5, 1.0), RATE, (0.02, -0.01, 0.0))
@@ -20,6 +20,7 @@ WALLS = {
         swarm.Sphere(0.8), swarm.Ellipsoid((0.1, 0.3, 0.2), (0.3, 0.0, 0.0), side="outside", motion=motion),
     ],
     "box": lambda motion: [swarm.Box((0.3, 0.25, 0.2), rotation=(1.0, 0.3, -0.2, 0.5), motion=motion)],
+    "can": lambda motion: [swarm.Cylinder(0.4, axis=(1.0, 0.0, 2.0), length=0.8, motion=motion)],
     "wedge": lambda motion: [swarm.Plane((s, 0.3, -1.0), 0.2, motion=motion) for s in (-1.0, 1.0)],
 }  # fmt: skip
 
@@ -152,17 +153,34 @@ def test_the_loop_of_multipliers_ends_on_a_wall_that_turns():
 # --- What is asked ---------------------------------------------------------------------------------------
 
 
-def test_a_step_in_a_contact_asks_for_no_safe_step(monkeypatch):
-    asked, whole = [], safe.free_time_moving
-    monkeypatch.setattr(safe, "free_time_moving", lambda *given: asked.append(1) or whole(*given))
+@pytest.mark.parametrize("name", ["box", "ellipsoid"])
+def test_a_step_in_a_contact_asks_for_no_safe_step(name, monkeypatch):
+    asked, whole = [], strides.met
+    monkeypatch.setattr(strides, "met", lambda *given: asked.append(1) or whole(*given))
     # A contact of pi sqrt(m/alpha) takes 18 steps.
-    result = run(WALLS["box"](TURN), swarm.Penalty(H, ALPHA), 4.0)
+    result = run(WALLS[name](TURN), swarm.Penalty(H, ALPHA), 4.0)
     impacts = result.observables["impacts"][-1]
     assert impacts >= 10
-    assert impacts <= len(asked) <= 6 * impacts
+    assert impacts <= len(asked) <= 3 * impacts
 
 
 # --- Against other ways to compute it --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gravity", [None, (0.3, 0.0, -2.0)], ids=["straight", "falling"])
+@pytest.mark.parametrize("name", ["ellipsoid", "swinging ellipsoid", "paddle", "box", "swinging box"])
+def test_steps_that_are_jumped_over_are_free(name, gravity):
+    """Frames of one step jump over none."""
+    walls = [swarm.Box((0.3, 0.25, 0.2), motion=SWING)] if name == "swinging box" else WALLS[name](TURN)
+    start = swarm.Particles(np.array([[-0.1, 0.0], [0.0, 0.1], [0.0, 0.05]]), np.array([[1, 1], [0, 0.1], [0, 0]]), 1.0)
+    method, until, ends = swarm.Penalty(2.0 * H, ALPHA), 1.2, []
+    for every in (until, 2.0 * H):
+        result = swarm.simulate(
+            swarm.Scene(walls, gravity), start, method, until=until, every=every, compile="never"
+        )  # fmt: skip
+        ends.append((result.observables["impacts"][-1], result.particles.position))
+    assert ends[0][0] == ends[1][0] >= 2
+    assert np.allclose(ends[0][1], ends[1][1], rtol=0.0, atol=1e-11)
 
 
 def test_the_order_is_2():
