@@ -129,10 +129,11 @@ def check_instants(scene: Scene, dt: float) -> None:
 def check_turns(method: base.Method, scene: Scene) -> None:
     """Raise a `SceneError` where a wall that turns does not give what its steps are made of."""
     purpose = f"{type(method).__name__} at a wall that turns"
-    for i, surface in enumerate(scene.surfaces):
-        if surface.motion is None or drive_of(surface, 0.0).turn is None:
-            continue
-        require([surface], purpose, ("turned_push",), f"surfaces[{i}]")
+    # Of the walls that steps take: a union of several rooms is one, and a sphere about its own centre does not turn.
+    pieces = scene.compiled(apart="fixed steps").pieces
+    for i, piece in zip(pieces.owners, pieces.each, strict=True):
+        if piece.motion is not None and drive_of(piece, 0.0).turn is not None:
+            require([piece], purpose, ("turned_push",), f"surfaces[{i}]")
 
 
 def check_solids(scene: Scene, particles: Particles, dt: float) -> None:

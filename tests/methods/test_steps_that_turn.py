@@ -132,6 +132,16 @@ def test_energy_is_that_of_the_work(name, gravity):
     assert np.abs(result.observables["wall_work"][-1]).max() > 1e-3
 
 
+def test_rooms_turn_as_one_wall():
+    """Their spheres alone give no bend: about its own centre none of them turns."""
+    rooms = swarm.Union((swarm.Sphere(0.4), swarm.Sphere(0.3, (0.4, 0.0, 0.0))), motion=TURN)
+    start = swarm.Particles([-0.3, 0.0, 0.0], [-1.0, 0.4, 0.1], 1.0)
+    result = run([rooms], swarm.Penalty(2.0 * H, ALPHA), 0.4, start=start)
+    assert result.observables["impacts"][-1] >= 1
+    assert imbalance(result) <= 1e-12
+    assert abs(result.observables["wall_work"][-1].sum()) > 1e-3
+
+
 def test_laws_take_what_is_dissipated():
     surface = swarm.Ellipsoid((0.5, 0.6, 0.4), motion=TURN, restitution=0.8, friction=0.2)
     result = run([surface], swarm.Penalty(H, ALPHA), 2.0)
