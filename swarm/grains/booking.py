@@ -10,11 +10,11 @@ from ..kernel.jit import Array, outlined
 from ..kernel.vector import dot, norm
 from .at_walls import rising
 from .contacts import closing, worse
-from .friction import turning
 from .grain_arrays import (
     AFTER,
     BEFORE,
     COAST,
+    COLUMNS_OF_BALLS,
     DRAG,
     GAP,
     IMPULSE,
@@ -26,11 +26,21 @@ from .grain_arrays import (
     SIZE,
     START,
     set_vector,
-    set_vector_in,
     vector_at,
     vector_in,
 )
-from .lanes_of_pairs import balls_of, move_in, of_group, twist_in
+from .lanes_of_pairs import (
+    balls_of,
+    lanes_between,
+    move_in,
+    of_group,
+    over_lanes,
+    read_ends,
+    read_lines,
+    slip_in,
+    turning_in,
+    twist_in,
+)
 from .vessel import met, met_member, moves
 
 
@@ -68,31 +78,24 @@ def _lost(matter, work, gap, change):
     return -work / matter.h - force * change
 
 
-# Rows of what is read of the balls of a group, v_i - v_j at the end of the step and R_i w_i + R_j w_j at both together;
-# and of what is booked: the part of the virial, the gap at the end, and what is lost.
-_DIFFERENCE, _TURNED, _READ = 0, 3, 6
+# Rows of what is read of the balls of a group: velocities at the end of the step, and all of their spins.
+_SLIP, _SPINS, _READ = 0, 8, 24
+# Rows of what is booked of a contact: the part of the virial, the gap at the end, and what is lost.
 _VIRIAL, _END, _LOST, _BOOKED = 0, 1, 2, 3
-
-
-def _read(matter, grains, lane, balls, read):
-    """Read what balls have for what is booked of their contact."""
-    (i, j), speed = balls, grains.speed
-    set_vector_in(read, _DIFFERENCE, lane, vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
-    if matter.pairs.friction is not None:
-        set_vector_in(read, _TURNED, lane, turning(grains, i, j, BEFORE) + turning(grains, i, j, AFTER))
 
 
 def _weigh(matter, rows, q, lane, read, booked):
     """Compute what is booked of a contact."""
     s0, impulse = vector_in(rows, q + START, lane), vector_in(rows, q + IMPULSE, lane)
-    move = move_in(matter, rows, q, lane, vector_in(read, _DIFFERENCE, lane))
+    move = move_in(matter, rows, q, lane, slip_in(read, _SLIP, lane))
     gap, way, lost = rows[q + GAP, lane], closing(s0, rows[q + SIZE, lane], move), 0.0
     booked[_VIRIAL, lane], booked[_END, lane] = dot(s0 + 0.5 * move, impulse), gap + way.change
     if matter.pairs.damping is not None:
         lost = _lost(matter, dot(impulse, move), gap, way.change)
     if matter.pairs.friction is not None:
-        gained = dot(vector_in(rows, q + DRAG, lane), move) / matter.h
-        gained = gained - 0.5 * dot(twist_in(rows, q, lane, move), vector_in(read, _TURNED, lane))
+        gained, lines = dot(vector_in(rows, q + DRAG, lane), move) / matter.h, (_SPINS, _SPINS + COLUMNS_OF_BALLS)
+        turned = turning_in(read, *lines, BEFORE, lane) + turning_in(read, *lines, AFTER, lane)
+        gained = gained - 0.5 * dot(twist_in(rows, q, lane, move), turned)
         rows[q + RUBBED, lane] = -gained
         lost = lost - gained
     booked[_LOST, lane] = 0.5 * lost
@@ -117,9 +120,10 @@ def book_pairs(matter, grains, near, touches, books):
     for g in range(touches.used[1]):
         rows, q, ends, e = of_group(touches, g)
         lanes = touches.lanes[index(g)]
-        for k in range(lanes):
-            _read(matter, grains, index(k), balls_of(ends, e, index(k)), read)
-        for k in range(lanes):
+        read_ends(grains.speed, ends, e, read, _SLIP)
+        if matter.pairs.friction is not None:
+            read_lines(grains.spin, ends, e, read, _SPINS)
+        for k in over_lanes(lanes_between(0, lanes)):
             _weigh(matter, rows, q, index(k), read, booked)
         for k in range(lanes):
             lane = index(k)

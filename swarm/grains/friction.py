@@ -22,7 +22,6 @@ from .at_walls import press_at_wall, rising
 from .contacts import change_of, is_due, size_of, stir, worse
 from .grain_arrays import (
     AFTER,
-    ARM,
     BEFORE,
     COAST,
     DRAG,
@@ -55,12 +54,6 @@ def rubbed(drag, slip, ease, limit):
 
 
 # --- Of pairs --------------------------------------------------------------------------------------------
-
-
-def turning(grains, i, j, column):
-    """R_i w_i + R_j w_j"""
-    spin = grains.spin
-    return vector_at(spin, i, column) * spin[i, ARM] + vector_at(spin, j, column) * spin[j, ARM]
 
 
 def arm_of(way, size, change, nearness):

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..kernel.arrays import aligned, spaced
 from ..kernel.jit import Array
+from ..kernel.lines import LANES
 from ..kernel.record import Record
 from ..kernel.vector import Vec
 
@@ -21,6 +22,8 @@ BEFORE, AFTER, ARM, LEVER = 0, 3, 6, 7
 # Columns of `Grains.change`: that of the velocity in the last step, with which the next one begins to solve, and that
 # by the impulses of pairs in this one.
 LAST, GIVEN = 0, 4
+# All of these are of a line of the cache.
+COLUMNS_OF_BALLS = 8
 # Columns of a contact: s0, from one centre to the other at the start of a step, or the centre; |s0|, or the inner
 # function of the wall; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
 # inverse of the mass that moves; the damping; the gain of a Newton step; and where there is friction its
@@ -31,8 +34,6 @@ COLUMNS, COLUMNS_OF_FRICTION = 16, 24
 # And of one of a pair, in a lane: what makes its changes relative ones, 1/(R_i + R_j), and of both balls 1/m and what
 # turns them.
 SCALE, NEARNESS, EASES, LEVERS, COLUMNS_OF_LANES = 15, 24, 25, 27, 29
-# How many contacts of pairs are improved at once, see lanes_of_pairs.py.
-LANES = 8
 # Columns of `Touches.found`: both balls, and the place in the lists. Rows of `Tile.ends`: both balls.
 ONE, OTHER, PLACE, FOUND, ENDS = 0, 1, 2, 3, 2
 # Columns of `Touches.course`: the centre at the start of a step, the radius, the move in the step, and 1/mass: what is
@@ -179,14 +180,14 @@ def set_vector_in(rows: Any, k: Any, lane: Any, a: Vec) -> None:
 def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = None) -> Grains:
     """The rows of balls, in the order of their numbers."""
     n = len(mass)
-    place, speed = np.zeros((n, 8)), np.zeros((n, 8))
+    place, speed = aligned(8 * n).reshape(n, 8), aligned(8 * n).reshape(n, 8)
     place[:, X : X + 3], speed[:, BEFORE : BEFORE + 3] = position.T, velocity.T
     place[:, RADIUS], place[:, LIGHTNESS] = radius, 1.0 / mass
-    turning = None if spin is None else np.zeros((n, 8))
+    turning = None if spin is None else aligned(8 * n).reshape(n, 8)
     if turning is not None:
         turning[:, BEFORE : BEFORE + 3] = spin.T
         turning[:, ARM], turning[:, LEVER] = radius, ROUNDNESS / radius
-    return Grains(np.arange(n), place, speed, np.zeros((n, 4)), np.zeros((n, 8)), turning)
+    return Grains(np.arange(n), place, speed, np.zeros((n, 4)), aligned(8 * n).reshape(n, 8), turning)
 
 
 def beside(grains: Grains, more: Grains) -> Grains:

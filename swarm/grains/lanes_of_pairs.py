@@ -12,11 +12,12 @@ import math
 import numpy as np
 
 from ..kernel.arrays import fetch, index, kept, unwritten
-from ..kernel.jit import outlined
-from ..kernel.vector import cross, dot, square
+from ..kernel.jit import is_known, outlined, select
+from ..kernel.lines import FOUR, add_from_lanes, into_lanes
+from ..kernel.vector import Vec, cross, dot, square
+from .cell import nearest
 from .contacts import (
     ContactSweep,
-    apart,
     begin_solve,
     changed,
     closing,
@@ -26,16 +27,17 @@ from .contacts import (
     pressed,
     scale_of,
     size_of,
-    stir,
     weight_of,
     worse,
 )
-from .friction import arm_of, rubbed, turning
+from .friction import arm_of, rubbed
 from .grain_arrays import (
     AFTER,
+    ARM,
     BEFORE,
     COAST,
     COLUMNS,
+    COLUMNS_OF_BALLS,
     COLUMNS_OF_LANES,
     DAMPING,
     DRAG,
@@ -52,6 +54,7 @@ from .grain_arrays import (
     LEVERS,
     LIGHTNESS,
     LISTED,
+    LOST,
     NEARNESS,
     ONE,
     OTHER,
@@ -64,16 +67,12 @@ from .grain_arrays import (
     SIZE,
     START,
     OfPair,
-    set_vector,
+    X,
     set_vector_in,
     vector_at,
     vector_in,
     with_lanes,
 )
-
-# The balls of contacts so much later are asked for. A loop that asks is not one of vectors either: LLVM would make
-# gathers of its loads, which take AMD processors longer.
-_LATER = 32
 
 
 def of_group(touches, g):
@@ -84,14 +83,13 @@ def of_group(touches, g):
 
 def balls_of(ends, e, lane):
     """The balls of a contact of the group with these rows of balls."""
-    fetch(ends, index(e * LANES) + lane + _LATER)
     return index(ends[e, lane]), index(ends[e + 1, lane])
 
 
-def _fetch_next(rows, q, lane, columns):
-    """Ask for the lane's part of so many columns of the next group: those of many balls are not in the second cache."""
-    for k in range(-(-columns // LANES)):
-        fetch(rows, (q + COLUMNS_OF_LANES + k * LANES + lane) * LANES)
+def _fetch_next(rows, q, columns):
+    """Ask for so many columns of the next group: those of many balls are not in the second cache."""
+    for k in range(columns):
+        fetch(rows, (q + COLUMNS_OF_LANES + k) * LANES)
 
 
 def _fetch_ball(grains, i):
@@ -100,6 +98,31 @@ def _fetch_ball(grains, i):
         fetch(rows, i * rows.shape[1])
     if grains.spin is not None:
         fetch(grains.spin, i * grains.spin.shape[1])
+
+
+def read_lines(table, ends, e, tile, k):
+    """Read all columns of both balls of each contact of a group: those of the second one are behind the others."""
+    for n in (0, 1):
+        first = k + n * COLUMNS_OF_BALLS
+        into_lanes(tile, first, table, 0, ends, e + n)
+        into_lanes(tile, first + FOUR, table, FOUR, ends, e + n)
+
+
+def read_ends(table, ends, e, tile, k):
+    """Read what they have at the end of the step, in four columns from that on."""
+    into_lanes(tile, k, table, AFTER, ends, e)
+    into_lanes(tile, k + FOUR, table, AFTER, ends, e + 1)
+
+
+def slip_in(tile, k, lane):
+    """v_i - v_j, from `read_ends`."""
+    return vector_in(tile, k, lane) - vector_in(tile, k + FOUR, lane)
+
+
+def turning_in(tile, one, other, column, lane):
+    """R_i w_i + R_j w_j; in which rows of a tile the columns of both balls begin."""
+    turned = vector_in(tile, one + column, lane) * tile[one + ARM, lane]
+    return turned + vector_in(tile, other + column, lane) * tile[other + ARM, lane]
 
 
 def pair_at(touches, g, lane):
@@ -115,9 +138,10 @@ def move_in(matter, rows, q, lane, difference):
 
 # --- At the start of a step ------------------------------------------------------------------------------
 
-# Rows of what the contacts of a group begin with: v_i - v_j, of both ends of the step together, R_i + R_j, and the sum
-# of the magnitudes of the velocities that are foreseen; then the impulse, and the twist.
-_BOTH, _REACH, _SPEEDS, _ALL, _TURN, _READ = 0, 3, 4, 5, 8, 11
+# Rows of what the contacts of a group begin with: the lines of both balls, their places and their velocities, and what
+# turns them; then of what they give, as `give`: velocities by the impulses, and spins by the twists.
+_PLACE, _SPEED, _TURNS = 0, 16, 32
+_IMPULSES, _TWISTS, _READ = 40, 48, 56
 
 
 def _lay(touches, g, lane, c):
@@ -129,68 +153,75 @@ def _lay(touches, g, lane, c):
 
 @outlined
 def _begin_group(matter, grains, near, touches, group):
-    """Begin to solve for the contacts of a group from one lane to another, with their impulses as they are foreseen."""
-    (g, begin, end), place, speed, spin, half = group, grains.place, grains.speed, grains.spin, 0.5 * matter.h
+    """Begin to solve for the contacts of a group from one lane to another, with their impulses as they are foreseen.
+
+    Of a whole group also lanes that have no contact.
+    """
+    (g, begin, end, is_whole), spin = group, grains.spin
+    lanes = lanes_between(begin, end)
     read, (rows, q, ends, e) = unwritten((_READ, LANES), np.float64), of_group(touches, g)
     for k in range(begin, end):
-        lane = index(k)
-        i, j = balls_of(ends, e, lane)
         # Of the second ball in the next group, which has been laid; the first one is often that of this group.
-        _fetch_ball(grains, index(ends[e + ENDS + 1, lane]))
+        _fetch_ball(grains, index(ends[e + ENDS + 1, index(k)]))
         if near.drag is not None:
-            fetch(near.drag, int(rows[q + COLUMNS_OF_LANES + LISTED, lane]) * near.drag.shape[1])
-        v, u = vector_at(speed, i, BEFORE), vector_at(speed, j, BEFORE)
-        set_vector_in(rows, q + START, lane, apart(matter, place, i, j))
-        set_vector_in(rows, q + COAST, lane, v - u)
-        v1, u1 = vector_at(speed, i, AFTER), vector_at(speed, j, AFTER)
-        set_vector_in(read, _BOTH, lane, (v + v1) - (u + u1))
-        read[_SPEEDS, lane] = size_of(v1) + size_of(u1)
-        read[_REACH, lane] = place[i, RADIUS] + place[j, RADIUS]
-        one, two = place[i, LIGHTNESS], place[j, LIGHTNESS]
-        rows[q + EASES, lane], rows[q + EASES + 1, lane] = one, two
-        if near.drag is not None:
-            listed = index(int(rows[q + LISTED, lane]))
+            fetch(near.drag, int(rows[q + COLUMNS_OF_LANES + LISTED, index(k)]) * near.drag.shape[1])
+    read_lines(grains.place, ends, e, read, _PLACE)
+    read_lines(grains.speed, ends, e, read, _SPEED)
+    if matter.pairs.friction is not None:
+        into_lanes(read, _TURNS, spin, FOUR, ends, e)
+        into_lanes(read, _TURNS + FOUR, spin, FOUR, ends, e + 1)
+    if near.drag is not None:
+        for k in range(begin, end):
+            lane, listed = index(k), index(int(rows[q + LISTED, index(k)]))
             if matter.pairs.friction is not None:
-                rows[q + LEVERS, lane], rows[q + LEVERS + 1, lane] = one * spin[i, LEVER], two * spin[j, LEVER]
                 set_vector_in(rows, q + DRAG, lane, vector_at(near.drag, listed, 0))
             if matter.pairs.rolling is not None:
                 set_vector_in(rows, q + ROLL, lane, vector_at(near.drag, listed, KEPT_ROLL))
-    for k in range(begin, end):
-        lane = index(k)
-        s0, move = vector_in(rows, q + START, lane), half * vector_in(read, _BOTH, lane)
-        size = math.sqrt(s0.x * s0.x + s0.y * s0.y + s0.z * s0.z)
-        gap, ease = read[_REACH, lane] - size, rows[q + EASES, lane] + rows[q + EASES + 1, lane]
-        rows[q + SIZE, lane], rows[q + GAP, lane], rows[q + EASE, lane] = size, gap, ease
-        set_vector_in(rows, q + COAST, lane, half * vector_in(rows, q + COAST, lane))
-        damping = None
-        if matter.pairs.damping is not None:
-            damping = matter.pairs.damping / math.sqrt(ease) / matter.h
-            rows[q + DAMPING, lane] = damping
-        way = closing(s0, size, move)
-        push, gain = begin_solve(pressed(matter, damping, gap, way.change), half * ease)
-        rows[q + PUSH, lane], rows[q + GAIN, lane] = push, gain
-        rows[q + SCALE, lane] = scale_of(matter, push, read[_SPEEDS, lane], ease)
-        set_vector_in(rows, q + IMPULSE, lane, push * way.along)
-        set_vector_in(read, _ALL, lane, push * way.along)
-        if matter.pairs.friction is not None:
-            rows[q + NEARNESS, lane] = 1.0 / read[_REACH, lane]
-            drag = vector_in(rows, q + DRAG, lane) * lasting(gap)
-            set_vector_in(rows, q + DRAG, lane, drag)
-            set_vector_in(read, _ALL, lane, push * way.along + drag)
-            set_vector_in(read, _TURN, lane, twist_in(rows, q, lane, move))
-        if matter.pairs.rolling is not None:
-            set_vector_in(rows, q + ROLL, lane, vector_in(rows, q + ROLL, lane) * lasting(gap))
-    _give(matter, grains, touches, group, read)
+    for k in over_lanes(lanes) if is_whole else range(begin, end):
+        _begin_contact(matter, rows, q, index(k), read)
+    add_from_lanes(grains.change, GIVEN, ends, e, read, _IMPULSES, lanes)
+    if matter.pairs.friction is not None:
+        add_from_lanes(spin, AFTER, ends, e, read, _TWISTS, lanes)
 
 
-def _give(matter, grains, touches, group, read):
-    """Add what a group begins with to the sums of balls, from one lane to another."""
-    g, begin, end = group
-    rows, q, ends, e = of_group(touches, g)
-    for k in range(begin, end):
-        push_ends(grains.change, GIVEN, (rows, q, ends, e), index(k), vector_in(read, _ALL, index(k)))
-        if matter.pairs.friction is not None:
-            twist_ends(grains.spin, rows, q, ends, e, index(k), vector_in(read, _TURN, index(k)))
+def _begin_contact(matter, rows, q, lane, read):
+    """Begin to solve for a contact of a group."""
+    half, one, other = 0.5 * matter.h, _PLACE, _PLACE + COLUMNS_OF_BALLS
+    s0 = nearest(matter.period, vector_in(read, one + X, lane), vector_in(read, other + X, lane))
+    s0 = s0 + (vector_in(read, one + LOST, lane) - vector_in(read, other + LOST, lane))
+    reach = read[one + RADIUS, lane] + read[other + RADIUS, lane]
+    eases = read[one + LIGHTNESS, lane], read[other + LIGHTNESS, lane]
+    one, other = _SPEED, _SPEED + COLUMNS_OF_BALLS
+    v, u = vector_in(read, one + BEFORE, lane), vector_in(read, other + BEFORE, lane)
+    v1, u1 = vector_in(read, one + AFTER, lane), vector_in(read, other + AFTER, lane)
+    move = half * ((v + v1) - (u + u1))
+    size = math.sqrt(s0.x * s0.x + s0.y * s0.y + s0.z * s0.z)
+    gap, ease = reach - size, eases[0] + eases[1]
+    set_vector_in(rows, q + START, lane, s0)
+    rows[q + SIZE, lane], rows[q + GAP, lane], rows[q + EASE, lane] = size, gap, ease
+    rows[q + EASES, lane], rows[q + EASES + 1, lane] = eases
+    set_vector_in(rows, q + COAST, lane, half * (v - u))
+    damping = None
+    if matter.pairs.damping is not None:
+        damping = matter.pairs.damping / math.sqrt(ease) / matter.h
+        rows[q + DAMPING, lane] = damping
+    way = closing(s0, size, move)
+    push, gain = begin_solve(pressed(matter, damping, gap, way.change), half * ease)
+    rows[q + PUSH, lane], rows[q + GAIN, lane] = push, gain
+    rows[q + SCALE, lane] = scale_of(matter, push, size_of(v1) + size_of(u1), ease)
+    impulse = push * way.along
+    set_vector_in(rows, q + IMPULSE, lane, impulse)
+    if matter.pairs.friction is not None:
+        rows[q + LEVERS, lane] = eases[0] * read[_TURNS + LEVER - FOUR, lane]
+        rows[q + LEVERS + 1, lane] = eases[1] * read[_TURNS + LEVER, lane]
+        rows[q + NEARNESS, lane] = 1.0 / reach
+        drag = vector_in(rows, q + DRAG, lane) * lasting(gap)
+        set_vector_in(rows, q + DRAG, lane, drag)
+        impulse = impulse + drag
+        give_twist(rows, q, lane, read, _TWISTS, twist_in(rows, q, lane, move))
+    if matter.pairs.rolling is not None:
+        set_vector_in(rows, q + ROLL, lane, vector_in(rows, q + ROLL, lane) * lasting(gap))
+    give_impulse(rows, q, lane, read, _IMPULSES, impulse)
 
 
 @outlined
@@ -213,7 +244,8 @@ def group_pairs(matter, grains, near, touches, known):
                 _lay(touches, g, index(k), c)
             touches.lanes[index(g)], touches.splits[index(g)] = lanes, splits
         for g in range(groups):
-            _begin_group(matter, grains, near, touches, (g, 0, touches.lanes[index(g)]))
+            end = touches.lanes[index(g)]
+            _begin_group(matter, grains, near, touches, (g, 0, end, True))
         touches.used[1] = groups
     else:
         # Few, behind the others.
@@ -226,60 +258,76 @@ def group_pairs(matter, grains, near, touches, known):
             _lay(touches, last, index(lane), index(k))
             touches.lanes[index(last)] = lane + 1
             touches.splits[index(last)] |= 1 << lane
-            _begin_group(matter, grains, near, touches, (last, lane, lane + 1))
+            _begin_group(matter, grains, near, touches, (last, lane, lane + 1, False))
 
 
 # --- At its end ------------------------------------------------------------------------------------------
 
 
+def lanes_between(begin, end):
+    """The lanes from one to the one before another, as bits."""
+    return (1 << end) - (1 << begin)
+
+
+# By their bits
+_SOME_LANES = tuple(tuple(k for k in range(LANES) if (lanes >> k) & 1 == 1) for lanes in range(2**LANES))
+
+
+def over_lanes(lanes):
+    """What a loop over some lanes, as bits, goes over: in a kernel all, so that it is of whole vectors."""
+    return _SOME_LANES[lanes] if is_known(lanes) else range(LANES)
+
+
+def is_in(lanes, k):
+    """Whether a lane is one of some lanes, as bits."""
+    return (lanes >> k) & 1 == 1
+
+
+def _give(given, k, lane, to_first, to_second):
+    """Note what both balls of a contact get, in eight rows, of which the fourth and the eighth are 0."""
+    set_vector_in(given, k, lane, to_first)
+    set_vector_in(given, k + FOUR, lane, to_second)
+    given[k + FOUR - 1, lane], given[k + 2 * FOUR - 1, lane] = 0.0, 0.0
+
+
+def give_impulse(rows, q, lane, given, k, impulse):
+    """Note what an impulse on the first ball of a contact changes of the velocities of both."""
+    to_second = impulse * rows[q + EASES + 1, lane]
+    _give(given, k, lane, impulse * rows[q + EASES, lane], -1.0 * to_second)
+
+
+def give_twist(rows, q, lane, given, k, twist):
+    """Note what a twist changes of the spins of both balls of a contact."""
+    _give(given, k, lane, -1.0 * (twist * rows[q + LEVERS, lane]), -1.0 * (twist * rows[q + LEVERS + 1, lane]))
+
+
 @outlined
 def push_pairs(matter, grains, touches):
     """Sum the impulses of the pairs."""
-    given = unwritten((3, LANES), np.float64)
+    given = unwritten((2 * FOUR, LANES), np.float64)
     for g in range(touches.used[1]):
         rows, q, ends, e = of_group(touches, g)
         lanes = touches.lanes[index(g)]
-        for k in range(lanes):
-            lane = index(k)
-            impulse = vector_in(rows, q + IMPULSE, lane)
+        for k in over_lanes(lanes_between(0, lanes)):
+            impulse = vector_in(rows, q + IMPULSE, index(k))
             if matter.pairs.friction is not None:
-                impulse = impulse + vector_in(rows, q + DRAG, lane)
-            set_vector_in(given, 0, lane, impulse)
-        for k in range(lanes):
-            push_ends(grains.change, GIVEN, (rows, q, ends, e), index(k), vector_in(given, 0, index(k)))
-
-
-def push_ends(target, column, tile, lane, impulse):
-    """Change what both balls of a contact have in a column, velocities or sums, by an impulse on the first one."""
-    rows, q, ends, e = tile
-    i, j = balls_of(ends, e, lane)
-    set_vector(target, i, column, vector_at(target, i, column) + impulse * rows[q + EASES, lane])
-    set_vector(target, j, column, vector_at(target, j, column) - impulse * rows[q + EASES + 1, lane])
-
-
-def twist_ends(spin, rows, q, ends, e, lane, twist):
-    """Change the spins of both balls of a contact by a twist."""
-    i, j = balls_of(ends, e, lane)
-    set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - twist * rows[q + LEVERS, lane])
-    set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - twist * rows[q + LEVERS + 1, lane])
+                impulse = impulse + vector_in(rows, q + DRAG, index(k))
+            give_impulse(rows, q, index(k), given, 0, impulse)
+        add_from_lanes(grains.change, GIVEN, ends, e, given, 0, lanes_between(0, lanes))
 
 
 @outlined
 def twist_pairs(matter, grains, touches):
     """Add the twists of all pairs to the spins at the end of the step; the velocities there are final."""
-    speed, spin, given = grains.speed, grains.spin, unwritten((3, LANES), np.float64)
+    begun, given = unwritten((_BEGUN, LANES), np.float64), unwritten((2 * FOUR, LANES), np.float64)
     for g in range(touches.used[1]):
         rows, q, ends, e = of_group(touches, g)
         lanes = touches.lanes[index(g)]
-        for k in range(lanes):
-            i, j = balls_of(ends, e, index(k))
-            set_vector_in(given, 0, index(k), vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER))
-        for k in range(lanes):
-            lane = index(k)
-            move = move_in(matter, rows, q, lane, vector_in(given, 0, lane))
-            set_vector_in(given, 0, lane, twist_in(rows, q, lane, move))
-        for k in range(lanes):
-            twist_ends(spin, rows, q, ends, e, index(k), vector_in(given, 0, index(k)))
+        read_ends(grains.speed, ends, e, begun, _SLIP)
+        for k in over_lanes(lanes_between(0, lanes)):
+            move = move_in(matter, rows, q, index(k), slip_in(begun, _SLIP, index(k)))
+            give_twist(rows, q, index(k), given, 0, twist_in(rows, q, index(k), move))
+        add_from_lanes(grains.spin, AFTER, ends, e, given, 0, lanes_between(0, lanes))
 
 
 def twist_in(rows, q, lane, move):
@@ -291,92 +339,98 @@ def twist_in(rows, q, lane, move):
 
 # --- Sweeps --------------------------------------------------------------------------------------------
 
-# Rows of what a group begins with: v_i - v_j, and R_i w_i + R_j w_j; and of what it gives: the change of the impulse,
-# the twist, the largest error of the sweep in each lane, and that of the contact.
-_SLIP, _TURNING, _BEGUN = 0, 3, 6
-_PART, _TWIST, _WORST, _OFF, _GIVEN = 0, 3, 6, 7, 8
+# Rows of what a group begins with: of both balls the velocities, and the spins with the radii; and of what it gives, as
+# `_give`: velocities by the change of the impulse, and spins by the twist, the largest error of the sweep in each lane,
+# and that of the contact.
+_SLIP, _TURNING, _BEGUN = 0, 8, 16
+_PART, _TWIST, _WORST, _OFF, _GIVEN = 0, 8, 16, 17, 18
 
 
-def _press(matter, rows, q, lane, begun, share):
-    """Improve the impulse of a contact of a group: its `Closing`, the change, and the error."""
-    move = move_in(matter, rows, q, lane, vector_in(begun, _SLIP, lane))
+def _press(matter, rows, q, lane, is_due, begun, share):
+    """Improve the impulse of a contact of a group, if it is due: its `Closing`, the change, and the error."""
+    move = move_in(matter, rows, q, lane, slip_in(begun, _SLIP, lane))
     way = closing(vector_in(rows, q + START, lane), rows[q + SIZE, lane], move)
     damping = None if matter.pairs.damping is None else rows[q + DAMPING, lane]
     wanted, _slope = pressed(matter, damping, rows[q + GAP, lane], way.change)
     push = improved(rows[q + PUSH, lane], wanted, rows[q + GAIN, lane])
     old = vector_in(rows, q + IMPULSE, lane)
     more, part = changed(old, push * way.along, share)
-    rows[q + PUSH, lane] = push
-    set_vector_in(rows, q + IMPULSE, lane, old + part)
-    return way, part, weight_of(matter.pairs) * (size_of(more) * rows[q + SCALE, lane])
+    rows[q + PUSH, lane] = select(is_due, push, kept(rows[q + PUSH, lane]))
+    set_vector_in(rows, q + IMPULSE, lane, old + _if(is_due, part))
+    return way, push, part, weight_of(matter.pairs) * (size_of(more) * rows[q + SCALE, lane])
 
 
-def _rub(matter, rows, q, lane, begun, given, share):
-    """Improve the impulse and the friction of a contact of a group."""
-    way, part, off = _press(matter, rows, q, lane, begun, share)
-    ease, push, over = rows[q + EASE, lane], rows[q + PUSH, lane], 1.0 / square(way.along)
+def _if(is_due, change):
+    """A change that is made, or what added to any number leaves it as it is."""
+    return Vec(select(is_due, change.x, -0.0), select(is_due, change.y, -0.0), select(is_due, change.z, -0.0))
+
+
+def _rub(matter, rows, q, lane, is_due, begun, given, share):
+    """Improve the impulse and the friction of a contact of a group, if it is due; its error."""
+    way, push, part, off = _press(matter, rows, q, lane, is_due, begun, share)
+    ease, over = rows[q + EASE, lane], 1.0 / square(way.along)
     arm = arm_of(way, rows[q + SIZE, lane], way.change, rows[q + NEARNESS, lane])
-    slip = vector_in(begun, _SLIP, lane) + ease * part - cross(vector_in(begun, _TURNING, lane), arm)
+    turning = turning_in(begun, _TURNING - AFTER, _TURNING + FOUR - AFTER, AFTER, lane)
+    slip = slip_in(begun, _SLIP, lane) + ease * part - cross(turning, arm)
     slip = slip - (dot(slip, way.along) * over) * way.along
     old = vector_in(rows, q + DRAG, lane)
     before = old - (dot(old, way.along) * over) * way.along
     new = rubbed(before, slip, ease * (1.0 + ROUNDNESS * square(arm)), matter.pairs.friction * push)
     more, rub = changed(old, new, share)
-    set_vector_in(rows, q + DRAG, lane, old + rub)
-    set_vector_in(given, _PART, lane, part + rub)
-    set_vector_in(given, _TWIST, lane, cross(arm, rub))
-    off = worse(size_of(more) * rows[q + SCALE, lane], off)
-    given[_OFF, lane], given[_WORST, lane] = off, worse(off, kept(given[_WORST, lane]))
+    set_vector_in(rows, q + DRAG, lane, old + _if(is_due, rub))
+    give_impulse(rows, q, lane, given, _PART, part + rub)
+    give_twist(rows, q, lane, given, _TWIST, cross(arm, rub))
+    return worse(size_of(more) * rows[q + SCALE, lane], off)
 
 
-def _read(grains, ends, e, lane, begun):
-    """Read what the improvement of a contact begins with; its balls."""
-    i, j = balls_of(ends, e, lane)
-    set_vector_in(begun, _SLIP, lane, vector_at(grains.speed, i, AFTER) - vector_at(grains.speed, j, AFTER))
-    return i, j
+def _note_worst(given, lane, is_due, off):
+    """Note the error of a contact, if it is due, in its lane."""
+    before = kept(given[_WORST, lane])
+    given[_WORST, lane] = select(is_due, worse(off, before), before)
 
 
 def _sweep_group(matter, grains, touches, group, arrays, sweep):
-    """Improve the impulses of a group from one lane to another."""
-    (g, begin, end), (begun, given) = group, arrays
+    """Improve the impulses of some lanes of a group, as bits."""
+    (g, lanes), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
-    for k in range(begin, end):
-        _read(grains, ends, e, index(k), begun)
-        _fetch_next(rows, q, index(k), COLUMNS)
-    for k in range(begin, end):
-        _way, part, off = _press(matter, rows, q, index(k), begun, sweep.share)
-        set_vector_in(given, _PART, index(k), part)
-        given[_WORST, index(k)] = worse(off, kept(given[_WORST, index(k)]))
-    for k in range(begin, end):
-        push_ends(grains.speed, AFTER, (rows, q, ends, e), index(k), vector_in(given, _PART, index(k)))
+    read_ends(grains.speed, ends, e, begun, _SLIP)
+    _fetch_next(rows, q, COLUMNS)
+    for k in over_lanes(lanes):
+        lane, is_due = index(k), is_in(lanes, k)
+        _way, _push, part, off = _press(matter, rows, q, lane, is_due, begun, sweep.share)
+        give_impulse(rows, q, lane, given, _PART, part)
+        _note_worst(given, lane, is_due, off)
+    add_from_lanes(grains.speed, AFTER, ends, e, given, _PART, lanes)
 
 
 def _rub_group(matter, grains, touches, group, arrays, sweep):
-    """Improve the impulses of a group with those of friction, as `_sweep_group`."""
-    (g, begin, end), (begun, given) = group, arrays
+    """Improve the impulses of some lanes of a group with those of friction, as `_sweep_group`."""
+    (g, lanes), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
-    for k in range(begin, end):
-        i, j = _read(grains, ends, e, index(k), begun)
-        _fetch_next(rows, q, index(k), COLUMNS_OF_LANES)
-        set_vector_in(begun, _TURNING, index(k), turning(grains, i, j, AFTER))
-    unsolved = False
-    for k in range(begin, end):
-        _rub(matter, rows, q, index(k), begun, given, sweep.share)
-        unsolved |= not given[_OFF, index(k)] <= sweep.solved
-    for k in range(begin, end):
-        push_ends(grains.speed, AFTER, (rows, q, ends, e), index(k), vector_in(given, _PART, index(k)))
-        twist_ends(grains.spin, rows, q, ends, e, index(k), vector_in(given, _TWIST, index(k)))
-    if unsolved:
-        for k in range(begin, end):
-            i, j = balls_of(ends, e, index(k))
-            stir(sweep, touches.stirred, i, given[_OFF, index(k)])
-            stir(sweep, touches.stirred, j, given[_OFF, index(k)])
+    read_ends(grains.speed, ends, e, begun, _SLIP)
+    read_ends(grains.spin, ends, e, begun, _TURNING)
+    _fetch_next(rows, q, COLUMNS_OF_LANES)
+    unsolved = 0
+    for k in over_lanes(lanes):
+        lane, is_due = index(k), is_in(lanes, k)
+        off = _rub(matter, rows, q, lane, is_due, begun, given, sweep.share)
+        given[_OFF, lane] = off
+        _note_worst(given, lane, is_due, off)
+        unsolved |= select(off <= sweep.solved, 0, 1) << k
+    add_from_lanes(grains.speed, AFTER, ends, e, given, _PART, lanes)
+    add_from_lanes(grains.spin, AFTER, ends, e, given, _TWIST, lanes)
+    unsolved &= lanes
+    if unsolved != 0:
+        for k in range(LANES):
+            if is_in(unsolved, k):
+                i, j = balls_of(ends, e, index(k))
+                touches.stirred[i], touches.stirred[j] = sweep.number, sweep.number
 
 
 # --- Sweeps over all groups -----------------------------------------------------------------------------
 
 
-_ALL_LANES = -1
+_ALL_LANES = 2**LANES - 1
 
 
 def _all_lanes(touches, g, sweep):
@@ -389,10 +443,20 @@ def _due_lanes(touches, g, sweep):
         return _ALL_LANES
     _rows, _q, ends, e = of_group(touches, g)
     stirred, due = touches.stirred, 0
-    for k in range(touches.lanes[index(g)]):
+    for k in range(LANES):
         i, j = balls_of(ends, e, index(k))
-        due |= (is_due(sweep, stirred, i) | is_due(sweep, stirred, j)) << k
+        due |= select(is_due(sweep, stirred, i) | is_due(sweep, stirred, j), 1, 0) << k
     return due
+
+
+def _part_from(begin, lanes, splits):
+    """Where the part of a group that begins in a lane ends."""
+    end = lanes
+    if splits >> (begin + 1) != 0:
+        end = begin + 1
+        while end < lanes and (splits >> end) & 1 == 0:
+            end += 1
+    return end
 
 
 def _over_groups(one, lanes_of, matter, grains, touches, sweep):
@@ -403,11 +467,10 @@ def _over_groups(one, lanes_of, matter, grains, touches, sweep):
         lanes, splits, begin = touches.lanes[index(g)], touches.splits[index(g)], 0
         due = lanes_of(touches, g, sweep)
         while begin < lanes:
-            end = begin + 1
-            if (due >> begin) & 1 == 1:
-                while end < lanes and (splits >> end) & 1 == 0 and (due >> end) & 1 == 1:
-                    end += 1
-                one(matter, grains, touches, (g, begin, end), (begun, given), sweep)
+            end = _part_from(begin, lanes, splits)
+            some = lanes_between(begin, end) & due
+            if some != 0:
+                one(matter, grains, touches, (g, some), (begun, given), sweep)
             begin = end
     worst = 0.0
     for lane in range(LANES):

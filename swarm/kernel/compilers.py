@@ -157,7 +157,7 @@ class LongKernelCompiler(KernelCompiler):
     """Numba's compiler for a `_LongKernel`."""
 
     library = _LongKernel
-    is_wide = False
+    is_wide = True
 
 
 @contextlib.contextmanager

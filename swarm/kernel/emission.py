@@ -1,4 +1,6 @@
-"""Instructions of operations of kernels, which `arrays.py`, `fours.py` and `vector.py` define in plain Python."""
+"""Instructions of operations of kernels, which `arrays.py`, `fours.py`, `lines.py` and `vector.py` define in plain
+Python.
+"""
 
 import functools
 import math
@@ -15,6 +17,7 @@ from numba.np.arrayobj import populate_array
 
 from .arrays import copy_row, fetch, index, next_of, scratch, unwritten
 from .fours import Four, over_block
+from .lines import COLUMNS, FOUR, LANES, add_from_lanes, into_lanes
 from .trace.calls import INTRINSIC, operation
 from .vector import Vec
 
@@ -191,3 +194,106 @@ _emitted(operator.sub, "fsub", types.BaseNamedTuple, types.BaseNamedTuple)
 _emitted(operator.mul, "fmul", types.BaseNamedTuple, types.Float)
 _emitted(operator.mul, "fmul", types.Float, types.BaseNamedTuple)
 _emitted(operator.truediv, "fdiv", types.BaseNamedTuple, types.Float)
+
+
+# --- Lines of eight numbers ------------------------------------------------------------------------------
+
+_NUMBER, _PLACE = ir.DoubleType(), ir.IntType(32)
+_FOUR, _EIGHT = ir.VectorType(_NUMBER, FOUR), ir.VectorType(_NUMBER, LANES)
+
+
+def _shuffled(builder, a, b, places):
+    mask = ir.Constant(ir.VectorType(_PLACE, len(places)), list(places))
+    return builder.shuffle_vector(a, b, mask)
+
+
+def _pointer(context, builder, kind, table, row, column, columns, to):
+    """That of so many numbers in a row of so many columns from one on; row and column are of the type of an index."""
+    data = context.make_array(kind)(context, builder, table).data
+    place = builder.add(builder.mul(row, row.type(columns)), column)
+    return builder.bitcast(builder.gep(data, [place]), to.as_pointer())
+
+
+def _row_of(context, builder, kind, table, ends, lane):
+    """The row of the table for a lane, of which `ends` is the pointer of the first."""
+    row = builder.load(builder.gep(ends, [lane]))
+    return builder.zext(row, context.get_value_type(types.intp))
+
+
+def _indices(context, builder, signature, args, places):
+    return [context.cast(builder, args[k], signature.args[k], types.intp) for k in places]
+
+
+@operation(
+    into_lanes, lambda tile, q, table, column, ends, e: types.none,
+    types.Array, types.Any, types.Array, types.Any, types.Array, types.Any,
+)  # fmt: skip
+def _emit_into_lanes(context, builder, signature, args):
+    q, column, e = _indices(context, builder, signature, args, (1, 3, 5))
+    kinds, none = signature.args, q.type(0)
+    ends = _pointer(context, builder, kinds[4], args[4], e, none, LANES, _PLACE)
+    lines = []
+    for lane in range(LANES):
+        row = _row_of(context, builder, kinds[2], args[2], ends, q.type(lane))
+        place = _pointer(context, builder, kinds[2], args[2], row, column, COLUMNS, _FOUR)
+        lines.append(builder.load(place, align=8))
+    # Numbers of two lanes beside one another by each instruction, which works on halves of a quarter of a vector.
+    halves = [_shuffled(builder, lines[k], lines[k + 2], range(8)) for k in (0, 1, 4, 5)]
+    low = [_shuffled(builder, halves[k], halves[k + 1], (0, 8, 2, 10, 4, 12, 6, 14)) for k in (0, 2)]
+    high = [_shuffled(builder, halves[k], halves[k + 1], (1, 9, 3, 11, 5, 13, 7, 15)) for k in (0, 2)]
+    for c, (one, other) in enumerate((low, high, low, high)):
+        first = 2 * (c // 2)
+        places = [base + first + k for base in (0, 4, 8, 12) for k in (0, 1)]
+        column_of_all = _shuffled(builder, one, other, places)
+        to = _pointer(context, builder, kinds[0], args[0], builder.add(q, q.type(c)), none, LANES, _EIGHT)
+        builder.store(column_of_all, to, align=8)
+    return context.get_dummy_value()
+
+
+@operation(
+    add_from_lanes, lambda table, column, ends, e, tile, q, lanes: types.none,
+    types.Array, types.Any, types.Array, types.Any, types.Array, types.Any, types.Any,
+)  # fmt: skip
+def _emit_add_from_lanes(context, builder, signature, args):
+    column, e, q, lanes = _indices(context, builder, signature, args, (1, 3, 5, 6))
+    kinds, none = signature.args, q.type(0)
+    ends = _pointer(context, builder, kinds[2], args[2], e, none, LANES, _PLACE)
+
+    def changes_of(end):
+        """Of each lane the four numbers of an end."""
+        columns = []
+        for c in range(FOUR):
+            row = builder.add(q, q.type(end * FOUR + c))
+            place = _pointer(context, builder, kinds[4], args[4], row, none, LANES, _EIGHT)
+            columns.append(builder.load(place, align=8))
+        low = [_shuffled(builder, *columns[k : k + 2], (0, 8, 2, 10, 4, 12, 6, 14)) for k in (0, 2)]
+        high = [_shuffled(builder, *columns[k : k + 2], (1, 9, 3, 11, 5, 13, 7, 15)) for k in (0, 2)]
+        firsts = [2 * (lane // 2) for lane in range(LANES)]
+        return [
+            _shuffled(builder, *(high if lane % 2 else low), (first, first + 1, first + LANES, first + LANES + 1))
+            for lane, first in enumerate(firsts)
+        ]
+
+    def add(end, lane, change):
+        row = _row_of(context, builder, kinds[0], args[0], ends, builder.add(lane, lane.type(end * LANES)))
+        place = _pointer(context, builder, kinds[0], args[0], row, column, COLUMNS, _FOUR)
+        builder.store(builder.fadd(builder.load(place, align=8), change), place, align=8)
+
+    changes, every = [changes_of(0), changes_of(1)], lanes.type(2**LANES - 1)
+    with builder.if_else(builder.icmp_unsigned("==", builder.and_(lanes, every), every)) as (all_lanes, some_lanes):
+        with all_lanes:
+            for lane in range(LANES):
+                for end in (0, 1):
+                    add(end, q.type(lane), changes[end][lane])
+        with some_lanes:
+            kept = cgutils.alloca_once(builder, _FOUR, size=2 * LANES)
+            for end in (0, 1):
+                for lane in range(LANES):
+                    builder.store(changes[end][lane], builder.gep(kept, [q.type(end * LANES + lane)]))
+            with cgutils.for_range(builder, q.type(LANES)) as loop:
+                bit = builder.and_(builder.lshr(lanes, loop.index), lanes.type(1))
+                with builder.if_then(builder.icmp_unsigned("==", bit, bit.type(1))):
+                    for end in (0, 1):
+                        place = builder.gep(kept, [builder.add(loop.index, q.type(end * LANES))])
+                        add(end, loop.index, builder.load(place))
+    return context.get_dummy_value()
