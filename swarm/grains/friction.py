@@ -89,8 +89,9 @@ def faced(wall, grains, touches, c, i, move):
 
 @outlined
 def rub_wall(matter, law, wall, grains, touches, number, sweep):
-    """Improve the impulse and the friction of each ball at a wall; the largest change, as for pairs."""
-    rows, speed, spin, half, worst = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h, 0.0
+    """Improve the impulse and the friction of each ball at a wall; the largest changes, as for pairs."""
+    rows, speed, spin, half = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h
+    worst, pressed_worst = 0.0, 0.0
     begin, share = touches.wall_spans[0, number], sweep.share
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
@@ -108,10 +109,11 @@ def rub_wall(matter, law, wall, grains, touches, number, sweep):
         more, part = change_of(OfWall(rows, c), DRAG, new, share)
         set_vector(speed, i, AFTER, v + part * ease)
         set_vector(spin, i, AFTER, w - cross(n, part) * (ROUNDNESS * ease / radius))
+        pressed_worst = worse(off, pressed_worst)
         off = worse(size_of(more) * rows[c, SCALE], off)
         stir(sweep, touches.stirred, i, off)
         worst = worse(off, worst)
-    return worst
+    return worst, pressed_worst
 
 
 @outlined

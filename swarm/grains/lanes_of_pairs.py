@@ -341,9 +341,9 @@ def twist_in(rows, q, lane, move):
 
 # Rows of what a group begins with: of both balls the velocities, and the spins with the radii; and of what it gives, as
 # `_give`: velocities by the change of the impulse, and spins by the twist, the largest error of the sweep in each lane,
-# and that of the contact.
+# the largest of normal impulses alone, and the error of the contact.
 _SLIP, _TURNING, _BEGUN = 0, 8, 16
-_PART, _TWIST, _WORST, _OFF, _GIVEN = 0, 8, 16, 17, 18
+_PART, _TWIST, _WORST, _PRESSED, _OFF, _GIVEN = 0, 8, 16, 17, 18, 19
 
 
 def _press(matter, rows, q, lane, is_due, begun, share):
@@ -366,7 +366,7 @@ def _if(is_due, change):
 
 
 def _rub(matter, rows, q, lane, is_due, begun, given, share):
-    """Improve the impulse and the friction of a contact of a group, if it is due; its error."""
+    """Improve the impulse and the friction of a contact of a group, if it is due; its error, and that of the first."""
     way, push, part, off = _press(matter, rows, q, lane, is_due, begun, share)
     ease, over = rows[q + EASE, lane], 1.0 / square(way.along)
     arm = arm_of(way, rows[q + SIZE, lane], way.change, rows[q + NEARNESS, lane])
@@ -380,13 +380,13 @@ def _rub(matter, rows, q, lane, is_due, begun, given, share):
     set_vector_in(rows, q + DRAG, lane, old + _if(is_due, rub))
     give_impulse(rows, q, lane, given, _PART, part + rub)
     give_twist(rows, q, lane, given, _TWIST, cross(arm, rub))
-    return worse(size_of(more) * rows[q + SCALE, lane], off)
+    return worse(size_of(more) * rows[q + SCALE, lane], off), off
 
 
-def _note_worst(given, lane, is_due, off):
+def _note_worst(given, k, lane, is_due, off):
     """Note the error of a contact, if it is due, in its lane."""
-    before = kept(given[_WORST, lane])
-    given[_WORST, lane] = select(is_due, worse(off, before), before)
+    before = kept(given[k, lane])
+    given[k, lane] = select(is_due, worse(off, before), before)
 
 
 def _sweep_group(matter, grains, touches, group, arrays, sweep):
@@ -399,7 +399,7 @@ def _sweep_group(matter, grains, touches, group, arrays, sweep):
         lane, is_due = index(k), is_in(lanes, k)
         _way, _push, part, off = _press(matter, rows, q, lane, is_due, begun, sweep.share)
         give_impulse(rows, q, lane, given, _PART, part)
-        _note_worst(given, lane, is_due, off)
+        _note_worst(given, _WORST, lane, is_due, off)
     add_from_lanes(grains.speed, AFTER, ends, e, given, _PART, lanes)
 
 
@@ -413,9 +413,10 @@ def _rub_group(matter, grains, touches, group, arrays, sweep):
     unsolved = 0
     for k in over_lanes(lanes):
         lane, is_due = index(k), is_in(lanes, k)
-        off = _rub(matter, rows, q, lane, is_due, begun, given, sweep.share)
+        off, pressed_off = _rub(matter, rows, q, lane, is_due, begun, given, sweep.share)
         given[_OFF, lane] = off
-        _note_worst(given, lane, is_due, off)
+        _note_worst(given, _WORST, lane, is_due, off)
+        _note_worst(given, _PRESSED, lane, is_due, pressed_off)
         unsolved |= select(off <= sweep.solved, 0, 1) << k
     add_from_lanes(grains.speed, AFTER, ends, e, given, _PART, lanes)
     add_from_lanes(grains.spin, AFTER, ends, e, given, _TWIST, lanes)
@@ -462,7 +463,7 @@ def _part_from(begin, lanes, splits):
 def _over_groups(one, lanes_of, matter, grains, touches, sweep):
     begun, given = unwritten((_BEGUN, LANES), np.float64), unwritten((_GIVEN, LANES), np.float64)
     for lane in range(LANES):
-        given[_WORST, index(lane)] = 0.0
+        given[_WORST, index(lane)], given[_PRESSED, index(lane)] = 0.0, 0.0
     for g in range(touches.used[1]):
         lanes, splits, begin = touches.lanes[index(g)], touches.splits[index(g)], 0
         due = lanes_of(touches, g, sweep)
@@ -472,19 +473,24 @@ def _over_groups(one, lanes_of, matter, grains, touches, sweep):
             if some != 0:
                 one(matter, grains, touches, (g, some), (begun, given), sweep)
             begin = end
-    worst = 0.0
+    worst, pressed_worst = 0.0, 0.0
     for lane in range(LANES):
         worst = worse(given[_WORST, index(lane)], worst)
-    return worst
+        pressed_worst = worse(given[_PRESSED, index(lane)], pressed_worst)
+    return worst, pressed_worst
 
 
 @outlined
 def sweep_pairs(matter, grains, touches, share):
     """Improve the impulse of each pair; the largest change of one, relative to what moves there."""
-    return _over_groups(_sweep_group, _all_lanes, matter, grains, touches, ContactSweep(0, share, 0.0))
+    worst, _pressed = _over_groups(_sweep_group, _all_lanes, matter, grains, touches, ContactSweep(0, share, 0.0))
+    return worst
 
 
 @outlined
 def rub_pairs(matter, grains, touches, sweep):
-    """Improve the impulse and the friction of each pair that is due; the largest change, relative to what moves."""
+    """Improve the impulse and the friction of each pair that is due.
+
+    The largest change, relative to what moves there, and the largest of normal impulses.
+    """
     return _over_groups(_rub_group, _due_lanes, matter, grains, touches, sweep)

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 from ..common.status import Status
 from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
-from ..kernel.jit import Array, long_kernel, outlined
+from ..kernel.jit import Array, long_kernel, outlined, select
 from ..kernel.vector import ZERO, square
 from ..lanes.watching.log import is_full
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall, count_members
-from .contacts import ContactSweep, find_more_pairs, find_pairs, foresee, travel_of, worse
+from .contacts import ContactSweep, find_more_pairs, find_pairs, foresee, travel_of, weight_of, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, rub_wall, twist_wall
 from .grain_arrays import (
@@ -202,22 +202,30 @@ def _sweep(matter, walls, world, share):
 
 
 def _rub(matter, walls, world, sweep):
-    """Improve all impulses with those of friction, as `_sweep`."""
+    """Improve all impulses with those of friction; the largest change, and the largest of normal impulses."""
     grains, touches, share = world.grains, world.touches, sweep.share
     if matter.pairs.friction is None:
         worst = sweep_pairs(matter, grains, touches, share)
+        pressed = worst
     else:
-        worst = rub_pairs(matter, grains, touches, sweep)
+        worst, pressed = rub_pairs(matter, grains, touches, sweep)
     if matter.pairs.rolling is not None:
         worst = worse(roll_pairs(matter, grains, touches, sweep), worst)
     for k, wall in enumerate(walls.each):
         if matter.walls[k].friction is None:
-            worst = worse(sweep_wall(matter, matter.walls[k], wall, grains, touches, k, share), worst)
+            off = sweep_wall(matter, matter.walls[k], wall, grains, touches, k, share)
+            pressed_off = off
         else:
-            worst = worse(rub_wall(matter, matter.walls[k], wall, grains, touches, k, sweep), worst)
+            off, pressed_off = rub_wall(matter, matter.walls[k], wall, grains, touches, k, sweep)
+        worst, pressed = worse(off, worst), worse(pressed_off, pressed)
         if matter.walls[k].rolling is not None:
+<<<<<<< HEAD
             worst = worse(roll_wall(matter.walls[k], wall, grains, touches, k, sweep), worst)
     return worst
+=======
+            worst = worse(roll_wall(matter, matter.walls[k], wall, grains, touches, k, sweep), worst)
+    return worst, pressed
+>>>>>>> 7a511a34 (No sweep of normal impulses follows friction that changed next to nothing)
 
 
 def _stalled(pace, worst):
@@ -232,27 +240,34 @@ def _stalled(pace, worst):
 
 @outlined
 def _solve_friction(matter, walls, world):
-    """Sweep until friction changes little; whether it does."""
-    worst, sweeps, share, best, since = 1.0, 0, 1.0, math.inf, 0
+    """Sweep until friction changes little: whether it does, and what the next sweep would change of normal impulses."""
+    worst, sweeps, share, best, since, follows = 1.0, 0, 1.0, math.inf, 0, math.inf
     world.touches.stirred[:] = -1
     while sweeps < _MOST_RUBS:
-        worst = _rub(matter, walls, world, ContactSweep(sweeps if matter.rubs_everywhere else 0, share, _STIRRING))
+        number = sweeps if matter.rubs_everywhere else 0
+        worst, pressed = _rub(matter, walls, world, ContactSweep(number, share, _STIRRING))
         sweeps += 1
         if worst <= _RUBBED:
+            # Where this one has seen all contacts, and dampers act: friction has moved the others by that much at most.
+            if sweeps == 1 and matter.damped:
+                follows = _LEAST_RATIO * worse(weight_of(matter.pairs) * worst, pressed)
             break
         share, best, since = _stalled((share, best, since), worst)
     world.books.sweeps[0] += sweeps
-    return worst <= _RUBBED
+    return worst <= _RUBBED, follows
 
 
 @outlined
 def _solve(matter, walls, world):
     """Sweep until the impulses solve the step; whether they do."""
-    books, lags = world.books, 0
+    books, lags, follows = world.books, 0, math.inf
     # Friction first, to fewer digits: then it is given, and what is to be exact depends on the others alone.
-    if matter.rubs and not _solve_friction(matter, walls, world):
-        lags = 1
+    if matter.rubs:
+        is_rubbed, follows = _solve_friction(matter, walls, world)
+        lags = select(is_rubbed, 0, 1)
     solved = _BESIDE_FRICTION if matter.damped and matter.rubs_everywhere else _SOLVED
+    if follows <= solved:
+        return True
     before, worst, sweeps, share, best, since = 1.0, 1.0, 0, 1.0, math.inf, 0
     while sweeps < _MOST_SWEEPS:
         worst = _sweep(matter, walls, world, share)

@@ -1,6 +1,4 @@
-"""Instructions of operations of kernels, which `arrays.py`, `fours.py`, `lines.py` and `vector.py` define in plain
-Python.
-"""
+"""Instructions of operations of kernels that `arrays.py`, `fours.py`, `lines.py` and `vector.py` define in Python."""
 
 import functools
 import math
