@@ -21,7 +21,7 @@ from numba.core.errors import TypingError
 
 import swarm
 from swarm.compiled_scene import MOST_WALLS
-from swarm.kernel import arrays, cache, machine_code
+from swarm.kernel import arrays, cache, lines, machine_code
 from swarm.kernel import jit as _jit
 from swarm.kernel.arrays import kept
 from swarm.kernel.compilers import _DEEPEST, deep, features_of
@@ -310,7 +310,9 @@ def roots(rows):
 @pytest.mark.level3(only=True)
 @compiled_only
 @wide_only
-@pytest.mark.parametrize(("decorator", "is_wide"), [(_jit.kernel, True), (_jit.long_kernel, False)])
+@pytest.mark.parametrize(
+    ("decorator", "is_wide"), [(_jit.kernel, True), (_jit.long_kernel, False), (_jit.wide_long_kernel, True)]
+)
 def test_kernels_of_flights_take_vectors_of_512_bits(decorator, is_wide, monkeypatch, tmp_path):
     """The square roots of eight lanes at once; of many short loops four, which is what LLVM takes by itself."""
     monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
@@ -333,6 +335,36 @@ def test_the_features_that_a_user_names_are_taken_as_they_are(monkeypatch, tmp_p
         is_wide = IN_WIDE_VECTORS and named is None
         assert (features_of(codegen) != codegen._tm_features) == is_wide
     assert (keys[0] != keys[1]) == IN_WIDE_VECTORS
+
+
+def through_lanes(table, ends, tile, lanes):
+    lines.into_lanes(tile, 1, table, 3, ends, 2)
+    for c in range(4):
+        for lane in range(8):
+            tile[5 + c, lane] = tile[1 + c, lane] * tile[1 + c, lane]
+    lines.add_from_lanes(table, 4, ends, 2, tile, 1, lanes)
+
+
+def columns_of(ends):
+    """Four columns of the rows for the first ends, by one number after another."""
+    table = np.random.default_rng(0).normal(size=(6, 8))
+    return [[table[ends[2, lane], 3 + c] for lane in range(8)] for c in range(4)]
+
+
+@compiled_only
+@pytest.mark.parametrize("lanes", [0b11111111, 0b01101001, 0])
+def test_rows_go_into_lanes_and_back(lanes, monkeypatch, tmp_path):
+    """The same numbers as in plain Python, also where lanes, or both ends of one, are of the same row."""
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    rng, ends = np.random.default_rng(0), np.zeros((4, 8), np.int32)
+    ends[2:] = [[4, 0, 2, 2, 1, 5, 3, 3], [1, 0, 3, 2, 4, 2, 5, 3]]
+    table, tile = rng.normal(size=(6, 8)), np.zeros((9, 8))
+    found = table.copy(), tile.copy()
+    through_lanes(table, ends, tile, lanes)
+    _jit.kernel(through_lanes)(found[0], ends, found[1], lanes)
+    assert (found[0] == table).all()
+    assert (found[1] == tile).all()
+    assert tile[1:5].tolist() == columns_of(ends)
 
 
 @_jit.outlined

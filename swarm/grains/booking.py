@@ -7,6 +7,7 @@ import numpy as np
 from ..contact.wall_impact import give_work
 from ..kernel.arrays import index, unwritten
 from ..kernel.jit import Array, outlined
+from ..kernel.lines import LANES
 from ..kernel.vector import dot, norm
 from .at_walls import rising
 from .contacts import closing, worse
@@ -18,7 +19,6 @@ from .grain_arrays import (
     DRAG,
     GAP,
     IMPULSE,
-    LANES,
     LISTED,
     PUSH,
     RADIUS,

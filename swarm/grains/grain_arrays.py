@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..kernel.arrays import aligned, spaced
+from ..kernel.arrays import aligned, aligned_copy, spaced
 from ..kernel.jit import Array
 from ..kernel.lines import LANES
 from ..kernel.record import Record
@@ -26,14 +26,14 @@ LAST, GIVEN = 0, 4
 COLUMNS_OF_BALLS = 8
 # Columns of a contact: s0, from one centre to the other at the start of a step, or the centre; |s0|, or the inner
 # function of the wall; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
-# inverse of the mass that moves; the damping; the gain of a Newton step; and where there is friction its
-# impulse, the place in the lists, the angular impulse of the resistance to rolling, and what both take.
-START, SIZE, GAP, PUSH, IMPULSE, COAST, EASE, DAMPING, GAIN = 0, 3, 4, 5, 6, 9, 12, 13, 14
-DRAG, LISTED, ROLL, RUBBED = 16, 19, 20, 23
-COLUMNS, COLUMNS_OF_FRICTION = 16, 24
-# And of one of a pair, in a lane: what makes its changes relative ones, 1/(R_i + R_j), and of both balls 1/m and what
-# turns them.
-SCALE, NEARNESS, EASES, LEVERS, COLUMNS_OF_LANES = 15, 24, 25, 27, 29
+# damping; the gain of a Newton step; what makes its changes relative ones; and of both balls of a pair 1/m. A sweep
+# without friction reads no more.
+START, SIZE, GAP, PUSH, IMPULSE, COAST, DAMPING, GAIN, SCALE, EASES = 0, 3, 4, 5, 6, 9, 12, 13, 14, 15
+COLUMNS_SWEPT = 17
+# The inverse of the mass that moves, the impulse of friction, and of a pair 1/(R_i + R_j) and what turns both balls.
+EASE, DRAG, NEARNESS, LEVERS, COLUMNS_RUBBED = 17, 18, 21, 22, 24
+# The place in the lists, the angular impulse of the resistance to rolling, and what both take.
+LISTED, ROLL, RUBBED, COLUMNS = 24, 25, 28, 29
 # Columns of `Touches.found`: both balls, and the place in the lists. Rows of `Tile.ends`: both balls.
 ONE, OTHER, PLACE, FOUND, ENDS = 0, 1, 2, 3, 2
 # Columns of `Touches.course`: the centre at the start of a step, the radius, the move in the step, and 1/mass: what is
@@ -90,7 +90,7 @@ class Neighbours(NamedTuple):
 class Tile(NamedTuple):
     """The contacts of pairs in groups, a row of each group for each column."""
 
-    rows: Array  # (groups * COLUMNS_OF_LANES, LANES)
+    rows: Array  # (groups * COLUMNS, LANES)
     ends: Array  # (groups * ENDS, LANES) int32
 
 
@@ -180,19 +180,25 @@ def set_vector_in(rows: Any, k: Any, lane: Any, a: Vec) -> None:
 def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = None) -> Grains:
     """The rows of balls, in the order of their numbers."""
     n = len(mass)
-    place, speed = aligned(8 * n).reshape(n, 8), aligned(8 * n).reshape(n, 8)
+    place, speed = _lines(n), _lines(n)
     place[:, X : X + 3], speed[:, BEFORE : BEFORE + 3] = position.T, velocity.T
     place[:, RADIUS], place[:, LIGHTNESS] = radius, 1.0 / mass
-    turning = None if spin is None else aligned(8 * n).reshape(n, 8)
+    turning = None if spin is None else _lines(n)
     if turning is not None:
         turning[:, BEFORE : BEFORE + 3] = spin.T
         turning[:, ARM], turning[:, LEVER] = radius, ROUNDNESS / radius
-    return Grains(np.arange(n), place, speed, np.zeros((n, 4)), aligned(8 * n).reshape(n, 8), turning)
+    return Grains(np.arange(n), place, speed, np.zeros((n, 4)), _lines(n), turning)
+
+
+def _lines(n: int) -> Array:
+    """Rows of so many balls, each a line of the cache."""
+    return aligned(COLUMNS_OF_BALLS * n).reshape(n, COLUMNS_OF_BALLS)
 
 
 def beside(grains: Grains, more: Grains) -> Grains:
     """The rows of balls, and behind them those of more."""
-    rows: Any = (None if old is None else np.concatenate([old, new]) for old, new in zip(grains, more, strict=True))
+    pairs = zip(grains, more, strict=True)
+    rows: Any = (None if old is None else aligned_copy(np.concatenate([old, new])) for old, new in pairs)
     return Grains(*rows)
 
 
@@ -216,19 +222,18 @@ def near_of(
     return made._replace(spans=spans, listed=listed, used=np.zeros(1, np.int64))
 
 
-def touches_of(n: int, walls: int, pairs: int, touching: int, is_kept: bool = False, listed: Any = None) -> Touches:
+def touches_of(n: int, walls: int, pairs: int, touching: int, listed: Any = None) -> Touches:
     """Room for the contacts of so many pairs and of so many balls at walls; `Neighbours` has the members of fields."""
-    columns = COLUMNS_OF_FRICTION if is_kept else COLUMNS
     # One more for those that are found by a step that has been solved without them, and one to ask for beside the last.
     groups = -(-pairs // LANES) + 2
     tile = Tile(
-        aligned(groups * COLUMNS_OF_LANES * LANES).reshape(-1, LANES), np.zeros((groups * ENDS, LANES), np.int32)
+        aligned(groups * COLUMNS * LANES).reshape(-1, LANES), np.zeros((groups * ENDS, LANES), np.int32)
     )  # fmt: skip
     return Touches(
         tile, np.zeros(groups, np.int64), np.zeros(groups, np.int64), np.zeros(n, np.int64),
-        aligned(8 * n).reshape(n, 8), np.zeros(n, np.int32),
+        _lines(n), np.zeros(n, np.int32),
         np.zeros(2, np.int64), np.zeros((pairs + 1, FOUND), np.int32), np.zeros((pairs + 1, FOUND), np.int32),
         np.zeros(1, np.int64), np.zeros(1),
-        np.zeros((touching, columns)), np.zeros(touching, np.int32), np.zeros((2, walls), np.int64),
+        np.zeros((touching, COLUMNS)), np.zeros(touching, np.int32), np.zeros((2, walls), np.int64),
         None if listed is None else np.zeros((touching, 3), np.int32), listed,
     )  # fmt: skip

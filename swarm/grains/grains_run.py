@@ -14,6 +14,7 @@ from ..compiled_scene import CompiledScene
 from ..contact.laws import NONE
 from ..contact.wall_impact import RandomSource
 from ..errors import RunError
+from ..kernel.arrays import aligned_copy
 from ..lanes.watching.log import Log
 from ..lanes.watching.watchers import Followed
 from ..methods import Penalty
@@ -227,7 +228,7 @@ class GrainsRun(BaseRun):
         self.state.dissipated[world.grains.number] += lost
         # There it stays.
         self._tier.kernel(energy.show)(world.grains, self.state, world.held)
-        stay = {name: rows[~gone] for name, rows in world.grains._asdict().items() if rows is not None}
+        stay = {name: aligned_copy(rows[~gone]) for name, rows in world.grains._asdict().items() if rows is not None}
         rest, near = world.grains._replace(**stay), world.near
         members = None if near.listed is None else near.listed.size
         near, touches = self._room(len(rest.number), near.mate.size, near.slot.size, members)
@@ -267,7 +268,7 @@ class GrainsRun(BaseRun):
         walls, matter = len(self._owners), self._matter
         kept = KEPT if self._impacts is not None else (6 if matter.rolls else 3) if matter.rubs else 0
         near = arrays.near_of(n, walls, pairs, touching, kept, members, matter.openings is not None)
-        return near, arrays.touches_of(n, walls, pairs, touching, kept > 0, near.listed)
+        return near, arrays.touches_of(n, walls, pairs, touching, near.listed)
 
     def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Neighbours:
         """Make room for so many pairs, balls at walls, and members of fields, and some more."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..kernel.arrays import fetch, index, kept, unwritten
 from ..kernel.jit import is_known, outlined, select
-from ..kernel.lines import FOUR, add_from_lanes, into_lanes
+from ..kernel.lines import FOUR, LANES, add_from_lanes, into_lanes
 from ..kernel.vector import Vec, cross, dot, square
 from .cell import nearest
 from .contacts import (
@@ -38,7 +38,8 @@ from .grain_arrays import (
     COAST,
     COLUMNS,
     COLUMNS_OF_BALLS,
-    COLUMNS_OF_LANES,
+    COLUMNS_RUBBED,
+    COLUMNS_SWEPT,
     DAMPING,
     DRAG,
     EASE,
@@ -49,7 +50,6 @@ from .grain_arrays import (
     GIVEN,
     IMPULSE,
     KEPT_ROLL,
-    LANES,
     LEVER,
     LEVERS,
     LIGHTNESS,
@@ -78,7 +78,7 @@ from .grain_arrays import (
 def of_group(touches, g):
     """The rows of the contacts, the first one of a group, the rows of the balls, and the first one of the group."""
     tile = with_lanes(touches.tile)
-    return tile.rows, index(g * COLUMNS_OF_LANES), tile.ends, index(g * ENDS)
+    return tile.rows, index(g * COLUMNS), tile.ends, index(g * ENDS)
 
 
 def balls_of(ends, e, lane):
@@ -89,7 +89,7 @@ def balls_of(ends, e, lane):
 def _fetch_next(rows, q, columns):
     """Ask for so many columns of the next group: those of many balls are not in the second cache."""
     for k in range(columns):
-        fetch(rows, (q + COLUMNS_OF_LANES + k) * LANES)
+        fetch(rows, (q + COLUMNS + k) * LANES)
 
 
 def _fetch_ball(grains, i):
@@ -164,7 +164,7 @@ def _begin_group(matter, grains, near, touches, group):
         # Of the second ball in the next group, which has been laid; the first one is often that of this group.
         _fetch_ball(grains, index(ends[e + ENDS + 1, index(k)]))
         if near.drag is not None:
-            fetch(near.drag, int(rows[q + COLUMNS_OF_LANES + LISTED, index(k)]) * near.drag.shape[1])
+            fetch(near.drag, int(rows[q + COLUMNS + LISTED, index(k)]) * near.drag.shape[1])
     read_lines(grains.place, ends, e, read, _PLACE)
     read_lines(grains.speed, ends, e, read, _SPEED)
     if matter.pairs.friction is not None:
@@ -394,7 +394,7 @@ def _sweep_group(matter, grains, touches, group, arrays, sweep):
     (g, lanes), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
     read_ends(grains.speed, ends, e, begun, _SLIP)
-    _fetch_next(rows, q, COLUMNS)
+    _fetch_next(rows, q, COLUMNS_SWEPT)
     for k in over_lanes(lanes):
         lane, is_due = index(k), is_in(lanes, k)
         _way, _push, part, off = _press(matter, rows, q, lane, is_due, begun, sweep.share)
@@ -409,7 +409,7 @@ def _rub_group(matter, grains, touches, group, arrays, sweep):
     rows, q, ends, e = of_group(touches, g)
     read_ends(grains.speed, ends, e, begun, _SLIP)
     read_ends(grains.spin, ends, e, begun, _TURNING)
-    _fetch_next(rows, q, COLUMNS_OF_LANES)
+    _fetch_next(rows, q, COLUMNS_RUBBED)
     unsolved = 0
     for k in over_lanes(lanes):
         lane, is_due = index(k), is_in(lanes, k)

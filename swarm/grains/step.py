@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from ..common.status import Status
 from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
-from ..kernel.jit import Array, long_kernel, outlined, select
+from ..kernel.jit import Array, outlined, select, wide_long_kernel
 from ..kernel.vector import ZERO, square
 from ..lanes.watching.log import is_full
 from .at_walls import gather_at_wall, push_walls, sweep_wall
@@ -219,13 +219,8 @@ def _rub(matter, walls, world, sweep):
             off, pressed_off = rub_wall(matter, matter.walls[k], wall, grains, touches, k, sweep)
         worst, pressed = worse(off, worst), worse(pressed_off, pressed)
         if matter.walls[k].rolling is not None:
-<<<<<<< HEAD
             worst = worse(roll_wall(matter.walls[k], wall, grains, touches, k, sweep), worst)
-    return worst
-=======
-            worst = worse(roll_wall(matter, matter.walls[k], wall, grains, touches, k, sweep), worst)
     return worst, pressed
->>>>>>> 7a511a34 (No sweep of normal impulses follows friction that changed next to nothing)
 
 
 def _stalled(pace, worst):
@@ -441,7 +436,7 @@ def _step(matter, walls, listed, world, skin):
 # --- Of a frame ------------------------------------------------------------------------------------------
 
 
-@long_kernel
+@wide_long_kernel
 def march(matter, walls, world, clock, rule):
     """Take step after step until the end of the frame, or the stop before it: the `Status`.
 

@@ -47,8 +47,9 @@ def features_of(codegen: Any) -> str:
     wider ones. Those lack the instruction set `_RECENT` and keep 256 bits; on them nothing was measured.
     Measured in turn on a Sapphire Rapids, times of 256 bits: an impact on walls that swing or turn 0.7 to 0.8, a
     formula of degree 4 0.80, boxes and rotated ellipsoids 0.8 to 0.9, other shapes 0.9 to 1.0 with gravity or without,
-    meshes 0.93 to 0.97, first calls the same. Grains, balls, bodies and sliding gain nothing (0.97 to 1.07): their
-    loops are short or in scalars, so a `_LongKernel` is left as it is.
+    meshes 0.93 to 0.97, first calls the same. Balls, bodies and sliding gain nothing (0.97 to 1.07): their loops are
+    short or in scalars, so a `_LongKernel` is left as it is, but that of grains, of which all lanes of a group are one
+    vector.
 
     No sum over lanes is reordered, so bits are the same. $NUMBA_CPU_FEATURES is taken as it is.
     """
@@ -157,6 +158,12 @@ class LongKernelCompiler(KernelCompiler):
     """Numba's compiler for a `_LongKernel`."""
 
     library = _LongKernel
+    is_wide = False
+
+
+class WideLongKernelCompiler(LongKernelCompiler):
+    """The same, with vectors of 512 bits."""
+
     is_wide = True
 
 

@@ -196,30 +196,61 @@ _emitted(operator.truediv, "fdiv", types.BaseNamedTuple, types.Float)
 
 # --- Lines of eight numbers ------------------------------------------------------------------------------
 
-_NUMBER, _PLACE = ir.DoubleType(), ir.IntType(32)
+_NUMBER, _PLACE, _WHOLE = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
 _FOUR, _EIGHT = ir.VectorType(_NUMBER, FOUR), ir.VectorType(_NUMBER, LANES)
 
 
-def _shuffled(builder, a, b, places):
+def _shuffled(builder, pair, places):
     mask = ir.Constant(ir.VectorType(_PLACE, len(places)), list(places))
-    return builder.shuffle_vector(a, b, mask)
+    return builder.shuffle_vector(*pair, mask)
 
 
 def _pointer(context, builder, kind, table, row, column, columns, to):
-    """That of so many numbers in a row of so many columns from one on; row and column are of the type of an index."""
+    """That of the numbers in a row of so many columns from one on; row and column are of the type of an index."""
     data = context.make_array(kind)(context, builder, table).data
     place = builder.add(builder.mul(row, row.type(columns)), column)
     return builder.bitcast(builder.gep(data, [place]), to.as_pointer())
 
 
-def _row_of(context, builder, kind, table, ends, lane):
-    """The row of the table for a lane, of which `ends` is the pointer of the first."""
-    row = builder.load(builder.gep(ends, [lane]))
-    return builder.zext(row, context.get_value_type(types.intp))
+def _pointers(context, builder, kinds, given):
+    """Those of the tile, of the table, and of the rows for its lanes, from arrays and places in them."""
+    tile, q, table, column, ends, e = given
+    none = q.type(0)
+    return [
+        _pointer(context, builder, kinds[0], tile, q, none, LANES, _NUMBER),
+        _pointer(context, builder, kinds[1], table, none, column, COLUMNS, _NUMBER),
+        _pointer(context, builder, kinds[2], ends, e, none, LANES, _PLACE),
+    ]
 
 
 def _indices(context, builder, signature, args, places):
     return [context.cast(builder, args[k], signature.args[k], types.intp) for k in places]
+
+
+def _function(module, name, arguments, body):
+    """A function of its own for all calls in a kernel: written out in each of them the kernel takes a third longer."""
+    if name not in module.globals:
+        made = ir.Function(module, ir.FunctionType(ir.VoidType(), arguments), name)
+        made.linkage = "internal"
+        made.attributes.add("noinline")
+        builder = ir.IRBuilder(made.append_basic_block())
+        body(builder, *made.args)
+        builder.ret_void()
+    return module.globals[name]
+
+
+def _row(builder, table, ends, lane, to):
+    """The pointer of a row of the table for a lane, which is a number of 64 bits."""
+    row = builder.zext(builder.load(builder.gep(ends, [lane])), _WHOLE)
+    return builder.bitcast(builder.gep(table, [builder.mul(row, _WHOLE(COLUMNS))]), to.as_pointer())
+
+
+def _column(builder, tile, c):
+    """The pointer of a column of all lanes."""
+    return builder.bitcast(builder.gep(tile, [_WHOLE(c * LANES)]), _EIGHT.as_pointer())
+
+
+# --- Into lanes ------------------------------------------------------------------------------------------
 
 
 @operation(
@@ -228,70 +259,79 @@ def _indices(context, builder, signature, args, places):
 )  # fmt: skip
 def _emit_into_lanes(context, builder, signature, args):
     q, column, e = _indices(context, builder, signature, args, (1, 3, 5))
-    kinds, none = signature.args, q.type(0)
-    ends = _pointer(context, builder, kinds[4], args[4], e, none, LANES, _PLACE)
-    lines = []
-    for lane in range(LANES):
-        row = _row_of(context, builder, kinds[2], args[2], ends, q.type(lane))
-        place = _pointer(context, builder, kinds[2], args[2], row, column, COLUMNS, _FOUR)
-        lines.append(builder.load(place, align=8))
+    pointers = _pointers(context, builder, signature.args[::2], (args[0], q, args[2], column, args[4], e))
+    called = _function(builder.module, ".into_lanes", [one.type for one in pointers], _into_lanes)
+    builder.call(called, pointers)
+    return context.get_dummy_value()
+
+
+def _into_lanes(builder, tile, table, ends):
+    lines = [builder.load(_row(builder, table, ends, _WHOLE(lane), _FOUR), align=8) for lane in range(LANES)]
     # Numbers of two lanes beside one another by each instruction, which works on halves of a quarter of a vector.
-    halves = [_shuffled(builder, lines[k], lines[k + 2], range(8)) for k in (0, 1, 4, 5)]
-    low = [_shuffled(builder, halves[k], halves[k + 1], (0, 8, 2, 10, 4, 12, 6, 14)) for k in (0, 2)]
-    high = [_shuffled(builder, halves[k], halves[k + 1], (1, 9, 3, 11, 5, 13, 7, 15)) for k in (0, 2)]
-    for c, (one, other) in enumerate((low, high, low, high)):
+    halves = [_shuffled(builder, (lines[k], lines[k + 2]), range(8)) for k in (0, 1, 4, 5)]
+    low = [_shuffled(builder, halves[k : k + 2], (0, 8, 2, 10, 4, 12, 6, 14)) for k in (0, 2)]
+    high = [_shuffled(builder, halves[k : k + 2], (1, 9, 3, 11, 5, 13, 7, 15)) for k in (0, 2)]
+    for c, pair in enumerate((low, high, low, high)):
         first = 2 * (c // 2)
         places = [base + first + k for base in (0, 4, 8, 12) for k in (0, 1)]
-        column_of_all = _shuffled(builder, one, other, places)
-        to = _pointer(context, builder, kinds[0], args[0], builder.add(q, q.type(c)), none, LANES, _EIGHT)
-        builder.store(column_of_all, to, align=8)
-    return context.get_dummy_value()
+        builder.store(_shuffled(builder, pair, places), _column(builder, tile, c), align=8)
 
 
-@operation(
-    add_from_lanes, lambda table, column, ends, e, tile, q, lanes: types.none,
-    types.Array, types.Any, types.Array, types.Any, types.Array, types.Any, types.Any,
-)  # fmt: skip
-def _emit_add_from_lanes(context, builder, signature, args):
-    column, e, q, lanes = _indices(context, builder, signature, args, (1, 3, 5, 6))
-    kinds, none = signature.args, q.type(0)
-    ends = _pointer(context, builder, kinds[2], args[2], e, none, LANES, _PLACE)
+# --- From lanes ------------------------------------------------------------------------------------------
 
-    def changes_of(end):
-        """Of each lane the four numbers of an end."""
-        columns = []
-        for c in range(FOUR):
-            row = builder.add(q, q.type(end * FOUR + c))
-            place = _pointer(context, builder, kinds[4], args[4], row, none, LANES, _EIGHT)
-            columns.append(builder.load(place, align=8))
-        low = [_shuffled(builder, *columns[k : k + 2], (0, 8, 2, 10, 4, 12, 6, 14)) for k in (0, 2)]
-        high = [_shuffled(builder, *columns[k : k + 2], (1, 9, 3, 11, 5, 13, 7, 15)) for k in (0, 2)]
-        firsts = [2 * (lane // 2) for lane in range(LANES)]
-        return [
-            _shuffled(builder, *(high if lane % 2 else low), (first, first + 1, first + LANES, first + LANES + 1))
-            for lane, first in enumerate(firsts)
-        ]
 
-    def add(end, lane, change):
-        row = _row_of(context, builder, kinds[0], args[0], ends, builder.add(lane, lane.type(end * LANES)))
-        place = _pointer(context, builder, kinds[0], args[0], row, column, COLUMNS, _FOUR)
-        builder.store(builder.fadd(builder.load(place, align=8), change), place, align=8)
+def _of_lanes(builder, tile, end):
+    """Of each lane the four numbers of an end."""
+    columns = [builder.load(_column(builder, tile, end * FOUR + c), align=8) for c in range(FOUR)]
+    low = [_shuffled(builder, columns[k : k + 2], (0, 8, 2, 10, 4, 12, 6, 14)) for k in (0, 2)]
+    high = [_shuffled(builder, columns[k : k + 2], (1, 9, 3, 11, 5, 13, 7, 15)) for k in (0, 2)]
+    firsts = [2 * (lane // 2) for lane in range(LANES)]
+    return [
+        _shuffled(builder, high if lane % 2 else low, (first, first + 1, first + LANES, first + LANES + 1))
+        for lane, first in enumerate(firsts)
+    ]
 
-    changes, every = [changes_of(0), changes_of(1)], lanes.type(2**LANES - 1)
+
+def _from_lanes(of_one, count, builder, tile, table, ends, lanes):
+    """Give `of_one` the place of each end in the table, and what is for it; of each lane so many ends."""
+    every = _WHOLE(2**LANES - 1)
     with builder.if_else(builder.icmp_unsigned("==", builder.and_(lanes, every), every)) as (all_lanes, some_lanes):
         with all_lanes:
+            changes = [_of_lanes(builder, tile, end) for end in range(count)]
             for lane in range(LANES):
-                for end in (0, 1):
-                    add(end, q.type(lane), changes[end][lane])
-        with some_lanes:
-            kept = cgutils.alloca_once(builder, _FOUR, size=2 * LANES)
-            for end in (0, 1):
-                for lane in range(LANES):
-                    builder.store(changes[end][lane], builder.gep(kept, [q.type(end * LANES + lane)]))
-            with cgutils.for_range(builder, q.type(LANES)) as loop:
-                bit = builder.and_(builder.lshr(lanes, loop.index), lanes.type(1))
-                with builder.if_then(builder.icmp_unsigned("==", bit, bit.type(1))):
-                    for end in (0, 1):
-                        place = builder.gep(kept, [builder.add(loop.index, q.type(end * LANES))])
-                        add(end, loop.index, builder.load(place))
+                for end in range(count):
+                    of_one(builder, _row(builder, table, ends, _WHOLE(end * LANES + lane), _FOUR), changes[end][lane])
+        with some_lanes, cgutils.for_range(builder, _WHOLE(LANES)) as loop:
+            bit = builder.and_(builder.lshr(lanes, loop.index), _WHOLE(1))
+            with builder.if_then(builder.icmp_unsigned("==", bit, _WHOLE(1))):
+                for end in range(count):
+                    lane = builder.add(loop.index, _WHOLE(end * LANES))
+                    row = _row(builder, table, ends, lane, _NUMBER)
+                    for c in range(FOUR):
+                        one = builder.gep(tile, [builder.add(loop.index, _WHOLE((end * FOUR + c) * LANES))])
+                        of_one(builder, builder.gep(row, [_WHOLE(c)]), builder.load(one))
+
+
+def _add(builder, place, change):
+    builder.store(builder.fadd(builder.load(place, align=8), change), place, align=8)
+
+
+def _put(builder, place, numbers):
+    builder.store(numbers, place, align=8)
+
+
+def _emit_from_lanes(name, of_one, count, context, builder, signature, args):
+    column, e, q, lanes = _indices(context, builder, signature, args, (1, 3, 5, 6))
+    kinds = [signature.args[k] for k in (4, 0, 2)]
+    pointers = _pointers(context, builder, kinds, (args[4], q, args[0], column, args[2], e))
+    body = functools.partial(_from_lanes, of_one, count)
+    called = _function(builder.module, name, [*(one.type for one in pointers), _WHOLE], body)
+    builder.call(called, [*pointers, lanes])
     return context.get_dummy_value()
+
+
+for _operation, _of_one, _count in ((add_from_lanes, _add, 2),):
+    operation(
+        _operation, lambda table, column, ends, e, tile, q, lanes: types.none,
+        types.Array, types.Any, types.Array, types.Any, types.Array, types.Any, types.Any,
+    )(functools.partial(_emit_from_lanes, f".{_operation.__name__}", _of_one, _count))  # fmt: skip

@@ -51,13 +51,14 @@ class Kernel:
     Args:
         function: what it computes, in plain Python.
         is_long: whether it is many short loops, see `compilers.py`.
+        is_wide: whether its vectors are of 512 bits where that pays.
 
     Attributes:
         py_func: the function.
     """
 
-    def __init__(self, function: Any, is_long: bool) -> None:
-        self.py_func, self.is_long = function, is_long
+    def __init__(self, function: Any, is_long: bool, is_wide: bool) -> None:
+        self.py_func, self.is_long, self.is_wide = function, is_long, is_wide
         functools.update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -81,13 +82,19 @@ class Kernel:
 
 def kernel(function: F) -> F:
     """Compile a module-level function, without the GIL, cached on disk."""
-    made: Any = function if cache.is_disabled() else Kernel(function, is_long=False)
+    made: Any = function if cache.is_disabled() else Kernel(function, is_long=False, is_wide=True)
     return made  # type: ignore[no-any-return]
 
 
 def long_kernel(function: F) -> F:
     """`kernel` for what is not flights: many short loops, see `compilers.py`."""
-    made: Any = function if cache.is_disabled() else Kernel(function, is_long=True)
+    made: Any = function if cache.is_disabled() else Kernel(function, is_long=True, is_wide=False)
+    return made  # type: ignore[no-any-return]
+
+
+def wide_long_kernel(function: F) -> F:
+    """`long_kernel` where most of the time goes to loops over whole vectors of lanes."""
+    made: Any = function if cache.is_disabled() else Kernel(function, is_long=True, is_wide=True)
     return made  # type: ignore[no-any-return]
 
 

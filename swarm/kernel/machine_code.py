@@ -29,7 +29,7 @@ from numba.np import linalg as blas
 
 from . import emission
 from .cache import base, is_disabled, listeners
-from .compilers import KernelCompiler, LongKernelCompiler, PartCompiler, features_of
+from .compilers import KernelCompiler, LongKernelCompiler, PartCompiler, WideLongKernelCompiler, features_of
 from .deferred import loaded
 from .digest import key_of_kernel, was_compiled
 from .entries import File, Key, is_own, key_of
@@ -99,7 +99,8 @@ def kernel_of(kernel: Kernel) -> Any:
         function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
     )
     prepare(traced, _INLINE, outlined=False, is_kernel=True)
-    pipeline = LongKernelCompiler if kernel.is_long else KernelCompiler
+    long = WideLongKernelCompiler if kernel.is_wide else LongKernelCompiler
+    pipeline = long if kernel.is_long else KernelCompiler
     return cached(function, {**_KERNEL, "pipeline_class": pipeline}, calling(traced))
 
 

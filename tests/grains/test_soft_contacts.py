@@ -440,3 +440,21 @@ def test_beside_friction_sweeps_end_where_they_would_not_make_the_end_more_exact
     (exact, _), (whole, many), (short, few) = found.values()
     assert abs(short - whole).max() < 1e-2 * abs(whole - exact).max()
     assert few < 0.9 * many
+
+
+def test_a_pile_at_rest_takes_one_sweep_a_step():
+    """Where friction changes next to nothing, what its sweep did to normal impulses is enough: none is after it."""
+    (scene, _start), places = heap(0.5, 0.5), [[0.0, 0.0], [0.0, 0.0], [0.005, 0.0149]]
+    start = swarm.Particles(places, np.zeros((3, 2)), 1.3e-3, radius=0.005)
+    with GrainsRun(
+        scene.compiled(), start, swarm.Penalty(2e-4, 1600.0, 1.0), 1, None, "never", Seeding(), Watched()
+    ) as run:
+        run.observe()
+        assert run.advance(400.0, 0.08)
+        books = run._world.books
+        before = int(books.sweeps[0])
+        assert before > 500
+        assert run.advance(50.0, 0.09)
+        assert int(books.sweeps[0]) - before == 50
+        assert np.abs(run.state.velocity).max() < 1e-6
+        assert books.overlap[0] > 1e-6
