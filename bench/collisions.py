@@ -173,7 +173,7 @@ def main(quick: bool = False) -> None:
     rows = [Row(f"{name}, a collision", *found[name], "us", f"{bar:g}") for name, *_rest, bar in SPEEDS]
     small, large = (float(child(_MEMORY, str(k), tier())) for k in ((8, 64) if quick else (1000, 1_000_000)))
     each = (large - small) / (64 if quick else 1_000_000)
-    rows.append(Row("memory, packing 0.3", each, each, "bytes/particle", "250"))
+    rows.append(Row("memory, packing 0.3", each, each, "bytes/particle", "220"))
     rows += _cavities(quick)
     rows += _exact(*((27, 100.0, 5) if quick else (1000, 1e8, 1000)))
     if not quick:

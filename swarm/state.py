@@ -91,13 +91,13 @@ class Balls(NamedTuple):
 
     Attributes:
         radius: (N,) [m].
-        collisions: (N,) with other particles since the start; each counts for both.
+        collisions: (N,) whole numbers, with other particles since the start; each counts for both.
         virial: (1,) the sum of r_ij . J_ij over all collisions since the start [J s].
         spin: (3, N) angular velocity [rad/s], or None where nothing turns them.
     """
 
     radius: Floats
-    collisions: NDArray[np.int64]
+    collisions: NDArray[Any]
     virial: Floats
     spin: Floats | None = None
 
@@ -165,7 +165,7 @@ class State(NamedTuple):
     @property
     def collisions(self) -> NDArray[np.int64] | None:
         """The number of collisions (N,) of each ball with others since the start; None for points."""
-        return None if self.balls is None else self.balls.collisions
+        return None if self.balls is None else self.balls.collisions.astype(np.int64, copy=False)
 
     def having(self, **arrays: NDArray[Any]) -> "State":
         """The state with other arrays, also in place of those of balls."""

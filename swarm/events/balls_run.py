@@ -11,7 +11,6 @@ from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..contact.laws import Laws
 from ..contact.wall_impact import RandomSource
-from ..kernel.arrays import aligned_copy
 from ..methods.base import Method
 from ..particles import Particles
 from ..run import failures
@@ -29,9 +28,10 @@ from .colliding import events
 from .colliding.bounce import Gates
 from .colliding.box import CollisionRule, CollisionTotals
 from .colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
-from .colliding.described import described, epoch_of, put_in, reach_of, there_at, with_room
+from .colliding.described import come, described, reach_of, there_at
 from .colliding.queue import FIRST
 from .colliding.resting import warn_of_rest
+from .colliding.rows import MET, WHOLES
 from .colliding.window import END
 from .windows import windows_of
 
@@ -46,18 +46,20 @@ class CollidingRun(BaseRun):
         assert particles.radius is not None
         scene, n, rows = compiled.scene, len(particles), len(compiled.numbering.surfaces_of_rows)
         self._radius = float(particles.radius.max())
-        box, self._flock = described(compiled, particles)
+        box, self._flock, epoch = described(compiled, particles)
         self._clock = np.zeros(CLOCK)
-        self._clock[[LENGTH, REACH]] = epoch_of(scene, particles, box.grid), reach_of(box.grid)
+        self._clock[[LENGTH, REACH]] = epoch, reach_of(box.grid)
         self._windows = windows_of(compiled, self._clock)
         openings = compiled.openings()
         rough = box.turning is not None and box.turning.friction is not None
         every = self._every_laws(compiled, box)
         loses = any(one.may_dissipate or one.loses for one in every) or box.loss is not None or rough
         ends = any(one.may_end for one in every)
-        balls = Balls(particles.radius, np.zeros(n, np.int64), np.zeros(1), particles.spin)
-        # The energy of each ball is not kept. An array of zeros that is never written takes one page of memory.
-        unused = np.zeros(n)
+        # How often each has collided is in its row of what is next.
+        met = self._flock.tag.reshape(n, WHOLES)[:, MET]
+        balls = Balls(particles.radius, met, np.zeros(1), particles.spin)
+        # The energy of each ball is not kept.
+        unused = np.broadcast_to(0.0, n)
         # Times are those of the start of each flight: so what is written at frames is no part of the motion.
         self.state = State(
             particles.position, particles.velocity, particles.mass, *2 * (unused,),
@@ -119,8 +121,6 @@ class CollidingRun(BaseRun):
             )
             if page is not None and status == Status.LOG_FULL:
                 page.turn()
-            elif status == Status.LEASE_ENDED and ball >= 0:
-                self._make_room()
             elif status == Status.LEASE_ENDED:
                 self._next_window()
             elif status == Status.DONE and self._feed is not None and self._feed.next() <= moment:
@@ -151,20 +151,14 @@ class CollidingRun(BaseRun):
         """Let those come that are due at a moment [s]."""
         assert self._feed is not None
         now = self._since(moment)
-        born = self._feed.come(moment, There(*there_at(self._flock, self._box.pull, now)))
+        born = self._feed.come(moment, There(*there_at(self._flock, self._balls.radius, self._box.pull, now)))
         for i, position, velocity in zip(born.number.tolist(), born.position.T, born.velocity.T, strict=True):
             self.state.position[:, i], self.state.velocity[:, i] = position, velocity
-            if not put_in(self._flock, self._box.grid, i, now, position, velocity):
-                self._make_room()
+            come(self._flock, self._box.grid, i, now, position, velocity)
             if (crossed := self.state.crossed) is not None:
                 counters = self._box.watchers.counters
                 crossed.side[:, i] = crossed_of(counters, self._counted, self._scene, position[:, None]).side[:, 0]
             self._call(events.welcome, self._box, self._flock, i, now)
-
-    def _make_room(self) -> None:
-        """More room in the cells."""
-        self._flock, grid = with_room(self._flock, self._box.grid)
-        self._box = self._box._replace(grid=grid)
 
     def _show(self, moment: float) -> None:
         self._show_at(self._since(moment))
@@ -261,16 +255,15 @@ class CollidingRun(BaseRun):
         return min(1.0, max(0.0, (self._now() - self._frame_before) / span))
 
     def _arrays(self) -> dict[str, Any]:
-        flock, state, kept = self._flock, self.state, self._flock.kept
+        flock, state = self._flock, self.state
         return {
             "flight": flock.flight, "event": flock.event, "node": flock.node, "key": flock.key, "item": flock.item,
-            "room": flock.room,
+            "head": flock.head,
             "impulse": state.impulse, "dissipated": state.dissipated, "impacts": state.impacts,
-            "collisions": self._balls.collisions, "virial": self._books.virial, "clock": self._clock,
+            "virial": self._books.virial, "clock": self._clock,
             "start": self._start, "position": state.position, "velocity": state.velocity,
             "last": flock.last, "followed": flock.followed, "image": state.image, "heat": state.heat,
             "escape_time": state.escape_time,
-            "kept": None if kept is None else kept.twice, "kept_stamp": None if kept is None else kept.stamp,
             "spin": self._balls.spin, "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
             "window": None if self._windows is None else self._windows.numbers,
             "held": None if flock.holds is None else self._box.kinds.mass, "crossed": state.crossed,
@@ -278,9 +271,6 @@ class CollidingRun(BaseRun):
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
-        grid, size = self._box.grid, arrays["room"].size
-        self._flock = self._flock._replace(room=aligned_copy(np.zeros(size, np.int32)))
-        self._box = self._box._replace(grid=grid._replace(stride=size // grid.near.size))
         super().restore(arrays, cut_short)
         if self._windows is not None:
             self._set_window()

@@ -8,8 +8,9 @@ import pytest
 from colliding.gases import frames, gas, run_of
 
 import swarm
+from swarm.events.colliding.next_collision import _MOST
 from swarm.events.colliding.queue import FIRST, SPARE, build, requeue
-from swarm.events.colliding.rows import FLOATS, LEAVES, NO_PARTNER, PARTNER, WHOLES, Flock
+from swarm.events.colliding.rows import CELL, FLOATS, LEAVES, MEETS, NO_PARTNER, PARTNER, WHOLES, Flock
 from swarm.kernel import cache
 
 
@@ -24,7 +25,7 @@ def flock_of(times):
     item[FIRST : FIRST + n] = np.arange(n)
     none = np.zeros(0)
     key = np.full(n + SPARE, math.inf)
-    made = Flock(none, event, tag, np.arange(FIRST, FIRST + n, dtype=np.int32), key, item, none)
+    made = Flock(none, event, none, tag, np.arange(FIRST, FIRST + n, dtype=np.int32), key, item, none)
     build(made)
     return made
 
@@ -65,7 +66,6 @@ def test_a_large_ball_among_small_ones():
     scene = swarm.Scene([swarm.Box((1.0, 1.0, 1.0))])
     with run_of(scene, start) as run:
         run.observe()
-        stride = run._box.grid.stride
         for k in range(10):
             run.advance(0.05, 0.05 * (k + 1))
             x = run.state.position
@@ -73,26 +73,67 @@ def test_a_large_ball_among_small_ones():
             gaps = np.sqrt((b * b).sum(axis=0)) - start.radius[:, None] - start.radius
             assert gaps[np.triu_indices(len(start), 1)].min() > -1e-15
         seen = run.seen()
-        assert stride > 5
     assert seen["collisions"] > 40
     assert seen["energy_error"] < 1e-14
 
 
-def test_cells_get_more_room():
-    """All balls come into one cell, which has room for fewer at the start."""
+def times_of_pairs(x, v, radius, shift=(0.0, 0.0, 0.0)):
+    """When each ball meets each other one, that far away, by brute force."""
+    b, u = x[:, :, None] - x[:, None, :] + np.array(shift)[:, None, None], v[:, :, None] - v[:, None, :]
+    closing, u2 = (b * u).sum(axis=0), (u * u).sum(axis=0)
+    gap = (b * b).sum(axis=0) - (radius[:, None] + radius) ** 2
+    root = closing**2 - u2 * gap
+    with np.errstate(all="ignore"):
+        return np.where((closing < 0.0) & (root > 0.0), gap / (np.sqrt(root) - closing), math.inf)
+
+
+def balls_of_cells(run):
+    """The balls of each cell that has any, by their links."""
+    flock, found = run._flock, {}
+    for cell, first in enumerate(flock.head.tolist()):
+        ball = first
+        while ball >= 0:
+            found.setdefault(cell, []).append(ball)
+            ball = int(flock.after(ball))
+    return found
+
+
+def test_the_next_collisions_where_cells_have_many_balls():
+    """Two that are each other's soonest know it, also if more balls are around them than are looked at at once."""
+    start = cell_of_many(6.0, 330)
+    with run_of(swarm.Scene([swarm.Box((1.0, 1.0, 1.0))]), start) as run:
+        run.observe()
+        counts = np.zeros([axis.count for axis in run._box.grid.axes()])
+        for x in zip(*run._flock.tag.reshape(-1, WHOLES)[:, CELL : CELL + 3].T - 1, strict=True):
+            counts[x] += 1
+        assert max(counts[k : k + 3, 1:4, 1:4].sum() for k in range(2)) > _MOST
+        times = times_of_pairs(start.position, start.velocity, start.radius)
+        mate = times.argmin(axis=0)
+        first, leaves = times.min(axis=0), run._flock.event[LEAVES::FLOATS]
+        # Those that meet after one of them has left its cell need not know it yet.
+        mutual = (mate[mate] == np.arange(len(start))) & (first < np.minimum(leaves, leaves[mate]))
+        assert mutual.sum() > 50
+        assert np.abs(run._flock.event[MEETS::FLOATS][mutual] - first[mutual]).max() < 1e-12
+
+
+def test_all_balls_come_into_one_cell():
     scene = swarm.Scene([swarm.Box((1.0, 1.0, 1.0))])
     corners = 0.6 * np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3))).T
     target = np.array([0.9, 0.9, 0.9])[:, None] + 0.05 * corners
     start = swarm.Particles(corners, target - corners, radius=0.01)
     with run_of(scene, start) as run:
         run.observe()
-        before, coarse = run._box.grid.stride, run._box.grid.x.count
+        assert max(map(len, balls_of_cells(run).values())) < 27
         run.advance(0.95, 0.95)
-        assert run._box.grid.stride > before
-        assert coarse > 2
+        (balls,) = balls_of_cells(run).values()
+        assert sorted(balls) == list(range(27))
         kept = {name: array.copy() for name, array in run.arrays().items()}
         run.advance(1.0, 1.95)
         expected = run.state.position.copy()
+        balls = balls_of_cells(run)
+        assert sorted(itertools.chain(*balls.values())) == list(range(27))
+        for cell, some in balls.items():
+            assert {int(run._box.grid.number(ball, run._flock)) for ball in some} == {cell}
     with run_of(scene, start) as run:
         run.restore(kept, False)
         run.advance(1.0, 1.95)
@@ -106,7 +147,6 @@ def test_each_event_is_the_first_that_there_is(options):
     """The next collision of a gas at any time is the least of those of all pairs, by brute force."""
     scene, start = gas(n=20, **options)
     start.image = None if scene.period is None else np.zeros((3, 20), np.int64)
-    lengths = None if scene.period is None else np.array(scene.period)[:, None, None]
     with run_of(scene, start) as run:
         run.observe()
         for k in range(40):
@@ -114,15 +154,8 @@ def test_each_event_is_the_first_that_there_is(options):
             x, v = run.state.position, run.state.velocity
             soonest = math.inf
             for shift in itertools.product((-1.0, 0.0, 1.0), repeat=3) if scene.period else [(0.0, 0.0, 0.0)]:
-                b = x[:, :, None] - x[:, None, :]
-                b = b if lengths is None else b + np.array(shift)[:, None, None] * lengths
-                u = v[:, :, None] - v[:, None, :]
-                closing, u2 = (b * u).sum(axis=0), (u * u).sum(axis=0)
-                gap = (b * b).sum(axis=0) - (start.radius[:, None] + start.radius) ** 2
-                root = closing**2 - u2 * gap
-                with np.errstate(all="ignore"):
-                    time = np.where((closing < 0.0) & (root > 0.0), gap / (np.sqrt(root) - closing), math.inf)
-                soonest = min(soonest, time.min())
+                away = shift if scene.period is None else np.multiply(shift, scene.period)
+                soonest = min(soonest, times_of_pairs(x, v, start.radius, away).min())
             meets = run._flock.event[0::FLOATS].min() - run._since(0.02 * (k + 1))
             # A known collision may not come to pass: then no collision is sooner.
             assert meets <= soonest + 1e-12

@@ -7,7 +7,7 @@ from ...kernel.jit import outlined
 from .cells import take_out, until_exit
 from .next_collision import find_partner, find_wall, forget_wall, tell_partner
 from .queue import requeue
-from .rows import DUE, FLOATS, LEAVES, MEETS, NO_PARTNER, PARTNER, WALL, WHOLES
+from .rows import DUE, FLOATS, LEAVES, MEETS, NO_PARTNER, PARTNER, WHOLES
 from .window import OUT
 
 
@@ -36,9 +36,9 @@ def queue_both(flock, i):
 @outlined
 def vanish(box, flock, i):
     """Take out a ball that has left the scene: it stays where it is, and meets no other ball."""
-    take_out(box.grid, flock, i, box.grid.number(i, flock))
+    take_out(flock, i, box.grid.number(i, flock))
     for k in (MEETS, LEAVES, DUE):
         flock.event[index(FLOATS * i + k)] = math.inf
-    flock.event[index(FLOATS * i + WALL)] = OUT
+    flock.aim_at(i, OUT)
     flock.tag[index(WHOLES * i + PARTNER)] = NO_PARTNER
     requeue(flock, i)

@@ -23,6 +23,4 @@ def fetch_next(box, flock):
     for kx in range(-1, 2):
         plane = box.grid.x.offset[index(x + kx)]
         for ky in range(-1, 2):
-            row = box.grid.stride * (box.grid.y.offset[index(y + ky)] + plane + z)
-            fetch(flock.room, row - box.grid.stride)
-            fetch(flock.room, row + box.grid.stride)
+            fetch(flock.head, box.grid.y.offset[index(y + ky)] + plane + z)

@@ -17,7 +17,6 @@ from ...lanes.watching.log import Struck
 from ...surfaces.presence.openings import is_open
 from .clock import moment_of
 from .followed import follow, settle
-from .rows import FLOATS, WALL
 from .rubbing import rub_wall
 from .window import HELD, walls_at
 
@@ -47,7 +46,7 @@ def bounce(box, flock, books, clock, i, now):
     """The impact of a ball on a wall: FLIES, GONE, or a status that ends the run."""
     follow(box, flock, books, clock, i, now)
     r, v = flock.at(box.pull, i, now)
-    wall, walls = flock.event[index(FLOATS * i + WALL)], walls_at(box, i, now)
+    wall, walls = flock.wall(i), walls_at(box, i, now)
     if box.gates is not None and box.gates.openings is not None:
         closed = _closed_wall(box, walls, wall, i, r, v)
         if closed < 0.0:
@@ -65,18 +64,18 @@ def bounce(box, flock, books, clock, i, now):
     ended = FLIES if box.laws.own is None else _end(box, flock, clock, wall, i, now, after)
     v1 = either((ended == FLIES) | (ended == STAYS), after.v, v)
     flock.put(i, now if flock.holds is None else now + select(ended == STAYS, after.wait, 0.0), r, v1)
-    flock.kept.keep(i, flock.stamp(i), after.twice_energy)
+    flock.keep(i, after.twice_energy)
     struck = Struck(i, wall, moment_of(clock, now), r, v, v1, box.kinds.mass_of(i) * after.impulse)
     struck = box.watchers.with_slip(box.laws, walls, struck)
     box.watchers.hit(books.image, struck._replace(wall=box.owner(wall)))
     if flock.holds is not None and ended == STAYS:
-        flock.event[index(FLOATS * i + WALL)] = HELD - wall
+        flock.aim_at(i, HELD - wall)
     return ended
 
 
 def press(box, flock, books, i, now, impulse):
     """Book what a wall gets of the impulse on a ball that it holds, along its normal [N s]."""
-    wall, walls = HELD - flock.event[index(FLOATS * i + WALL)], walls_at(box, i, now)
+    wall, walls = HELD - flock.wall(i), walls_at(box, i, now)
     row = index(int(walls.row(wall) if box.rows is None else box.rows[index(int(wall))]))
     books.impulse[row, 0] += dot(walls.unit_normal(wall, flock.place(i)), impulse)
 
@@ -115,7 +114,7 @@ def _turned(box, flock, books, walls, wall, ball):
         laws = laws._replace(friction=None)
     if laws.send_off:
         random = box.source.of_impact(i, books.impacts[index(i)], laws)
-    arriving = Arriving(r, v, flock.kept.at(i, flock.stamp(i), square(v) + fall), box.kinds.mass_of(i))
+    arriving = Arriving(r, v, flock.kept(i, square(v) + fall), box.kinds.mass_of(i))
     turned = impact_on_wall(laws, walls, box.pull, wall, arriving, random)
     if box.loss is not None and laws.restitution is not None and box.loss.spares(flock, i, now):
         turned = impact_on_wall(laws._replace(restitution=None), walls, box.pull, wall, arriving, random)

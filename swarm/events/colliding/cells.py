@@ -14,7 +14,7 @@ from ...kernel.record import Record
 from ...kernel.vector import Vec
 from ...surfaces.time_of_impact.course import rise_time
 from ...surfaces.walls import Field
-from .rows import CELL, FACE, FLOATS, LEAVES, WHOLES
+from .rows import AFTER, CELL, FACE, FLOATS, LEAVES, WHOLES
 from .window import middle_of, swept
 
 
@@ -63,7 +63,6 @@ class BallGrid(Record):
     y: Axis
     z: Axis
     near: Array  # bool, whether a ball in a cell may touch a wall
-    stride: int  # of the row of a cell: one more than how many balls it has room for
     few: Any = None  # 1.0 where some axis has so few cells that two images of a ball may be near another one
 
     def axes(self):
@@ -87,25 +86,29 @@ def until_exit(grid, pull, flock, i, now):
         sooner = time < first
         first, face = select(sooner, time, first), select(sooner, 2 * k + select(up, 1, 0), face)
     flock.event[index(FLOATS * i + LEAVES)] = now + first
-    flock.tag[index(WHOLES * i + FACE)] = face
+    flock.link[index(WHOLES * i + FACE)] = face
 
 
-def take_out(grid, flock, i, cell):
-    """Remove a ball from its cell; the last one takes its place."""
-    row = grid.stride * cell
-    last = flock.room[index(row)]
-    for k in range(1, last):
-        if flock.room[index(row + k)] == i:
-            flock.room[index(row + k)] = flock.room[index(row + last)]
-    flock.room[index(row)] = last - 1
+def put_in(flock, i, cell):
+    """Put a ball into a cell, as the first one of it."""
+    flock.link[index(WHOLES * i + AFTER)] = flock.head[index(cell)]
+    flock.head[index(cell)] = i
+
+
+def take_out(flock, i, cell):
+    """Remove a ball from its cell."""
+    after, k = flock.after(i), flock.head[index(cell)]
+    if k == i:
+        flock.head[index(cell)] = after
+    else:
+        while flock.after(k) != i:
+            k = flock.after(k)
+        flock.link[index(WHOLES * k + AFTER)] = after
 
 
 def cross(grid, flock, i):
-    """Bring a ball into the cell that it enters now: (the axis, by how many periods it goes back, whether it has room).
-
-    If the cell has no room, nothing is done.
-    """
-    face, old = flock.tag[index(WHOLES * i + FACE)], grid.number(i, flock)
+    """Bring a ball into the cell that it enters now: (the axis, by how many periods it goes back)."""
+    face, old = flock.link[index(WHOLES * i + FACE)], grid.number(i, flock)
     which, step = face >> 1, 2 * (face & 1) - 1
     new, turns, cell = old, 0, 0
     for k, (axis, here) in enumerate(zip(grid.axes(), flock.cell(i), strict=True)):
@@ -115,19 +118,13 @@ def cross(grid, flock, i):
                 turns = select(cell > axis.count, 1, select(cell < 1, -1, 0))
                 cell -= turns * axis.count
             new = old + axis.offset[index(cell)] - axis.offset[index(here)]
-    row = grid.stride * new
-    taken = flock.room[index(row)] + 1
-    fits = taken < grid.stride
-    if fits:
-        take_out(grid, flock, i, old)
-        # Where an axis has one cell it is the same one.
-        taken = flock.room[index(row)] + 1
-        flock.room[index(row)], flock.room[index(row + taken)] = taken, i
-        flock.tag[index(WHOLES * i + CELL + which)] = cell
-        for k, axis in enumerate(grid.axes()):
-            if axis.period is not None and which == k:
-                flock.flight[index(FLOATS * i + k)] -= turns * axis.period
-    return which, turns, fits
+    take_out(flock, i, old)
+    put_in(flock, i, new)
+    flock.tag[index(WHOLES * i + CELL + which)] = cell
+    for k, axis in enumerate(grid.axes()):
+        if axis.period is not None and which == k:
+            flock.flight[index(FLOATS * i + k)] -= turns * axis.period
+    return which, turns
 
 
 # --- At the start ----------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...compiled_scene import CompiledScene
 from ...contact.laws import NONE
-from ...kernel.arrays import aligned, aligned_copy
+from ...kernel.arrays import aligned
 from ...pairs import Pairs
 from ...particles import Particles
 from ...scene import Scene
@@ -15,12 +15,12 @@ from ...state import Floats
 from ...surfaces.in_motion.drive import drive_of
 from ..reacting.described import scenery_of
 from .box import Domain
-from .cells import Axis, BallGrid
+from .cells import Axis, BallGrid, put_in
 from .meet import Loss
 from .next_collision import Alike, Holdable, Various
 from .queue import FIRST, SPARE
 from .resting import repose_of
-from .rows import CELL, FLOATS, NO_PARTNER, PARTNER, RADIUS, STAMP, TIME, WALL, WHOLES, Flock, Kept
+from .rows import AFTER, CELL, FLOATS, NO_PARTNER, PARTNER, STAMP, TIME, WALL, WHOLES, Flock
 from .rubbing import BallSpins
 from .window import OUT, UNKNOWN
 
@@ -32,8 +32,6 @@ _SPACING = 0.8
 _CELLS, _FEW = 2.0, 64
 # Of fewer cells along a period a ball may have two images of another one in its own cell and its neighbours.
 _IMAGES = 4
-# The least numbers in the row of a cell: how many balls, and these.
-_LEAST = 5
 # Balls fly this part of the scene in an epoch, about.
 _EPOCH = 0.125
 # t_c, if it is not given, is this part of the time in which balls fly their diameter; under gravity, by which contacts
@@ -41,84 +39,84 @@ _EPOCH = 0.125
 _DURATION, _FALL = 1e-4, 1e-3
 # A flight from a wall back to it takes at least this part of an epoch: on a shorter one round-off is all there is.
 _SHORTEST = 2.0**-20
+# Temporary arrays are of so many balls, so that they are small beside what is kept of them.
+_AT_ONCE = 32_768
 
 
-def flock_of(particles: Particles, grid: BallGrid, loses: bool, walled: bool) -> Flock:
+def _cell_along(axis: Axis, x: Any) -> Any:
+    """The numbers of the cells of places along an axis."""
+    return 1 + np.clip(np.floor((x - axis.low) / axis.width), 0, axis.count - 1)
+
+
+def flock_of(particles: Particles, grid: BallGrid, loses: bool) -> Flock:
     """The balls at the start, in their cells."""
     n = len(particles)
     flight, event = aligned(FLOATS * n), aligned(FLOATS * n)
-    tag = event.view(np.int32)
+    link, tag = flight.view(np.int32), event.view(np.int32)
     rows, whole = flight.reshape(n, FLOATS), tag.reshape(n, WHOLES)
-    rows[:, :3], rows[:, 3:6], rows[:, RADIUS] = particles.position.T, particles.velocity.T, particles.radius
-    event.reshape(n, FLOATS)[:, :3] = math.inf
-    for k, axis in enumerate(grid.axes()):
-        where = np.clip(np.floor((particles.position[k] - axis.low) / axis.width), 0, axis.count - 1)
-        whole[:, CELL + k] = where + 1
-    key, item = np.full(n + SPARE, math.inf), np.zeros(n + SPARE, np.int32)
-    item[FIRST : FIRST + n] = np.arange(n)
+    rows[:, :3], rows[:, 3:6] = particles.position.T, particles.velocity.T
+    event.reshape(n, FLOATS)[:, :3], event.reshape(n, FLOATS)[:, 3] = math.inf, math.nan
+    for first in range(0, n, _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        for k, axis in enumerate(grid.axes()):
+            whole[some, CELL + k] = _cell_along(axis, particles.position[k, some])
+    key, node, item = aligned(n + SPARE), np.arange(FIRST, FIRST + n, dtype=np.int32), np.zeros(n + SPARE, np.int32)
+    key.fill(math.inf)
+    np.subtract(node, FIRST, out=item[FIRST : FIRST + n])
     if particles.births is not None:
         # In no cell, and nothing is next for them.
         late = particles.births.source >= 0
-        event.reshape(n, FLOATS)[late, WALL], whole[late, PARTNER] = OUT, NO_PARTNER
+        whole[late, WALL], whole[late, PARTNER] = OUT, NO_PARTNER
     last = np.full(n, -math.inf) if loses else None
-    kept = Kept(np.zeros(n), np.full(n, NO_PARTNER, np.int32)) if walled else None
-    node = np.arange(FIRST, FIRST + n, dtype=np.int32)
-    return Flock(flight, event, tag, node, aligned_copy(key), item, np.empty(0, np.int32), last, kept)
+    return Flock(flight, event, link, tag, node, key, item, _linked(link, tag, grid), last)
 
 
-def with_room(flock: Flock, grid: BallGrid) -> tuple[Flock, BallGrid]:
-    """The balls in cells that have room for all, and for some more. Balls that left the scene are in no cell."""
-    n, cells = flock.number(), 0
-    there = np.flatnonzero(flock.event.reshape(n, FLOATS)[:, WALL] != OUT)
-    whole = flock.tag.reshape(n, WHOLES)
-    for k, axis in enumerate(grid.axes()):
-        cells = cells + axis.offset[whole[there, CELL + k]]
-    sorts = np.argsort(cells, kind="stable")
-    order = there[sorts].astype(np.int32)
-    numbers, first, counts = np.unique(np.asarray(cells)[sorts], return_index=True, return_counts=True)
-    # A cell is full by one ball, so that a little more will do; memory is dear.
-    stride = max(_LEAST, grid.stride + max(1, grid.stride // 4), int(counts.max(initial=0)) + 1)
-    room = np.zeros((grid.near.size, stride), np.int32)
-    room[numbers, 0] = counts
-    place = np.arange(len(order)) - np.repeat(first, counts)
-    room[np.repeat(numbers, counts), 1 + place] = order
-    return flock._replace(room=aligned_copy(room.ravel())), grid._replace(stride=stride)
+def _linked(link: NDArray[np.int32], tag: NDArray[np.int32], grid: BallGrid) -> NDArray[np.int32]:
+    """Link the balls of each cell, those of the start: the first one of each cell."""
+    whole, after = tag.reshape(-1, WHOLES), link.reshape(-1, WHOLES)[:, AFTER]
+    head = np.full(grid.near.size, NO_PARTNER, np.int32)
+    for first in range(0, len(whole), _AT_ONCE):
+        left = first + np.flatnonzero(whole[first : first + _AT_ONCE, WALL] != OUT)
+        while left.size:
+            cell = np.zeros(left.size, np.int32)
+            for k, axis in enumerate(grid.axes()):
+                cell += axis.offset[whole[left, CELL + k]]
+            # Of those in one cell the last one is put in; the others follow.
+            before, head[cell] = head[cell], left
+            is_in = head[cell] == left
+            after[left[is_in]] = before[is_in]
+            left = left[~is_in]
+    return head
 
 
-def put_in(flock: Flock, grid: BallGrid, i: int, now: float, position: Floats, velocity: Floats) -> bool:
-    """Put a ball that is born at a time of the epoch [s] into its cell: whether that has room for it."""
+def come(flock: Flock, grid: BallGrid, i: int, now: float, position: Floats, velocity: Floats) -> None:
+    """Put a ball that is born at a time of the epoch [s] into its cell."""
     n = flock.number()
     row, whole = flock.flight.reshape(n, FLOATS)[i], flock.tag.reshape(n, WHOLES)[i]
     row[:3], row[3:6], row[TIME] = position, velocity, now
     whole[STAMP] += 1
-    flock.event.reshape(n, FLOATS)[i, WALL] = UNKNOWN
+    whole[WALL] = UNKNOWN
     if flock.followed is not None:
         flock.followed[i] = now
-    cell = 0
     for k, axis in enumerate(grid.axes()):
-        whole[CELL + k] = 1 + int(np.clip(math.floor((position[k] - axis.low) / axis.width), 0, axis.count - 1))
-        cell += int(axis.offset[whole[CELL + k]])
-    room = flock.room.reshape(-1, grid.stride)[cell]
-    if room[0] + 1 >= grid.stride:
-        return False
-    room[0] += 1
-    room[room[0]] = i
-    return True
+        whole[CELL + k] = _cell_along(axis, position[k])
+    put_in(flock, i, grid.number(i, flock))
 
 
-def there_at(flock: Flock, pull: Any, now: float) -> tuple[Floats, Floats, Floats]:
+def there_at(flock: Flock, radius: Floats, pull: Any, now: float) -> tuple[Floats, Floats, Floats]:
     """The balls that are in the vessel at a time of the epoch [s]: places and velocities (3, n), radii (n,)."""
     n = flock.number()
-    rows = flock.flight.reshape(n, FLOATS)[flock.event.reshape(n, FLOATS)[:, WALL] != OUT]
+    there = flock.tag.reshape(n, WHOLES)[:, WALL] != OUT
+    rows = flock.flight.reshape(n, FLOATS)[there]
     # The flight of a ball that is held begins later.
     way = np.maximum(now - rows[:, TIME], 0.0)
     fall = np.zeros((3, 1)) if pull is None else np.array([tuple(pull)]).T
     position = rows[:, :3].T + rows[:, 3:6].T * way + 0.5 * fall * way * way
-    return position, rows[:, 3:6].T + fall * way, rows[:, RADIUS]
+    return position, rows[:, 3:6].T + fall * way, radius[there]
 
 
-def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Flock]:
-    """What the balls are in, and these at the start."""
+def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Flock, float]:
+    """What the balls are in, these at the start, and the length of an epoch [s]."""
     assert particles.radius is not None
     scene = compiled.scene
     scenery = scenery_of(compiled, 0.0) if scene.reacts() else None
@@ -131,32 +129,37 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     if pairs.restitution < 1.0 or laws.restitution is not None or heavy_loses:
         loss = Loss(pairs.restitution, duration_of(scene, pairs, particles))
     grid = grid_of(scene, particles)
-    flock, grid = with_room(flock_of(particles, grid, loss is not None, bool(scene.surfaces)), grid)
-    shortest = max(_SHORTEST * epoch_of(scene, particles, grid), 0.0 if loss is None else loss.duration)
+    epoch = _epoch_of(scene, particles, grid)
+    flock = flock_of(particles, grid, loss is not None)
+    shortest = max(_SHORTEST * epoch, 0.0 if loss is None else loss.duration)
     walls = compiled.walls(0.0) if scenery is None else scenery.given
-    kinds = kinds_of(particles, flock.flight)
+    kinds = kinds_of(particles)
     if laws.may_wait:
-        flock, kinds = flock._replace(holds=1.0), Holdable(flock.flight, particles.mass.copy())
+        flock, kinds = flock._replace(holds=1.0), Holdable(particles.radius, particles.mass.copy())
     made = Domain(walls, laws, scene.pull(), grid, kinds, loss, shortest)
     made = made._replace(turning=turning)
     if scene.gravity is not None:
         # Also where nothing is lost: balls may start at rest on a floor.
         made = made._replace(repose=repose_of(math.hypot(*scene.gravity), particles.radius))
-    return made, flock
+    return made, flock, epoch
 
 
-def kinds_of(particles: Particles, flight: Any) -> Any:
+def kinds_of(particles: Particles) -> Any:
     """The radii and masses of balls."""
     radius, mass = particles.radius, particles.mass
     assert radius is not None
     if np.ptp(radius) == 0.0 and np.ptp(mass) == 0.0:
         return Alike(float(radius[0]), float(mass[0]), (2.0 * float(radius[0])) ** 2)
-    return Various(flight, mass)
+    return Various(radius, mass)
 
 
 def speed_of(scene: Scene, particles: Particles) -> float:
     """The root mean square speed of balls at the start, or that of the fastest wall [m/s]."""
-    fastest = [math.sqrt(float((particles.velocity**2).sum(axis=0).mean()))]
+    # Row by row: the squares of all components at once are the largest array of a run for a moment.
+    squares = np.zeros(len(particles))
+    for row in particles.velocity:
+        squares += row * row
+    fastest = [math.sqrt(float(squares.mean()))]
     for surface in scene.surfaces:
         if surface.motion is not None and not surface.reacts():
             drive = drive_of(surface, 0.0)
@@ -181,7 +184,7 @@ def reach_of(grid: BallGrid) -> float:
     return float(_EPOCH * max(axis.width * axis.count for axis in grid.axes()))
 
 
-def epoch_of(scene: Scene, particles: Particles, grid: BallGrid) -> float:
+def _epoch_of(scene: Scene, particles: Particles, grid: BallGrid) -> float:
     """The length of an epoch [s], a power of two."""
     speed = speed_of(scene, particles)
     size = reach_of(grid)
@@ -218,7 +221,7 @@ def grid_of(scene: Scene, particles: Particles) -> BallGrid:
         axes.append(Axis(float(low[k]), cell, int(counts[k]), offset, length, last))
         stride *= int(counts[k]) + 2
     few = any(axis.period is not None and axis.count < _IMAGES for axis in axes)
-    return BallGrid(*reversed(axes), np.ones(stride, np.bool_), 0, 1.0 if few else None)
+    return BallGrid(*reversed(axes), np.ones(stride, np.bool_), 1.0 if few else None)
 
 
 def _region(scene: Scene, particles: Particles) -> tuple[Floats, Floats]:

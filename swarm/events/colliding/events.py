@@ -25,7 +25,7 @@ from .heavy import first_number
 from .meet import met
 from .next_collision import find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .queue import FIRST, build, requeue
-from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NO_PARTNER, PARTNER, SEEN, STAMP, TIME, WALL, WHOLES
+from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NO_PARTNER, PARTNER, SEEN, STAMP, TIME, WHOLES
 from .striking import renew_ended, shift_leases, strike_heavy
 from .window import END, HELD, OUT
 
@@ -95,7 +95,7 @@ def _book(flock, books, clock, pair, blow, now):
 def _at_wall(box, flock, books, clock, i, now):
     """What comes when a ball may meet a wall: it is reflected, or gone, or looks farther; a status if it goes wrong."""
     if box.heavy is not None:
-        if flock.event[index(FLOATS * i + WALL)] >= first_number(box):
+        if flock.wall(i) >= first_number(box):
             return strike_heavy(box, flock, books, clock, i, now)
         if len(box.walls.each) == 0:
             _look_for_wall(box, flock, i, now)
@@ -113,7 +113,7 @@ def _look_for_wall(box, flock, i, now):
 
 
 def _at_given_wall(box, flock, books, clock, i, now):
-    ended, wall = FLIES, flock.event[index(FLOATS * i + WALL)]
+    ended, wall = FLIES, flock.wall(i)
     if flock.holds is not None and wall <= HELD:
         _let_go(box, flock, books, i, now)
     elif wall >= 0.0:
@@ -139,39 +139,36 @@ def _let_go(box, flock, books, i, now):
     """A ball leaves the wall that has held it."""
     box.kinds.mass[index(i)] = books.mass[index(i)]
     # With another stamp: a ball that was to meet it there looks anew.
-    twice = flock.kept.at(i, flock.stamp(i), square(flock.velocity(i)) + 2.0 * potential(box.pull, flock.place(i)))
+    twice = flock.kept(i, square(flock.velocity(i)) + 2.0 * potential(box.pull, flock.place(i)))
     flock.put(i, now, flock.place(i), flock.velocity(i))
-    flock.kept.keep(i, flock.stamp(i), twice)
+    flock.keep(i, twice)
     aim_again(box, flock, i, now)
     queue_both(flock, i)
 
 
 @outlined
 def _enter(box, flock, books, clock, i, now):
-    """The way of a ball into the next cell: whether there is room for it."""
+    """The way of a ball into the next cell."""
     if books.image is not None:
         follow(box, flock, books, clock, i, now)
     r, v = flock.at(box.pull, i, now)
-    which, turns, fits = cross(box.grid, flock, i)
-    if fits:
-        if turns != 0 and box.watchers.counters is not None:
-            come_over(box, flock, books, clock, (i, now, r, v))
-        if books.image is not None:
-            books.image[index(which), index(i)] += turns
-        if turns != 0:
-            # There it meets other images of the walls.
-            forget_wall(flock, i)
-            if flock.kept is not None:
-                flock.kept.keep(i, NO_PARTNER, 0.0)
-        found = look_ahead(box, flock, i, now)
-        until_exit(box.grid, box.pull, flock, i, now)
-        find_wall(box, flock, i, now)
-        requeue(flock, i)
-        if found:
-            partner = tell_partner(flock, i)
-            if partner >= 0:
-                requeue(flock, partner)
-    return fits
+    which, turns = cross(box.grid, flock, i)
+    if turns != 0 and box.watchers.counters is not None:
+        come_over(box, flock, books, clock, (i, now, r, v))
+    if books.image is not None:
+        books.image[index(which), index(i)] += turns
+    if turns != 0:
+        # There it meets other images of the walls.
+        forget_wall(flock, i)
+        flock.keep(i, math.nan)
+    found = look_ahead(box, flock, i, now)
+    until_exit(box.grid, box.pull, flock, i, now)
+    find_wall(box, flock, i, now)
+    requeue(flock, i)
+    if found:
+        partner = tell_partner(flock, i)
+        if partner >= 0:
+            requeue(flock, partner)
 
 
 # --- Of all ----------------------------------------------------------------------------------------------
@@ -197,7 +194,7 @@ def begin(box, flock, now, first, last):
     At the start this is the next event of each ball. Later, where a window begins, it is only the next wall of each.
     """
     for i in range(first, last):
-        if flock.event[index(FLOATS * i + WALL)] <= OUT:
+        if flock.wall(i) <= OUT:
             continue
         if box.window is not None and now >= 0.0:
             forget_wall(flock, i)
@@ -283,9 +280,8 @@ def _is_over(box, end, now):
 def take(box, flock, books, clock, rule):
     """Take event after event until the end of the frame: (status, ball).
 
-    LEASE_ENDED where a cell has no room for one ball more: give all cells more, and call it again; with no ball where
-    the window of walls that move has ended. LOG_FULL where the log needs an empty part. INTERRUPTED after so many
-    events as the rule says; it goes on with the same bits.
+    LEASE_ENDED where the window of walls that move has ended. LOG_FULL where the log needs an empty part. INTERRUPTED
+    after so many events as the rule says; it goes on with the same bits.
     """
     end, taken = rule.end - clock[EPOCHS] * clock[LENGTH], 0
     most = float(_AT_ONCE * flock.number())
@@ -316,9 +312,8 @@ def take(box, flock, books, clock, rule):
                 status = _at_wall(box, flock, books, clock, i, now)
                 if status != FLIES:
                     return status, i
-            elif not _enter(box, flock, books, clock, i, now):
-                clock[EVENTS] -= 1.0
-                return Status.LEASE_ENDED.value, i
+            else:
+                _enter(box, flock, books, clock, i, now)
 
 
 @long_kernel
@@ -327,7 +322,7 @@ def follow_all(box, flock, books, clock, now, first):
     for i in range(first, flock.number()):
         if is_full(box.watchers.log):
             return i
-        if flock.event[index(FLOATS * i + WALL)] != OUT:
+        if flock.wall(i) != OUT:
             follow(box, flock, books, clock, i, now)
     return flock.number()
 
@@ -338,7 +333,7 @@ def show(box, flock, state, end, first, last):
     for k in range(first, last):
         i = index(k)
         r, v = flock.at(box.pull, k, end)
-        if box.gates is not None and flock.event[index(FLOATS * k + WALL)] == OUT:
+        if box.gates is not None and flock.wall(k) == OUT:
             r, v = flock.place(k), flock.velocity(k)
         # That with which it leaves
         v = either(flock.is_held(k, end), flock.velocity(k), v)
@@ -349,4 +344,3 @@ def show(box, flock, state, end, first, last):
                 x = select(x < 0.0, 0.0, select(x >= cells.period, cells.last, x))
             state.position[axis, i] = x
         put(state.velocity, 0, i, v)
-        state.balls.collisions[i] = flock.tag[index(WHOLES * k + MET)]

@@ -14,7 +14,7 @@ from ...kernel.vector import ZERO
 from ..reacting.freedoms import ParticleFlight
 from ..reacting.strikes import first_hit, reach_of_all
 from .clock import LENGTH, moment_of
-from .rows import DUE, FLOATS, LEAVES, WALL
+from .rows import DUE, FLOATS, LEAVES
 from .window import UNKNOWN
 
 # Of the counts: balls that are listed, strikes of the walls so far, and events before the leases.
@@ -70,7 +70,8 @@ def meet_heavy(box, flock, i, now, hit):
             met = first_hit(walls, box.pull, heavy.freedoms, flight)
             if met.time < flight.longest:
                 due, known = now + met.time, first_number(box) + met.wall
-    flock.event[index(row + DUE)], flock.event[index(row + WALL)] = due, known
+    flock.event[index(row + DUE)] = due
+    flock.aim_at(i, known)
     heavy.near[index(i)] = is_near
     if is_near and not heavy.listed[index(i)]:
         heavy.listed[index(i)] = True

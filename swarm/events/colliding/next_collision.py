@@ -18,11 +18,11 @@ from ...kernel.vector import ZERO, Vec, dot, either, square
 from ...surfaces.shapes.sphere import ball
 from ...surfaces.time_of_impact.flights import Hit
 from .heavy import meet_heavy
-from .rows import DUE, FACE, FLOATS, MEETS, NO_PARTNER, PARTNER, RADIUS, SEEN, STAMP, WALL, WHOLES
+from .rows import DUE, FACE, FLOATS, MEETS, NO_PARTNER, PARTNER, SEEN, STAMP, WHOLES
 from .window import OUT, UNKNOWN, next_hit
 
-# So many balls of a cell are copied without a branch, and so many are looked at at once.
-_FEW, _MOST = 4, 128
+# Cells around a ball, its own included, and how many balls of them are looked at at once.
+_CELLS, _MOST = 27, 128
 # The mass of a ball that a wall holds [kg]: that of two is then the other one's, to the last bit.
 _FIXED = 2.0**200
 # So many parts a fall beside a ball that is held has at most, in each of which it surely meets it or not.
@@ -57,6 +57,9 @@ class Alike(Record):
         """Its mass [kg]."""
         return self.mass
 
+    def ask(self, i):
+        """Ask for what is needed of a ball soon."""
+
     def share(self, i, j):
         """The part that ball j has of the mass of both."""
         return 0.5
@@ -69,7 +72,7 @@ class Alike(Record):
 class Various(Record):
     """Balls of any radii and masses."""
 
-    flight: Array  # rows of flights
+    radius: Array  # (N,)
     mass: Array  # (N,)
 
     def is_held(self, i):
@@ -78,11 +81,15 @@ class Various(Record):
 
     def radius_of(self, i):
         """Its radius [m]."""
-        return self.flight[index(FLOATS * i + RADIUS)]
+        return self.radius[index(i)]
 
     def mass_of(self, i):
         """Its mass [kg]."""
         return self.mass[index(i)]
+
+    def ask(self, i):
+        """Ask for what is needed of a ball soon."""
+        fetch(self.radius, i)
 
     def share(self, i, j):
         """The part that ball j has of the mass of both."""
@@ -233,27 +240,14 @@ def _looked_at(box, flock, i, now, near, count, known):
     return ask(box, flock, i, now, near, count, known)
 
 
-@outlined
-def _look_through(box, flock, i, now, near, row, known):
-    """The `NextCollision` with those of a cell too, at this row, beyond the first few."""
-    count, done = flock.room[index(row)], _FEW
-    while done < count:
-        some = min(count - done, _MOST)
-        for k in range(some):
-            near[index(k)] = flock.room[index(row + 1 + done + k)]
-        known = _looked_at(box, flock, i, now, near, some, known)
-        done += some
-    return known
-
-
 def _around(box, flock, i, now, face, known):
     """The `NextCollision` of ball i with all balls in the cells around its own, or only in those beyond a face.
 
-    The first few of each cell are copied at once, also where there are less, so that no branch of the processor is
-    foretold from how many balls are in a cell.
+    First come those that are the first ones of their cells, then those after them in the order in which they were
+    found: so the processor has no branch to predict from how many balls are in a cell.
     """
-    grid, room, found = box.grid, flock.room, 0
-    near, rest = unwritten(27 * _FEW + _FEW, np.int32), unwritten(_MOST, np.int32)
+    grid, found, done = box.grid, 0, 0
+    near = unwritten(_MOST, np.int32)
     step = 2 * (face & 1) - 1
     lows = tuple(select((face >> 1) == k, step, -1) for k in range(3))
     highs = tuple(select((face >> 1) == k, step + 1, 2) for k in range(3))
@@ -263,16 +257,26 @@ def _around(box, flock, i, now, face, known):
         for ky in range(cy + lows[1], cy + highs[1]):
             line = grid.y.offset[index(ky)] + plane
             for kz in range(cz + lows[2], cz + highs[2]):
-                row = grid.stride * (grid.z.offset[index(kz)] + line)
-                count = room[index(row)]
-                for k in range(_FEW):
-                    j = room[index(row + 1 + k)]
-                    near[index(found + k)] = j
-                    fetch(flock.flight, FLOATS * j)
-                found += min(count, _FEW)
-                if count > _FEW:
-                    known = _look_through(box, flock, i, now, rest, row, known)
+                found += _found(box, flock, flock.head[index(grid.z.offset[index(kz)] + line)], near, found)
+    while done < found:
+        found += _found(box, flock, flock.after(near[index(done)]), near, found)
+        done += 1
+        # Of each chain one ball may still be to come, and `_found` writes one more.
+        if done == _MOST - _CELLS - 1:
+            known = _looked_at(box, flock, i, now, near, done, known)
+            found -= done
+            for k in range(found):
+                near[index(k)] = near[index(done + k)]
+            done = 0
     return _looked_at(box, flock, i, now, near, found, known)
+
+
+def _found(box, flock, j, near, count):
+    """Write a ball behind the first `count`, and ask for its flight: 1, or 0 for `NO_PARTNER`."""
+    near[index(count)] = j
+    fetch(flock.flight, FLOATS * j)
+    box.kinds.ask(j)
+    return select(j >= 0, 1, 0)
 
 
 def _keep(flock, i, known):
@@ -292,7 +296,7 @@ def look_ahead(box, flock, i, now):
     """Look whether a ball that has come into a cell collides sooner with those that are near now: whether it does."""
     row = FLOATS * i + MEETS
     if box.grid.few is None:
-        face = flock.tag[index(WHOLES * i + FACE)]
+        face = flock.link[index(WHOLES * i + FACE)]
         before = NextCollision(flock.event[index(row)], flock.tag[index(WHOLES * i + PARTNER)])
         known = _around(box, flock, i, now, face, before)
         sooner = (known.time < before.time) | (known.mate != before.mate)
@@ -317,7 +321,8 @@ def tell_partner(flock, i):
 
 def forget_wall(flock, i):
     """The next wall of a ball is not known any more."""
-    flock.event[index(FLOATS * i + DUE)], flock.event[index(FLOATS * i + WALL)] = math.inf, UNKNOWN
+    flock.event[index(FLOATS * i + DUE)] = math.inf
+    flock.aim_at(i, UNKNOWN)
 
 
 def _given_hit(box, flock, i, now):
@@ -332,12 +337,12 @@ def _given_hit(box, flock, i, now):
 @outlined
 def find_wall(box, flock, i, now):
     """Find when a ball meets a wall, if its cell is near one and that is not known."""
-    row = FLOATS * i
     if box.heavy is not None:
         # A lease ends for all balls, also for those that are not there, or held.
-        if flock.event[index(row + WALL)] <= OUT:
+        if flock.wall(i) <= OUT:
             return
         meet_heavy(box, flock, i, now, _given_hit(box, flock, i, now))
-    elif box.grid.near[index(box.grid.number(i, flock))] and flock.event[index(row + WALL)] == UNKNOWN:
+    elif box.grid.near[index(box.grid.number(i, flock))] and flock.wall(i) == UNKNOWN:
         hit = next_hit(box, flock, i, now)
-        flock.event[index(row + DUE)], flock.event[index(row + WALL)] = now + hit.time, hit.wall
+        flock.event[index(FLOATS * i + DUE)] = now + hit.time
+        flock.aim_at(i, hit.wall)

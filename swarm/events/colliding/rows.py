@@ -1,9 +1,10 @@
 """What a run knows of each ball between two events: two lines of the cache, and its node of the queue.
 
 One line is the flight: position and velocity at a time, which is that of the last impact. The other one is what is
-next; it holds whole numbers too, as a view of the same memory.
+next. Both hold whole numbers too, as a view of the same memory.
 """
 
+import math
 from typing import Any, NamedTuple
 
 from ...kernel.arrays import index
@@ -13,31 +14,18 @@ from ...kernel.vector import ZERO, Vec, either
 
 # Numbers of a row, and whole numbers in the same memory.
 FLOATS, WHOLES = 8, 16
-# Of a flight: position [m], velocity [m/s], their time [s since the epoch], the radius [m].
-_X, _V, TIME, RADIUS = 0, 3, 6, 7
-# Of what is next [s since the epoch]: a collision, the end of the cell, a wall; and which wall.
-MEETS, LEAVES, DUE, WALL = 0, 1, 2, 3
+# Of a flight: position [m], velocity [m/s], their time [s since the epoch].
+_X, _V, TIME = 0, 3, 6
+# Whole numbers of a flight: the ball after it in its cell, and the face by which it leaves the cell.
+AFTER, FACE = 14, 15
+# Of what is next [s since the epoch]: a collision, the end of the cell, a wall. And twice the energy per mass with
+# which it left a wall, for the next one: squares of velocities alone have a bias. NaN: its last impact was no wall's.
+MEETS, LEAVES, DUE, _TWICE = 0, 1, 2, 3
 # Whole numbers of what is next: the ball that it collides with, and how often the velocity of that ball had changed
-# when this was found; how often its own has changed, and how often it has collided; its cell; the face by which it
-# leaves the cell.
-PARTNER, SEEN, STAMP, MET, CELL, FACE = 8, 9, 10, 11, 12, 15
+# when this was found; how often its own has changed, and how often it has collided; its cell; the wall.
+PARTNER, SEEN, STAMP, MET, CELL, WALL = 8, 9, 10, 11, 12, 15
 # Of no ball.
 NO_PARTNER = -1
-
-
-class Kept(NamedTuple):
-    """The energy with which balls left a wall, for the next one: squares of velocities alone have a bias."""
-
-    twice: Array  # (N) twice that per mass
-    stamp: Array  # (N) int32, of the flight that has it
-
-    def at(self, i, stamp, otherwise):
-        """That of a ball, if its flight is still that one."""
-        return select(self.stamp[index(i)] == stamp, self.twice[index(i)], otherwise)
-
-    def keep(self, i, stamp, twice):
-        """Store it."""
-        self.twice[index(i)], self.stamp[index(i)] = twice, stamp
 
 
 class Flock(NamedTuple):
@@ -45,13 +33,13 @@ class Flock(NamedTuple):
 
     flight: Array  # (8 N) numbers of flights
     event: Array  # (8 N) numbers of what is next
-    tag: Array  # (16 N) int32, the same memory
+    link: Array  # (16 N) int32, the memory of flights
+    tag: Array  # (16 N) int32, the memory of what is next
     node: Array  # (N) int32, its place in the queue
     key: Array  # of the nodes of the queue: the time of what is next
     item: Array  # int32, the ball of each node
-    room: Array  # int32 of each cell: how many balls are in it, and these
+    head: Array  # int32 of each cell: the first ball in it, or `NO_PARTNER`
     last: Any = None  # (N) when each met another ball last [s since the epoch]; None where nothing loses any
-    kept: Any = None  # `Kept`, None where there are no walls
     freedoms: Any = None  # of walls with a mass, or None
     followed: Any = None  # (N) until when counters know the flight of each [s since the epoch]; None without counters
     holds: Any = None  # 1.0 where walls may hold balls: the flight of one that is held begins later than now; or None
@@ -97,6 +85,28 @@ class Flock(NamedTuple):
         for k, value in enumerate((*r, *v, now)):
             self.flight[index(row + k)] = value
         self.tag[index(WHOLES * i + STAMP)] += 1
+        self.keep(i, math.nan)
+
+    def kept(self, i, otherwise):
+        """Twice the energy per mass with which it left a wall, if that was its last impact."""
+        twice = self.event[index(FLOATS * i + _TWICE)]
+        return select(math.isnan(twice), otherwise, twice)
+
+    def keep(self, i, twice):
+        """Store twice the energy per mass with which it leaves a wall; NaN: forget it."""
+        self.event[index(FLOATS * i + _TWICE)] = twice
+
+    def wall(self, i):
+        """The number of its next wall, or one of those of window.py."""
+        return float(self.tag[index(WHOLES * i + WALL)])
+
+    def aim_at(self, i, wall):
+        """Store the number of its next wall."""
+        self.tag[index(WHOLES * i + WALL)] = int(wall)
+
+    def after(self, i):
+        """The ball after it in its cell, or `NO_PARTNER`."""
+        return self.link[index(WHOLES * i + AFTER)]
 
     def cell(self, i):
         """The numbers of its cell along the axes."""

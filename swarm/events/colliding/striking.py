@@ -19,7 +19,6 @@ from .followed import follow
 from .heavy import LISTED, SINCE, STRIKES, first_number
 from .next_collision import find_wall
 from .queue import FIRST, requeue
-from .rows import FLOATS, WALL
 from .window import END
 
 
@@ -27,7 +26,7 @@ from .window import END
 def strike_heavy(box, flock, books, clock, i, now):
     """The impact of a ball on the wall with a mass that it meets now: a status."""
     heavy, m = box.heavy, box.kinds.mass_of(i)
-    wall = flock.event[index(FLOATS * i + WALL)] - first_number(box)
+    wall = flock.wall(i) - first_number(box)
     follow(box, flock, books, clock, i, now)
     r, v = flock.at(box.pull, i, now)
     if box.gates is not None and box.gates.escape_time is not None:
@@ -38,7 +37,7 @@ def strike_heavy(box, flock, books, clock, i, now):
             let_out(box, flock, books, clock, out, (i, now, r, v))
             vanish(box, flock, i)
             return FLIES
-    twice = flock.kept.at(i, flock.stamp(i), square(v) + 2.0 * potential(box.pull, r))
+    twice = flock.kept(i, square(v) + 2.0 * potential(box.pull, r))
     blow = _blow(box, flock, wall, ParticleFlight(r, v, ZERO, now, 0.0), (i, books.impacts[index(i)]))
     left, fall = twice - 2.0 * (blow.given + blow.lost) / m, 2.0 * potential(box.pull, blow.r)
     if books.heat is not None:
@@ -51,7 +50,7 @@ def strike_heavy(box, flock, books, clock, i, now):
     if box.source is not None and math.isnan(v1.x):
         return Status.SENT_WRONG.value
     flock.put(i, now, blow.r, v1)
-    flock.kept.keep(i, flock.stamp(i), kept)
+    flock.keep(i, kept)
     _book(box, books, i, blow)
     struck = Struck(i, float(blow.owner), moment_of(clock, now), blow.r, v, v1, blow.impulse, blow.slip)
     box.watchers.hit(books.image, struck)
