@@ -187,7 +187,7 @@ def require_fit(
 ) -> None:
     """Raise a SceneError unless the arrays of a checkpoint have the names, types and shapes of the run's own.
 
-    The lanes of a run halted within a frame may hold any number of particles, each once; cells of balls more of them.
+    The lanes of a run halted within a frame may hold any number of particles, each once.
     `may_grow` says of which other arrays the first axis may have any length. `written` is the version that wrote it.
     Checksums are right, so what differs is probably the version; but a list of the entries has no checksum.
     """
@@ -206,9 +206,6 @@ def require_fit(
     left = arrays["halted.particle"].shape[-1:] if "halted.particle" in run else ()
     for name, mine in run.items():
         shape = mine.shape[:-1] + left if name.startswith("halted.") else mine.shape
-        # The cells of balls get more room during a run.
-        if name == "room" and arrays[name].ndim == 1 and arrays[name].size >= mine.size:
-            shape = arrays[name].shape
         if may_grow(name) and arrays[name].ndim == mine.ndim:
             shape = arrays[name].shape[:1] + mine.shape[1:]
         if (arrays[name].dtype, arrays[name].shape) != (mine.dtype, shape):
