@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...compiled_scene import CompiledScene
 from ...contact.laws import NONE
