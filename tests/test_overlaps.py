@@ -8,7 +8,7 @@ from test_openings import run
 
 import swarm
 from swarm import scene_file
-from swarm.run.preflight.hints import warn_of_overlap
+from swarm.run.preflight.hints import warn_of_overlap, warn_of_walls_in_one_place
 
 SENTENCE = (
     "surfaces[0] (Sphere) and surfaces[2] (Box) overlap only in part: particles are kept in what they have in common; "
@@ -68,3 +68,57 @@ def test_a_run_says_it_once_before_it_starts(caplog):
     with caplog.at_level(logging.WARNING, "swarm"):
         run(scene, swarm.fill(scene, 3, speed=1.0, seed=1), until=1.0, frames=4)
     assert [record.getMessage() for record in caplog.records] == [SENTENCE]
+
+
+LID = {"normal": (1.0, 0.0, 0.0), "offset": 0.5}
+HALL = swarm.Box((0.5, 0.5, 0.5))
+FLOOR = swarm.Plane((0.0, 0.0, -1.0))
+POST = swarm.Box((0.1, 0.1, 0.2), center=(0.5, 0.0, 0.2), side="outside")
+BRICK = swarm.Box((0.5, 0.5, 0.5), side="outside")
+TURN = {"axis": (0.0, 1.0, 0.0), "angle": 0.5}
+IN_ONE_PLACE = {
+    "a face that absorbs": ([HALL, swarm.Plane(**LID, laws=[swarm.Absorb(1.0)])], "the laws of either"),
+    "a face with losses": ([swarm.Plane(**LID, restitution=0.5), HALL], "the laws of either"),
+    "a warm face": ([HALL, swarm.Plane(**LID, temperature=1.0)], "the laws of either"),
+    "a post on a plane": ([FLOOR, POST], "touch at a face"),
+    "a post in a box": ([swarm.Box((1.0, 1.0, 0.5), center=(0.0, 0.0, 0.5)), POST], "touch at a face"),
+    "two bricks": ([BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 0.9, 0.0), side="outside")], "touch at a face"),
+    "a column": ([FLOOR, swarm.Cylinder(0.1, length=0.4, center=(0, 0, 0.2), side="outside")], "touch at a face"),
+}
+NOT_IN_ONE_PLACE = {
+    "one law": [HALL, swarm.Plane(**LID)],
+    "an open face": [swarm.Box((0.5, 0.5, 0.5), open=("+x",)), swarm.Plane(**LID, restitution=0.5)],
+    "a lid before it": [HALL, swarm.Plane((1.0, 0.0, 0.0), 0.4999, restitution=0.5)],
+    "one after the other": [
+        swarm.Plane(**LID, restitution=0.9, present=[(0, 1)]), swarm.Plane(**LID, restitution=0.5, present=[(1, 2)])
+    ],
+    "a post that overlaps its floor": [FLOOR, swarm.Box((0.1, 0.1, 0.2), center=(0.5, 0.0, 0.1), side="outside")],
+    "a post above its floor": [FLOOR, swarm.Box((0.1, 0.1, 0.1), center=(0.5, 0.0, 0.2), side="outside")],
+    "bricks in one layer, apart": [BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 1.5, 0.0), side="outside")],
+    "bricks beside one another": [BRICK, swarm.Box((0.5, 0.5, 0.5), center=(2.0, 0.0, 0.0), side="outside")],
+    "a turned post": [FLOOR, swarm.Box((0.1, 0.1, 0.1), center=(0.5, 0, 0.1), side="outside", rotation=TURN)],
+}  # fmt: skip
+
+
+def hints_of_walls(surfaces, caplog, of_points=True):
+    with caplog.at_level(logging.WARNING, "swarm"):
+        warn_of_walls_in_one_place(swarm.Scene(surfaces), of_points)
+    return [record.getMessage() for record in caplog.records]
+
+
+@pytest.mark.parametrize("name", IN_ONE_PLACE)
+def test_walls_in_one_place_are_reported(name, caplog):
+    surfaces, words = IN_ONE_PLACE[name]
+    (sentence,) = hints_of_walls(surfaces, caplog)
+    assert "surfaces[0]" in sentence
+    assert "surfaces[1]" in sentence
+    assert words in sentence
+
+
+@pytest.mark.parametrize("name", NOT_IN_ONE_PLACE)
+def test_other_walls_are_not(name, caplog):
+    assert hints_of_walls(NOT_IN_ONE_PLACE[name], caplog) == []
+
+
+def test_balls_do_not_fit_into_a_gap_of_no_width(caplog):
+    assert hints_of_walls([FLOOR, POST], caplog, of_points=False) == []

@@ -1,5 +1,6 @@
 """What a user may not have meant, said before a run starts: cavities, times, steps, gravity."""
 
+import dataclasses
 import itertools
 import logging
 import math
@@ -13,6 +14,7 @@ from ...methods import Impact
 from ...scene import Scene
 from ...surfaces.instant import box_of, gaps_of, side_of
 from ...surfaces.presence.openings import least_distance
+from ...surfaces.presence.seams import Face, faces_of
 from ...surfaces.surface import Surface
 from ..options import Task
 from . import softness, workload
@@ -29,11 +31,17 @@ _STABLE = 2.0
 _LOOKED_AT = 1000
 # Points at which two cavities are compared, and the part of one beyond the other that says that it is cut.
 _POINTS, _CUT = 4096, 0.01
+# Digits to which two flat faces are in one place, of a normal and of an offset in sizes of the scene; listed surfaces
+# beyond this number are not compared.
+_DIGITS, _COMPARED = 9, 200
+# What an impact on a surface depends on, besides its shape.
+_LAWS = ("restitution", "friction", "rolling", "temperature", "accommodation", "laws", "mass", "inertia")
 
 
 def give(task: Task) -> None:
     """Warn of what the run will do that may not be meant. Nothing of it is wrong."""
     warn_of_overlap(task.scene)
+    warn_of_walls_in_one_place(task.scene, task.bodies is not None or task.particles.radius is None)
     _warn_of_faces(task.scene)
     _warn_of_fall(task.compiled)
     _warn_of_counters(task)
@@ -212,6 +220,71 @@ def warn_of_overlap(scene: Scene) -> None:
                 i, type(one).__name__, j, type(other).__name__,
             )  # fmt: skip
             return
+
+
+def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
+    """Warn of the first two surfaces with flat faces in one place: of two laws, or with a gap of no width between them.
+
+    Args:
+        scene: the scene.
+        of_points: whether points meet its walls. Balls do not fit into a gap of no width.
+    """
+    if len(scene.surfaces) > _COMPARED:
+        return
+    size, known = scene.extent() or 1.0, dict[tuple[float, ...], list[tuple[int, Surface, Face]]]()
+    for i, one in enumerate(scene.surfaces):
+        for face in faces_of(one):
+            if face.plane is None:
+                continue
+            normal, offset = face.plane
+            along, against = (
+                tuple((np.round([*(sign * normal), sign * offset / size], _DIGITS) + 0.0).tolist()) for sign in (1, -1)
+            )
+            for j, other, mate in known.get(along, []):
+                if _differ(other, one) and _share_a_place((other, mate), (one, face), size):
+                    _LOG.warning(
+                        "surfaces[%d] (%s) and surfaces[%d] (%s) have faces in one place, with the same side: an "
+                        "impact there follows the laws of either; leave that face of one out (open = [...] of a box), "
+                        "or let one stand in front of the other",
+                        j, type(other).__name__, i, type(one).__name__,
+                    )  # fmt: skip
+                    return
+            for j, other, mate in known.get(against, []) if of_points else []:
+                if (one.is_solid() or other.is_solid()) and _share_a_place((other, mate), (one, face), size):
+                    _LOG.warning(
+                        "surfaces[%d] (%s) and surfaces[%d] (%s) touch at a face but do not overlap: points that slide "
+                        "along one of them, or hit the edge of the face, may enter the gap of no width between them; "
+                        "let them overlap, as a post that goes on below its floor",
+                        j, type(other).__name__, i, type(one).__name__,
+                    )  # fmt: skip
+                    return
+            known.setdefault(along, []).append((i, one, face))
+
+
+def _differ(one: Surface, other: Surface) -> bool:
+    """Whether impacts on two surfaces differ."""
+    return any(getattr(one, name, None) != getattr(other, name, None) for name in _LAWS)
+
+
+def _share_a_place(first: tuple[Surface, Face], second: tuple[Surface, Face], size: float) -> bool:
+    """Whether two surfaces that move as one have a place in common, on their flat faces in one plane."""
+    (one, face), (other, _mate) = first, second
+    if one.motion != other.motion or not _are_there_together(one, other):
+        return False
+    boxes = np.array([_filled(surface).bounds() for surface in (one, other)])
+    reach = size + float(np.abs(boxes[np.isfinite(boxes)]).max(initial=0.0))
+    least, most = np.clip([boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)], -reach, reach)
+    if (least > most + _CUT * 1e-6 * size).any():
+        return False
+    points = face.onto(least[:, None] + (most - least)[:, None] * np.random.default_rng(0).random((3, _POINTS)))
+    with np.errstate(all="ignore"):
+        off = [np.abs(gaps_of((surface.at_rest(),), points, 0.0)[0]) for surface in (one, other)]
+    return bool((np.maximum(*off) <= 10.0**-_DIGITS * size).any())
+
+
+def _filled(surface: Surface) -> Surface:
+    """The inside of a surface at rest: of a solid, what it fills."""
+    return dataclasses.replace(surface.at_rest(), side="inside") if surface.is_solid() else surface.at_rest()  # type: ignore[call-arg]
 
 
 def _are_there_together(one: Surface, other: Surface) -> bool:
