@@ -278,6 +278,10 @@ def test_without_a_checkpoint_nothing_begins_again_unasked(tmp_path):
         ({"n": 30}, "number of particles is 20, got 30"),
         ({"start_seed": 2}, r"run\.h5 is of another run: its particles at the start .* have the digest"),
         ({"seed": 2}, r"run\.h5 is of another run: its seed of thermal walls is 0, got 2"),
+        (
+            {"scene": swarm.Scene([swarm.Sphere(0.6)])},
+            r"its scene is .*radius = 0\.5, center = \[0\.0, 0\.0, 0\.0\], side",
+        ),
         ({}, r"run\.h5\.checkpoint must be there .*begin again at 0 s and replace the 3 frames of .*--overwrite"),
     ):
         with pytest.raises(swarm.SceneError, match=words) as caught:

@@ -9,6 +9,7 @@ import hashlib
 import io
 import json
 import math
+import re
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
@@ -80,14 +81,18 @@ class SavedRun:
     def require_same(self, other: "SavedRun", path: Path) -> None:
         """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""
         for name, what in _NAMES.items():
-            mine, its = (
-                ", ".join(line for line in str(getattr(job, name)).splitlines() if line) for job in (self, other)
-            )
+            mine, its = (_on_one_line(str(getattr(job, name))) for job in (self, other))
             if getattr(self, name) != getattr(other, name):
                 raise SceneError(
                     f"{path} is of another run: its {what} {mine}, got {its}; {_HINT}; swarm {self.version} wrote it, "
                     f"this is {other.version}"
                 )
+
+
+def _on_one_line(text: str) -> str:
+    """A text of TOML on one line, with its lists as a reader writes them."""
+    lists = re.sub(r",?\n\s*\]", "]", re.sub(r"\[\n\s*", "[", text))
+    return re.sub(r",?\s*\n\s*", ", ", lists.strip())
 
 
 _NAMES = {
