@@ -230,16 +230,34 @@ def test_the_loop_in_the_edge_of_one_room_takes_the_walls_of_that_room_alone(who
     assert result.observables["energy_error"].max() < 1e-13
 
 
-def test_fixed_steps_of_the_loop_in_two_boxes_are_those_in_one_long_box():
-    whole = swarm.Union(HALVES_OF_IT)
+@pytest.mark.parametrize(
+    "motion",
+    [
+        None,
+        swarm.Translation((0.3, 0.0, 0.1)),
+        swarm.Oscillation((0.05, 0.03, 0.04), 1.0),
+        swarm.Rotation((0.2, -0.1, 1.0), 0.5),
+    ],
+    ids=["at rest", "going", "shaken", "turning"],
+)
+def test_fixed_steps_of_the_loop_in_two_boxes_are_those_in_one_long_box(motion):
+    whole = swarm.Union(HALVES_OF_IT, motion=motion)
     loop = swarm.AugmentedLagrangian(dt=5e-3, penalty=4e3, on_unconverged="count", max_sweeps=3)
     start = [(0.5,), (0.1,), (0.0,)], [(1.0,), (0.3,), (-0.2,)]
     one, other = (
-        run([wall], start, 0.4, loop, gravity=(0.1, -0.2, -1.0)) for wall in (whole, swarm.Box((0.7, 0.4, 0.45)))
+        run([wall], start, 0.4, loop, gravity=(0.1, -0.2, -1.0))
+        for wall in (whole, swarm.Box((0.7, 0.4, 0.45), motion=motion))
     )
     assert other.observables["impacts"][-1] >= 1
     assert (one.observables["unconverged"] == other.observables["unconverged"]).all()
     assert np.abs(one.particles.position - other.particles.position).max() < 1e-8
-    moving = swarm.Union(HALVES_OF_IT, motion=swarm.Translation((0.1, 0.0, 0.0)))
-    with pytest.raises(swarm.SceneError, match="must not be Union with adaptive = False where walls move"):
-        run([moving], starts(1), method=loop)
+    # With what a wall that moves has given
+    assert one.observables["total_energy"] == pytest.approx(other.observables["total_energy"], abs=1e-8)
+
+
+def test_fixed_steps_of_the_loop_at_a_field_beside_a_wall_that_moves_are_a_sentence():
+    loop = swarm.AugmentedLagrangian(dt=5e-3, penalty=4e3)
+    field = swarm.Spheres(np.array([(0.2, 0.0, 0.0), (-0.2, 0.1, 0.0)]), np.array([0.05, 0.04]))
+    vessel = swarm.Box((0.5, 0.5, 0.5), motion=swarm.Translation((0.1, 0.0, 0.0)))
+    with pytest.raises(swarm.SceneError, match="must not be Spheres with adaptive = False where walls move"):
+        run([vessel, field], starts(1), method=loop)

@@ -202,9 +202,9 @@ def _fields(asked: Asked) -> Found:
 
 
 def _in_fixed_steps_beside_motions(asked: Asked) -> Found:
-    """Fields, and unions of several rooms, where walls move, in steps of fixed length."""
+    """Fields, where walls move, in steps of fixed length."""
     if asked.scene.moves() and not _takes_rooms(asked):
-        yield from (*_fields(asked), *_unions(asked))
+        yield from _fields(asked)
 
 
 def _sheets(asked: Asked) -> Found:
