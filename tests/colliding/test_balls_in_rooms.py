@@ -29,8 +29,12 @@ PIPES = swarm.Union([
     swarm.Cylinder(0.3, (1.0, 0.0, 0.0), 1.0), swarm.Cylinder(0.3, (0.0, 1.0, 0.0), 1.0, (0.05, 0.0, 0.02)),
     swarm.Cylinder(0.3, (0.1, 0.0, 1.0), 1.0),
 ])  # fmt: skip
+# A ball high in the tower is outside of the sphere, of which it faces a part that is seen from inside.
+TOWER = swarm.Union(
+    [swarm.Box((0.5, 0.5, 0.5)), swarm.Box((0.3, 0.3, 0.8), (0.2, 0.1, 0.3)), swarm.Sphere(0.5, (-0.4, 0.0, 0.12))]
+)
 TIPPED = {"bubbles": BUBBLES, "cross": CROSS, "pipes": PIPES}
-UNIONS = {"boxes": BOXES, "spheres": SPHERES, "pipe": PIPE, "foam": FOAM, "bin": BIN, **TIPPED}
+UNIONS = {"boxes": BOXES, "spheres": SPHERES, "pipe": PIPE, "foam": FOAM, "bin": BIN, "tower": TOWER, **TIPPED}
 FLIGHTS = 6
 
 
@@ -74,8 +78,9 @@ def test_a_flight_ends_where_points_all_over_the_ball_leave_the_union(name, pull
     rng, union, radius = np.random.default_rng(5), UNIONS[name], 0.07
     around = rng.normal(size=(3, 3000))
     around *= radius / np.sqrt((around**2).sum(axis=0))
-    for _flight in range(FLIGHTS):
-        place, velocity = rng.uniform(-0.2, 0.2, 3), rng.normal(size=3)
+    starts = rng.uniform(-1.0, 1.0, (1000, 3)) * np.abs(union.bounds()).max(axis=0)
+    starts = [place for place in starts if union.phi(place[:, None] + around).max() <= 0.0]
+    for place, velocity in zip(starts[:FLIGHTS], rng.normal(size=(FLIGHTS, 3)), strict=True):
         time, meets = met(union, radius, place, velocity, pull)
         assert meets
 
@@ -85,6 +90,27 @@ def test_a_flight_ends_where_points_all_over_the_ball_leave_the_union(name, pull
 
         assert max(outside(t, 1.0 - 1e-9) for t in np.linspace(0.0, time, 40)) <= 1e-9
         assert outside(time, 1.03) > 0.0
+
+
+def test_an_edge_that_touches_the_wall_of_a_third_room_has_one_tip():
+    # The line x = -0.1, z = 0.5 is 0.5 from the centre, at y = 0.
+    touching = swarm.Union([*TOWER.parts[:2], swarm.Sphere(0.5, (-0.4, 0.0, 0.1))])
+    (tip,) = [np.array(tip) for wall in walls_of(touching, 0.04) for tip in wall.tips]
+    assert tip == pytest.approx([-0.1, 0.0, 0.5], abs=1e-5)
+
+
+@pytest.mark.parametrize("pull", [None, (0.3, -0.2, 1.0)], ids=["straight", "fall"])
+def test_a_ball_behind_a_face_that_is_seen_flies_on(pull):
+    """High in the tower it meets the walls of the tower alone, as a point meets a box that is smaller by its radius."""
+    rng, radius = np.random.default_rng(2), 0.02
+    low, high = np.array([-0.1, -0.2, 0.5]) + radius, np.array([0.5, 0.4, 1.1]) - radius
+    for place in rng.uniform((-0.05, -0.15, 0.95), (0.2, 0.35, 1.05), (30, 3)):
+        velocity, g = np.abs(rng.normal(size=3)) * (-1.0, 1.0, 1.0), np.array(pull or (0.0, 0.0, 0.0))
+        passed = [np.roots([0.5 * g[k], velocity[k], place[k] - end[k]]) for k in range(3) for end in (low, high)]
+        first = min(t.real for times in passed for t in times if t.imag == 0.0 and t.real > 0.0)
+        time, meets = met(TOWER, radius, place, velocity, pull)
+        assert meets
+        assert time == pytest.approx(first, abs=1e-12)
 
 
 @pytest.mark.parametrize("height", [0.0, 0.02, 0.05, 0.069])

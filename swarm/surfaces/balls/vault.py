@@ -25,6 +25,8 @@ from .vaulted import FLAT, RoomEdge, RoomFace, Vaulted, crossing, is_seen, outwa
 
 # Of the extent: what is round-off of a place, and what is farther than anything.
 _SLACK, _FAR = 1e-11, 1e6
+# Where an edge only touches the wall of a third room, the place is known to the root of the round-off.
+_TOUCHES = math.sqrt(_SLACK)
 # Places from which edges are looked for, and most rooms; of the smallest radius of curvature at these places, what is
 # taken for certain.
 _PLACES, _MOST, _ROUND = 24, 64, 0.5
@@ -147,7 +149,7 @@ def _made(vault: Vault) -> list[Vaulted]:
             one, other = group[first[k] + a], group[first[m] + b]
             group = [one if g == other else g for g in group]
             edges.append((first[k] + a, edge))
-            new = (x for x in ends if all(norm(x - tip) > slack for _i, tip in tips))
+            new = (x for x, known in ends if all(norm(x - tip) > known for _i, tip in tips))
             tips.extend((first[k] + a, tip) for tip in new)
     return [
         Vaulted(
@@ -205,8 +207,8 @@ def _is_on(walls: tuple[Any, ...], x: Vec, slack: float) -> bool:
 
 def _tips_of(
     edge: RoomEdge, on_it: list[Vec], rooms: tuple[Any, ...], bounds: list[Any], slack: float, far: float
-) -> list[Vec]:
-    """The places of an edge where it is seen and goes into a third room.
+) -> list[tuple[Vec, float]]:
+    """(a place of an edge where it is seen and goes into a third room, to how much that is known [m]), all of them.
 
     Args:
         edge: an edge.
@@ -216,7 +218,7 @@ def _tips_of(
         slack: round-off of a place [m].
         far: so far along the edge from its places others are looked for [m].
     """
-    found: list[Vec] = []
+    found: list[tuple[Vec, float]] = []
     starts = [x + way * along for x in on_it for along in [_along(edge, x)] for way in (0.0, far, -far)]
     for k, room in enumerate(rooms):
         boxes = [bounds[i] for i in (*edge.rooms, k)]
@@ -227,13 +229,17 @@ def _tips_of(
             walls = edge.one, edge.other, wall
             for start in starts:
                 x = _meeting(walls, start)
-                if (
-                    _is_on(walls, x, slack)
-                    and is_seen(rooms, (*edge.rooms, k), x, slack)
-                    and all(norm(x - y) > slack for y in found)
-                ):
-                    found.append(Vec(*map(float, x)))
+                if _is_on(walls, x, slack) and is_seen(rooms, (*edge.rooms, k), x, slack):
+                    known = slack / max(_volume(walls, x), _TOUCHES)
+                    if all(norm(x - y) > known for y, _known in found):
+                        found.append((Vec(*map(float, x)), known))
     return found
+
+
+def _volume(walls: tuple[Any, ...], x: Vec) -> float:
+    """That of the unit normals of three walls at a place: 0 where an edge only touches the third wall."""
+    one, other, third = (outward(wall, x) for wall in walls)
+    return abs(float(dot(one, cross(other, third))))
 
 
 def _along(edge: RoomEdge, x: Vec) -> Vec:

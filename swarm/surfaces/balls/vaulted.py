@@ -303,10 +303,14 @@ def _until_face(wall, face, flight):
     away, n = face.wall.distance(p), outward(face.wall, p)
     foot = p - away * n
     depth, step = hidden(wall.rooms, face.rooms, foot, n if isinstance(face.wall, FLAT) else ZERO), 0.0
-    if depth <= wall.slack or away <= -wall.radius:
+    # What is seen is seen from inside of its own room alone.
+    faces = depth <= wall.slack and away <= 0.0
+    if faces or away <= -wall.radius:
         step = flight.until_wall(face.wall.grown(wall.radius))
-    if depth <= wall.slack:
+    if faces:
         return step
+    if depth <= wall.slack:
+        return flight.until_gone(away)
     way = _way_of_foot(_round_at(face, foot, n), face.slope, abs(away), depth)
     return max(step, _until_seen(wall, abs(away), way, flight))
 
