@@ -92,6 +92,20 @@ def test_a_flight_ends_where_points_all_over_the_ball_leave_the_union(name, pull
         assert outside(time, 1.03) > 0.0
 
 
+def test_the_clearance_is_at_most_the_distance_from_the_edge_of_a_doorway():
+    """Also where the edge is many radii away: cells of balls are marked by it as near a wall, or not."""
+    radius, between = 0.03, np.array([0.6, 0.1, 0.0])
+    length = np.linalg.norm(between)
+    along = between / length
+    middle = 0.5 * (length + (0.5**2 - 0.4**2) / length)
+    circle = math.sqrt(0.5**2 - middle**2)
+    for place in np.random.default_rng(4).uniform(-0.45, 0.45, (200, 3)) + 0.5 * between:
+        off = place - along * (place @ along)
+        away = math.hypot(place @ along - middle, np.linalg.norm(off) - circle)
+        clear = min(wall.clearance(Vec(*place)) for wall in walls_of(SPHERES, radius))
+        assert clear <= away - radius + 1e-12
+
+
 def test_an_edge_that_touches_the_wall_of_a_third_room_has_one_tip():
     # The line x = -0.1, z = 0.5 is 0.5 from the centre, at y = 0.
     touching = swarm.Union([*TOWER.parts[:2], swarm.Sphere(0.5, (-0.4, 0.0, 0.1))])

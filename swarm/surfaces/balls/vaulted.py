@@ -109,7 +109,7 @@ class Vaulted(Smooth):
         return self.gradient(r)
 
     def clearance(self, r):
-        return -self.phi(r)
+        return at_least(self, r) - self.radius
 
     def project(self, r):
         away, place = nearest(self, r)
@@ -142,6 +142,21 @@ def nearest(wall, r):
         better = away < best
         best, place = select(better, away, best), either(better, tip, place)
     return best, place
+
+
+@outlined
+def at_least(wall, r):
+    """A lower bound of how far the nearest place is, also from afar, where `nearest` finds no edges."""
+    best = wall.most
+    for face in wall.faces:
+        away = face.wall.distance(r)
+        seen = is_seen(wall.rooms, face.rooms, r - away * outward(face.wall, r), wall.slack)
+        best = select(seen, min(abs(away), best), best)
+    for edge in wall.edges:
+        best = min(best, max(abs(edge.one.distance(r)), abs(edge.other.distance(r))))
+    for tip in wall.tips:
+        best = min(best, norm(tip - r))
+    return best
 
 
 def outward(wall, r):
