@@ -1,4 +1,4 @@
-// The search of the reference: entries whose title or text has every word, those whose title begins with it first.
+// The search of the reference: entries with every word in their title or text, first those with a title that begins so.
 const box = document.getElementById("search");
 const list = document.getElementById("found");
 const MOST = 30;

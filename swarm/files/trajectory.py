@@ -208,8 +208,8 @@ class Trajectory(Stored):
         """Whether each of the particles of frame k was born by then, (N,)."""
         k = self._number(k)
         with self._reading(f"frame {k}") as file:
-            there = self._there(file, k)
-            return np.ones(len(file["particles/all/mass"]), np.bool_) if there is None else there
+            born = self._there(file, k)
+            return np.ones(len(file["particles/all/mass"]), np.bool_) if born is None else born
 
     def columns(self, k: int) -> dict[str, NDArray[Any]]:
         """The columns of frame k as they are on file, a row a particle: "position", "velocity", "impacts", ..."""
@@ -217,9 +217,9 @@ class Trajectory(Stored):
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
             held = {name: self._of_frame(name, k) for name in layout.KEPT if name in everything}
-            there = self._there(file, k)
+            born = self._there(file, k)
             for name in layout.PARTS:
-                finite(held[name] if there is None else held[name][there], "particle")
+                finite(held[name] if born is None else held[name][born], "particle")
             return held
 
     def bodies(self, k: int) -> "Bodies":

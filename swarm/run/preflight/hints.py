@@ -4,6 +4,8 @@ import dataclasses
 import itertools
 import logging
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +36,21 @@ _POINTS, _CUT = 4096, 0.01
 # Digits to which two flat faces are in one place, of a normal and of an offset in sizes of the scene; listed surfaces
 # beyond this number are not compared.
 _DIGITS, _COMPARED = 9, 200
+_IN_ONE_PLACE = (
+    "surfaces[%d] (%s) and surfaces[%d] (%s) have faces in one place, with the same side: an impact there follows the "
+    "laws of either; leave that face of one out (open = [...] of a box), or let one stand in front of the other"
+)
+_ONLY_TOUCH = (
+    "surfaces[%d] (%s) and surfaces[%d] (%s) touch at a face but do not overlap: points that slide along one of them, "
+    "or hit the edge of the face, may enter the gap of no width between them; let them overlap, as a post that goes on "
+    "below its floor"
+)
 # What an impact on a surface depends on, besides its shape.
 _LAWS = ("restitution", "friction", "rolling", "temperature", "accommodation", "laws", "mass", "inertia")
 
 
 def give(task: Task) -> None:
-    """Warn of what the run will do that may not be meant. Nothing of it is wrong."""
+    """Warn of what the run will do that may not be meant."""
     warn_of_overlap(task.scene)
     warn_of_walls_in_one_place(task.scene, task.bodies is not None or task.particles.radius is None)
     _warn_of_faces(task.scene)
@@ -240,24 +251,15 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
             along, against = (
                 tuple((np.round([*(sign * normal), sign * offset / size], _DIGITS) + 0.0).tolist()) for sign in (1, -1)
             )
-            for j, other, mate in known.get(along, []):
-                if _differ(other, one) and _share_a_place((other, mate), (one, face), size):
-                    _LOG.warning(
-                        "surfaces[%d] (%s) and surfaces[%d] (%s) have faces in one place, with the same side: an "
-                        "impact there follows the laws of either; leave that face of one out (open = [...] of a box), "
-                        "or let one stand in front of the other",
-                        j, type(other).__name__, i, type(one).__name__,
-                    )  # fmt: skip
-                    return
-            for j, other, mate in known.get(against, []) if of_points else []:
-                if (one.is_solid() or other.is_solid()) and _share_a_place((other, mate), (one, face), size):
-                    _LOG.warning(
-                        "surfaces[%d] (%s) and surfaces[%d] (%s) touch at a face but do not overlap: points that slide "
-                        "along one of them, or hit the edge of the face, may enter the gap of no width between them; "
-                        "let them overlap, as a post that goes on below its floor",
-                        j, type(other).__name__, i, type(one).__name__,
-                    )  # fmt: skip
-                    return
+            both: tuple[tuple[Any, str, Callable[[Surface, Surface], bool]], ...] = (
+                (along, _IN_ONE_PLACE, _differ),
+                (against, _ONLY_TOUCH, lambda a, b: of_points and (a.is_solid() or b.is_solid())),
+            )
+            for place, words, matters in both:
+                for j, other, mate in known.get(place, []):
+                    if matters(other, one) and _share_a_place((other, mate), (one, face), size):
+                        _LOG.warning(words, j, type(other).__name__, i, type(one).__name__)
+                        return
             known.setdefault(along, []).append((i, one, face))
 
 
