@@ -50,10 +50,14 @@ class Parallel(Surface):
         return self.tightest()[1]
 
     def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
-        rows = self._own_rows(points, time)
-        found = np.empty(points.shape[1])
-        distances_from(self.walls_of_balls(0.0)[0], np.ascontiguousarray(rows), found)
-        return found + radius
+        return reach_by_distance(self, points, radius, time)
+
+
+def reach_by_distance(surface: Any, points: Floats, radius: Floats, time: float) -> Floats:
+    """How far balls (N,) at points (3, N) reach out of a surface whose one wall of balls gives distances [m]."""
+    found = np.empty(points.shape[1])
+    distances_from(surface.walls_of_balls(0.0)[0], np.ascontiguousarray(surface._own_rows(points, time)), found)
+    return found + radius
 
 
 def foot_of(numbers: Any, most: float, bend: float, box: Box = UNBOUNDED, known: float = math.inf) -> ByFoot:

@@ -15,7 +15,8 @@ from ...common.validated import Lengths
 from ...kernel.jit import select
 from ...kernel.vector import cross, norm, times, total, vec
 from .. import rotation as rotations
-from ..balls.egg import EggCavity, EggSolid, distances_from
+from ..balls.egg import EggCavity, EggSolid
+from ..balls.parallel import reach_by_distance
 from ..surface import Box, Surface, box_around, farthest, rotated_box, side_sign
 from ..time_of_impact.course import level_and_window, rise_time_inside
 from .quadratic import QuadricNumbers, form, turning, widths
@@ -64,11 +65,7 @@ class Ellipsoid(Surface):
     def reaching_outside(
         self, points: NDArray[np.float64], radius: NDArray[np.float64], time: float = 0.0
     ) -> NDArray[np.float64]:
-        rows = self._own_rows(points, time)
-        wall = self.walls_of_balls(0.0)[0]
-        found = np.empty(points.shape[1])
-        distances_from(wall, np.ascontiguousarray(rows), found)
-        return found + radius
+        return reach_by_distance(self, points, radius, time)
 
     def size(self) -> float:
         return min(self.semi_axes)
