@@ -54,7 +54,7 @@ class Parallel(Surface):
 
 
 def reach_by_distance(surface: Any, points: Floats, radius: Floats, time: float) -> Floats:
-    """How far balls (N,) at points (3, N) reach out of a surface whose one wall of balls gives distances [m]."""
+    """How far balls (N,) at points (3, N) reach out of a surface [m]; its one wall of balls gives distances."""
     found = np.empty(points.shape[1])
     distances_from(surface.walls_of_balls(0.0)[0], np.ascontiguousarray(surface._own_rows(points, time)), found)
     return found + radius
