@@ -3,6 +3,7 @@
 import logging
 from pathlib import Path
 
+import numpy as np
 import pytest
 from test_openings import run
 
@@ -74,16 +75,22 @@ LID = {"normal": (1.0, 0.0, 0.0), "offset": 0.5}
 HALL = swarm.Box((0.5, 0.5, 0.5))
 FLOOR = swarm.Plane((0.0, 0.0, -1.0))
 POST = swarm.Box((0.1, 0.1, 0.2), center=(0.5, 0.0, 0.2), side="outside")
+COLUMN = swarm.Cylinder(0.1, length=0.4, center=(0.5, 0.0, 0.2), side="outside")
+LOW_ROOM = swarm.Box((1.0, 1.0, 0.5), center=(0.0, 0.0, 0.5))
 BRICK = swarm.Box((0.5, 0.5, 0.5), side="outside")
 TURN = {"axis": (0.0, 1.0, 0.0), "angle": 0.5}
 IN_ONE_PLACE = {
     "a face that absorbs": ([HALL, swarm.Plane(**LID, laws=[swarm.Absorb(1.0)])], "the laws of either"),
     "a face with losses": ([swarm.Plane(**LID, restitution=0.5), HALL], "the laws of either"),
     "a warm face": ([HALL, swarm.Plane(**LID, temperature=1.0)], "the laws of either"),
-    "a post on a plane": ([FLOOR, POST], "touch at a face"),
-    "a post in a box": ([swarm.Box((1.0, 1.0, 0.5), center=(0.0, 0.0, 0.5)), POST], "touch at a face"),
+    "a post over an edge": (
+        [BRICK, swarm.Box((0.1, 0.1, 0.1), center=(0.5, 0, 0.6), side="outside")],
+        "touch at a face",
+    ),
+    "tiles": ([BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 0.0, 0.0), side="outside")], "touch at a face"),
+    "drums": ([COLUMN, swarm.Cylinder(0.1, length=0.4, center=(0.5, 0, 0.6), side="outside")], "touch at a face"),
+    "a post that stays": ([swarm.Plane((0.0, 0.0, -1.0), present=[(0, 1)]), POST], "touch at a face"),
     "two bricks": ([BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 0.9, 0.0), side="outside")], "touch at a face"),
-    "a column": ([FLOOR, swarm.Cylinder(0.1, length=0.4, center=(0, 0, 0.2), side="outside")], "touch at a face"),
 }
 NOT_IN_ONE_PLACE = {
     "one law": [HALL, swarm.Plane(**LID)],
@@ -92,6 +99,11 @@ NOT_IN_ONE_PLACE = {
     "one after the other": [
         swarm.Plane(**LID, restitution=0.9, present=[(0, 1)]), swarm.Plane(**LID, restitution=0.5, present=[(1, 2)])
     ],
+    "a post on a plane": [FLOOR, POST],
+    "a post in a box": [LOW_ROOM, POST],
+    "a post in a corner": [LOW_ROOM, swarm.Box((0.1, 0.1, 0.2), center=(0.9, 0.9, 0.2), side="outside")],
+    "a beam from wall to wall": [LOW_ROOM, swarm.Box((0.1, 1.0, 0.2), center=(0.0, 0.0, 0.5), side="outside")],
+    "a column": [FLOOR, COLUMN],
     "a post that overlaps its floor": [FLOOR, swarm.Box((0.1, 0.1, 0.2), center=(0.5, 0.0, 0.1), side="outside")],
     "a post above its floor": [FLOOR, swarm.Box((0.1, 0.1, 0.1), center=(0.5, 0.0, 0.2), side="outside")],
     "bricks in one layer, apart": [BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 1.5, 0.0), side="outside")],
@@ -121,4 +133,32 @@ def test_other_walls_are_not(name, caplog):
 
 
 def test_balls_do_not_fit_into_a_gap_of_no_width(caplog):
-    assert hints_of_walls([FLOOR, POST], caplog, of_points=False) == []
+    assert hints_of_walls([BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1, 0, 0), side="outside")], caplog, False) == []
+
+
+def sunk(post, by):
+    """A post of which so much more is below the floor."""
+    x, y, z = post.center
+    if isinstance(post, swarm.Box):
+        a, b, half = post.half_widths
+        return swarm.Box((a, b, half + 0.5 * by), center=(x, y, z - 0.5 * by), side="outside")
+    return swarm.Cylinder(post.radius, length=post.length + by, center=(x, y, z - 0.5 * by), side="outside")
+
+
+@pytest.mark.parametrize("post", [POST, COLUMN, swarm.Box((0.1,) * 3, center=(0.9, 0.0, 0.1), side="outside")])
+@pytest.mark.parametrize(("gravity", "radius"), [(None, None), ((0.0, 0.0, -9.81), None), (None, 0.05)])
+def test_what_slides_on_a_floor_meets_a_post_that_stands_on_it(post, gravity, radius):
+    # The first meets the post, the second one passes beside it.
+    low, ends = 0.0 if radius is None else radius, []
+    position = np.array([[0.25, 0.25], [0.01, 0.4], [low, low]])
+    velocity = np.array([[1.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
+    for foot in (post, sunk(post, 0.01)):
+        scene = swarm.Scene([LOW_ROOM, foot], gravity=gravity)
+        ends.append(run(scene, swarm.Particles(position, velocity, radius=radius), until=0.8, frames=2))
+    for one in ends:
+        assert one.particles.position[0, 0] < 0.8
+        assert one.impacts_per_particle[0] >= 1
+        assert one.particles.velocity[0, 0] < 0.0
+        energy = one.observables["total_energy"]
+        assert np.abs(energy / energy[0] - 1.0).max() < 1e-12
+    np.testing.assert_allclose(ends[0].particles.position, ends[1].particles.position, atol=1e-12)

@@ -1,11 +1,8 @@
 """What a user may not have meant, said before a run starts: cavities, times, steps, gravity."""
 
-import dataclasses
 import itertools
 import logging
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +12,8 @@ from ...kernel.limits import EPSILON
 from ...methods import Impact
 from ...scene import Scene
 from ...surfaces.instant import box_of, gaps_of, side_of
+from ...surfaces.presence.flush import are_there_together, pairs_in_one_place, standing
 from ...surfaces.presence.openings import least_distance
-from ...surfaces.presence.seams import Face, faces_of
 from ...surfaces.surface import Surface
 from ..options import Task
 from . import softness, workload
@@ -33,9 +30,8 @@ _STABLE = 2.0
 _LOOKED_AT = 1000
 # Points at which two cavities are compared, and the part of one beyond the other that says that it is cut.
 _POINTS, _CUT = 4096, 0.01
-# Digits to which two flat faces are in one place, of a normal and of an offset in sizes of the scene; listed surfaces
-# beyond this number are not compared.
-_DIGITS, _COMPARED = 9, 200
+# Listed surfaces beyond this number are not compared.
+_COMPARED = 200
 _IN_ONE_PLACE = (
     "surfaces[%d] (%s) and surfaces[%d] (%s) have faces in one place, with the same side: an impact there follows the "
     "laws of either; leave that face of one out (open = [...] of a box), or let one stand in front of the other"
@@ -224,7 +220,7 @@ def warn_of_overlap(scene: Scene) -> None:
     cavities = [(i, one) for i, one in enumerate(scene.surfaces) if not one.is_solid() and side_of(one) > 0.0]
     bounded = [(i, one) for i, one in cavities if np.isfinite(boxes[i]).all()]
     for (i, one), (j, other) in itertools.combinations(bounded, 2):
-        if _are_there_together(one, other) and _cut_one_another(one, other, boxes[[i, j]]):
+        if are_there_together(one, other) and _cut_one_another(one, other, boxes[[i, j]]):
             _LOG.warning(
                 "surfaces[%d] (%s) and surfaces[%d] (%s) overlap only in part: particles are kept in what they have in "
                 'common; a vessel of both is one surface, swarm.Union([...]), in a scene file kind = "union"',
@@ -240,60 +236,24 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
         scene: the scene.
         of_points: whether points meet its walls. Balls do not fit into a gap of no width.
     """
-    if len(scene.surfaces) > _COMPARED:
+    surfaces, size = scene.surfaces, scene.extent() or 1.0
+    if len(surfaces) > _COMPARED:
         return
-    size, known = scene.extent() or 1.0, dict[tuple[float, ...], list[tuple[int, Surface, Face]]]()
-    for i, one in enumerate(scene.surfaces):
-        for face in faces_of(one):
-            if face.plane is None:
-                continue
-            normal, offset = face.plane
-            along, against = (
-                tuple((np.round([*(sign * normal), sign * offset / size], _DIGITS) + 0.0).tolist()) for sign in (1, -1)
-            )
-            both: tuple[tuple[Any, str, Callable[[Surface, Surface], bool]], ...] = (
-                (along, _IN_ONE_PLACE, _differ),
-                (against, _ONLY_TOUCH, lambda a, b: of_points and (a.is_solid() or b.is_solid())),
-            )
-            for place, words, matters in both:
-                for j, other, mate in known.get(place, []):
-                    if matters(other, one) and _share_a_place((other, mate), (one, face), size):
-                        _LOG.warning(words, j, type(other).__name__, i, type(one).__name__)
-                        return
-            known.setdefault(along, []).append((i, one, face))
+
+    def matters(one: Surface, other: Surface, are_back_to_back: bool) -> bool:
+        return of_points and (one.is_solid() or other.is_solid()) if are_back_to_back else _differ(one, other)
+
+    closed = standing(surfaces) if of_points else {}
+    for pair in pairs_in_one_place(surfaces, size, matters):
+        if not any(end in closed for end in zip(pair.surfaces, pair.faces, strict=True)):
+            (j, i), words = pair.surfaces, _ONLY_TOUCH if pair.are_back_to_back else _IN_ONE_PLACE
+            _LOG.warning(words, j, type(surfaces[j]).__name__, i, type(surfaces[i]).__name__)
+            return
 
 
 def _differ(one: Surface, other: Surface) -> bool:
     """Whether impacts on two surfaces differ."""
     return any(getattr(one, name, None) != getattr(other, name, None) for name in _LAWS)
-
-
-def _share_a_place(first: tuple[Surface, Face], second: tuple[Surface, Face], size: float) -> bool:
-    """Whether two surfaces that move as one have a place in common, on their flat faces in one plane."""
-    (one, face), (other, _mate) = first, second
-    if one.motion != other.motion or not _are_there_together(one, other):
-        return False
-    boxes = np.array([_filled(surface).bounds() for surface in (one, other)])
-    reach = size + float(np.abs(boxes[np.isfinite(boxes)]).max(initial=0.0))
-    least, most = np.clip([boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)], -reach, reach)
-    if (least > most + _CUT * 1e-6 * size).any():
-        return False
-    points = face.onto(least[:, None] + (most - least)[:, None] * np.random.default_rng(0).random((3, _POINTS)))
-    with np.errstate(all="ignore"):
-        off = [np.abs(gaps_of((surface.at_rest(),), points, 0.0)[0]) for surface in (one, other)]
-    return bool((np.maximum(*off) <= 10.0**-_DIGITS * size).any())
-
-
-def _filled(surface: Surface) -> Surface:
-    """The inside of a surface at rest: of a solid, what it fills."""
-    return dataclasses.replace(surface.at_rest(), side="inside") if surface.is_solid() else surface.at_rest()  # type: ignore[call-arg]
-
-
-def _are_there_together(one: Surface, other: Surface) -> bool:
-    """Whether two surfaces are there at one time."""
-    always = ((0.0, math.inf),)
-    pairs = itertools.product(one.present or always, other.present or always)
-    return any(max(begins) < min(ends) for begins, ends in (zip(*pair, strict=True) for pair in pairs))
 
 
 def _cut_one_another(one: Surface, other: Surface, boxes: NDArray[np.float64]) -> bool:

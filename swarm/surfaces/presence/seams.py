@@ -35,13 +35,13 @@ _ROUNDINGS = 4.0 * np.finfo(np.float64).eps
 # Of the size: the distance beside a face at which a room is there, and the part of that by which it is.
 _BESIDE, _WITHIN = 1e-7, 0.5
 # The reach by which it is asked whether a face lies within another one, and how far outside of that it may be then.
-_FAR, _OUTSIDE = 1e-6, 1e-9
+FAR, OUTSIDE = 1e-6, 1e-9
 # Of the size, how far a room without end is searched.
 _REACH = 2.0
 # Places that are tried, moves of each, and how far each move aims.
-_PLACES, _MOVES, _PAST = 512, 24, 1.05
+PLACES, _MOVES, _PAST = 512, 24, 1.05
 # Places that a room gains: so many are tried, and fewer are not enough to say where it gains them.
-_MANY, _ENOUGH = 4096, 8
+_MANY, ENOUGH = 4096, 8
 # Of the normals of round faces that are one, the least cosine, less 1.
 _OPPOSITE = 1e-9
 
@@ -225,7 +225,7 @@ def _may_be_one(face: Face, mate: Face, size: float) -> bool:
 
 def _is_at(apart: Any, size: float) -> Any:
     """Whether the distance between faces is round-off, or an overlap too small for a flight to go on."""
-    return (apart <= _ROUNDINGS * size) & (apart >= -_OUTSIDE * size)
+    return (apart <= _ROUNDINGS * size) & (apart >= -OUTSIDE * size)
 
 
 class _Rooms(NamedTuple):
@@ -263,14 +263,14 @@ class _Rooms(NamedTuple):
             box = np.array(within[0].bounds())
             low, high = np.maximum(low, box[0][:, None]), np.minimum(high, box[1][:, None])
             low, high = np.minimum(low, high), np.maximum(low, high)
-        points = low + (high - low) * np.random.default_rng(0).random((3, _PLACES))
+        points = low + (high - low) * np.random.default_rng(0).random((3, PLACES))
         for move in range(_MOVES + 1):
             points = face.onto(points)
             normals = face.normals(points)
             with np.errstate(all="ignore"):
                 gaps = [_gap(one, points + sign * shift * normals) + more for one, sign, more in asked]
             worst, out = np.argmax(gaps, axis=0), np.max(gaps, axis=0)
-            if move == _MOVES or (out <= 0.0).sum() > _PLACES // 4:
+            if move == _MOVES or (out <= 0.0).sum() > PLACES // 4:
                 break
             for k in np.unique(worst[out > 0.0]).tolist():
                 some = (worst == k) & (out > 0.0)
@@ -287,13 +287,13 @@ class _Rooms(NamedTuple):
         """Whether what one of the rooms gains where a face of its surface k is moved is within the other one."""
         assert face.longer is not None
         room, other = (self.other, self.room) if grown else (self.room, self.other)
-        larger = (*room[:k], face.longer(_FAR * self.size), *room[k + 1 :])
+        larger = (*room[:k], face.longer(FAR * self.size), *room[k + 1 :])
         low, high = (np.clip(corner, -_REACH * self.size, _REACH * self.size) for corner in room_bounds(room))
         random = np.random.default_rng(1)
         points = face.onto(low[:, None] + (high - low)[:, None] * random.random((3, _MANY)))
-        points = points + _FAR * self.size * random.random(_MANY) * face.normals(points)
+        points = points + FAR * self.size * random.random(_MANY) * face.normals(points)
         points = points[:, _gaps(larger, points) <= 0.0]
-        return points.shape[1] >= _ENOUGH and bool((_gaps(other, points) <= _OUTSIDE * self.size).all())
+        return points.shape[1] >= ENOUGH and bool((_gaps(other, points) <= OUTSIDE * self.size).all())
 
 
 def _sign_of(surface: Surface) -> float:
