@@ -93,3 +93,40 @@ def test_bodies_do_not_meet():
     bodies = swarm.place(VESSEL, swarm.dumbbell(0.1, 1.0), 2, speed=0.1)
     with pytest.raises(swarm.SceneError, match="pairs must be None with bodies"):
         admitted(scene, bodies, swarm.Impact(dt=1e-2))
+
+
+AS_WIDE = {
+    "box": [swarm.Box((0.25, 1.0, 1.0))],
+    "tube": [swarm.Cylinder(0.25, axis=(0.0, 0.0, 1.0))],
+    "lids": [swarm.Cylinder(1.0, length=0.5, axis=(1.0, 0.0, 0.0))],
+    "slab": [swarm.Slab((1.0, 0.0, 0.0), 0.25)],
+    "planes": [swarm.Plane((1.0, 0.0, 0.0), 0.25), swarm.Plane((-1.0, 0.0, 0.0), 0.25)],
+    "polygon": [swarm.Polygon([(-0.25, -1.0), (0.25, -1.0), (0.25, 1.0), (-0.25, 1.0)])],
+    "prism": [swarm.Prism([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)], height=0.5, axis=(1.0, 0.0, 0.0))],
+    "two balls": [swarm.Sphere(0.3, center=(0.55 * way, 0.0, 0.0), side="outside") for way in (1.0, -1.0)],
+}
+
+
+def one_ball(velocity, radius=0.25):
+    return swarm.Particles(np.zeros((3, 1)), np.array(velocity, float).reshape(3, 1), radius=radius)
+
+
+@pytest.mark.parametrize("name", AS_WIDE)
+@pytest.mark.parametrize(("velocity", "gravity"), [((0.3, 0.0, 0.4), None), ((0.0, 0.0, 0.0), (-2.0, 0.0, 0.0))])
+def test_a_ball_as_wide_as_its_gap_may_not_cross_it(name, velocity, gravity):
+    scene = swarm.Scene(AS_WIDE[name], gravity=gravity)
+    how = r"moves across it with 0.3 m/s" if gravity is None else r"falls across it with 2 m/s\^2"
+    with pytest.raises(swarm.SceneError, match=f"between facing walls, got 1 .* as wide as the gap .* {how}: no time"):
+        admitted(scene, one_ball(velocity))
+
+
+@pytest.mark.parametrize("name", AS_WIDE)
+def test_it_may_move_along_the_walls(name):
+    admitted(swarm.Scene(AS_WIDE[name]), one_ball((0.0, 0.0, 1e-200)))
+    admitted(swarm.Scene(AS_WIDE[name]), one_ball((0.3, 0.0, 0.4), radius=0.25 - 1e-9))
+
+
+@pytest.mark.parametrize("velocity", [(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (-0.3, 0.0, 1.0)])
+def test_a_ball_that_touches_two_walls_of_a_groove_may_move(velocity):
+    groove = [swarm.Plane((way, 0.0, -1.0), 0.25 * 2.0**0.5) for way in (1.0, -1.0)]
+    admitted(swarm.Scene(groove), one_ball(velocity))

@@ -12,9 +12,16 @@ from ..placing.fitting_shapes import require_shapes
 from ..placing.sequential import require_size
 from ..run.preflight.starts import error_of
 from ..scene import Scene
+from ..state import Floats
+from ..surfaces.rotation import normalized
+from ..surfaces.surface import shown
 
 # Balls overlap by round-off of their places at the start: this many times that of the largest coordinate.
 _ROUND_OFF = 64.0 * np.finfo(np.float64).eps
+# Of that coordinate, how far balls that touch walls are moved to see what keeps them, and a step of their distances.
+_MOVED, _STEP = 1e-6, 1e-7
+# The cosine, less 1, of the normals of walls between which a ball has no room.
+_FACING = 1e-6
 
 
 def require_balls(scene: Scene, particles: Particles, method: Method) -> None:
@@ -55,6 +62,8 @@ def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
     magnitude = max(float(np.abs(particles.position).max()), scene.finite_size())
     if scene.surfaces:
         _require_within(scene, particles, radius, _ROUND_OFF * magnitude, method.is_rigid())
+        if method.is_rigid() and not scene.moves():
+            _require_room(scene, particles, magnitude)
     found = overlaps_of(particles.position, radius, scene.period)
     if found is None:
         return
@@ -79,3 +88,46 @@ def _require_within(scene: Scene, particles: Particles, radius: np.ndarray, clos
     if not outside.size:
         return
     raise error_of(scene, particles, outside, distances[:, outside])
+
+
+def _require_room(scene: Scene, particles: Particles, magnitude: float) -> None:
+    """Raise a `SceneError` where a ball that touches facing walls moves from one to the other: that takes no time."""
+    assert particles.radius is not None
+    place, radius = particles.position, particles.radius
+    touches = (scene.distances_outside(place, 0.0, radius) >= -_ROUND_OFF * magnitude).any(axis=0)
+    pulls = None if scene.gravity is None else np.repeat(np.array(scene.gravity)[:, None], len(particles), axis=1)
+    for across, verb, unit in ((particles.velocity, "moves", "m/s"), (pulls, "falls", "m/s^2")):
+        moving = touches if across is None else touches & (np.abs(across).max(axis=0) > 0.0)
+        if across is None or not moving.any():
+            continue
+        some = np.flatnonzero(moving)
+        way = normalized(across[:, some] / np.abs(across[:, some]).max(axis=0))
+        ends = [_kept(scene, place[:, some] + sign * _MOVED * magnitude * way, radius[some]) for sign in (1.0, -1.0)]
+        (outside, normal), (behind, other) = ends
+        stuck = (np.minimum(outside, behind) > _ROUND_OFF * magnitude) & ((normal * other).sum(axis=0) < _FACING - 1.0)
+        if not stuck.any():
+            continue
+        k = int(np.argmax(stuck))
+        i = int(some[k])
+        error = SceneError(
+            f"particles must have room between facing walls, got {int(stuck.sum())} without; the first is particle {i} "
+            f"at {shown(place[:, i])}, which is as wide as the gap that it is in, radius {radius[i]:g} m, and {verb} "
+            f"across it with {abs(float(across[:, i] @ normal[:, k])):.3g} {unit}: no time would pass between its "
+            "impacts; use a smaller radius, or let it move along the walls only"
+        )
+        error.particle = i
+        raise error
+
+
+def _kept(scene: Scene, place: Floats, radius: Floats) -> tuple[Floats, Floats]:
+    """How far balls at places (3, N) are outside [m], and the unit normals of the walls that they are out of."""
+    distance = scene.distances_outside(place, 0.0, radius)
+    wall, each = distance.argmax(axis=0), np.arange(place.shape[1])
+    step = _STEP * max(float(np.abs(place).max()), float(radius.max()))
+    slopes = np.zeros(place.shape)
+    for k in scene.axes():
+        move = np.zeros((3, 1))
+        move[k] = step
+        ends = [scene.distances_outside(place + way * move, 0.0, radius)[wall, each] for way in (1.0, -1.0)]
+        slopes[k] = ends[0] - ends[1]
+    return distance[wall, each], normalized(slopes)
