@@ -96,6 +96,27 @@ def test_a_slide_that_gets_nowhere_is_bounded(monkeypatch):
     assert len(passes) <= 2 * slide.LOOK
 
 
+def test_impacts_in_a_gap_of_no_width_are_bounded(monkeypatch):
+    """Between two stones that touch a particle goes to and fro without time; in a narrow wedge it comes out again."""
+    passes, one_pass = [], block._pass
+
+    def counted(*about):
+        passes.append(1)
+        return one_pass(*about)
+
+    monkeypatch.setattr(block, "_pass", counted)
+    stones = [swarm.Box((0.5, 0.5, 0.1), center=(x, 0.0, 0.0), side="outside") for x in (0.0, 1.0)]
+    start = swarm.Particles([[0.3], [0.0], [0.3]], [[1.0], [0.0], [-1.0]])
+    with pytest.raises(swarm.RunError, match=r"meets its walls without end, .* at \(0.5, 0, 0.1\) m"):
+        run_in_plain_python(swarm.Scene([swarm.Box((3.0, 1.0, 2.0)), *stones]), start)
+    assert len(passes) <= 4 * block.LOOK
+    passes.clear()
+    wedge = [swarm.Plane((way, 0.0, -1.4e-3)) for way in (1.0, -1.0)]
+    end = run_in_plain_python(swarm.Scene(wedge), swarm.Particles([[0.0], [0.0], [0.5]], [[1e-18], [0.0], [-1.0]]))
+    assert end.particles.velocity[2, 0] > 0.9
+    assert len(passes) > block.LOOK
+
+
 @dataclass(frozen=True)
 class Lossy(Mirror):
     """A user-defined method that halves the normal velocity at each impact, and lets no particle rest."""

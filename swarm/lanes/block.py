@@ -115,6 +115,7 @@ def _look(method, walls, state, lanes, live):
     """Whether a particle meets its walls without end, or has not gone on since it was looked at: (status, its lane).
 
     The narrower a wedge is, the more impacts have no time between them: there is an end to them, and they are counted.
+    In a gap of no width a particle comes to be what it was before.
     """
     # Walls that close on a particle hit it without end; where hits are found by safe steps, these are seconds too.
     most_hits = 0.1 * MOST_HITS if isinstance(walls, Carried) else MOST_HITS
@@ -127,13 +128,14 @@ def _look(method, walls, state, lanes, live):
             status = Status.STALLED.value
         elif lane.stands(method, p) and lane.looked_hits == lane.hits:
             status = Status.TIMELESS.value
+        elif method.holds and lane.goes_round(p):
+            status = Status.STALLED.value
         if status != Status.DONE.value:
             put(state.position, 0, lanes.particle[i], lane.r)
             if state.contacts is not None:
                 state.contacts.remaining[lanes.particle[i]] = lane.remaining
             return status, i
         lane.look(p)
-        lane.looked_hits = lane.hits
     return Status.DONE.value, 0
 
 

@@ -9,7 +9,7 @@ from ..contact.uzawa import RECORDS
 from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
-from ..kernel.vector import Vec, column, put
+from ..kernel.vector import Vec, column, put, square
 from ..methods import contract as methods
 from ..surfaces.in_motion.moving import Carried
 from ..surfaces.presence.ajar import Faced
@@ -31,7 +31,18 @@ class Flying(Advanced):
     ROWS = _named.count
     CLOSED_UP = _named.take(6)
     looked_particle, looked_left, looked_hits = _named.number(), _named.number(), _named.number()
+    looked_r, looked_v = _named.vector(), _named.vector()
     ALL = _named.count
+
+    def look(self, p):
+        """As `Advanced.look`, with all that its flight depends on."""
+        Advanced.look(self, p)
+        self.looked_hits, self.looked_r, self.looked_v = self.hits, self.r, self.v
+
+    def goes_round(self, p):
+        """Whether particle p, of this lane, is what it was when it was looked at: it will be so again without end."""
+        off = square(self.r - self.looked_r) + square(self.v - self.looked_v)
+        return self.looked_particle == p and self.looked_left == self.remaining and off == 0.0
 
     def put_end(self, end):
         """Its place at the end of a flight or a contact, and the time that remains of its frame."""
