@@ -32,7 +32,7 @@ from ..state import Balls, State, none_left
 from . import energy, lists, refused
 from . import grain_arrays as arrays
 from .booking import ContactTotals, MemberCounts
-from .drags import Drags, kept_drags, set_drags
+from .drags import Drags, carry, kept_drags, room_for, set_drags
 from .exits import stored_with_others
 from .faces import Fields
 from .grain_arrays import BEFORE, DONE, KEPT, LOST, SINCE, SKIN, TAKEN, X
@@ -181,7 +181,7 @@ class GrainsRun(BaseRun):
         born = feed.come(now, there, slack)
         if not born.number.size:
             return
-        kept = kept_drags(self._world)
+        kept = kept_drags(self._tier.kernel, self._world)
         state = self.state
         state.position[:, born.number], state.velocity[:, born.number] = born.position, born.velocity
         if state.crossed is not None:
@@ -196,7 +196,7 @@ class GrainsRun(BaseRun):
 
     def _list(self) -> None:
         """List anew what is near, where all are now."""
-        self._list_with(kept_drags(self._world))
+        self._list_with(kept_drags(self._tier.kernel, self._world))
 
     def _list_with(self, kept: Drags | None) -> None:
         """The same, with these impulses of friction of before."""
@@ -215,7 +215,7 @@ class GrainsRun(BaseRun):
         while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:
             near = self._make_room(pairs, near.slot.size)
         self._list_walls(kernel, near, skin)
-        set_drags(self._world, kept)
+        set_drags(kernel, self._world, kept)
         clock[SINCE] = 0.0
 
     def _drop_gone(self) -> None:
@@ -402,6 +402,8 @@ class GrainsRun(BaseRun):
         cells, _order = lists.cells_of(np.zeros((1, 3)), 1.0, None)
         yield lists.list_pairs, (matter.period, world.grains, world.near, cells, 0.0)
         yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0, 0.0)
+        if world.near.drag is not None:
+            yield carry, (world.grains.number, world.near, room_for(world.near), False)
         watched = self._watched_world(None if self._impacts is None else self._impacts.example)
         yield march, (matter, self._walls, watched, self._clock, MarchRule(0.0, 0.0, self._watch.passes, 0.0))
         yield energy.stored, (matter, self._walls, world.grains, world.near)

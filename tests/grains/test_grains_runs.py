@@ -7,8 +7,10 @@ from grains_runs import ROOM, cloud, ran
 import swarm
 from swarm.errors import RunError, SceneError
 from swarm.files import checkpoint
-from swarm.grains.drags import kept_drags
+from swarm.grains.drags import carry, kept_drags, room_for
+from swarm.grains.grain_arrays import FACE, near_of
 from swarm.grains.grains_run import GrainsRun
+from swarm.kernel.cache import in_python
 from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched
 
@@ -77,16 +79,39 @@ def frictions(run):
     return {pair: tuple(drag) for pair, drag in zip(pairs, kept, strict=True) if drag.any()}
 
 
-def test_friction_is_that_of_the_same_pairs_when_lists_are_made_anew():
+def frictions_at_walls(run):
+    """The impulses of friction at walls, by the wall and the particle."""
+    grains, near = run._world.grains, run._world.near
+    wall = np.repeat(np.arange(len(near.wall_first) - 1), np.diff(near.wall_first))
+    number, drags = grains.number[near.slot[: wall.size]], near.wall_drag[: wall.size]
+    return {(w, n): tuple(drag) for w, n, drag in zip(wall, number, drags, strict=True) if drag.any()}
+
+
+def test_friction_is_that_of_the_same_contacts_when_lists_are_made_anew():
     with started() as run:
-        advanced(run, 1)
-        before, kept = frictions(run), kept_drags(run._world)
+        advanced(run, 2)
+        before, at_walls, kept = frictions(run), frictions_at_walls(run), kept_drags(run._tier.kernel, run._world)
         # In reverse, so that of each pair the other ball comes first.
         for rows in run._world.grains:
             rows[:] = rows[::-1].copy()
         run._list_with(kept)
         assert frictions(run) == before
-        assert len(before) > 1
+        assert frictions_at_walls(run) == at_walls
+        assert len(before) > 1 < len(at_walls)
+
+
+def test_friction_at_a_field_is_that_of_the_same_faces_when_lists_are_made_anew():
+    near = near_of(2, 1, 0, 4, 3, 0)
+    near.wall_first[1], near.slot[:], near.spans[:, FACE] = 4, [0, 0, 1, 1], [5, 9, 5, 9]
+    near.wall_drag[:, 0] = [1.0, 2.0, 0.0, 4.0]
+    kept = room_for(near)
+    in_python(carry)(np.array([7, 3]), near, kept, False)
+    # The balls are in the other order, one of them is near another face first, and one is not near face 9.
+    row = np.full(8, -1)
+    row[[3, 7]] = 0, 1
+    near.spans[:, FACE], near.wall_drag[:] = [5, 2, 9, 5], 0.0
+    in_python(carry)(row, near, kept, True)
+    assert near.wall_drag[:, 0].tolist() == [0.0, 0.0, 2.0, 1.0]
 
 
 def test_a_run_does_not_depend_on_its_frames():
