@@ -2,9 +2,6 @@
 
 import math
 
-# Halvings in which a damping is found.
-_HALVINGS = 200
-
 
 def damping_of(alpha: float, restitution: float) -> float | None:
     """What times the root of the mass that moves is the damping C of a contact with this restitution, None for 1.
@@ -21,8 +18,8 @@ def damping_of(alpha: float, restitution: float) -> float | None:
     low, high = 0.0, 1.0
     while _loss(high) < wanted:
         high *= 2.0
-    for _k in range(_HALVINGS):
-        middle = 0.5 * (low + high)
+    # Until there is no number between them.
+    while low < (middle := 0.5 * (low + high)) < high:
         if _loss(middle) < wanted:
             low = middle
         else:
