@@ -116,6 +116,49 @@ def test_no_root_is_missed_of_many(family, seed):
     _require_first_roots(family, seed)
 
 
+def _quadric(random):
+    """Any of degree 2 or 1: bowls, saddles, sheets, cylinders, planes."""
+    few = [one for one in MONOMIALS if sum(one) <= (1 if random.integers(8) == 0 else 2)]
+    factors = random.normal(size=len(few)) * random.choice([0.0, 1e-6, 1.0, 30.0], len(few))
+    return " + ".join(f"({a!r})*x**{i}*y**{j}*z**{k}" for a, (i, j, k) in zip(factors.tolist(), few, strict=True))
+
+
+def test_falls_meet_quadrics_at_the_first_root():
+    random, hits = np.random.default_rng(5), 0
+    for _wall_of_many in range(8):
+        try:
+            surface = swarm.Formula(_quadric(random), bounds=BOX, center=(0.2, -0.1, 0.1))
+        except swarm.SceneError:
+            continue  # without a surface, or with a tip
+        wall = surface.numbers()
+        for place, velocity in _flights(random, wall, 12):
+            pull = vec((random.normal(size=3) * 10.0 ** random.choice([-3.0, 0.0, 1.0])).tolist())
+            # Numbers of NumPy are divided by 0 as those of kernels are.
+            with np.errstate(all="ignore"):
+                time, found = wall.falling_hit(*(vec(np.array(one)) for one in (place, velocity, pull)))
+            verdict = Flight([wall], tuple(place), tuple(velocity), tuple(pull)).judge(time, found, 0.0, 4.0 * EPSILON)
+            assert verdict in (EXACT, TOUCHED), (verdict, surface, place, velocity, pull)
+            hits += found and time < math.inf
+    assert hits > 10
+
+
+def test_a_fall_meets_no_wall_outside_of_the_box_of_a_solid():
+    post = swarm.Formula("x**2 + y**2 - 0.01", side="outside", bounds=((-0.2, -0.2, -1.0), (0.2, 0.2, 1.0))).numbers()
+    pull = vec((0.0, 0.0, -1.0))
+    beyond, beside = vec((1.0, 0.0, -3.0)), vec((1.0, 0.0, 0.5))
+    assert math.isinf(post.first_hit(beyond, vec((-1.0, 0.0, -1.0)))[0])
+    time, found = post.falling_hit(beside, vec((-2.0, 0.0, 0.0)), pull)
+    assert (time, found) == (pytest.approx(0.45), True)
+    free = 0.0
+    for _step in range(50):
+        r = vec((1.0 - free, 0.0, -3.0 - 0.5 * free * free))
+        time, found = post.falling_hit(r, vec((-1.0, 0.0, -free)), pull)
+        free += time
+        if found or free > 4.0:
+            break
+    assert free > 4.0 or not found
+
+
 def _from_wall(text, count):
     """The levels of flights from places of impact, as lanes take them."""
     wall, particles = _wall(text), swarm.fill(swarm.Scene([swarm.Formula(text)]), count, speed=0.5, seed=2)

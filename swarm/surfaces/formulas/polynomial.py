@@ -5,8 +5,9 @@ from typing import Any
 
 from ...kernel.gravity import rise_time_by, rise_time_inside
 from ...kernel.jit import outlined, select
-from ...kernel.vector import absolute, total
-from ..time_of_impact.course import first_rise
+from ...kernel.vector import absolute, dot, square, total
+from ..balls.foot_hit import applied
+from ..time_of_impact.course import Quartic, first_rise, level_and_window
 from ..time_of_impact.polynomial import ConvexFlight, PolynomialFlight
 from .numbers import OwnNumbers, SmoothCavity, SmoothSolid
 
@@ -62,11 +63,33 @@ class QuadraticCavity(PolynomialNumbers):
         there = self.side * self.phi(r + select(far, middle, 0.0) * v)
         return self.refined(r, v, rise_time_by(c, b, a, select(far, -a * there, d))), True
 
+    def course(self, r, v, pull):
+        # phi(r + v t + G t^2/2) with H, which is the same everywhere
+        side, h = self.side, self.hessian(r)
+        c, twice_b, a2 = self.along(r, v)
+        _c, along_pull, pull2 = self.along(r, pull)
+        most = max(abs(self.bends.least), abs(self.bends.most))
+        own, falling = most * self.size * self.size, most * square(pull)
+        is_curved, size = falling > 0.0, select(abs(c) > own, abs(c), own)
+        size = select(size > 0.0, size, 1.0)
+        level, window = level_and_window(c, own, size, most * square(v), select(is_curved, falling, 1.0))
+        curved = select(is_curved, side, 0.0)
+        return Quartic(
+            select(is_curved, side * level, side * c),
+            0.5 * side * twice_b,
+            side * (a2 + 0.5 * along_pull),
+            curved * dot(applied(h, v), pull),
+            0.25 * curved * pull2,
+            select(is_curved, window, math.inf),
+        )
+
 
 class QuadraticSolid(QuadraticCavity):
     """The same of a solid."""
 
     is_solid = True
+    # Outside its box there is no wall, whatever phi is there.
+    is_quartic = False
 
 
 class ConvexQuadraticCavity(QuadraticCavity):
