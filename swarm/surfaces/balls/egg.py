@@ -8,9 +8,11 @@ import math
 
 from ...kernel.jit import kernel, outlined, select
 from ...kernel.limits import EPSILON
-from ...kernel.vector import Symmetric, Vec, column, dot, norm, square, times
+from ...kernel.vector import Symmetric, Vec, column, dot, largest, norm, square, times
 from .. import contract
+from ..shapes.quadratic import ConvexQuadric
 from ..time_of_impact.course import rise_time_inside
+from .by_foot import ByFoot
 from .rounded import Rounded
 
 # Newton's steps to a foot and to a hit; near both each one doubles the digits.
@@ -86,6 +88,18 @@ class EggCavity(contract.Smooth):
 
     def first_hit(self, r, v):
         return _leaving(self, r, v), True
+
+    def falling_hit(self, r, v, pull):
+        # A parabola may leave what is convex and come back: planes at feet prove too little.
+        return self.by_foot().falling_hit(r, v, pull)
+
+    def by_foot(self):
+        """The same wall as those of any smooth phi."""
+        a2 = self.squares
+        a = Vec(1.0 / a2.x, 1.0 / a2.y, 1.0 / a2.z)
+        body = ConvexQuadric(self.center, a, None, 1.0, 1.0, 1.0)
+        low, high = Vec(-math.inf, -math.inf, -math.inf), Vec(math.inf, math.inf, math.inf)
+        return ByFoot(body, self.radius, largest(a), self.bend, low, high, math.inf)
 
     def hessian_bounds(self, r):
         # 1/(2 (R - d)) at most, where d is how far inside of the ellipsoid, and R the radius of curvature
