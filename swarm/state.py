@@ -86,6 +86,10 @@ class Crossed(NamedTuple):
     sums: Floats
 
 
+# Counts of 32 bits begin anew from so many on, and how often is counted beside another number, which is below `BELOW`.
+ROUND, BELOW = 2**30, 8
+
+
 class Balls(NamedTuple):
     """The further state of particles with a radius.
 
@@ -94,12 +98,19 @@ class Balls(NamedTuple):
         collisions: (N,) whole numbers, with other particles since the start; each counts for both.
         virial: (1,) the sum of r_ij . J_ij over all collisions since the start [J s].
         spin: (3, N) angular velocity [rad/s], or None where nothing turns them.
+        rounds: (N,) `BELOW` times how often `collisions` has begun anew after `ROUND`, plus another number; or None.
     """
 
     radius: Floats
     collisions: NDArray[Any]
     virial: Floats
     spin: Floats | None = None
+    rounds: NDArray[Any] | None = None
+
+    def all_collisions(self) -> NDArray[np.int64]:
+        """`collisions` (N,), also where these have begun anew."""
+        found = self.collisions.astype(np.int64, copy=False)
+        return found if self.rounds is None else found + ROUND * (self.rounds // BELOW).astype(np.int64)
 
     def of(self, some: NDArray[np.bool_], n: int) -> "Balls":
         """That of some of n balls."""
@@ -165,12 +176,14 @@ class State(NamedTuple):
     @property
     def collisions(self) -> NDArray[np.int64] | None:
         """The number of collisions (N,) of each ball with others since the start; None for points."""
-        return None if self.balls is None else self.balls.collisions.astype(np.int64, copy=False)
+        return None if self.balls is None else self.balls.all_collisions()
 
     def having(self, **arrays: NDArray[Any]) -> "State":
         """The state with other arrays, also in place of those of balls."""
         mine: dict[str, Any] = {name: array for name, array in arrays.items() if name in self._fields}
-        balls = {name: array for name, array in arrays.items() if name not in mine}
+        balls: dict[str, Any] = {name: array for name, array in arrays.items() if name not in mine}
+        if "collisions" in balls:
+            balls["rounds"] = None
         return self._replace(**mine, balls=None if self.balls is None else self.balls._replace(**balls))
 
     def of(self, some: NDArray[np.bool_]) -> "State":

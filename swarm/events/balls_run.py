@@ -31,7 +31,7 @@ from .colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
 from .colliding.described import come, described, reach_of, there_at
 from .colliding.queue import FIRST
 from .colliding.resting import warn_of_rest
-from .colliding.rows import MET, WHOLES
+from .colliding.rows import FACE, MET, WHOLES
 from .colliding.window import END
 from .windows import windows_of
 
@@ -55,9 +55,9 @@ class CollidingRun(BaseRun):
         every = self._every_laws(compiled, box)
         loses = any(one.may_dissipate or one.loses for one in every) or box.loss is not None or rough
         ends = any(one.may_end for one in every)
-        # How often each has collided is in its row of what is next.
-        met = self._flock.tag.reshape(n, WHOLES)[:, MET]
-        balls = Balls(particles.radius, met, np.zeros(1), particles.spin)
+        # How often each has collided is in its rows.
+        met, rounds = self._flock.tag.reshape(n, WHOLES)[:, MET], self._flock.link.reshape(n, WHOLES)[:, FACE]
+        balls = Balls(particles.radius, met, np.zeros(1), particles.spin, rounds)
         # The energy of each ball is not kept.
         unused = np.broadcast_to(0.0, n)
         # Times are those of the start of each flight: so what is written at frames is no part of the motion.

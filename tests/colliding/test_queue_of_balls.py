@@ -8,6 +8,9 @@ import pytest
 from colliding.gases import frames, gas, run_of
 
 import swarm
+from swarm.events.colliding import rows
+from swarm.events.colliding.clock import EVENTS
+from swarm.events.colliding.events import _COUNTED, _begin_counts_anew
 from swarm.events.colliding.next_collision import _MOST
 from swarm.events.colliding.queue import FIRST, SPARE, build, requeue
 from swarm.events.colliding.rows import CELL, FLOATS, LEAVES, MEETS, NO_PARTNER, PARTNER, WHOLES, Flock
@@ -171,3 +174,45 @@ def test_compiled_it_has_the_same_bits():
     assert (one[0] == two[0]).all()
     assert (one[1] == two[1]).all()
     assert one[2]["energy_error"] == two[2]["energy_error"]
+
+
+@pytest.mark.parametrize("compile", ["never", pytest.param("always", marks=pytest.mark.slow)])
+def test_counts_of_32_bits_begin_anew(compile):
+    scene, start = gas()
+    times, many = [0.5, 1.0], 2**31 - 20
+    one, other = run_of(scene, start, compile=compile), run_of(scene, start, compile=compile)
+    whole = other._flock.tag.reshape(-1, WHOLES)
+    whole[:, rows.STAMP] = whole[:, rows.MET] = many
+    other._clock[EVENTS] = _COUNTED - 20
+    found, later = frames(one, times), frames(other, times)
+    assert max(other._clock[EVENTS] - _COUNTED, np.median(one.state.collisions)) > 1
+    for mine, its in zip(found[:2], later[:2], strict=True):
+        assert (mine == its).all()
+    assert (other.state.collisions == one.state.collisions + many).all()
+    assert later[2]["collisions"] == found[2]["collisions"] + len(start) * many // 2
+    assert later[2]["collision_rate"] == pytest.approx(found[2]["collision_rate"])
+    assert whole[:, [rows.STAMP, rows.MET]].max() < many - 2**29, "they are far from their ends again"
+    # A copy, as writers of files take it, has counts of its own.
+    copy = other.state.having(collisions=other.state.collisions[1:])
+    assert (copy.collisions == other.state.collisions[1:]).all()
+    assert (other.state.of(np.arange(len(start)) < 3).collisions == other.state.collisions[:3]).all()
+
+
+def test_no_flight_is_taken_for_another_one_where_counts_begin_anew():
+    scene, start = gas()
+    run = run_of(scene, start)
+    frames(run, [0.5])
+    whole = run._flock.tag.reshape(-1, WHOLES)
+
+    def are_same():
+        mate, seen = whole[:, PARTNER], whole[:, rows.SEEN]
+        return (mate >= 0) & (whole[mate, rows.STAMP] == seen)
+
+    before = are_same()
+    assert 0 < before.sum() < (whole[:, PARTNER] >= 0).sum(), "some have changed since they were seen"
+    # Such as 0, from which stamps begin anew.
+    whole[~before, rows.SEEN] = 0
+    _begin_counts_anew(run._flock)
+    assert (are_same() == before).all()
+    whole[:, rows.STAMP] += 1
+    assert not are_same().any()

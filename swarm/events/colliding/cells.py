@@ -14,7 +14,7 @@ from ...kernel.record import Record
 from ...kernel.vector import Vec
 from ...surfaces.time_of_impact.course import rise_time
 from ...surfaces.walls import Field
-from .rows import AFTER, CELL, FACE, FLOATS, LEAVES, WHOLES
+from .rows import AFTER, CELL, FLOATS, LEAVES, WHOLES
 from .window import middle_of, swept
 
 
@@ -86,7 +86,7 @@ def until_exit(grid, pull, flock, i, now):
         sooner = time < first
         first, face = select(sooner, time, first), select(sooner, 2 * k + select(up, 1, 0), face)
     flock.event[index(FLOATS * i + LEAVES)] = now + first
-    flock.link[index(WHOLES * i + FACE)] = face
+    flock.leave_by(i, face)
 
 
 def put_in(flock, i, cell):
@@ -108,7 +108,7 @@ def take_out(flock, i, cell):
 
 def cross(grid, flock, i):
     """Bring a ball into the cell that it enters now: (the axis, by how many periods it goes back)."""
-    face, old = flock.link[index(WHOLES * i + FACE)], grid.number(i, flock)
+    face, old = flock.face(i), grid.number(i, flock)
     which, step = face >> 1, 2 * (face & 1) - 1
     new, turns, cell = old, 0, 0
     for k, (axis, here) in enumerate(zip(grid.axes(), flock.cell(i), strict=True)):

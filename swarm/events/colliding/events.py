@@ -31,6 +31,9 @@ from .window import END, HELD, OUT
 
 # So many events a ball between which no time passes: then time does not pass at all.
 _AT_ONCE = 1000
+# Counts of 32 bits begin anew after so many events, of which each counts a few times at most: two balls take less than
+# an hour to pass 2^31, and there is no room for longer numbers in a row.
+_COUNTED = 2**28
 
 
 # --- Of one ball -------------------------------------------------------------------------------------------
@@ -241,6 +244,14 @@ def _begin_epoch(flock, clock, now):
     return shift
 
 
+@outlined
+def _begin_counts_anew(flock):
+    for i in range(flock.number()):
+        flock.begin_counts_anew(i)
+    for i in range(flock.number()):
+        flock.tag[index(WHOLES * i + STAMP)] = 0
+
+
 def _pass_epoch(box, flock, clock, now):
     """`_begin_epoch`, and the length of this one, where no window ends with it."""
     shift = _begin_epoch(flock, clock, now)
@@ -295,6 +306,8 @@ def take(box, flock, books, clock, rule):
             return Status.INTERRUPTED.value, 0
         taken += 1
         clock[EVENTS] += 1.0
+        if int(clock[EVENTS]) % _COUNTED == 0:
+            _begin_counts_anew(flock)
         fetch_next(box, flock)
         if now >= clock[LENGTH]:
             shift = _pass_epoch(box, flock, clock, now)

@@ -18,7 +18,7 @@ from ...kernel.vector import ZERO, Vec, dot, either, square
 from ...surfaces.shapes.sphere import ball
 from ...surfaces.time_of_impact.flights import Hit
 from .heavy import meet_heavy
-from .rows import DUE, FACE, FLOATS, MEETS, NO_PARTNER, PARTNER, SEEN, STAMP, WHOLES
+from .rows import DUE, FLOATS, MEETS, NO_PARTNER, PARTNER, SEEN, STAMP, WHOLES
 from .window import OUT, UNKNOWN, next_hit
 
 # Cells around a ball, its own included, and how many balls of them are looked at at once.
@@ -296,9 +296,8 @@ def look_ahead(box, flock, i, now):
     """Look whether a ball that has come into a cell collides sooner with those that are near now: whether it does."""
     row = FLOATS * i + MEETS
     if box.grid.few is None:
-        face = flock.link[index(WHOLES * i + FACE)]
         before = NextCollision(flock.event[index(row)], flock.tag[index(WHOLES * i + PARTNER)])
-        known = _around(box, flock, i, now, face, before)
+        known = _around(box, flock, i, now, flock.face(i), before)
         sooner = (known.time < before.time) | (known.mate != before.mate)
         if sooner:
             _keep(flock, i, known)

@@ -11,12 +11,14 @@ from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, displacement
 from ...kernel.jit import Array, select
 from ...kernel.vector import ZERO, Vec, either
+from ...state import BELOW, ROUND
 
 # Numbers of a row, and whole numbers in the same memory.
 FLOATS, WHOLES = 8, 16
 # Of a flight: position [m], velocity [m/s], their time [s since the epoch].
 _X, _V, TIME = 0, 3, 6
-# Whole numbers of a flight: the ball after it in its cell, and the face by which it leaves the cell.
+# Whole numbers of a flight: the ball after it in its cell; and the face by which it leaves the cell, below `BELOW`,
+# plus so many times how often `MET` has begun anew.
 AFTER, FACE = 14, 15
 # Of what is next [s since the epoch]: a collision, the end of the cell, a wall. And twice the energy per mass with
 # which it left a wall, for the next one: squares of velocities alone have a bias. NaN: its last impact was no wall's.
@@ -24,8 +26,8 @@ MEETS, LEAVES, DUE, _TWICE = 0, 1, 2, 3
 # Whole numbers of what is next: the ball that it collides with, and how often the velocity of that ball had changed
 # when this was found; how often its own has changed, and how often it has collided; its cell; the wall.
 PARTNER, SEEN, STAMP, MET, CELL, WALL = 8, 9, 10, 11, 12, 15
-# Of no ball.
-NO_PARTNER = -1
+# Of no ball, and the number of changes that no ball has.
+NO_PARTNER, NEVER = -1, -1
 
 
 class Flock(NamedTuple):
@@ -103,6 +105,25 @@ class Flock(NamedTuple):
     def aim_at(self, i, wall):
         """Store the number of its next wall."""
         self.tag[index(WHOLES * i + WALL)] = int(wall)
+
+    def face(self, i):
+        """The face by which it leaves its cell, or has come into it."""
+        return self.link[index(WHOLES * i + FACE)] & (BELOW - 1)
+
+    def leave_by(self, i, face):
+        """Store the face by which it leaves its cell."""
+        self.link[index(WHOLES * i + FACE)] += face - self.face(i)
+
+    def begin_counts_anew(self, i):
+        """Let its counts be far from their last numbers; 0 is the number of its flight for all that have seen it."""
+        row = WHOLES * i
+        if self.tag[index(row + MET)] >= ROUND:
+            self.tag[index(row + MET)] -= ROUND
+            self.link[index(row + FACE)] += BELOW
+        mate = self.tag[index(row + PARTNER)]
+        if mate >= 0:
+            is_same = self.tag[index(row + SEEN)] == self.stamp(mate)
+            self.tag[index(row + SEEN)] = select(is_same, 0, NEVER)
 
     def after(self, i):
         """The ball after it in its cell, or `NO_PARTNER`."""
