@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 # Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
 MOST_WALLS = 24
-# Of a scene in which impacts move a wall, what takes each wall by itself.
+# The `apart` of a scene in which impacts move a wall: each listed solid is a wall.
 REACTING = "walls that react"
-# Of a method with steps from one wall, what takes fields by their members, and all other walls by themselves.
+# The `apart` of a method that cuts its steps at impacts: the same, but a field keeps its members.
 CUT = "steps that are cut at impacts"
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
@@ -97,7 +97,7 @@ class Numbering:
 
 
 def is_in_steps(apart: str | None) -> bool:
-    """Whether what takes each wall by itself goes by steps, which may end outside of walls and of a cell."""
+    """Whether the method that takes each listed solid as a wall has steps, which may end outside of walls and of a cell."""
     return apart is not None and apart != REACTING
 
 
@@ -107,7 +107,8 @@ class CompiledScene:
     Args:
         scene: the description.
         largest: the largest radius of the balls in the scene [m]; None: its particles are points.
-        apart: what does not support listed solids of one kind as a field, in words; None: more than a few are one.
+        apart: the method that does not take listed solids of one kind as a field, in words for errors; None: more than
+            a few of them are a field.
 
     Attributes:
         scene, largest: as the arguments.

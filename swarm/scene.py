@@ -29,14 +29,14 @@ from .surfaces.room import lasting, room_bounds
 from .surfaces.surface import UNBOUNDED, Box, Surface, held_opening
 from .surfaces.union import Place
 
-# The number of points with gaps found at once.
+# Gaps are evaluated at this many points at once.
 _BATCH = 4096
 # A slot thinner than this part of the scene's extent does not set the length of steps, which would be lost in the
 # round-off of times.
 _THIN = 1e-6
 # Planes nearer to the origin than an atom's nucleus is wide [m] are at it: a scene of them has no extent.
 _AT_ORIGIN = 1e-15
-# Of the shortest period, how far outside of the cell a step of points that meets images of solids may end.
+# A step of points that meets images of solids ends at most this part of the shortest period outside of the cell.
 _REACH_OF_STEPS = 0.05
 
 
@@ -66,13 +66,13 @@ class Scene:
             surface is the same all along the period, as a plane or an endless cylinder along it, and may move along
             it. Flights go on over any number of cells where no wall that repeats is in the way.
         plane: None, or "x", "y" or "z": a billiard of two dimensions, with particles in the plane x, y or z = 0.
-            Walls stand upright on it. `fill` and all pictures are of the plane, and what is said of volumes and areas
-            holds for areas and lengths: `Particles.volume` is an area [m^2], pressures are per length [N/m].
-        pairs: None, or `Pairs`, what particles that have a radius do to one another; None: they keep the energy.
+            Walls are perpendicular to it. `fill` and all pictures are of the plane. Volumes are areas there, and areas
+            are lengths: `Particles.volume` is in m^2, a pressure in N/m.
+        pairs: the `Pairs` of particles with a radius, what two of them do to one another; None: they keep the energy.
 
     Raises:
-        SceneError: no surface, more than 24 walls with their images, surfaces that leave no volume, or one that does
-            not go with the period or leans out of the plane.
+        SceneError: an argument is out of its range, there are more than 24 walls with their images, the surfaces leave
+            no volume, or one of them does not go with the period or is not perpendicular to the plane.
 
     >>> import swarm
     >>> Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=(0.0, 0.0, -9.81)).size()
@@ -157,7 +157,7 @@ class Scene:
         return min(high[k] - low[k] for k in self.axes()) / 2.0
 
     def across(self) -> int | None:
-        """The axis across the plane of a scene of two dimensions, or None."""
+        """The axis perpendicular to the plane of a scene of two dimensions, or None."""
         return planes.PLANES.get(self.plane)
 
     def axes(self) -> list[int]:
@@ -171,11 +171,11 @@ class Scene:
         return size if _THIN * extent < size < math.inf else extent
 
     def wrapped(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Points (3, N) in the cell, and how many cells away they were (3, N); 0 where it does not repeat."""
+        """Points (3, N) shifted into the cell, and by how many cells (3, N); 0 in a direction without a period."""
         return into_cell(self.period or (None, None, None), checks.array("points", points))
 
     def unwrapped(self, particles: Particles) -> NDArray[np.float64]:
-        """Places of particles (3, N), with all cells that they have come through: position + image * period."""
+        """The positions of particles (3, N) without the shift into the cell: position + image * period [m]."""
         if self.period is None or particles.image is None:
             return np.array(particles.position)
         lengths = np.array([length or 0.0 for length in self.period])
@@ -184,9 +184,10 @@ class Scene:
     def gaps(
         self, points: ArrayLike, time: float = 0.0, radius: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """Signed gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0.
+        """The gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0.
 
-        That of a surface that is not there then is minus infinity. With a radius (N,) points are the centres of balls.
+        The gap of a surface that is not there at that time is minus infinity. With a radius (N,) points are the centres
+        of balls, and the values are those of `distances_outside`.
         """
         if radius is not None:
             return self.distances_outside(points, time, radius)
@@ -208,10 +209,11 @@ class Scene:
     def distances_outside(
         self, points: ArrayLike, time: float = 0.0, radius: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """Gap over its gradient of every surface at points (3, N), shape (surfaces, N) [m]; negative inside.
+        """How far points (3, N) are outside of every surface, shape (surfaces, N) [m]; negative inside.
 
-        That of a surface that is not there at this time [s] is minus infinity. With a radius (N,) points are the
-        centres of balls: how far they reach outside.
+        The distance is the gap over the magnitude of its gradient, of first order. It is minus infinity where a surface
+        is not there at that time [s]. With a radius (N,) points are the centres of balls, and the distance is how far
+        they reach outside.
         """
         if radius is None:
             return self._of_each(
@@ -223,7 +225,7 @@ class Scene:
     def _of_each(
         self, points: ArrayLike, time: float, images: Images, values: Callable[[Any, Any], Any]
     ) -> NDArray[np.float64]:
-        """The largest of the values of the images of every surface at points, (surfaces, N)."""
+        """Of every surface the largest of the values of its images at points, (surfaces, N)."""
         rows = checks.array("points", points)
         if self.period is not None:
             rows, _image = into_cell(self.period, rows)
@@ -260,7 +262,7 @@ class Scene:
         if self.period is None:
             return self._pieces_of_vaults
         known = self._pieces_by_radius
-        # Those of larger balls are as right.
+        # The pieces of larger balls do as well.
         largest = min((one for one in known if one >= largest), default=largest)
         if largest not in known:
             known[largest] = pieces_of(self.surfaces, self.period, largest)
@@ -295,13 +297,13 @@ class Scene:
     def poses(self, time: float) -> list[motions.Pose]:
         """The pose of every surface at a time [s].
 
-        What the surface has at a point p, as it is given, is then at `center` + `turn` @ (p - `center`) + `shift`;
-        `quaternion` is the rotation `turn` as (w, x, y, z).
+        A point p of the surface as it is given is then at `center` + `turn` @ (p - `center`) + `shift`; `quaternion` is
+        the rotation `turn` as (w, x, y, z).
         """
         return [motions.pose(surface.motion, time) for surface in self.surfaces]
 
     def open_faces(self, time: float = 0.0) -> NDArray[np.float64]:
-        """Open faces through which gravity pulls no particle back: rows (n, offset); n.r > offset is outside."""
+        """Open faces through which gravity pulls no particle back: rows (*n, offset); n.r > offset is outside."""
         faces = [
             (*n, offset)
             for surface in self.surfaces
@@ -317,19 +319,19 @@ class Scene:
     def bounds(self, time: float = 0.0) -> Box:
         """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open.
 
-        Across the plane of a scene of two dimensions it has no width.
+        Perpendicular to the plane of a scene of two dimensions it has no width.
         """
         low, high = self.bounds_of([surface for surface in self.surfaces if surface.is_there(time)], time)
         return tuple(low.tolist()), tuple(high.tolist())
 
     def _bounds_of_lasting(self, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A box around the volume that those of the surfaces leave at the start that are always there."""
+        """A box around the volume at the start, by the surfaces alone that are there at all times."""
         return self.bounds_of([surface for surface in surfaces if surface.present is None])
 
     def bounds_of(
         self, surfaces: Sequence[Surface], time: float = 0.0
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A box around the volume that some of the surfaces leave, and the cell that repeats."""
+        """A box (lower, upper) around the volume that these surfaces leave, of a cell that repeats or of space."""
         cell = UNBOUNDED if self.period is None else cell_of(self.period)
         low, high = room_bounds(surfaces, time, cell)
         for k, union in enumerate(surfaces):
@@ -416,13 +418,13 @@ class Scene:
         """Whether impacts move a surface."""
         return any(surface.reacts() for surface in self.surfaces)
 
-    # --- Made of it ----------------------------------------------------------------------------------
+    # --- What kernels take ---------------------------------------------------------------------------
 
     def compiled(self, largest: float | None = None, apart: str | None = None) -> CompiledScene:
         """The scene as kernels take it, for points, or balls with radii up to the largest one [m].
 
-        `apart` names what does not support listed solids of one kind as a field; then each is a wall by itself, and so
-        is each field.
+        `apart` names the method that does not take listed solids of one kind as a field: then each of them is a wall.
+        In fixed steps of points each field, and each union of several rooms, is one wall too.
 
         Raises:
             SceneError: it has too many walls.
@@ -438,7 +440,7 @@ class Scene:
         return CompiledScene(self)
 
     def placed(self, positions: ArrayLike, orientations: ArrayLike) -> "Scene":
-        """The scene with walls that react kept where `wall_position` and `wall_orientation` of a frame say."""
+        """The scene with its walls that react held at the `wall_position` and `wall_orientation` of a frame."""
         surfaces = list(self.surfaces)
         for i, surface in enumerate(surfaces):
             if surface.reacts():

@@ -39,7 +39,7 @@ class Method(Validated):
         raise NotImplementedError
 
     def apart(self) -> str | None:
-        """What of it does not support listed solids of one kind as a field, in words; None where it does."""
+        """The `apart` of `CompiledScene`: a name where the method does not take listed solids as a field, else None."""
         return type(self).__name__
 
     def time_of_impact(self) -> float | None:

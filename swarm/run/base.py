@@ -35,35 +35,34 @@ _FAR = 100.0
 OUTSIDE = 1e-9
 # The caller's thread looks for an interrupt so often [s].
 _GLANCE = 0.1
-# Kernels take fewer particles than this sooner than another thread is awake.
+# A kernel is done with fewer particles than this before another thread is awake.
 _FEW = 4096
-# So many particles are taken at a time, compiled and in plain Python: in some 0.1 s, from one look at the halt to the
-# next.
+# The particles between two looks at the halt, compiled and in plain Python: some 0.1 s of work.
 _AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 64
 Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
 
 
 class BaseRun:
-    """A run from frame to frame: it times, halts, balances and observes an engine; those functions come first below.
+    """A run from frame to frame: it times, halts, balances and observes an engine, as a context in which threads live.
 
-    Its threads end with this context.
+    The functions in which engines differ come first.
 
     Args:
-        scene, method: what is run.
-        n: how many particles, or bodies.
-        threads: how many.
-        tier: of the kernels.
+        compiled, method: the scene and the method.
+        n: the number of particles, or bodies.
+        threads: the number of threads.
+        tier: the tier of the kernels.
         seeding: the number of the first particle, or body, in the whole run.
-        watched: the log of impacts and their tally.
-        pool: the threads, where they are not the usual ones.
+        watched: the log and the tally of impacts, and the counters.
+        pool: the pool of threads; None: a new one.
 
     Attributes:
         state: what files take of a frame.
     """
 
     state: State
-    # Of one particle, where walls have any.
+    # The law of soft walls; None where walls are rigid.
     _law: Any = None
     # The walls as observed.
     _walls: Any
@@ -73,7 +72,7 @@ class BaseRun:
     _feed: Feed | None = None
     # Where walls react.
     _observed: Observed | None = None
-    # What is no flight, of contacts that have lasted.
+    # The phases other than flight that particles have been in.
     _kinds: Set[int] = frozenset()
     # The times at which frames are cut into pieces [s]; None: they are not.
     _instants: Sequence[float] | None = None
@@ -119,7 +118,7 @@ class BaseRun:
     # --- What differs between engines --------------------------------------------------------------------
 
     def calls(self) -> Iterable[tuple[Any, tuple[Any, ...]]]:
-        """Every kernel of a frame, with arguments of the types that it is called with from now on."""
+        """Every kernel of a frame, each with arguments of the types of its next calls."""
         raise NotImplementedError
 
     def _prepare(self, span: float, moment: float) -> None:
@@ -127,11 +126,11 @@ class BaseRun:
         raise NotImplementedError
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
-        """Call kernels until the frame is done, or halted: their status, and the particle or body that it is about."""
+        """Call kernels until the frame is done or halted: (status, the particle or body that it is about)."""
         raise NotImplementedError
 
     def _goes_on(self, status: int, item: int, seconds: float) -> bool:
-        """Whether a turn that took so many seconds and ended like this is followed by another one at once."""
+        """Whether another turn follows at once on one that took so many seconds and ended with this status."""
         return False
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
@@ -139,7 +138,7 @@ class BaseRun:
         raise NotImplementedError
 
     def _share_done(self, span: float) -> float:
-        """The share that is done of a frame, or of a piece of it."""
+        """The share of a frame, or of a piece of it, that is done, from 0 to 1."""
         raise NotImplementedError
 
     def furthest_behind(self) -> tuple[int, list[float]] | None:
@@ -147,21 +146,21 @@ class BaseRun:
         return None
 
     def _arrays(self) -> dict[str, Any]:
-        """The arrays of `arrays` that only this engine has, as `arrays_of` takes them."""
+        """The arrays of a checkpoint that only this engine has, as `arrays_of` takes them."""
         raise NotImplementedError
 
     def _begin(self) -> None:
-        """Prepare the start."""
+        """Prepare the observation of the start."""
 
     def _show(self, moment: float) -> None:
         """Bring the state, and the walls as observed, to a frame at a moment [s]."""
 
     def _with_stored(self, seen: dict[str, Any]) -> dict[str, Any]:
-        """The observables of points with what contacts store, where sums over particles are without it."""
+        """The observables with the energy that contacts store, where the sums over particles are without it."""
         return seen
 
     def _scale_of(self, seen: dict[str, Any]) -> float | None:
-        """What the error of the energy is relative to [J]; None: each particle has an error of its own."""
+        """The energy that the error of the energy is relative to [J]; None: the error is that of the worst particle."""
         return None
 
     def _length(self, duration: float) -> float:
@@ -173,20 +172,20 @@ class BaseRun:
         return self._method.instant(moment)
 
     def _switch(self, instant: float) -> None:
-        """Change what changes at the instant at which a piece of a frame begins [s]."""
+        """Open, shut, add and remove walls at the instant at which a piece of a frame begins [s]."""
 
     def chunk_sums(self) -> NDArray[np.float64]:
-        """The sums over each chunk of the last frame, from which those of shards are joined."""
+        """The sums over each chunk of particles of the last frame; the sums of a run in shards are made of them."""
         raise NotImplementedError
 
     # --- From frame to frame -----------------------------------------------------------------------------
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
-        """Advance all by `span`, in the method's unit, to a moment [s], and observe them: whether the frame is done.
+        """Advance all by `span`, in the method's unit, to a moment [s], and observe them.
 
-        It is not if `halt` was called, at the time `latest` [s of time.monotonic], or when the time for plain Python
-        is used up. The next call then continues the frame, with the same bits as without the halt. `writing` is the
-        time to write a frame [s].
+        Returns whether the frame is done. It is not if `halt` was called, the time `latest` [s of time.monotonic] has
+        come, or the time for plain Python is used up. The next call then continues the frame, with the same bits as
+        without the halt. `writing` is the time to write a frame [s].
 
         Raises:
             RunError: a step failed.
@@ -234,7 +233,7 @@ class BaseRun:
         return not self._cut_short
 
     def share_done(self, span: float) -> float:
-        """The share of a frame that was cut short that is done, on average over the particles, or bodies."""
+        """The share that is done of a frame that was cut short, on average over the particles or bodies."""
         if self._instants is None:
             return self._share_done(span)
         k, times = int(self._done[0]), self._times(self._end)
@@ -243,7 +242,7 @@ class BaseRun:
         return float(done / (times[-1] - times[0]))
 
     def arrays(self) -> Arrays:
-        """The arrays that `restore` needs for the same bits, not copied; to be called between calls of `advance`."""
+        """The arrays of a checkpoint, not copied: `restore` goes on from them with the same bits."""
         found = arrays_of(self._arrays())
         if self._instants is not None:
             found |= {"piece.begun": self._begun, "piece.done": self._done}
@@ -252,7 +251,7 @@ class BaseRun:
         return found
 
     def may_grow(self, name: str) -> bool:
-        """Whether an array of `arrays` has another length in a run that goes on than at its start."""
+        """Whether an array of `arrays` may have another length later in the run than at its start."""
         return False
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
@@ -308,12 +307,12 @@ class BaseRun:
         return seen
 
     def _escaped(self) -> int:
-        """The number of particles that are far away, and left through no opening."""
+        """The number of particles that are far away and have left through no opening."""
         far = np.sqrt((self.state.position**2).sum(axis=0)) > self._far
         return int((far & ~self.state.gone()).sum())
 
     def _seen_state(self) -> State:
-        """The state as observers of the last frame know it."""
+        """The state of the particles that are there at the last frame."""
         return self.state if self._feed is None else self._feed.seen(self.state)
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
@@ -326,7 +325,7 @@ class BaseRun:
     # --- Calls of kernels --------------------------------------------------------------------------------
 
     def _called(self, kernel: Any, calls: Iterable[tuple[Any, ...]], latest: float) -> list[Any]:
-        """The results of a kernel of this tier for each of these arguments, in a thread each, halted at `latest`."""
+        """The results of a kernel for each of these tuples of arguments, each in a thread; halted at `latest`."""
         chosen = self._tier.kernel(kernel)
         shares = [self._pool.submit(chosen, *arguments) for arguments in calls]
         return [result_of(share, latest, self.halt) for share in shares]
@@ -336,22 +335,22 @@ class BaseRun:
         return self._called(kernel, [arguments], latest)[0]
 
     def _in_parts(self, kernel: Any, *arguments: Any, first: int = 0, last: int, latest: float = math.inf) -> None:
-        """Call a kernel for what has numbers from `first` to before `last`, a part of it in each thread."""
+        """Call a kernel for the numbers from `first` to before `last`, a part of them in each thread."""
         threads = 1 if self._tier.is_plain or self.state.mass.size < _FEW else self._threads
         ends = np.linspace(first, last, threads + 1).astype(int).tolist()
         self._called(kernel, [(*arguments, *part) for part in itertools.pairwise(ends)], latest)
 
     def _at_once(self) -> int:
-        """How many particles are looked at from one look at the halt to the next."""
+        """How many particles a kernel takes between two looks at the halt."""
         return _AT_ONCE_PLAIN if self._tier.is_plain else _AT_ONCE
 
     def _watchers(self, counters: Any) -> Watchers:
-        """The watchers of the thread that calls."""
+        """The log, the tally and the counters of the calling thread."""
         log = None if self._impacts is None else self._impacts.example
         return Watchers(log, None if self._tally is None else self._tally.counts(), counters)
 
     def _open_page(self, end: float) -> ThreadLog | None:
-        """The log of the thread that calls, in the frame that ends at a time [s]; None in a run without one."""
+        """The log of the calling thread, for the frame that ends at a time [s]; None in a run without a log."""
         return None if self._impacts is None else ThreadLog(self._impacts, end)
 
     def _choose_tier(self) -> None:
@@ -359,7 +358,7 @@ class BaseRun:
         self._tier.choose(self.calls())
 
     def _limit(self, latest: float) -> float:
-        """When kernels return at the latest [s of time.monotonic]: plain Python has little time, and may have none."""
+        """When kernels return at the latest [s of time.monotonic]: sooner where the time for plain Python ends."""
         if self._tier.is_plain and self._tier.remaining <= 0.0:
             self._choose_tier()
         return min(latest, time.monotonic() + self._tier.remaining) if self._tier.is_plain else latest

@@ -27,7 +27,7 @@ _CHORD_SWEEPS = 50
 
 
 class Bent(NamedTuple):
-    """A level at a place, for safe steps: grad q, the level, its `hessian_bounds`, and the `clearance`."""
+    """What safe steps need at a place: grad q, the level, the three `hessian_bounds` and the `clearance`."""
 
     n: Vec
     level: Any
@@ -44,22 +44,21 @@ class Smooth(AtRest):
         first_hit (and falling_hit under gravity)  in closed form,
         course   the level along a fall as a quartic; falling_hit and safe_time follow by its first root, course.py,
         near     a polynomial above the level from a place on; the hits follow by steps, approach.py,
-        hessian_bounds  how strongly q bends at most; the hits follow by steps under a parabola, march.py;
-    for methods with steps in contact also `farthest_push`, and one that makes the step:
+        hessian_bounds  bounds of the curvature of q; the hits follow by steps under a parabola, march.py;
+    for methods with steps in contact also `farthest_push`, and one of these for the step:
         push, rise and resolve  in closed form,
         hessian                 by Newton's method, newton.py;
-    for motion other than uniform one from which safe steps in the frame of the wall follow, rising.py:
-        level_along  the level with a bound of its third derivative; the best,
+    for motion that is not uniform one of these, from which safe steps in the frame of the wall follow, rising.py:
+        level_along  the level with a bound of its third derivative, which gives the longest steps,
         hessian_bounds.
     Everything else has a definition here, which a surface overrides only where that is faster or more exact. A surface
-    with an inner function other than phi overrides `inner`, `inner_gradient`, `gap_of`, `level_of` and `gap_slope`,
-    all of them.
-    What is no method is a constant for the compiler.
+    with an inner function other than phi overrides all of `inner`, `inner_gradient`, `gap_of`, `level_of` and
+    `gap_slope`. Attributes that are no methods are constants for the compiler.
     """
 
     @classmethod
     def gives(cls, name):
-        """Whether a surface has a definition of its own of a method."""
+        """Whether the class of a surface overrides a method of `Smooth`."""
         return getattr(cls, name) is not getattr(Smooth, name)
 
     # --- Required: the level set ---
@@ -73,22 +72,23 @@ class Smooth(AtRest):
         raise NotImplementedError
 
     def hessian(self, r):
-        """H = grad grad q/2, a `Symmetric`: of steps in contact that have no closed form."""
+        """H = grad grad q/2, a `Symmetric`; steps in contact that have no closed form need it."""
         raise NotImplementedError
 
     def step_bend(self, r0, d):
-        """H for a step from r0 by d: that of its middle."""
+        """H for a step from r0 by d: at the midpoint of the step."""
         return self.hessian(r0 + 0.5 * d)
 
     def hessian_bounds(self, r):
-        """Bounds of the eigenvalues of side H: (the largest one at most, their magnitude, the distance within which).
+        """Bounds of the eigenvalues of side H near r: (most, magnitude, reach).
 
+        Within the distance `reach` of r no eigenvalue exceeds `most`, and none is larger in magnitude than `magnitude`.
         The distance must be finite where the hits of falls follow from these.
         """
         raise NotImplementedError
 
     def farthest_push(self):
-        """The kappa up to which `push` is continuous from 0 on, with the sign in which the surface pushes."""
+        """The kappa of the first pole of `push`: above 0 for a cavity, below 0 for a solid; infinite without one."""
         raise NotImplementedError
 
     # --- The inner function and the gap ---
@@ -125,7 +125,7 @@ class Smooth(AtRest):
         return self.gap_of(self.inner(r)) / norm(self.gradient(r))
 
     def gap_scale(self, r):
-        """The most that the gap changes when each coordinate changes by itself: the magnitude of its round-off."""
+        """The sum of |r_i dg/dr_i| over the coordinates: times the machine epsilon it is the round-off of the gap."""
         return total(absolute(times(self.gradient(r), r)))
 
     def unit_normal(self, r):
@@ -134,17 +134,17 @@ class Smooth(AtRest):
         return n * (self.side / norm(n))
 
     def project(self, r):
-        """A point within round-off of the surface, moved onto it: one Newton step along the gradient."""
+        """The point on the surface next to one within round-off of it: one Newton step along the gradient."""
         n = self.gradient(r)
         return r - (self.phi(r) / square(n)) * n
 
     # --- Of sources and counters, in Python ---
 
-    # The degree of a polynomial that is 0 on the wall alone; 0 where none is known.
+    # The degree of a polynomial that vanishes on the wall and nowhere else; 0: there is no such polynomial.
     degree = 0
 
     def polynomial(self, r):
-        """That polynomial at points."""
+        """The values of that polynomial at points."""
         return self.phi(r)
 
     def smooth_parts(self):
@@ -152,15 +152,14 @@ class Smooth(AtRest):
         return (self,)
 
     def reversible(self):
-        """The wall without what holds on its admissible side alone; None where its other side is another wall."""
-        return self if self.gives("reversible") else None
+        """A record of the wall that differs between its two sides by the sign of `side` alone; None if it has none."""
 
     # --- Of balls ---
 
     def grown(self, radius):
-        """The wall that the centre of a ball meets: the parallel surface, so far in the admissible side.
+        """The wall that the centre of a ball meets: the parallel surface, so far on the admissible side.
 
-        A separate record: its `distance` is exact there; `radius` is a number of a kernel, 0 or more.
+        Returns a record with an exact `distance`. The radius is 0 or more, and no constant for the compiler.
         """
         raise NotImplementedError
 
@@ -174,10 +173,10 @@ class Smooth(AtRest):
     def first_hit(self, r, v):
         """When the straight flight r + v t leaves the admissible side: (time, whether it does then).
 
-        Where the second is False the flight surely stays admissible until then, and what comes after is not known yet;
-        an infinite time means never. A particle on the surface that moves inward does not hit it at time 0: the sign of
-        the approach decides, not an epsilon. At a point outside by round-off the time is 0 if the particle moves
-        outward.
+        Where the second is False, the flight surely stays admissible until that time and has to be searched further
+        from there. An infinite time means never. A particle on the surface that moves inward does not hit it at time 0:
+        the sign of the approach decides, not an epsilon. At a point outside by round-off the time is 0 if the particle
+        moves outward.
         """
         return self.hit_by_steps(None, r, v)
 
@@ -186,7 +185,7 @@ class Smooth(AtRest):
         return self.hit_by_steps(Gravity(pull.x, pull.y, pull.z), r, v)
 
     def hit_by_steps(self, gravity, r, v):
-        """Both hits of a surface that gives `course`, `near` or `hessian_bounds`."""
+        """`first_hit` (gravity None) or `falling_hit` of a surface that gives `course`, `near` or `hessian_bounds`."""
         steps = self.steps(gravity, r, v)
         if isinstance(steps, Fall):
             return first_rise(steps)
@@ -195,9 +194,9 @@ class Smooth(AtRest):
         return march.march(self, r, v, ZERO if gravity is None else as_vector(gravity))
 
     def steps(self, gravity, r, v):
-        """The safe steps of a flight to the wall, which lanes take: `Fall`, `Approach` or alike.
+        """The safe steps of a flight to the wall, for lanes: a `Fall`, an `Approach` or the like.
 
-        None where its hit is asked for as a whole.
+        None where the hit is found in one call.
         """
         if gravity is not None and self.is_quartic:
             level = self.course(r, v, as_vector(gravity))
@@ -206,22 +205,22 @@ class Smooth(AtRest):
         return Approach(self, gravity, r, v) if near else None
 
     def look(self, r, v, pull, t, is_first):
-        """The `Look` of march.py at a flight at a time."""
+        """The `SafeStep` of march.py from the place of a flight at the time t."""
         return march.look(self, r, v, pull, t, is_first)
 
     def bent(self, r):
-        """What safe steps ask of a place all at once: a `Bent`."""
+        """The `Bent` of a place, from which safe steps follow."""
         n, level = self.inner_gradient(r), self.level_of(self.inner(r))
         most, magnitude, reach = self.hessian_bounds(r)
         return Bent(n, level, most, magnitude, reach, self.clearance(r))
 
-    # The most looks at a fall.
+    # The most safe steps of the search along a fall.
     falling_looks = march.FALLING_LOOKS
 
     def safe_time(self, r, v, pull):
-        """A time during which that parabola surely stays admissible: a lower bound, cheap.
+        """A time during which that parabola surely stays admissible: a cheap lower bound of the hit.
 
-        With 0, where nothing is known, a method takes every one of its steps.
+        It is 0 where no bound is known: then a method takes every one of its steps.
         """
         if self.is_quartic:
             return safe_rise_time(self.course(r, v, pull))
@@ -231,9 +230,9 @@ class Smooth(AtRest):
         return march.safe_time_by_steps(self, r, v, pull) if self.gives("hessian_bounds") else 0.0
 
     def entry(self, gravity, r, v):
-        """A time until which a flight surely stays admissible: (time, whether it does no longer then).
+        """A time until which a flight surely stays admissible: (time, whether it leaves the admissible side then).
 
-        By less than a hit, of a part of a solid: there the next entry of all parts is asked for again.
+        Solids ask this of their parts, and ask all of them again at that time: so it may be earlier than the hit.
         """
         if gravity is None:
             return self.first_hit(r, v)
@@ -241,7 +240,7 @@ class Smooth(AtRest):
         return rise_near(self.course(r, v, pull)) if self.is_quartic else self.falling_hit(r, v, pull)
 
     def straight_hit(self, end, r0, r1):
-        """`first_hit` of a straight way from r0 at one instant to r1 at another, where the surface is `end`."""
+        """`first_hit` of a straight way from r0 to r1, at the end of which the surface is `end`."""
         return self.first_hit(r0, r1 - r0)
 
     def course(self, r, v, pull):
@@ -256,19 +255,19 @@ class Smooth(AtRest):
     # Whether its `course` may be one from afar.
     may_be_far = True
 
-    # How many numbers of the steps of a straight flight lanes keep, if they are a `PolynomialFlight`, a `flight`.
+    # The number of numbers of a `PolynomialFlight`, made by `flight`, that lanes keep for a straight flight; 0: none.
     kept = 0
-    # Whether these begin with a guess of the root.
+    # Whether its steps begin with a guess of the root.
     aims = False
 
     def refined(self, r, v, time):
-        """The time to which these steps lead, by what the level is there: its coefficients have the round-off of r."""
+        """The time that these steps have found, corrected by the level there: that at r has the round-off of r."""
         raise NotImplementedError
 
     def near(self, gravity, r, v):
-        """A polynomial of time that is nowhere below the level of a flight from here on, and touches it here.
+        """A polynomial of time that is nowhere below the level of a flight from r on, and equals it at r.
 
-        Returns a `Near` of approach.py. A straight flight has the `gravity` None.
+        Returns a `LevelBound` of approach.py. The gravity of a straight flight is None.
         """
         raise NotImplementedError
 
@@ -282,7 +281,7 @@ class Smooth(AtRest):
         return 0.0
 
     def out_of(self, r):
-        """Lower bound of the distance of a point from a part of a solid; below 0 in it."""
+        """Lower bound of the distance of a point from a part of a solid; below 0 inside."""
         return self.clearance(r)
 
     def far(self, r):
@@ -290,16 +289,16 @@ class Smooth(AtRest):
         return self.clearance(r)
 
     def reach(self, lease):
-        """A time during which a particle surely does not meet the wall, which keeps a `Lease` and does not turn."""
-        # The distance is all that is known.
+        """A time during which a particle with this `Lease` surely does not meet the wall, which does not turn."""
+        # From the distance alone.
         clear = max(self.far(lease.r), 0.0)
         return rise_time(-clear, 0.5 * (norm(lease.v) + lease.width), 0.5 * norm(lease.a))
 
     def may_reach(self, low, high):
-        """Whether a solid may have a point in common with a box with these corners; its bounds do."""
+        """Whether a solid may have a point in common with the box between these corners, which its bounds overlap."""
         return True
 
-    # Whether `first_hit` of a straight flight that comes in from outside is when it leaves again.
+    # Whether `first_hit` of a straight flight that starts outside and comes in is the time at which it leaves again.
     leaves_once = False
 
     def passed(self, r, v):
@@ -307,7 +306,7 @@ class Smooth(AtRest):
         return False
 
     def outward_acceleration(self, r, v, pull):
-        """The acceleration of a free flight along the wall out of it [m/s^2]: above 0 the wall holds the particle."""
+        """The outward acceleration of a free flight along the wall [m/s^2]; above 0 the particle stays on the wall."""
         if not self.gives("hessian"):
             return curvature.outward_acceleration(self, r, v, pull)
         # The second derivative of the distance, (2 v.H v + grad q.G)/|grad q|
@@ -328,9 +327,9 @@ class Smooth(AtRest):
         return g + (rest / select(d2 > 0.0, d2, 1.0)) * d
 
     def resting_gradient(self, r0, r1):
-        """The discrete gradient, but grad q(m) where that meets the identity up to round-off.
+        """The discrete gradient, but grad q(m) where that satisfies D.(r1 - r0) = q1 - q0 up to round-off.
 
-        Divided by |d| that round-off is noise, the larger the shorter a step is, which keeps balls from coming to rest.
+        Divided by |d| that round-off is noise in short steps, which would keep balls from coming to rest.
         """
         if self.gives("discrete_gradient"):
             return self.discrete_gradient(r0, r1)
@@ -356,7 +355,7 @@ class Smooth(AtRest):
         return newton.rise(self, r0, p, kappa)
 
     def free_rise(self, r0, p):
-        """`rise` of the step that is not pushed, for a guess: its derivative may be near."""
+        """`rise` of the step with kappa = 0, for a first guess: its derivative may be approximate."""
         return self.rise(r0, p, 0.0)
 
     def turned_push(self, r0, p, kappa, tilt):
@@ -364,7 +363,7 @@ class Smooth(AtRest):
         return newton.push(self, r0, p, kappa, tilt)
 
     def turned_rise(self, r0, p, kappa, tilt):
-        """As `rise` of that step."""
+        """`rise` of that step."""
         return newton.rise(self, r0, p, kappa, tilt)
 
     def resolve(self, r, strength):
@@ -376,11 +375,11 @@ class Smooth(AtRest):
         return -self.chord_improve(r, p, 0.0)
 
     def chord_improve(self, r, p, kappa):
-        """Newton step of that kappa, to be subtracted."""
+        """The Newton step of that kappa: subtract it."""
         risen, steepness = self.rise(r, p, kappa)
         return risen / steepness
 
-    # The most steps of `chord_improve` it takes, 0 where the guess is exact.
+    # The most steps of `chord_improve`; 0 where the guess is exact.
     chord_sweeps = _CHORD_SWEEPS
 
     def chord_normal(self, r, p, kappa):
