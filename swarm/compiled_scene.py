@@ -97,7 +97,7 @@ class Numbering:
 
 
 def is_in_steps(apart: str | None) -> bool:
-    """Whether the method that takes each listed solid as a wall has steps, which may end outside of walls and of a cell."""
+    """Whether a method with this `apart` goes by steps, which may end outside of walls and of a cell."""
     return apart is not None and apart != REACTING
 
 

@@ -123,7 +123,7 @@ class Log(NamedTuple):
         self.shift(first, images)
 
     def add_crossing(self, state, particle, there, number, images):
-        """A row for a particle that crosses a counter at the r, v and remaining time of `there`; number: 2 counter + sense."""
+        """A row for a particle that crosses a counter where the lane `there` is; number = 2 counter + sense."""
         if not self.has(particle):
             return
         # The rest is for the impacts of this pass.

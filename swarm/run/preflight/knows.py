@@ -1,8 +1,9 @@
-"""What each engine supports, and what to use instead of what it does not support.
+"""What each engine supports, and the sentences of the errors for what it does not support.
 
-A run has one engine, by its particles, its method and whether impacts move a wall. A capability is something that a run
-may ask for: a law of a wall, a source, a period. `CAPABILITIES` has a `Refusal` for each pair that is not supported;
-every other pair is. `require_known` raises the first one that applies, before anything is compiled.
+The particles of a run, its method, and whether impacts move a wall determine its engine. A capability is something that
+a run may ask for: a law of a wall, a source, a period. `CAPABILITIES` has a `Refusal` for each pair of an engine and a
+capability that is not supported; all other pairs are. `require_known` raises the first one that applies to a run,
+before anything is compiled.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,7 +27,7 @@ POINTS, CHORDS, MASSIVE = "points with Impact", "points with a contact_step", "p
 SOFT, PAPER, BASELINE = "points with Penalty", "points with AugmentedLagrangian", "points with a baseline"
 BALLS, HEAVY, GRAINS = "balls with Impact", "balls and walls with a mass", "balls with Penalty"
 BODIES, SOFT_BODIES, PAPER_BODIES = "bodies with Impact", "bodies with Penalty", "bodies with AugmentedLagrangian"
-# Of methods that balls or bodies do not support, and of user-defined ones, which check by themselves.
+# Balls and bodies with a method that they do not support; points with a user-defined one, which has checks of its own.
 OTHER_POINTS, OTHER_BALLS, OTHER_BODIES = (f"{kind} with another method" for kind in ("points", "balls", "bodies"))
 
 _RIGID_POINTS, _FIXED_STEPS = (POINTS, CHORDS, MASSIVE), (SOFT, PAPER, BASELINE)
@@ -39,7 +40,7 @@ _ALONE = (*_EVERY_POINT, OTHER_POINTS)
 
 
 class Asked(NamedTuple):
-    """A run as it is asked for, with arguments of the right types; no particles where all come from sources."""
+    """The arguments of a run, of the right types; the particles are None where all come from sources."""
 
     scene: Scene
     particles: Particles | TiedParticles | None
@@ -48,7 +49,7 @@ class Asked(NamedTuple):
 
 
 def engine_of(asked: Asked) -> str:
-    """The engine of a run: one of `ENGINES`, or that of a method which this kind of particles does not support."""
+    """The engine of a run: one of `ENGINES`, or `OTHER_POINTS`, `OTHER_BALLS` or `OTHER_BODIES`."""
     scene, particles, method, options = asked
     if isinstance(particles, TiedParticles):
         return _by_method(method, (BODIES, SOFT_BODIES, PAPER_BODIES), OTHER_BODIES)
@@ -73,12 +74,12 @@ def _by_method(method: Method, engines: tuple[str, str, str], other: str) -> str
 
 # --- Capabilities ----------------------------------------------------------------------------------------
 
-# Where a run asks for a capability, in the fields that sentences name: `i` the surface, `k` its law, `got` the value.
+# Where a run asks for a capability, as the fields of its sentence: `i` the surface, `k` its law, `got` the value.
 Found = Iterator[dict[str, Any]]
 
 
 def _of_walls(name: str, without: Any) -> Callable[[Asked], Found]:
-    """Walls with an attribute of another value than that of a wall without it."""
+    """A function that finds the walls with another value of an attribute than `without`."""
 
     def found(asked: Asked) -> Found:
         for i, wall in asked.scene.pieces.owned():
@@ -106,7 +107,7 @@ def _of_scene(name: str) -> Callable[[Asked], Found]:
 
 
 def _argument(name: str, *without: Any) -> Callable[[Asked], Found]:
-    """A method with an argument of another value than these."""
+    """A function that finds a method with another value of an argument than these; the first is its default."""
 
     def found(asked: Asked) -> Found:
         got = getattr(asked.method, name, without[0])
@@ -119,7 +120,7 @@ def _argument(name: str, *without: Any) -> Callable[[Asked], Found]:
 def _where(
     holds: Callable[[Asked], Any], found: Callable[[Asked], Found] = lambda asked: iter([{}])
 ) -> Callable[[Asked], Found]:
-    """What is found of a run for which a condition holds."""
+    """A function that finds what `found` does in a run for which a condition holds, and nothing in any other."""
     return lambda asked: found(asked) if holds(asked) else iter(())
 
 
@@ -152,7 +153,7 @@ def _waits_beside_motions(asked: Asked) -> Found:
         yield from (one for one in _waits(asked) if scene.surfaces[one["i"]].reacts())
 
 
-def _losses_that_fall(asked: Asked) -> Found:
+def _losses_under_gravity(asked: Asked) -> Found:
     for i, wall in asked.scene.pieces.owned():
         if wall.restitution < 1.0 and asked.scene.gravity is not None:
             yield {"i": i, "got": f"{wall.restitution:g}"}
@@ -170,7 +171,7 @@ def _unions(asked: Asked) -> Found:
 
 
 def _takes_rooms(asked: Asked) -> bool:
-    """Whether the steps of a method are cut at impacts, so that it knows in which room they are."""
+    """Whether the steps of a method are cut at impacts, so that each is in one room."""
     return bool(getattr(asked.method, "adaptive", False))
 
 
@@ -191,7 +192,7 @@ def _heavy_rooms(asked: Asked) -> Found:
             yield {**one, "name": "inertia" if surface.mass is None else "mass"}
 
 
-def _unions_beside_own(asked: Asked) -> Found:
+def _unions_beside_guides(asked: Asked) -> Found:
     body = asked.particles.body if isinstance(asked.particles, TiedParticles) else None
     if body is not None and (body.guides or body.cavities):
         yield from _unions(asked)
@@ -224,9 +225,7 @@ def _groups(asked: Asked) -> Found:
 def _lossy_groups(asked: Asked) -> Found:
     for i, one in enumerate(asked.scene.surfaces):
         groups: dict[str, dict[str, Any]] = one.groups or {}
-        names = [
-            name for name, given in groups.items() if given.keys() & {"restitution", "friction", "rolling"}
-        ]  # fmt: skip
+        names = [name for name, given in groups.items() if given.keys() & {"restitution", "friction", "rolling"}]
         if names:
             yield {"i": i, "got": f"those of {', '.join(names)}"}
 
@@ -250,8 +249,8 @@ def _rolls(asked: Asked) -> Found:
 
 
 def _cuts_at_impacts(asked: Asked) -> str | None:
-    """The argument of `AugmentedLagrangian` by which its steps are cut at impacts with walls at rest."""
-    if getattr(asked.method, "adaptive", False):
+    """The argument of `AugmentedLagrangian` that cuts its steps at impacts with walls at rest; None without it."""
+    if _takes_rooms(asked):
         return "adaptive = True"
     return 'on_unconverged = "impact"' if getattr(asked.method, "on_unconverged", "") == "impact" else None
 
@@ -312,7 +311,7 @@ def _measured_in_part(asked: Asked) -> Found:
 
 
 class Refusal(NamedTuple):
-    """What an engine does not support, with what was given, and what to use instead."""
+    """The error of an engine for what it does not support: the problem, and what to use instead."""
 
     problem: str
     remedy: str
@@ -345,7 +344,7 @@ _CHANGES = Refusal(
 
 
 def _with_method(name: str, without: str, got: str = "got") -> Refusal:
-    """Of a law of a wall that methods of fixed steps do not have."""
+    """The error for a property of a wall that a method of fixed steps does not support."""
     return Refusal(f"surfaces[{{i}}].{name} must be {without} with {{method}}, got {{{got}}}", "use Impact")
 
 
@@ -373,12 +372,12 @@ class Capability(NamedTuple):
     """Something that a run may ask for.
 
     Attributes:
-        name: what it is.
-        found: where a run asks for it.
-        refused: what is said for each engine that does not support it. The fields in braces are those of `found`, the
-            `kind` of what was found, the name of the `method`, the `whole` method and its contact `step`.
-        is_argument: whether it is an argument of a method, which other methods do not have.
-        within: the name of the capability that this is a kind of, or "".
+        name: its name, which the table of the guide shows.
+        found: yields the places where a run asks for it.
+        refused: engines that do not support it -> the error. The fields in braces are those of `found`, the `kind` (the
+            class) of its `got`, the name of the `method`, the `whole` method, and its `contact_step` as `step`.
+        is_argument: whether it is about an argument of a method; then it is no row of the table.
+        within: the name of the capability that this is a special case of, or "".
     """
 
     name: str
@@ -388,11 +387,11 @@ class Capability(NamedTuple):
     within: str = ""
 
     def sentence(self, engine: str) -> str | None:
-        """The sentence for an engine, with its fields in braces; None if the engine supports this."""
+        """The sentence of the error for an engine, with its fields in braces; None if the engine supports this."""
         return next((one.sentence() for engines, one in self.refused.items() if engine in engines), None)
 
 
-# In the order in which they are looked for.
+# The first that applies is the error of a run.
 CAPABILITIES = (
     Capability("method", _where(lambda asked: True), {
         (OTHER_BODIES,): _NO_METHOD,
@@ -451,7 +450,7 @@ CAPABILITIES = (
             "are one spring", f"give the {{name}} to the whole, or {_TO_ROOMS}",
         ),
     }, within="union"),
-    Capability("union beside guides and cavities", _unions_beside_own, {
+    Capability("union beside guides and cavities", _unions_beside_guides, {
         (BODIES,): Refusal(
             "surfaces[{i}] must not be a {kind} of several rooms with a body that has guides or cavities, got "
             "{got!r:.200}", "use a body without them",
@@ -564,7 +563,7 @@ CAPABILITIES = (
         (SOFT_BODIES, PAPER_BODIES): _with_method("restitution", "1"),
         (CHORDS,): _LOSES,
     }),
-    Capability("restitution under gravity", _losses_that_fall, {
+    Capability("restitution under gravity", _losses_under_gravity, {
         (MASSIVE, HEAVY): Refusal(
             "surfaces[{i}].restitution must be 1 under gravity where a wall has a mass, got {got}: particles would "
             "come to rest on a wall that moves with them",
@@ -767,7 +766,7 @@ CAPABILITIES = (
 
 
 def sentence(engine: str, capability: str) -> str | None:
-    """The sentence for an engine and a capability by its name, with its fields in braces; None if it is supported.
+    """The sentence of the error for an engine and the name of a capability; None if the engine supports it.
 
     >>> sentence(POINTS, "source") is None
     True
@@ -782,12 +781,12 @@ def _refused_by(engine: str) -> list[tuple[Capability, str]]:
     return [(one, text) for one in CAPABILITIES if (text := one.sentence(engine)) is not None]
 
 
-# Of each engine what it does not support, in the order in which it is looked for, with the sentence.
+# Engine -> the capabilities that it does not support, in the order of `CAPABILITIES`, each with its sentence.
 _REFUSED = {engine: _refused_by(engine) for engine in (*ENGINES, OTHER_POINTS, OTHER_BALLS, OTHER_BODIES)}
 
 
 def require_known(asked: Asked) -> None:
-    """Raise a `SceneError` with the first sentence that applies to a run."""
+    """Raise a `SceneError` for the first capability that a run asks for and its engine does not support."""
     method = asked.method
     fields = {"method": type(method).__name__, "whole": method, "step": getattr(method, "contact_step", 0.0)}
     for capability, text in _REFUSED[engine_of(asked)]:
@@ -797,7 +796,7 @@ def require_known(asked: Asked) -> None:
 
 
 def markdown() -> list[str]:
-    """The table of the guide, in lines of Markdown: whether each engine supports each capability."""
+    """The lines of the table in the guide: whether each engine supports each capability."""
     kinds = [engine for engine in ENGINES if engine != BASELINE]
     rows = [("", *kinds), ("---",) * (1 + len(kinds))]
     shown = (one for one in CAPABILITIES if not one.is_argument)
