@@ -41,17 +41,18 @@ _SHORT_FRAME = 0.05
 _LITTLE_WORK = 2e-4
 # A frame counts as slow to write above this part of the work in it.
 _MUCH_WRITING = 1.0 / 3.0
-# What slides in each phase, and what else is no flight: each is a kernel.
+# The phases that are no flight, with what slides in each; each phase has a kernel.
 _KINDS = {EVENT: None, CAREFUL: None, HELD: One(0.0), EDGE: Two(0.0, 0.0)}
-# A thread draws so many parts of its share of a frame in which particles slide: each part is done before the next.
+# In a frame in which particles slide a thread takes its share in so many parts, one after the other.
 _PARTS = 4
 _DONE: End = (int(Status.DONE), 0, None)
 
 
 class Run(BaseRun):
-    """The run of particles; their arrays become a part of its state."""
+    """The run of points; the state holds the arrays of the particles, not copies."""
 
-    # Work of the last frame [s], over its span; unknown, so that another thread compiles what is missing.
+    # Seconds of work in the last frame per unit of its span. Infinite where unknown: then another thread than the
+    # caller's compiles what is missing.
     _pace = math.inf
 
     def __init__(
@@ -73,15 +74,15 @@ class Run(BaseRun):
         self.state = with_counters(self.state, self._counters, counters, scene)
         observables.start_energies(compiled, self._law, self.state)
         self._faces = scene.open_faces()
-        # Whole chunks, so that a thread observes what it has advanced.
+        # A block is whole chunks, so that each thread observes the particles that it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
         self._present = Presence(particles.births, self.state, self._size)
         self._ticket = np.zeros(1, np.int64)
         self._phase = np.zeros(n, np.int8)
         self._seed = seeding.signed()
-        self._kinds: set[int] = set()  # the phases that are no flight and that this run has met
+        self._kinds: set[int] = set()  # the phases other than flight that particles have been in
         self._halted = lanes.none_halted(self._booked)
-        self._lanes: list[lanes.Lanes] = []  # of threads that do not advance now
+        self._lanes: list[lanes.Lanes] = []  # those that no thread uses now
         self._hard = None if method.may_slide() or method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
         self._threads = min(threads, len(self._present.order))
         self._choose_tier()
@@ -113,7 +114,7 @@ class Run(BaseRun):
 
     def _goes_on(self, status: int, item: int, seconds: float) -> bool:
         if status == Status.HARD_CONTACT:
-            # Go on with the kernel of this phase, or with hard contacts where none last.
+            # Go on with the kernel of this phase, or, where no contacts last, with the kernel of hard contacts.
             if self.state.contacts is not None:
                 self._kinds.add(item)
             else:
@@ -130,9 +131,9 @@ class Run(BaseRun):
         return failures.of_frame(self._compiled, self._method, self.state, (status, item), moment, seeding)
 
     def _share(self, span: float) -> End:
-        """Advance and observe what one thread draws."""
+        """Advance and observe the particles that one thread draws; returns how that ended."""
         draws = self._drawing()
-        # To make lanes takes as long as all else that Python does of a small frame.
+        # Lanes are kept: to make them takes as long as all else that Python does in a small frame.
         try:
             mine = self._lanes.pop()
         except IndexError:
@@ -141,7 +142,7 @@ class Run(BaseRun):
         if not self._kinds:
             end = self._part(span, draws, mine, page)
         else:
-            # In parts: a thread that flies first would draw all particles before the other threads are ready to slide.
+            # In parts: otherwise the first thread would draw all particles before the other threads begin.
             some, end = max(1, len(self._present.order) // (_PARTS * self._threads)), _DONE
             while end[0] == Status.DONE and (order := take(draws, some)).size:
                 end = self._part(span, draws.again(order), mine, page)
@@ -180,7 +181,7 @@ class Run(BaseRun):
         return status, 0, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
 
     def _kernel(self, kernel: Any, page: ThreadLog | None) -> Any:
-        """The function of this tier that advances particles, with the log of this page."""
+        """A kernel of this tier that advances particles, and writes its impacts to a page of the log."""
         chosen = self._tier.kernel(kernel)
         return chosen if page is None else functools.partial(page.call, chosen)
 
@@ -194,10 +195,10 @@ class Run(BaseRun):
         self._tier.spend(time.perf_counter() - began)
 
     def _observe(self, moment: float) -> None:
-        """Each thread has observed what it has advanced."""
+        """Do nothing: each thread has observed the particles that it has advanced."""
 
     def _reach(self, moment: float) -> None:
-        """The walls and the particles of the frame that ends at a moment [s]."""
+        """Set the walls, and the particles that are there, for the frame that ends at a moment [s]."""
         self._present.reach(moment)
         if self._scene.moves():
             self._walls, self._faces = self._compiled.walls(self._moment), self._scene.open_faces(self._moment)
@@ -216,7 +217,7 @@ class Run(BaseRun):
         return self._first + int(self._halted.particle[last]), self._halted.places()[:, last].tolist()
 
     def _hands(self, span: float, writing: float) -> tuple[int, bool]:
-        """The number of threads of the pool that advance a frame, and whether the caller's thread does too."""
+        """(the number of threads of the pool that advance a frame, whether the caller's thread does too)."""
         work = self._pace * span if span > 0.0 else 0.0
         helps = work < _SHORT_FRAME * self._threads
         # A thread that writes for as long as one computes has a processor of its own: three threads that share two
@@ -242,7 +243,7 @@ class Run(BaseRun):
         return made if counters is None else made._replace(began=table.table(counters.rows()))
 
     def _shared(self, span: float, draws: Draws) -> Share:
-        """The share of a thread, with the arrays of all, and its counts."""
+        """The share of a thread: its draws and counts, and the arrays of all particles."""
         return Share(
             self._present.flying(self.state), self._present.of(self._phase), np.zeros(PHASES, np.int64), self._halted,
             draws, self._watch.passes, span,

@@ -1,4 +1,4 @@
-"""The engines of runs, and how one is chosen. The engines of wings are loaded here, by their names, and nowhere else.
+"""The engines of runs, and the choice of one. Only this module loads the engines of wings, by their names.
 
 A run of points that are independent of one another is an engine of the core, `Run`, or where walls come and go
 `DoorRun`. Bodies, balls and walls with a mass are wings: the core imports none of their modules.
@@ -26,7 +26,7 @@ def wing(name: str) -> ModuleType:
 
 
 def run_of(task: Task, watched: Watched = UNWATCHED) -> BaseRun:
-    """The state of a run at its start, and the threads that advance it."""
+    """The engine of a run, at its start."""
     scene, particles, method, options = task.scene, task.particles, task.method, task.options
     what: Any = particles
     kind: Any = DoorRun if scene.has_doors() else Run

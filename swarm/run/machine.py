@@ -36,12 +36,12 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("swarm")
 _OF_PARTICLES = "position", "velocity", "mass", "image", "radius", "spin"
-# So many frames are packed into arrays: as Python objects they take 3 kB each.
+# Observables of so many frames are packed into arrays: as Python objects they take 3 kB a frame.
 _PACKED = 1024
 
 
 class RunEnd(NamedTuple):
-    """The end of a run; `simulation.Result` describes each."""
+    """The end of a run; `Result` describes each of these."""
 
     particles: Particles
     observables: dict[str, NDArray[Any]]
@@ -81,7 +81,7 @@ class Columns:
 
 
 def carry_out_task(task: Task, session: Session) -> RunEnd:
-    """Carry out a run that is checked."""
+    """Carry out a checked run, frame by frame."""
     if task.scene.is_open() and not task.is_shard:
         warn_open()
     if not task.is_shard:
@@ -101,15 +101,12 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
                         still.look(number, share, run.furthest_behind(), session.compiled.seconds)
                         show.within(before + share * (moment - before), until)
                         session.look(run, writer, number - 1, before, moment)
-                seen = {
-                    "time": moment,
-                    **run.seen(),
-                    **(tally.seen(run.state.absorbed, task.is_shard) if tally else {}),
-                }
+                seen = {"time": moment, **run.seen()}
+                seen |= tally.seen(run.state.absorbed, task.is_shard) if tally else {}
                 run.require_admissible(seen, moment)
                 read = functools.partial(getattr, run.state)
                 seen |= _measured(task, measures, number, read, moment)
-                # Those of a shard are joined to those of the others.
+                # The file of a shard has its sums; the observables of the run are made of those of all shards.
                 if task.is_shard:
                     seen |= {} if task.is_coupled else {CHUNK_SUMS: run.chunk_sums()}
                 else:
@@ -132,10 +129,7 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
 
     Until the context ends signals stop the run, and its files are locked.
     """
-    recorder, watched = (
-        recorder_of(task),
-        Watched(log_of(task), tally_of(task), task.options.counters),
-    )
+    recorder, watched = recorder_of(task), Watched(log_of(task), tally_of(task), task.options.counters)
     runs: list[BaseRun] = []
 
     def stop() -> None:
@@ -167,7 +161,7 @@ def _measured(task: Task, measures: Measures, number: int, read: Read, moment: f
 
 
 def _measures_of(task: Task, session: Session) -> Measures:
-    """The user-defined observables of a run, tried at its start, or with the shapes that its trajectory holds."""
+    """The user-defined observables of a run, with their shapes from the start, or from a trajectory that goes on."""
     made = Measures(task.options.observables, task.options.until)
     if made and session.first == 0:
         made.begin(0, 0.0, start_of(task))
@@ -199,7 +193,7 @@ def _snapshot_of(task: Task, read: Read, moment: float, copies: bool = False) ->
 def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> RunEnd:
     state = run.state
     born = birth_times(task.particles) if state.born_time is None else state.born_time
-    # Those that were never born are nowhere.
+    # Balls that were never born have no place.
     task.particles.position[:, np.isnan(born)] = task.particles.velocity[:, np.isnan(born)] = np.nan
     is_whole = session.first == 0 or task.is_shard
     return RunEnd(
@@ -227,7 +221,7 @@ def warn_open() -> None:
 
 
 def _meanwhile(session: Session, writer: "Background | None", show: Display) -> tuple[float, float]:
-    """For `Run.advance`: the time to write a frame [s], and when to return at the latest."""
+    """The last arguments of `BaseRun.advance`: the time to write a frame [s], and when it returns at the latest."""
     return writer.seconds if writer else 0.0, min(session.latest(writer), time.monotonic() + min(show.every, LOOK))
 
 

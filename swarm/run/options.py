@@ -41,7 +41,7 @@ def _logged(name: str, value: Any) -> Any:
     if isinstance(value, str):
         known = value == "all"
     elif isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
-        # A number is known when it is checked against that of the particles.
+        # `require_logged` checks that there is a particle with each of these numbers.
         known = len(value) > 0 and all(isinstance(i, (int, np.integer)) and i >= 0 for i in value)
     else:
         return checks.count(name, value)

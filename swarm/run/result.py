@@ -1,4 +1,4 @@
-"""The end of a run, and what can be made of it."""
+"""The result of a run: its end, its observables, and the views of it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,39 +43,40 @@ class Result:
             "wall_heat" (frames, surfaces). Where a surface is a union or an intersection also "part_impulse" and
             "part_heat" (frames, parts), of each of `scene.parts`. Where walls move also "wall_work" (frames, surfaces)
             [J] and "wall_position" (frames, surfaces, 3) [m] and "wall_orientation" (frames, surfaces, 4), quaternions
-            (w, x, y, z): what is given at xi is at position + orientation xi. Where walls react also "wall_energy"
-            (frames, surfaces) [J], which "total_energy" includes, "wall_velocity" [m/s] and "wall_spin" [rad/s]
-            (frames, surfaces, 3). Of bodies also "link_error", the "work" of led anchors [J], and "cavity_impulse"
-            (frames, cavities) of what points carry [N s]. With member_impacts=True "member_impacts" (frames, members)
-            of all members of surface 0, then of surface 1, and so on, and where particles may slide "member_residence"
-            [s], how long they slid, rested or by a law waited there, at an edge on the wall that they were on before, a
-            wait from its begin on; where walls heat
-            or absorb them "member_heat" [J] and "member_absorbed". Where laws of walls return a `Leave` also "absorbed"
-            (frames, surfaces), how many each has absorbed so far.
+            (w, x, y, z): the point xi of the surface as given is at position + orientation xi. Where walls react also
+            "wall_energy" (frames, surfaces) [J], which "total_energy" includes, "wall_velocity" [m/s] and "wall_spin"
+            [rad/s] (frames, surfaces, 3). Of bodies also "link_error", the "work" of anchors that move [J], and
+            "cavity_impulse" (frames, cavities) on the cavities that points carry [N s]. With member_impacts=True
+            "member_impacts" (frames, members) of all members of surface 0, then of surface 1, and so on. Where
+            particles may slide also "member_residence" [s], the time for which they slid, rested or, by a law, waited
+            there; at an edge it counts for the wall that they were on before, and a wait counts as a whole when it
+            begins. Where walls heat or absorb particles also "member_heat" [J] and "member_absorbed". Where laws of
+            walls return a `Leave` also "absorbed" (frames, surfaces), how many each has absorbed so far.
             With counters "crossings" (frames, counters, 2), how many have crossed each since 0 s, out of its admissible
             side and back; what they carried, "crossed_momentum" (frames, counters, 2, 3) [kg m/s] and "crossed_energy"
-            (frames, counters, 2) [J]; and "crossed_slowness", the sum of 1/|v_n| [s/m]. A flux is a difference over
-            frames; see `Counter`.
-            Of particles with a radius also "collisions", how many pairs have met since 0 s, and, of the frame before,
-            "collision_rate", pairs that met a second [1/s], and "pressure" [Pa, in a plane N/m], by the virial,
-            (2 K + sum r_ij . J_ij/dt)/(d V), NaN at the start and where no volume is known: V is `particles.volume`, or
-            the cell of a scene without surfaces; where they have a spin "rotational_energy" [J], which "total_energy"
-            includes as "angular_momentum" does the spins. Of those with Penalty also "largest_overlap" [m], by how much
-            two balls, or a ball and a wall, have overlapped at most, at any end of a step since the frame before.
+            (frames, counters, 2) [J]; and "crossed_slowness", the sum of 1/|v_n| [s/m]. A flux is a difference between
+            frames over their time; see `Counter`.
+            Of particles with a radius also "collisions", the number of pairs that met since 0 s. Two are means since
+            the frame before: "collision_rate", the pairs that met per second [1/s], and "pressure" [Pa, in a plane
+            N/m], by the virial, (2 K + sum r_ij . J_ij/dt)/(d V). The pressure is NaN at the start and where no volume
+            is known: V is `particles.volume`, or the cell of a scene without surfaces. Where particles have a spin also
+            "rotational_energy" [J]; "total_energy" includes it, and "angular_momentum" includes the spins. With Penalty
+            also "largest_overlap" [m], the largest overlap of two balls, or of a ball and a wall, at any end of a step
+            since the frame before.
             With sources "born" (frames, sources), the number of particles born so far, and "source_energy" [J], the
-            energy that they brought in. Particles born later are in no observable of the frame. Of balls also "blocked"
+            energy that they brought in. No observable counts particles that are born later. Of balls also "blocked"
             (frames, sources), the number of births that found no free place at their time.
         wall_time: seconds the run took in all its sessions, compilation included.
         trajectory: the file that was written, or None.
         multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
         impacts_per_particle: (N,) how many impacts each has had.
-        escape_time: (N,) when each has passed an opening of a wall [s], where it is since then; NaN of those inside.
-        absorbed_time: (N,) when a law of a wall has absorbed each [s], where it is since then; NaN of the others.
+        escape_time: (N,) when each passed an opening of a wall [s], where it stays from then on; NaN of those inside.
+        absorbed_time: (N,) when a law of a wall absorbed each [s], where it stays from then on; NaN of the others.
         bodies: the bodies at `until`, or None; then `particles` are all their points.
-        scene, method: as they were run.
+        scene, method: the arguments of the run.
         birth_time: (N,) when each came [s], 0 of those of the start, NaN of balls that were never born, which are at
             NaN in `particles`: `particles.born()` are the others.
-        collisions_per_particle: (N,) how often each has met another one; None of points, which do not meet.
+        collisions_per_particle: (N,) how often each has met another one; None for points, which do not meet.
         compile_time: seconds of the wall time in which the last session compiled kernels; 0 on a cluster.
     """
 
@@ -125,22 +126,23 @@ class Result:
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """When each frame is [s], as `Trajectory.times`: the observable "time"."""
+        """The times of the frames [s], as `Trajectory.times`: the observable "time"."""
         times: NDArray[np.float64] = self.observables["time"]
         return times
 
     @property
     def member_impacts(self) -> list[NDArray[np.int64]] | None:
-        """With member_impacts=True how many impacts each surface has had since 0 s, in all sessions, else None.
+        """The impacts on each member of each surface since 0 s, in all sessions; None without member_impacts=True.
 
-        A list with an array for each, (members,) of a field such as `Spheres`, of the facets of a `Mesh` or of the
-        parts of a union, and (1,) of any other; in a cell that repeats all images of a body are one.
+        A list with an array for each surface: (members,) for a field such as `Spheres`, for the facets of a `Mesh` and
+        for the parts of a union, and (1,) for any other surface. In a cell that repeats all images of a solid are one
+        member.
         """
         return self._of_members("member_impacts")
 
     @property
     def member_residence(self) -> list[NDArray[np.float64]] | None:
-        """Likewise how long particles have slid, rested or waited on each [s]; None where none may.
+        """How long particles have slid, rested or waited on each member [s], as `member_impacts`; None if none may.
 
         A wait, of `Sticky`, counts as a whole when it begins.
         """
@@ -148,12 +150,12 @@ class Result:
 
     @property
     def member_heat(self) -> list[NDArray[np.float64]] | None:
-        """Likewise the heat that each has given [J]; None where no wall gives any."""
+        """The heat that each member has given [J], as `member_impacts`; None where no wall gives any."""
         return self._of_members("member_heat")
 
     @property
     def member_absorbed(self) -> list[NDArray[np.int64]] | None:
-        """Likewise how many each has absorbed; None where no wall absorbs."""
+        """The particles that each member has absorbed, as `member_impacts`; None where no wall absorbs."""
         return self._of_members("member_absorbed")
 
     def _of_members(self, name: str) -> list[NDArray[Any]] | None:
@@ -175,7 +177,7 @@ class Result:
         return Frames(load(path))
 
     def _written(self, what: str, otherwise: str = "") -> Path:
-        """The path of the trajectory, of which `what` are or is."""
+        """The path of the trajectory; the error without one begins with `what`, such as "frames are"."""
         if self.trajectory is None:
             raise SceneError(
                 f"{what} those of the trajectory, and this run has written none; give trajectory={otherwise}"
@@ -244,5 +246,5 @@ class Result:
         return cast("Page", pages.report_of_content(self.content("report"), self.wall_time, path, overwrite))
 
     def content(self, what: str) -> "Content":
-        """The part of the run that pictures and verdicts are made of; `what` needs it, for the sentence of an error."""
+        """What pictures and verdicts are made of; `what` is the view that needs it, for the sentence of an error."""
         return cast("Content", view("content").content_of_result(self, what))

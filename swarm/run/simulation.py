@@ -81,7 +81,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
         recording: Rerun file to write; its folder must exist. Needs the packages of the extra "record".
         impacts: HDF5 file for a log of every impact, not with the baselines; see `load_impacts`. Its folder must
             exist.
-        impact_particles: those with impacts in it, "all", k for every k-th one, or a list of particle numbers.
+        impact_particles: the particles with impacts in that log: "all", k for every k-th one, or a list of numbers.
         member_impacts: True to count the impacts on each member of each surface, and how long particles stay there; see
             `Result`.
         observables: user-defined observables, functions by their names. Each is called with every `Frame` and returns a
@@ -93,7 +93,7 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             crosses what is between the two ends of its step. A body crosses with its centre of mass. See
             `Result.observables`.
         record_particles: the most particles recorded, evenly chosen.
-        record_color: what their colour shows, "speed" or "energy-error".
+        record_color: what the colour of a recorded particle shows, "speed" or "energy-error".
         record_megabytes: largest size of the recording, above 0; of too many frames every k-th is recorded.
         live: True to show the run in a Rerun viewer on this machine, or the URL of a viewer.
         threads: number of threads; None: all cores this process may use. Results have the same bits for any number.
@@ -112,26 +112,27 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             there is neither a checkpoint nor a trajectory.
         walltime: seconds of wall time after which the run stops: it stops computing early enough to write the frames
             in its queue, and a checkpoint if it makes any. A compilation under way ends first.
-        compile: "auto": kernels that an earlier run compiled are used; others run in plain Python, with the same bits,
-            and once this and earlier runs of the process have taken about a second in it, the rest is compiled.
+        compile: "auto": kernels that an earlier run compiled are used. With up to 2000 particles the others run in
+            plain Python, with the same bits, until the runs of the process have taken about a second in it; then, and
+            with more particles at once, they are compiled.
             "always": compiled from the start. "never": plain Python only.
-        seed: of the random numbers of thermal walls, from 0 to 2**64 - 1: the same seed gives the same bits.
+        seed: seed of the random numbers of walls and sources, from 0 to 2**64 - 1: the same seed gives the same bits.
         cluster: where to run: None for this machine; "local:N", N worker processes on it; the address of a scheduler of
             Dask, such as "tcp://10.0.0.1:8786"; or a `distributed.Client`. Needs a trajectory, and the packages of the
             extra "cluster". The particles are shards, each with files in the folder TRAJECTORY.shards, which the
             trajectory needs; results have the same bits as without. A worker that dies is replaced, and its shard goes
             on from its checkpoint, by default of every 60 s.
-        shards: their number, of a cluster; None: one for each thread of its workers. A run of particles that meet, or
-            that move a wall, is one shard.
-        sources: `Source`s of particles that come during the run, not with a contact_step; None: none come. All
-            that is random of births is drawn from `seed`.
+        shards: number of shards on a cluster; None: one for each thread of its workers. A run of particles that meet,
+            or that move a wall, is one shard.
+        sources: the `Source`s of particles that come during the run, not with a contact_step; None: no particles come.
+            Births are drawn from `seed`.
 
     Returns:
         A `Result`.
 
     Raises:
         SceneError: bad input, or a checkpoint of another run; nothing has run or been written.
-        FileError: the trajectory or the recording cannot be written, or another run is writing it.
+        FileError: an output cannot be written, or another run is writing it.
         RunError: a step failed; the frames before it are in the trajectory.
         KeyboardInterrupt: SIGINT or SIGTERM came; the frames before it are in the trajectory.
         WallTimeError: the wall time limit is reached; the frames before it are in the trajectory.
@@ -162,7 +163,7 @@ def carry_out(
     options: RunOptions,
     counted_from: float | None = None,
 ) -> Result:
-    """`simulate` with its keywords as `RunOptions`; the wall time counts from a time [s of time.monotonic], or now."""
+    """`simulate` with its keywords as `RunOptions`; the wall time counts from `counted_from` [s], or from now."""
     carried: Callable[[Task, Any], machine.RunEnd] = machine.carry_out_task
     session: Session
     if options.cluster is None:

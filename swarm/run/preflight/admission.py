@@ -25,17 +25,17 @@ from .knows import Asked, require_known
 from .softness import depths_at_start
 from .starts import require_inside
 
-# Of the size of a scene, a place ahead that tells on which side of a wall a flight begins, and of that way, how far
-# outside it is where it begins in a tip.
+# The way ahead that shows on which side of a wall a flight begins, as a part of the size of the scene; and the part of
+# that way by which the place is outside where the flight begins in a tip.
 _NEAR, _TIP = 1e-6, 1e-2
-# A time this many runs ago leaves float64 a ten-thousandth of the run.
+# With a time so many runs ago float64 resolves a ten-thousandth of the run.
 _LONG_AGO = 1e12
-# Images beyond this are no whole numbers of floats, which files and `Particles` hold.
+# A float does not hold larger whole numbers exactly; the numbers of images are multiplied by lengths.
 _MOST_CELLS = 2.0**53
 
 
 def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: Method, options: RunOptions) -> Task:
-    """The run, checked, with its own copy of the particles, and behind them those that come.
+    """The checked run, with a copy of the particles of the start, followed by those that sources add.
 
     Raises:
         SceneError: an argument is wrong, or the arguments do not go together.
@@ -58,7 +58,7 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
     start = None if particles is None else _in_the_cell(scene, particles.copy(), options.times.until)
     check_surfaces(method, scene)
     times = options.times
-    # Of balls: of those that come too.
+    # The balls of the start and those of sources.
     balls = _balls(scene, start, method, options)
     radius = None if balls is None else balls.radius
     compiled = scene.compiled(None if radius is None else float(radius.max()), method.apart())
@@ -90,7 +90,7 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
 
 
 def _balls(scene: Scene, start: Particles | None, method: Method, options: RunOptions) -> Particles | None:
-    """The balls of a run, checked but for their places; None of a run of points."""
+    """The balls of a run, with all checks but those of their places; None in a run of points."""
     if start.radius is None if start is not None else options.sources[0].radius is None:
         return None
     balls = with_births(scene, start, options.sources, options.seed, options.until)
@@ -121,7 +121,7 @@ def _require_motions(scene: Scene, until: float) -> None:
                     f"surfaces[{i}].motion.times must cover the run from 0 to {until:g} s, got {one.times[0]:g} to "
                     f"{one.times[-1]:g}; add what is missing, at rest if the wall is so there, or give another until"
                 )
-            # A piece knows the time since its start: of a start long ago, no digits of this run are left.
+            # A piece of a path counts the time since its start: long after that, float64 resolves nothing of this run.
             if isinstance(one, Path) and max(t for t in one.times if t <= 0.0) < -_LONG_AGO * until:
                 raise SceneError(
                     f"surfaces[{i}].motion.times must have one at 0 s or at most {_LONG_AGO:g} times the length of the "
