@@ -1,4 +1,4 @@
-"""What a user may not have meant, said before a run starts: cavities, times, steps, gravity."""
+"""Warnings before a run starts, of what its user may not have meant: cavities, times, steps, gravity."""
 
 import itertools
 import logging
@@ -19,16 +19,16 @@ from ..options import Task
 from . import softness, workload
 
 _LOG = logging.getLogger("swarm")
-# The parts of the time between impacts from which a step, a contact, and the round-off of a time are said.
+# A run warns of a step, a contact and a round-off of a time above these parts of the time between impacts.
 _STEP, _CONTACT, _ROUND_OFF = 0.25, 0.5, 1e-4
 # The time between impacts is computed only if a step, a contact or a round-off is longer than this fraction of its part
 # (above) of the time that a crossing of the scene takes.
 _SURELY = 1e-2
-# Explicit steps of a spring are stable up to this many over its angular frequency.
+# Explicit steps of a spring are stable up to this number over its angular frequency.
 _STABLE = 2.0
-# Particles that are looked at.
+# The number of particles in a sample.
 _LOOKED_AT = 1000
-# Points at which two cavities are compared, and the part of one beyond the other that says that it is cut.
+# Two cavities are compared at so many points; a larger part of one beyond the other says that they cut one another.
 _POINTS, _CUT = 4096, 0.01
 # Listed surfaces beyond this number are not compared.
 _COMPARED = 200
@@ -46,7 +46,7 @@ _LAWS = ("restitution", "friction", "rolling", "temperature", "accommodation", "
 
 
 def give(task: Task) -> None:
-    """Warn of what the run will do that may not be meant."""
+    """Warn of what the run will do and its user may not have meant."""
     warn_of_overlap(task.scene)
     warn_of_walls_in_one_place(task.scene, task.bodies is not None or task.particles.radius is None)
     _warn_of_faces(task.scene)
@@ -54,10 +54,10 @@ def give(task: Task) -> None:
     _warn_of_counters(task)
     softness.warn_of_depths(task)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
-        # About the fastest: of some.
+        # The speed of the fastest in a sample.
         some = task.particles.velocity[:, _some(len(task.particles))]
         fastest = float(np.sqrt((some**2).sum(axis=0).max()))
-        # After a fall through the scene.
+        # The speed after a fall through the scene.
         pull = math.hypot(*(task.scene.gravity or (0.0,)))
         speed = math.hypot(fastest, math.sqrt(2.0 * pull * task.scene.finite_size()))
         crossing = task.scene.finite_size() / speed if speed > 0.0 else math.inf
@@ -69,12 +69,12 @@ def give(task: Task) -> None:
 
 
 def _some(count: int) -> slice:
-    """Some of so many particles."""
+    """The sample of so many particles."""
     return slice(0, None, max(1, count // _LOOKED_AT))
 
 
 def _takes_energy(compiled: CompiledScene) -> bool:
-    """Whether an impact may change the energy of a particle."""
+    """Whether walls have losses or laws, or pairs lose energy: then impacts may take what gravity gives."""
     pairs = compiled.scene.pairs
     return (pairs is not None and pairs.restitution < 1.0) or compiled.laws is not None
 
@@ -95,7 +95,7 @@ def _warn_of_fall(compiled: CompiledScene) -> None:
 
 
 def _warn_of_faces(scene: Scene) -> None:
-    """Warn where parts of a union touch at the start and do not move as one: a face is open where both have it."""
+    """Warn where parts of a union with a common face at the start do not move as one: there is a wall between them."""
     for i, surface in enumerate(scene.surfaces):
         for one, other in surface.moving_apart() if len(surface.rooms) > 1 else ():
             _LOG.warning(
@@ -129,7 +129,7 @@ def _warn_of_counters(task: Task) -> None:
 
 
 def _warn_of_rest(task: Task) -> None:
-    """Warn where nothing will move."""
+    """Warn where no particle will move."""
     scene = task.scene
     is_moved = scene.gravity is not None or scene.moves() or scene.has_doors() or bool(task.options.sources)
     if not is_moved and task.particles.fastest() == 0.0:
@@ -152,11 +152,11 @@ def _warn_of_times(task: Task, crossing: float) -> None:
     if kept > _ROUND_OFF * between:
         # Within a frame times are counted from its end.
         inside = float(np.spacing(every)) > _ROUND_OFF * between
-        flights = "flights too, in frames as long" if inside else "flights are not, each frame counts its own time"
+        flights = "flights too, in frames this long" if inside else "flights are not: each frame counts from its end"
         _LOG.warning(
             "the time between impacts is about T = %.2g s; until = %g s is kept to %.1e s, %.1e of it: the instants of "
             "a log of impacts, of doors, births, escapes and absorptions are that coarse (%s); use until <= %.1g s, or "
-            "go on from the last frame in a run of its own",
+            "begin another run from the last frame",
             between, until, kept, kept / between, flights, _ROUND_OFF * between / EPSILON,
         )  # fmt: skip
 
@@ -181,8 +181,8 @@ def _warn_of_steps(task: Task, speed: float, crossing: float) -> None:
         )  # fmt: skip
     elif contact > _CONTACT * between and not method.has_multipliers():
         _LOG.warning(
-            "%sa contact lasts %.2g s, %.2g of it, and the fastest sinks %.2g m into its wall: such walls are no "
-            "walls; use a larger penalty (%g here), or Impact",
+            "%sa contact lasts %.2g s, %.2g of it, and the fastest particle sinks %.2g m into its wall, which is "
+            "too soft to be one; use a larger penalty (%g here), or Impact",
             period, contact, contact / between, depth, method.penalty,  # type: ignore[attr-defined]
         )  # fmt: skip
     if method.is_explicit() and step * math.pi > _STABLE * contact:
@@ -196,7 +196,7 @@ def _warn_of_steps(task: Task, speed: float, crossing: float) -> None:
 def _contact(task: Task, speed: float) -> tuple[float, float]:
     """How long the shortest contact with a soft wall lasts [s], and how deep the fastest sinks in [m].
 
-    Of m g'' = -alpha s^2 g^a, s the slope of phi: see `contact_time` of grains.
+    The gap g obeys m g'' = -alpha s^2 g^a, with the slope s of phi: see `contact_time` of grains.
     """
     scene, particles, method = task.scene, task.particles, task.method
     mass, p = particles.mass[_some(len(particles))].min(), 1.0 / (method.exponent + 1.0)  # type: ignore[attr-defined]

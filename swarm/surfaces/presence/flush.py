@@ -151,12 +151,12 @@ def _share_a_place(one: Surface, other: Surface, face: Face, size: float) -> boo
 
 
 def _filled(surface: Surface) -> Surface:
-    """The inside of a surface at rest: of a solid, what it fills."""
+    """The surface at rest, with the inside as its admissible side."""
     return replace(surface.at_rest(), side="inside") if surface.is_solid() else surface.at_rest()  # type: ignore[call-arg]
 
 
 def are_there_together(one: Surface, other: Surface) -> bool:
-    """Whether two surfaces are there at one time."""
+    """Whether there is a time at which both surfaces are present."""
     always = ((0.0, math.inf),)
     pairs = itertools.product(one.present or always, other.present or always)
     return any(max(begins) < min(ends) for begins, ends in (zip(*pair, strict=True) for pair in pairs))
