@@ -1,4 +1,4 @@
-"""A union of several rooms, or a foam, as balls meet it: a surface of walls, each of faces that join at edges."""
+"""A union of several rooms, or a foam, as balls meet it: a surface of walls, each of faces that edges join."""
 
 import itertools
 import math
@@ -23,17 +23,17 @@ from ..surface import Surface
 from .tip import TipPlane
 from .vaulted import FLAT, RoomEdge, RoomFace, Vaulted, crossing, is_seen, outward
 
-# Of the extent: what is round-off of a place, and what is farther than anything.
+# Parts of the extent: the round-off of a place, and a distance that is larger than any other.
 _SLACK, _FAR = 1e-11, 1e6
-# Where an edge only touches the wall of a third room, the place is known to the root of the round-off.
+# Where an edge only touches the wall of a third room, the place is known to the square root of the round-off.
 _TOUCHES = math.sqrt(_SLACK)
-# Places from which edges are looked for, and most rooms; of the smallest radius of curvature at these places, what is
-# taken for certain.
+# The number of places from which edges are searched, the most rooms, and the part of the smallest radius of curvature
+# at these places that is taken for a lower bound.
 _PLACES, _MOST, _ROUND = 24, 64, 0.5
-# Newton's steps to a tip, at most; one that is so many roundings of a place is the last. Walls do not meet at a point
-# where their normals span no more than this.
+# The most steps of Newton's method to a tip; one that is no longer than this round-off of a place is the last. Walls
+# with normals that span no more than this volume do not meet at a point.
 _SWEEPS, _STILL, _PARALLEL = 30, 4.0 * EPSILON, 1e-9
-# What all parts of a union that balls meet have in common: laws, and how the whole moves, comes and goes, and opens.
+# What all parts of a union that balls meet must have in common.
 _LAWS = "restitution", "friction", "temperature", "accommodation", "laws"
 _CHANGES = "motion", "openings", "present", "mass", "inertia"
 _KINDS = Sphere, Plane, Slab, Box, Cylinder, Cone
@@ -41,7 +41,7 @@ _KINDS = Sphere, Plane, Slab, Box, Cylinder, Cone
 
 @dataclass(frozen=True, repr=False)
 class Vault(Surface):
-    """A union of several rooms, taken as one surface."""
+    """A union of several rooms as one surface."""
 
     rooms_of: Any = ()
 
@@ -94,14 +94,14 @@ class Vault(Surface):
 
 
 def vault_of(union: Any) -> Vault:
-    """A union of several rooms, or a foam, as balls meet it."""
+    """The `Vault` of a union of several rooms, or of a foam."""
     rooms = union.rooms_of_balls()
     one, still = rooms[0][0], [[replace(one.at_rest(), openings=(), present=None) for one in room] for room in rooms]
     return Vault(rooms_of=tuple(map(tuple, still)), **{name: getattr(one, name) for name in (*_LAWS, *_CHANGES)})
 
 
 def no_balls_in(union: Any) -> str | None:
-    """None where balls may meet a union of several rooms, or a foam, else half a sentence that says why not."""
+    """Why balls cannot meet a union of several rooms, or a foam, for the sentence of an error; None where they can."""
     rooms = union.rooms_of_balls()
     surfaces = [surface for room in rooms for surface in room]
     begin = f"of {len(rooms)} rooms, of which "
@@ -132,7 +132,8 @@ def _walls_of(vault: Vault) -> tuple[Any, ...]:
 
 
 def _made(vault: Vault) -> list[Vaulted]:
-    rooms, extent = _rooms_of(vault), vault.extent()
+    rooms = tuple(tuple(wall for _surface, wall in _each(room)) for room in vault.rooms_of)
+    extent = vault.extent()
     slack, places, bounds = _SLACK * extent, _places_in(vault), [room_bounds(room) for room in vault.rooms_of]
     faces = [
         RoomFace(wall, (k, k), *_bend_of(one, wall))
@@ -161,20 +162,15 @@ def _made(vault: Vault) -> list[Vaulted]:
     ]  # fmt: skip
 
 
-def _rooms_of(vault: Vault) -> tuple[tuple[Any, ...], ...]:
-    """The walls of every room."""
-    return tuple(tuple(wall for _surface, wall in _each(room)) for room in vault.rooms_of)
-
-
 def _each(room: Any) -> Iterator[tuple[Surface, Any]]:
-    """The surfaces of a room, each with one of its walls."""
+    """Every wall of a room: (its surface, the wall)."""
     for one in room:
         for wall in one.walls_of_balls(0.0):
             yield one, wall.grown(0.0)
 
 
 def _bend_of(surface: Surface, wall: Any) -> tuple[float | None, float]:
-    """The radius of curvature of a wall [m], None of a cone, and by how much it changes along the wall."""
+    """(the radius of curvature of a wall [m], None for a cone, how fast it changes along the wall)."""
     if isinstance(surface, (Sphere, Cylinder)) and not isinstance(wall, FLAT):
         return surface.radius, 0.0
     if isinstance(surface, Cone) and not isinstance(wall, TipPlane):
@@ -188,7 +184,7 @@ def _places_in(vault: Vault) -> list[Vec]:
 
 
 def _edges_of(rooms: tuple[Any, ...]) -> Iterator[tuple[RoomEdge, tuple[int, int], tuple[int, int]]]:
-    """What may be an edge between two rooms, and the numbers of both walls."""
+    """Every pair of walls of two rooms: (the edge that it may have, (room, wall) of one, (room, wall) of the other)."""
     for k, m in itertools.combinations(range(len(rooms)), 2):
         for a, b in itertools.product(range(len(rooms[k])), range(len(rooms[m]))):
             yield RoomEdge(rooms[k][a], rooms[m][b], (k, m)), (k, a), (m, b)
@@ -208,7 +204,7 @@ def _is_on(walls: tuple[Any, ...], x: Vec, slack: float) -> bool:
 def _tips_of(
     edge: RoomEdge, on_it: list[Vec], rooms: tuple[Any, ...], bounds: list[Any], slack: float, far: float
 ) -> list[tuple[Vec, float]]:
-    """(a place of an edge where it is seen and goes into a third room, to how much that is known [m]), all of them.
+    """The tips of an edge, where it is seen and goes into a third room: each a (place, uncertainty of the place [m]).
 
     Args:
         edge: an edge.
@@ -216,7 +212,7 @@ def _tips_of(
         rooms: the walls of each room.
         bounds: a box around each room.
         slack: round-off of a place [m].
-        far: so far along the edge from its places others are looked for [m].
+        far: tips are searched from each of the places, and from so far along the edge on both sides [m].
     """
     found: list[tuple[Vec, float]] = []
     starts = [x + way * along for x in on_it for along in [_along(edge, x)] for way in (0.0, far, -far)]
@@ -237,7 +233,7 @@ def _tips_of(
 
 
 def _volume(walls: tuple[Any, ...], x: Vec) -> float:
-    """That of the unit normals of three walls at a place: 0 where an edge only touches the third wall."""
+    """The volume that the unit normals of three walls span at a place: 0 where an edge only touches the third wall."""
     one, other, third = (outward(wall, x) for wall in walls)
     return abs(float(dot(one, cross(other, third))))
 

@@ -1,12 +1,13 @@
-"""The walls of a union of several rooms that balls meet: by the place of them that is nearest.
+"""The walls of a union of several rooms that balls meet, by the nearest place of their faces, edges and tips.
 
-A wall of a room is seen where it is in no other room; where walls of two rooms cross is an edge, about which balls
-turn. The nearest place of a wall is its foot, that of an edge is found by Newton's method: it is the one on the line in
-both planes that touch the walls, next to the ball. Where walls of three rooms meet is a tip, a place by itself.
+A face is a wall of a room. It is *seen*, that is, there, at places that are in no other room. An edge is where walls
+of two rooms cross; balls turn about it. A tip is a place where walls of three rooms meet. The *foot* of a ball is the
+place of a face or an edge that is nearest to it. On an edge Newton's method finds it: each step goes to the place
+nearest to the ball on the line in both tangent planes.
 
-A flight of a hard ball is looked at. Where the foot on a face is seen, the flight is free until it meets the parallel
-surface; of an edge for as long as its bend says. A face or an edge that is hidden is not met before its foot may be
-seen, or is as near as a radius.
+Flights of hard balls take safe steps. Where the foot on a face is seen, a flight is free until it meets the parallel
+surface. Near an edge it is free for a time that follows from the curvature of the edge. A hidden face or edge is not
+met before its foot may be seen, and not before it is as near as a radius.
 """
 
 import math
@@ -21,9 +22,9 @@ from ..shapes.plane import PlaneNumbers
 from ..shapes.slab import SlabNumbers
 from ..time_of_impact import march, rising
 
-# Newton's steps to an edge; one that is so many roundings of a place is the last.
+# The most steps of Newton's method to an edge; one that is no longer than this round-off of a place is the last.
 _SWEEPS, _STILL = 60, 4.0 * EPSILON
-# Edges are looked for up to so many radii.
+# Edges are found up to so many radii away.
 _FAR = 4.0
 # Walls are parallel where the square of the sine is below this.
 _PARALLEL = 1e-18
@@ -36,12 +37,12 @@ class RoomFace(Record):
 
     wall: Any
     rooms: Any  # the number of the room, twice
-    round: Any = None  # the smallest radius of curvature [m], None where it is another one at each place
-    slope: float = 0.0  # by how much at most that becomes less, of the way along the wall
+    round: Any = None  # the smallest radius of curvature [m]; None where it depends on the place
+    slope: float = 0.0  # how fast it decreases at most along the wall, a length per length
 
 
 class RoomEdge(Record):
-    """Walls of two rooms that cross."""
+    """An edge, where walls of two rooms cross."""
 
     one: Any
     other: Any
@@ -49,7 +50,7 @@ class RoomEdge(Record):
     bend: float = math.inf  # the smallest radius of curvature [m]
 
     def bend_at(self, x):
-        """The radius of curvature at a place, in Python: by what both walls bend along the edge."""
+        """The radius of curvature of the edge at a place, from those of both walls along it; in Python."""
         n, m = outward(self.one, x), outward(self.other, x)
         along = cross(n, m)
         sine2 = square(along)
@@ -60,7 +61,7 @@ class RoomEdge(Record):
 
 
 class Rim(Record):
-    """An edge as a ball at a place sees it: the foot, how far it is, and the radius of the ball."""
+    """The surface at a radius around an edge, next to a ball: the foot of the ball, and its distance `away`."""
 
     bend: float
     foot: Any
@@ -80,13 +81,13 @@ class Rim(Record):
 
 
 class Vaulted(Smooth):
-    """What is farther than the radius of a ball from faces of a union, the edges between them and the tips of these."""
+    """The wall of the centres of balls: the places a radius away from faces of a union, their edges and their tips."""
 
     rooms: Any  # the walls of each room of the union
     faces: Any
     edges: Any
     tips: Any  # places
-    radius: Any
+    radius: Any  # of a ball [m]
     slack: float  # round-off of a place [m]
     most: float  # farther than anything [m]
 
@@ -124,7 +125,7 @@ class Vaulted(Smooth):
 
 @outlined
 def nearest(wall, r):
-    """How far the nearest place is, and where it is."""
+    """(distance, place) of the place of a wall that is nearest to r; edges beyond `_FAR` radii are left out."""
     best, place = wall.most, r
     for face in wall.faces:
         foot = r - face.wall.distance(r) * outward(face.wall, r)
@@ -146,7 +147,7 @@ def nearest(wall, r):
 
 @outlined
 def at_least(wall, r):
-    """A lower bound of how far the nearest place is, also from afar, where `nearest` finds no edges."""
+    """A lower bound of the distance to the nearest place, also from afar, where `nearest` leaves edges out."""
     best = wall.most
     for face in wall.faces:
         away = face.wall.distance(r)
@@ -160,26 +161,26 @@ def at_least(wall, r):
 
 
 def outward(wall, r):
-    """The unit vector along the gradient of the distance from a wall, also far from that."""
+    """The unit vector along the gradient of the distance from a wall, also far from the wall."""
     return wall.side * wall.gradient(r)
 
 
 def is_seen(rooms, own, place, slack):
-    """Whether a place of a face or an edge is in its own rooms, and not inside of others."""
+    """Whether a place of a face or an edge is in its own rooms and in no other one."""
     return hidden(rooms, own, place, ZERO) <= slack
 
 
 @outlined
 def hidden(rooms, own, place, n):
-    """How far a place of a face or an edge is from where it would be seen, at least; 0 or less where it is seen.
+    """A lower bound of the distance from a place of a face or an edge to where that is seen; 0 or less if it is seen.
 
-    A flat face has the normal n: what is behind a wall along it stays so.
+    A place that moves along a flat face with the normal n stays inside of the walls that are parallel to it.
 
     Args:
         rooms: the walls of each room of the union.
         own: the numbers of the rooms that the face or the edge belongs to.
         place: the place.
-        n: a unit normal, or 0.
+        n: the unit normal of a flat face, else 0.
     """
     depth = -math.inf
     for k, room in enumerate(rooms):
@@ -200,7 +201,7 @@ def hidden(rooms, own, place, n):
 
 @outlined
 def crossing(one, other, y, far):
-    """The place where two walls cross that is nearest to y; any one where both are not nearer than `far`."""
+    """The place where two walls cross that is nearest to y; y itself where one of them is not nearer than `far`."""
     x = y
     if max(abs(one.distance(y)), abs(other.distance(y))) < far:
         for _sweep in range(_SWEEPS):
@@ -220,20 +221,20 @@ def crossing(one, other, y, far):
 
 # --- Flights of hard balls -------------------------------------------------------------------------------
 
-# Of a radius, how far a ball goes where the edge next to it is not found. A ball that is hidden from an edge goes at
-# least this part of what its foot has to go: the radius of curvature of an edge is a lower bound from samples.
+# Where the edge next to a ball is not found, the ball goes this part of its radius. Where an edge is hidden, the ball
+# goes at least this part of the way of its foot: the radius of curvature of an edge is a bound from samples.
 _UNFOUND, _LEAST = 0.05, 0.125
 
 
 class AtInstant(Record):
-    """A flight at an instant, and how long it surely stays clear of something."""
+    """A flight at an instant; the methods return times during which it surely stays clear of something [s]."""
 
     r: Vec
     v: Vec
     pull: Vec
 
     def until_wall(self, grown):
-        """How long it stays clear of a parallel surface."""
+        """The time to the parallel surface of a wall."""
         if self.pull.x == 0.0 and self.pull.y == 0.0 and self.pull.z == 0.0:
             time, _meets = grown.first_hit(self.r, self.v)
         else:
@@ -241,16 +242,16 @@ class AtInstant(Record):
         return time
 
     def until_rim(self, rim):
-        """How long it stays clear of an edge."""
+        """The time to a ball around an edge."""
         return march.safe_step(rim, self.r, self.v, self.pull, 0.0)[2]
 
     def until_gone(self, way):
-        """How long it takes to go so far, at the least."""
+        """The least time in which it goes so far."""
         return march.time_to_travel(norm(self.v), norm(self.pull), way)
 
 
 class AtInstantInFrame(Record):
-    """The same in the frame of a union that moves, for at most the longest time [s]."""
+    """`AtInstant` in the frame of a union that moves, with times up to the longest one [s]."""
 
     r: Vec
     seen: rising.InWallFrame
@@ -267,7 +268,7 @@ class AtInstantInFrame(Record):
 
 
 class Hidden(rising.Ahead):
-    """What is not met on the first part of a way, as the frame sees it."""
+    """A wall that is not met before the flight has gone a way [m] in its frame."""
 
     seen: rising.InWallFrame
     way: float
@@ -279,7 +280,7 @@ class Hidden(rising.Ahead):
 
 @outlined
 def _look(wall, r, v, pull, t, is_first):
-    """The `SafeStep` of a flight at a time."""
+    """The `SafeStep` of a flight from the time t on."""
     p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
     away, place = nearest(wall, p)
     room = 2.0 * EPSILON * total(absolute(p))
@@ -292,7 +293,7 @@ def _look(wall, r, v, pull, t, is_first):
 
 @outlined
 def _moving_step(wall, seen, longest):
-    """The `LevelStep` of all faces, edges and tips."""
+    """The `LevelStep` of a wall with all its faces, edges and tips."""
     away, place = nearest(wall, seen.r)
     half = 0.5 * dot((place - seen.r) * (1.0 / select(away > 0.0, away, 1.0)), seen.v)
     step = _until_any(wall, AtInstantInFrame(seen.r, seen, longest), longest)
@@ -300,7 +301,7 @@ def _moving_step(wall, seen, longest):
 
 
 def _until_any(wall, flight, longest):
-    """How long, at most the longest time, a flight surely stays clear of all faces, edges and tips."""
+    """A time, at most the longest one, during which a flight surely stays clear of all faces, edges and tips."""
     step = longest
     for face in wall.faces:
         step = min(step, _until_face(wall, face, flight))
@@ -313,12 +314,12 @@ def _until_any(wall, flight, longest):
 
 @outlined
 def _until_face(wall, face, flight):
-    """How long a flight surely stays clear of a face."""
+    """A time during which a flight surely stays clear of a face."""
     p = flight.r
     away, n = face.wall.distance(p), outward(face.wall, p)
     foot = p - away * n
     depth, step = hidden(wall.rooms, face.rooms, foot, n if isinstance(face.wall, FLAT) else ZERO), 0.0
-    # What is seen is seen from inside of its own room alone.
+    # A face is seen from inside of its own room alone.
     faces = depth <= wall.slack and away <= 0.0
     if faces or away <= -wall.radius:
         step = flight.until_wall(face.wall.grown(wall.radius))
@@ -332,7 +333,7 @@ def _until_face(wall, face, flight):
 
 @outlined
 def _until_edge(wall, edge, flight):
-    """The same of an edge."""
+    """A time during which a flight surely stays clear of an edge."""
     p = flight.r
     least = max(abs(edge.one.distance(p)), abs(edge.other.distance(p)))
     foot = crossing(edge.one, edge.other, p, _FAR * wall.radius)
@@ -345,7 +346,7 @@ def _until_edge(wall, edge, flight):
 
 
 def _rim_of(wall, tip, p):
-    """A tip as a ball at a place sees it: a straight edge with a foot that stays where it is."""
+    """The `Rim` of a tip: that of a straight edge with its foot at the tip."""
     return Rim(math.inf, tip, norm(tip - p), wall.radius)
 
 
@@ -363,10 +364,10 @@ def _round_at(face, foot, n):
 
 
 def _way_of_foot(roundness, slope, away, depth):
-    """How far a ball goes at least before its foot on a wall, or edge, goes by a distance `depth`.
+    """The least way of a ball on which its foot on a wall or an edge goes by `depth`.
 
     With the radius of curvature R of the wall, a ball at the distance d that goes the way w moves its foot by at most
-    w R/(R - d - w). On a cone R is then less by the slope times w.
+    w R/(R - d - w). Along a cone R decreases by the slope times the way of the foot.
     """
     if not roundness < math.inf:
         return depth
@@ -374,5 +375,5 @@ def _way_of_foot(roundness, slope, away, depth):
 
 
 def _until_seen(wall, away, way, flight):
-    """How long a face or an edge stays hidden, or is farther than a radius, with the way until its foot may be seen."""
+    """A time during which a face or an edge stays hidden or farther away than a radius; `way`: until it may be seen."""
     return flight.until_gone(max(away - wall.radius, min(way, wall.radius)))
