@@ -21,18 +21,18 @@ from ..errors import SceneError
 Vector = tuple[float, float, float]
 # Magnitudes with squares and inverse squares that are finite.
 SMALLEST, LARGEST = 1e-100, 1e100
-# Bytes of a particle in a run (`python -m bench bars`); and a number of particles that fits on every machine.
+# Bytes for each particle in a run (`python -m bench bars`), and a number of particles that fits into every memory.
 PARTICLE, FEW = 146, 1_000_000
 _DOUBLE = 8
 # Characters of a value that are shown in a sentence.
 _SHOWN = 200
-# How a sentence about an argument, or about a key of a table of it, begins.
+# The beginning of a sentence about an argument, or about a part of it.
 _ARGUMENT = re.compile(r"[a-z_]\w*(\[\d+\])*(\.[a-z_]\w*(\[\d+\])*)*( must | has | is |: )")
 _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
 def shown(value: Any) -> str:
-    """A value in a line of a sentence.
+    """The `repr` of a value, in one line of at most 200 characters, for the sentence of an error.
 
     >>> shown(np.zeros((2, 2)))
     'array([[0., 0.], [0., 0.]])'
@@ -45,7 +45,7 @@ def shown(value: Any) -> str:
 
 
 def assign(frozen: Any, **values: Any) -> None:
-    """Give a frozen dataclass the values of its fields as they have been checked."""
+    """Set fields of a frozen dataclass, as they have been checked."""
     for name, value in values.items():
         object.__setattr__(frozen, name, value)
 
@@ -57,7 +57,7 @@ def of_class(name: str, value: Any, cls: type[Any]) -> None:
 
 
 def is_masked(value: Any) -> bool:
-    """Whether it is an array with a mask, which no value is before their module is imported: that takes 8 ms."""
+    """Whether a value is a masked array. Before `numpy.ma` is imported, which takes 8 ms, there are no such arrays."""
     module = sys.modules.get("numpy.ma")
     return module is not None and isinstance(value, module.MaskedArray)
 
@@ -65,11 +65,11 @@ def is_masked(value: Any) -> bool:
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
     """`value` as a finite float."""
     try:
-        # float() accepts the last two, without the imaginary part and without the mask.
+        # float() would take the last two, and drop the imaginary part or the mask.
         if isinstance(value, (bool, str, bytes, np.complexfloating)) or is_masked(value):
             raise TypeError
         result = float(value)
-    except Exception:  # of float(), or of an object of others
+    except Exception:  # of float(), or of a foreign object
         raise SceneError(f"{name} must be {expected}, got {shown(value)}") from None
     if not math.isfinite(result):
         raise SceneError(f"{name} must be {expected}, got {result}")
@@ -142,7 +142,7 @@ def count(name: str, value: Any, least: int = 1) -> int:
 
 
 def seed(name: str, value: Any) -> int:
-    """`value` as a key of random numbers: an integer that 64 bits hold."""
+    """`value` as the seed of random numbers: an integer from 0 to 2**64 - 1."""
     result = count(name, value, least=0)
     if result >= 1 << 64:
         raise SceneError(f"{name} must be below 2**64, got {min(result, 10**300):.6g}")
@@ -176,7 +176,7 @@ def _too_large(name: str, given: str, size: float) -> SceneError:
 
 
 def require_memory(name: str, given: str, size: float) -> None:
-    """Raise a `SceneError` if what is given, of so many bytes, does not fit in the memory of this machine."""
+    """Raise a `SceneError` if an argument of so many bytes does not fit in the memory of this machine."""
     if size > memory():
         raise _too_large(name, given, size)
 
@@ -212,7 +212,7 @@ def path_of(name: str, value: Any) -> Path:
 
 
 def require_short(name: str, path: Path, longest: Path) -> None:
-    """Raise a `SceneError` if the system finds the name of a file too long."""
+    """Raise a `SceneError` if the name of the file `longest`, derived from `path`, is too long for the system."""
     try:
         os.lstat(longest)
     except OSError as error:
@@ -231,7 +231,7 @@ def flag(name: str, value: Any) -> bool:
 
 
 def parts_of(value: Any) -> tuple[Any, ...] | None:
-    """The parts of a list or of anything that can be gone through; None of a text and of what has no parts.
+    """The items of an iterable as a tuple; None for a text, for a class and for what is not iterable.
 
     >>> parts_of(np.array(5.0)) is None, parts_of([1, 2])
     (True, (1, 2))
@@ -245,7 +245,7 @@ def parts_of(value: Any) -> tuple[Any, ...] | None:
 
 
 def list_of(name: str, value: Any, expected: str, *one: type[Any]) -> tuple[Any, ...]:
-    """`value` as a tuple of what is `expected`; an object of the class of `one` of them is no list."""
+    """`value` as a tuple; an instance of the class `one`, which may be iterable itself, is refused."""
     given = None if isinstance(value, one) else parts_of(value)
     if given is None:
         raise SceneError(f"{name} must be a list of {expected}, got {shown(value)}{brackets(value)}")
@@ -253,7 +253,7 @@ def list_of(name: str, value: Any, expected: str, *one: type[Any]) -> tuple[Any,
 
 
 def brackets(value: Any) -> str:
-    """A hint where a class came in place of an object, or nothing.
+    """A hint where a class was given in place of an object, or an empty text.
 
     >>> brackets(float)
     '; to make one of the class, call it: float(...)'
@@ -262,7 +262,7 @@ def brackets(value: Any) -> str:
 
 
 def entries(name: str, value: Any, count: int, expected: str) -> tuple[Any, ...]:
-    """`value` as a tuple of so many parts; `expected` says what they are."""
+    """`value` as a tuple of `count` parts; `expected` says what they are."""
     try:
         # One more than there should be: what has no end is refused as well.
         parts = tuple(itertools.islice(value, count + 1))
@@ -297,7 +297,7 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
         given = np.asarray(value)
         if given.dtype.kind not in "iufO":
             raise TypeError
-        # A view of one number may say that it has any shape: nothing of that size is copied.
+        # A broadcast view of one number can have any shape: it is not copied if it would not fit.
         if _DOUBLE * given.size <= memory():
             return given.astype(np.float64, copy=False)
     except Exception:  # of float(), or of an object of others
@@ -315,13 +315,13 @@ def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
 
 
 def closest(value: Any, known: Iterable[str]) -> str:
-    """A hint "; did you mean ...?" or nothing."""
+    """The hint "; did you mean ...?" with the most similar name, or an empty text."""
     found = difflib.get_close_matches(value if isinstance(value, str) else shown(value), list(known), n=1, cutoff=0.5)
     return f"; did you mean {found[0]!r}?" if found else ""
 
 
 def located(where: str, error: object) -> str:
-    """The sentence about a part, behind the place of it: an argument or a key of it behind a dot.
+    """The sentence about a part, after its place: behind a dot where the sentence begins with an argument.
 
     >>> located("surface[0]", "radius must be above 0"), located("surface[0]", "cannot read the mesh part.stl")
     ('surface[0].radius must be above 0', 'surface[0]: cannot read the mesh part.stl')
@@ -330,6 +330,6 @@ def located(where: str, error: object) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """'a', 'b' and 'c'."""
+    """The names in quotes, joined by commas and "and": 'a', 'b' and 'c'."""
     quoted = [repr(name) for name in names]
     return " and ".join([", ".join(quoted[:-1]), quoted[-1]]) if len(quoted) > 1 else "".join(quoted)

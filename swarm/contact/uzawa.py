@@ -20,7 +20,7 @@ from ..kernel.record import Record
 from ..kernel.vector import Vec
 from . import corner, impulse
 
-# How the multiplier is updated and started: (8) itself, the secant, or the secant from the reflection's multiplier.
+# The `acceleration`: (8) itself, the secant, or the secant started from the multiplier of the reflection.
 PLAIN, SECANT, REFLECTION = 0.0, 1.0, 2.0
 # Rows of the record that a lane keeps of its loop: lambda now; (Phi0 + Phi1)/2, V and dkappa/dlambda of its step;
 # lambda and the miss of the sweep before; the sweeps; whether the step was accepted above the tolerance; the
@@ -33,8 +33,8 @@ _CHORD_STEPS = 3
 
 
 def next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_before):
-    """lambda after a sweep that missed by alpha Phi_mean: (8), or the secant through the last two sweeps."""
-    # NaN before the second sweep, and where the miss does not fall: then (8).
+    """lambda after a sweep with the miss alpha (Phi0 + Phi1)/2: by (8), or the secant through the last two sweeps."""
+    # NaN in the first sweep, below 1 or infinite where the miss does not fall: then (8).
     stretch = (multiplier - multiplier_before) / (miss_before - miss)
     use = (acceleration > PLAIN) & (stretch >= 1.0) & (stretch < math.inf)
     return multiplier + miss * select(use, stretch * (1.0 - _SHORT), 1.0)
@@ -66,7 +66,7 @@ def reflection(walls, wall, law, step):
 
 
 def meets_later(walls, wall, law, r, p):
-    """Whether the free flight r0 + p leaves any other wall on which the particle is not yet: a State II."""
+    """Whether the free flight from r to r + p ends outside of another wall that the particle is not on (State II)."""
     found = False
     for k, other in enumerate(walls.each):
         leaves = other.level_of(other.inner(r + p)) > 0.0
@@ -75,7 +75,7 @@ def meets_later(walls, wall, law, r, p):
 
 
 class LastSweep(Record):
-    """The sweep before, for the secant: one entry a wall."""
+    """The multipliers and misses of the sweep before, for the secant: one entry for each wall."""
 
     multipliers: Any
     misses: Any
@@ -90,7 +90,7 @@ class UzawaSweep(Record):
 
 
 class Loop(Record):
-    """The step that the loop ended with."""
+    """The step of the last sweep, the number of sweeps, and whether they converged."""
 
     r: Vec
     sweeps: int
@@ -101,7 +101,7 @@ class Loop(Record):
 
 @outlined
 def sweep_all(method, law, walls, step, multipliers, before, sweep, reactions):
-    """One sweep of (8) for all walls: the step, then the multipliers of the next sweep in place; `before` is kept."""
+    """One sweep of (8) for all walls: the `UzawaSweep` of the step; `multipliers` and `before` are updated in place."""
     count = multipliers.shape[0]
     end = corner.hold(method.form, law, multipliers, walls, step, reactions)
     first, last = scratch(count, np.float64), reactions[:, 3]
@@ -122,7 +122,7 @@ def sweep_all(method, law, walls, step, multipliers, before, sweep, reactions):
 
 @outlined
 def start(method, law, walls, step, multipliers):
-    """The multipliers that the loop starts from."""
+    """Set the multipliers that the loop starts from."""
     multipliers[:] = 0.0
     touched = walls.touched(step.r, step.p)
     if method.acceleration == REFLECTION and touched.number == 1.0:
@@ -132,7 +132,7 @@ def start(method, law, walls, step, multipliers):
 
 @outlined
 def loop(method, law, walls, step, reactions):
-    """Sweeps until V <= tolerance."""
+    """Repeat sweeps until V <= tolerance: the `Loop`, with the step of the last sweep."""
     count = walls.length()
     multipliers = scratch(count, np.float64)
     before = LastSweep(scratch(count, np.float64), scratch(count, np.float64))

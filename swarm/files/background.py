@@ -19,11 +19,11 @@ from .writer import WriteFrames, Written
 # single frame takes 2.5 ms, one of a batch of ten 0.9 ms. No frame waits longer than this for others [s].
 CHUNK_FRAMES = 10
 _PATIENCE = 0.05
-# Most frames in the queue: half of them are written while the others are computed. More would only hide a slow disk in
-# memory. With very many particles there is one, which is written while the next is computed.
+# The most frames in the queue: half of them are written while the others are computed. A longer queue would only hide a
+# slow disk. With very many particles it has one frame, which is written while the next is computed.
 _COPIES = 20 * CHUNK_FRAMES
 _BYTES = 1 << 26
-# Bytes of a particle that are copied of a state.
+# Bytes for each particle in the copy of a state.
 _PARTICLE = 88
 
 Job = Callable[[], None]
@@ -31,12 +31,12 @@ WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
 
 
 def _copies_of(n: int) -> int:
-    """The most frames of n particles that wait to be written."""
+    """The most frames of n particles in the queue."""
     return max(1, min(_COPIES, _BYTES // (_PARTICLE * max(1, n))))
 
 
 def waiting_bytes(n: int) -> int:
-    """The most bytes of frames of n particles that wait to be written.
+    """The most bytes of the frames of n particles in the queue.
 
     >>> waiting_bytes(1_000_000)
     88000000
@@ -56,7 +56,7 @@ class Writer(Protocol):
 
 
 class Several:
-    """Several writers as one, each with the particles that it keeps; they write in turn."""
+    """Several writers as one: each writes a slice of the particles, one writer after the other."""
 
     def __init__(self, writers: list[tuple[Writer, slice]]) -> None:
         self._writers = writers
@@ -86,16 +86,21 @@ def _some(state: State, kept: slice) -> State:
 
 
 def _copied(state: State) -> list[str]:
-    """The parts of a state that writers take, as far as it has them."""
+    """The names of the arrays of a state that writers take; those that it does not have are left out."""
     return [name for name in KEPT if getattr(state, name) is not None]
 
 
 class Background:
     """A context that gives a function which queues a copy of a frame; a thread writes all queued frames at once.
 
-    When the context ends, every frame is written. An error of the writer is raised at the next frame, or at the end. Of
-    the n particles only the `kept` ones are copied. Where they are `born` during the run [s], in this order, those that
-    come later are at NaN.
+    When the context ends, every frame is written. An error of the writer is raised at the next frame, or at the end.
+
+    Args:
+        writer: writes the frames, in the thread.
+        n: the number of particles.
+        kept: the particles that are copied and written.
+        born: (n,) the times at which the particles come [s], in ascending order; None: all are there from the start.
+            Particles that come after a frame are at NaN in it.
     """
 
     def __init__(
@@ -104,9 +109,9 @@ class Background:
         self._writer, self._kept = writer, kept
         self._born = None if born is None else born[kept]
         n = max(1, len(range(n)[kept]))
-        # An event is set when all frames before it are written, a function is called; None is the end.
+        # An event is set when all frames before it are written; a function is called; None ends the thread.
         self._frames: queue.SimpleQueue[Written | threading.Event | Job | None] = queue.SimpleQueue()
-        # Bounds the other queue: a frame needs one of these copies.
+        # Every frame needs one of these copies, so that the queue is no longer than they are.
         self._copies: queue.SimpleQueue[State | None] = queue.SimpleQueue()
         copies = _copies_of(n)
         for _ in range(copies):
@@ -114,7 +119,7 @@ class Background:
         half = max(1, copies // 2)
         self._at_once = half if half < CHUNK_FRAMES else half - half % CHUNK_FRAMES
         self._problem: BaseException | None = None
-        self.seconds = 0.0  # to write a frame of the latest batch
+        self.seconds = 0.0  # the time to write one frame of the latest batch
         self.written = self._queued = 0  # frames
         self._thread = threading.Thread(target=self._work, name="swarm-writer", daemon=True)
 
@@ -132,7 +137,7 @@ class Background:
             raise problem
 
     def backlog(self) -> float:
-        """Seconds that the frames in the queue take, each as long as one of the latest batch."""
+        """The time to write the frames in the queue [s], each as long as one of the latest batch."""
         return self.seconds * max(0, self._queued - self.written)
 
     def _put(self, number: int, moment: float, state: State, seen: dict[str, Any]) -> None:
@@ -154,7 +159,7 @@ class Background:
         self._frames.put((number, moment, copy, seen))
 
     def do(self, job: Job) -> None:
-        """Have the thread call a function, in its turn among the frames."""
+        """Call a function in the thread, after the frames that are in the queue."""
         self._frames.put(job)
 
     def drain(self) -> None:
@@ -170,7 +175,7 @@ class Background:
         end: object = True
         while end is not None:
             frames, end = self._gather()
-            # After a frame that could not be written, no other one is.
+            # No frame is written after one that could not be.
             if frames and self._problem is None:
                 began = time.perf_counter()
                 try:
@@ -185,7 +190,7 @@ class Background:
                 end.set()
 
     def _gather(self) -> tuple[list[Written], object]:
-        """The next batch of frames, and what ended it: None is the end of the run."""
+        """(the next batch of frames, what ended it: None at the end of the run, an event, or True)."""
         frames: list[Written] = []
         frame, latest = self._frames.get(), math.inf
         while frame is not None and not isinstance(frame, threading.Event):

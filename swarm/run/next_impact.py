@@ -1,4 +1,4 @@
-"""The next impact of one point, by itself: the flight to it, exact, and what the wall makes of the velocity."""
+"""The next impact of one point without a run: the exact flight to it, and the velocity after it."""
 
 import math
 from typing import NamedTuple
@@ -23,7 +23,7 @@ from .preflight.knows import Asked, require_known
 from .preflight.starts import require_inside
 from .starting_state import Seeding
 
-# A fall is known part by part; one of more parts meets no wall.
+# The search for a hit ends after so many parts of a flight, each of which surely meets no wall.
 _PARTS = 1000
 
 
@@ -46,15 +46,14 @@ class NextImpact(NamedTuple):
 
 
 def bounce(scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float = 1.0, seed: int = 0) -> NextImpact:
-    """The next impact of one point, as `Impact` makes it: to walk from impact to impact, without a run.
+    """The next impact of one point, as `Impact` makes it; repeat it to walk from impact to impact.
 
     Args:
         scene: walls at rest, without openings and without a period, and gravity.
         position: three numbers [m]; on a wall, as after an impact, or inside.
         velocity: three numbers [m/s].
-        mass: of the point [kg], above 0, which laws of walls and temperatures ask for.
-        seed: of the random numbers of walls that send particles off by chance, from 0 to 2**64 - 1: of another impact
-            another one.
+        mass: of the point [kg], above 0; laws of walls and temperatures depend on it.
+        seed: seed of the random numbers of walls, from 0 to 2**64 - 1. Give another one for each impact.
 
     Returns:
         A `NextImpact`.
@@ -114,7 +113,7 @@ def bounce(scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float =
 
 
 def _require_simple(scene: Scene) -> None:
-    """Raise a `SceneError` where the next impact needs more than walls at rest."""
+    """Raise a `SceneError` where the scene has more than walls at rest that are always there."""
     if scene.period is not None:
         raise SceneError("period must be None for a bounce, got one; use simulate with impacts=, a log of every impact")
     for i, surface in scene.pieces.owned():

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 class Session:
     """From a start or a checkpoint to the end, a signal or the wall time limit; it locks the trajectory.
 
-    Without a trajectory nothing can be saved.
+    Without a trajectory it saves nothing.
 
     Args:
-        options: of the run.
+        options: the options of the run.
         counted_from: when the wall time began [s of time.monotonic]; None: now.
     """
 
@@ -42,20 +42,20 @@ class Session:
         self._saves, self._resumes = options.checkpoint is not None, options.resume
         self._every = math.inf if options.checkpoint is None else options.checkpoint
         self._end = math.inf if options.walltime is None else counted_from + options.walltime
-        self._took = 0.0  # seconds of the last checkpoint
-        # One half way to the limit says how long they take.
+        self._took = 0.0  # the time that the last checkpoint took [s]
+        # A checkpoint half way to the limit measures that time.
         self._due = self._began + min(self._every, 0.5 * (self._end - self._began) if self._saves else math.inf)
         self._stops = False
-        # A run without a trajectory has None in their place, and no `Job`.
+        # These are None in a run without a trajectory.
         self._trajectory: Any = options.trajectory
         self._path: Any = options.checkpoint_file()
         self._job: Any = None
-        # What identifies the run besides its texts, for the trajectory.
+        # What identifies the run in its files, besides its texts.
         self.identity: dict[str, Any] = {}
         self._arrays: checkpoint.Arrays | None = None
         self._held = contextlib.ExitStack()
         self._log: Impacts | None = None
-        # What the session has compiled.
+        # The time that the session has spent in compilations.
         self.compiled = Spent()
 
     def __enter__(self) -> Self:
@@ -147,7 +147,7 @@ class Session:
             before.require_intact()
 
     def _refuse_to_restart(self, until: float) -> None:
-        """Raise an error that says what the trajectory without a checkpoint is."""
+        """Raise the error for a trajectory without a checkpoint: complete, of another run, or in the way."""
         from ..files.trajectory import load
 
         trajectory = self._trajectory
@@ -224,11 +224,11 @@ class Session:
                 yield number, before, moment
 
     def latest(self, writer: "Background | None") -> float:
-        """When `look` is due [s of time.monotonic]."""
+        """The time at which `look` is due [s of time.monotonic]."""
         return min(self._due, self._last_call(writer))
 
     def _last_call(self, writer: "Background | None") -> float:
-        """When to stop so that the queue, and a checkpoint, are written at the limit [s of time.monotonic]."""
+        """The latest time to stop [s of time.monotonic]: the queue and a checkpoint are then written by the limit."""
         return self._end - self._took - (0.0 if writer is None else writer.backlog())
 
     def stop(self) -> None:
@@ -236,14 +236,14 @@ class Session:
         self._stops = True
 
     def wall_time(self) -> float:
-        """Seconds of all sessions of the run."""
+        """The wall time of all sessions of the run [s]."""
         before: float = 0.0 if self._job is None else self._job.wall_time
         return time.monotonic() - self._began + before
 
     def look(
         self, run: BaseRun, writer: "Background | None", frame: int, moment: float, following: float | None
     ) -> None:
-        """Save a checkpoint if one is due, and end if it is time: after `frame`, within the one at `following`.
+        """Save a checkpoint if one is due, and end if it is time: after `frame`, or within the frame at `following`.
 
         Raises:
             KeyboardInterrupt: `stop` was called.
@@ -264,7 +264,7 @@ class Session:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s", late)
 
     def _save(self, run: BaseRun, writer: Any, frame: int, moment: float, following: float | None) -> None:
-        # A checkpoint is never ahead of the frames.
+        # First the frames: a checkpoint is never ahead of them.
         writer.drain()
         job = dataclasses.replace(
             self._job, frame=frame, time=moment, following=following, wall_time=self.wall_time(),
@@ -273,6 +273,6 @@ class Session:
         checkpoint.save(self._path, job, run.arrays(), self._owners)
 
     def finish(self) -> None:
-        """Remove the checkpoint: all frames are written."""
+        """Remove the checkpoint, as all frames are written."""
         if self._path is not None and (self._saves or self._arrays is not None):
             self._path.unlink(missing_ok=True)

@@ -268,7 +268,7 @@ class AtInstantInFrame(Record):
 
 
 class Hidden(rising.Ahead):
-    """A wall that is not met before the flight has gone a way [m] in its frame."""
+    """A wall that is not met before the flight has covered a way [m] in its frame."""
 
     seen: rising.InWallFrame
     way: float
