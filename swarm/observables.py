@@ -19,12 +19,12 @@ from .state import CROSSED, Floats, State, is_gone
 from .surfaces.depth import penetration
 from .surfaces.time_of_impact import flights
 
-# Particles in a partial sum. Unlike the block size it affects the last bits of results.
+# The number of particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256
 # Partial sums run in this many interleaved columns, which the compiler vectorises without reordering any.
 _COLUMNS = 64
 
-# Rows of what has crossed a counter, in both senses: how many, and the sums.
+# Rows for a counter: the number of crossings and the sums, in both senses.
 COUNTED = 2 * (1 + CROSSED)
 
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
@@ -92,9 +92,9 @@ def start_energies(compiled: CompiledScene, law: Any, state: State) -> None:
 
 @kernel
 def observe(law, walls, gravity, state, drawn, size, partial):
-    """Partial sums and maxima of each chunk into partial[chunk, ROWS].
+    """Write the sums and maxima of each chunk into partial[chunk, ROWS].
 
-    Of the particles k size to (k + 1) size for every k `drawn`; `size` is a number of whole chunks.
+    The chunks are those of the particles k size to (k + 1) size for every k in `drawn`; `size` is whole chunks.
     """
     position, velocity, mass = state.position, state.velocity, state.mass
     energy, inverse_scale = state.energy, state.inverse_scale
@@ -109,7 +109,7 @@ def observe(law, walls, gravity, state, drawn, size, partial):
                     m, r, v = mass[i], column(position, 0, i), column(velocity, 0, i)
                     e = _energies(law, walls.at(0.0), gravity, m, r, v)
                     if law is not None:
-                        # What a particle that has escaped had stored is lost.
+                        # A particle that has escaped has lost its stored energy.
                         e = e._replace(stored=select(is_gone(state, i), 0.0, e.stored))
                     p = m * v
                     error = abs(e.kinetic + e.fall + e.stored - energy[i]) * inverse_scale[i]
@@ -142,7 +142,7 @@ def observe(law, walls, gravity, state, drawn, size, partial):
 
 @kernel
 def store(law, walls, remaining, state, into):
-    """What the contacts of each particle store when so much of the frame is left [s], per mass, into an array (N,)."""
+    """Write the stored energy of each particle per mass, when so much of the frame is left [s], into an array (N,)."""
     now = walls.at(remaining)
     for i in range(state.mass.size):
         r = column(state.position, 0, i)
@@ -151,11 +151,11 @@ def store(law, walls, remaining, state, into):
 
 @kernel
 def count_escaped(walls, gravity, far, faces, state):
-    """The number of particles that leave an open scene and do not come back, not through an opening of a wall.
+    """The number of particles that leave an open scene for ever, but not through an opening of a wall.
 
-    Those farther from the origin than `far`; those in a straight flight that hits no wall; and those beyond one of the
-    open `faces`, rows (n, offset), that fly in its direction n: the walls beside that face are endless, and a particle
-    that hits them there still leaves.
+    These are farther from the origin than `far`, or in a straight flight that hits no wall, or beyond one of the open
+    `faces`, rows (n, offset), and fly in its direction n: the walls beside that face are endless, and a particle that
+    hits them there still leaves.
     """
     position, velocity, count = state.position, state.velocity, 0
     for i in range(state.mass.size):

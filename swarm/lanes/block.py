@@ -1,8 +1,8 @@
-"""Particles to one time, a block of them at once, in lanes.
+"""The particles of a block to the end of a frame, many at once, each in a lane.
 
-One pass does one flight and one contact for every live lane, in loops without branches, which LLVM vectorises. Lanes
-that reached the frame time retire, and the next particle, or the last live lane, takes their slot. The result does not
-depend on which lane or block a particle is in.
+One pass does one flight and one contact for every live lane, in loops without branches, which LLVM vectorises. A lane
+retires when its particle reaches the end of the frame, and takes the next particle, or that of the last live lane. The
+result does not depend on the lane or the block of a particle.
 """
 
 import math
@@ -27,27 +27,28 @@ from .solve import count_sweeps, keep_failure, solution, solve
 from .table import LANES, LOOK, marked_lanes, with_distances
 from .watching import log as impact_log
 
-# Impacts of one particle in one frame after which it is given up: seconds, not hours, in a cusp.
+# The most impacts of one particle in one frame. More are an error, which comes in seconds, not hours, in a cusp.
 MOST_HITS = 1e8
-# Passes of a call of `advance_block` that is never halted.
+# A number of passes that no call of `advance_block` reaches.
 NEVER = 2**63 - 1
 
 
 class Hard(Record):
-    """With it a kernel can do hard contacts: half of what there is to compile, and seldom met in a smooth cavity."""
+    """The argument of kernels that do hard contacts, which double what is compiled and are rare in a smooth cavity."""
 
     most_hits: float
 
 
 @kernel
 def advance_block(method, walls, gravity, hard, share, lanes):
-    """Advance what a thread draws of a frame: (status, particle, drawn), DONE or the first particle that failed.
+    """Advance the particles that a thread draws to the end of a frame: (status, particle, drawn).
 
-    `drawn` is how many draws that were; `lanes` are any. After `share.halt[0]` passes, which another thread may change
-    at any time, it ends before the next: (INTERRUPTED, live lanes, drawn), and `lanes.left_behind` has what these held,
-    which the next call takes as `share.halted`. Particles that are done are skipped; those that arrive are then done.
-    Without `hard` the first hard contact ends the call with HARD_CONTACT; a kernel that can do it goes on from there.
-    LOG_FULL asks for a call with an empty log and the same lanes, which goes on.
+    The status is DONE, or says how `particle` failed, the first that did; `drawn` is the number of draws. The contents
+    of `lanes` are overwritten. Particles that have arrived are skipped. Three other statuses ask for another call:
+        INTERRUPTED   after `share.halt[0]` passes, a number that another thread may change at any time: then `particle`
+                      is the number of live lanes, and the next call takes `lanes.left_behind` as `share.halted`;
+        HARD_CONTACT  at the first hard contact in a call without `hard`: a kernel with `hard` goes on from there;
+        LOG_FULL      the next call goes on with an empty log and the same lanes.
     """
     lanes, state, picked = with_distances(lanes), share.state, picks(method, walls)
     place, live, passes = impact_log.gone_on(share.log)
@@ -87,7 +88,7 @@ def advance_block(method, walls, gravity, hard, share, lanes):
 
 
 def _halts(share, lanes, place, live, passes):
-    """Whether the call ends before the next pass."""
+    """The status with which the call ends before the next pass, or DONE."""
     if passes >= share.halt[0]:
         lanes.leave(live)
         if share.counters is not None:
@@ -102,7 +103,7 @@ def _halts(share, lanes, place, live, passes):
 
 @outlined
 def _rare(hard, method, walls, gravity, share, lanes, live, some_hard):
-    """The rare part of a pass: (worst status, its lane)."""
+    """The part of a pass that is seldom needed: (the worst status, its lane)."""
     if not some_hard:
         return _look(method, walls, share.state, lanes, live)
     if hard is None:
@@ -112,12 +113,12 @@ def _rare(hard, method, walls, gravity, share, lanes, live, some_hard):
 
 @outlined
 def _look(method, walls, state, lanes, live):
-    """Whether a particle meets its walls without end, or has not gone on since it was looked at: (status, its lane).
+    """Whether a particle has too many impacts, or no time has passed since the last look: (status, its lane).
 
-    The narrower a wedge is, the more impacts have no time between them: there is an end to them, and they are counted.
-    In a gap of no width a particle comes to be what it was before.
+    The narrower a wedge is, the more impacts have no time between them. They come to an end, so these are counted.
+    In a gap of no width a particle returns to the state of the last look.
     """
-    # Walls that close on a particle hit it without end; where hits are found by safe steps, these are seconds too.
+    # Walls that close on a particle hit it without end; also by safe steps so many hits take only seconds.
     most_hits = 0.1 * MOST_HITS if isinstance(walls, Carried) else MOST_HITS
     for i in range(live):
         lane, p, status = lanes.lane(i), float(lanes.particle[i]), Status.DONE.value
@@ -141,7 +142,7 @@ def _look(method, walls, state, lanes, live):
 
 @outlined
 def _hard_passes(hard, method, walls, gravity, share, lanes, live):
-    """The hard lanes, one by one: (worst status, its lane)."""
+    """The contacts of the hard lanes, one by one: (the worst status, its lane)."""
     worst, where = 0, 0
     for i in range(live):
         if lanes.wall[i] <= methods.HARD:
@@ -169,7 +170,7 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
 
 
 def _pass(method, walls, gravity, share, lanes, picked, live):
-    """A flight and a contact of every lane: whether one reached the end of the frame, is hard, was sent off wrong."""
+    """A flight and a contact of every lane: (whether one has arrived, whether one is hard, whether a law was wrong)."""
     state, watches, counters = share.state, share.watchers.of_impacts(), share.counters
     if counters is not None:
         counters.keep_before(method, gravity, lanes, live)
@@ -206,7 +207,7 @@ def _count_contacts(method, share, lanes, first, after):
 
 
 def _make_contacts(method, walls, gravity, share, lanes, picked, live):
-    """The contact of every lane: (whether one reached the end of the frame, whether one is hard)."""
+    """The contact of every lane: (whether one has arrived, whether one is hard)."""
     some_arrived, some_hard, watches = False, False, share.watchers.of_impacts()
     at_once = method.lands and isinstance(walls, Aimed)
     if at_once:
@@ -229,7 +230,7 @@ def _make_contacts(method, walls, gravity, share, lanes, picked, live):
 
 
 def _put_contact(method, lanes, i, contact):
-    """A lane after its contact, its impacts and its energy where contacts change that; whether it has arrived."""
+    """Write a contact into its lane: place, velocity, impacts, energy. Returns whether the lane has arrived."""
     lane = lanes.lane(i)
     lane.put_end(contact)
     lane.hits += contact.hits
@@ -242,7 +243,7 @@ def _put_contact(method, lanes, i, contact):
 def _add_impulse(walls, impulse, i, wall, given):
     """impulse[wall, i] += given, without a branch; a loop over rows here would not vectorise."""
     if len(walls.each) == 1 and not walls.fields():
-        # One wall: what is given is 0, or it is given by that.
+        # With one wall the impulse is that of this wall, or 0.
         impulse[0, i] += given
     else:
         add_to_rows(walls, impulse, 0, i, wall, given)

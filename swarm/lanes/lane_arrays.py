@@ -1,4 +1,4 @@
-"""The particles that are being advanced, one a lane: arrays that fit in the cache, the ways in and out."""
+"""The particles that are being advanced, one in each lane: arrays that fit in the cache, and the ways in and out."""
 
 from typing import Any, NamedTuple
 
@@ -26,8 +26,8 @@ class Flying(Advanced):
     # The first of what its method keeps of it, where contacts change the energy: twice that, per mass.
     twice = Number(own.row)
 
-    # The rows of a particle. After them is the flight of a lane that `seek` closes up, and what a lane was when all
-    # were looked at: as an array of its own that made the impacts in an ellipsoid twice as dear.
+    # The rows of a particle. After them are the flight of a lane that `seek` closes up, and the lane at the last look
+    # at all lanes: with a separate array for that, impacts in an ellipsoid took twice as long.
     ROWS = _named.count
     CLOSED_UP = _named.take(6)
     looked_particle, looked_left, looked_hits = _named.number(), _named.number(), _named.number()
@@ -45,16 +45,16 @@ class Flying(Advanced):
         return self.looked_particle == p and self.looked_left == self.remaining and off == 0.0
 
     def put_end(self, end):
-        """Its place at the end of a flight or a contact, and the time that remains of its frame."""
+        """Write the place, the velocity and the remaining time at the end of a flight or a contact."""
         self.r, self.v, self.remaining = end.r, end.v, end.remaining
 
 
 class Lanes(NamedTuple):
-    """Arrays of one column a lane. NumPy makes them: what a kernel makes takes it a tenth of a second to compile."""
+    """Arrays with a column for each lane. NumPy makes them: in a kernel this takes a tenth of a second to compile."""
 
     rows: Array  # (Flying.ALL, stride)
     impulse: Array  # (booked, stride) normal impulse per mass, then the work of walls that move
-    wall: Array  # that of the contact in this pass, -1 for none, HARD - wall where the lane is hard
+    wall: Array  # the wall of the contact in this pass, -1 for none, HARD - wall where the lane is hard
     kappa: Array  # the contact's unknown
     unsolved: Array  # bool, whether its solve goes on
     sweeping: Array  # bool, whether the loop of its multiplier goes on
@@ -78,26 +78,26 @@ class Lanes(NamedTuple):
         return Flying(self.rows, i)
 
     def given(self, method, i):
-        """A lane as methods are given it."""
+        """The `Lane` that methods are given."""
         lane = self.lane(i)
         flown = self.flown[i] if method.asks_flown else None
         return methods.Lane(lane.r, lane.v, lane.remaining, lane.hits, method.own(*lane.own), flown)
 
     def faced(self, walls, i):
-        """The walls as the step of a lane meets them."""
+        """The walls that the step of a lane meets: those that are open to it stand aside."""
         if self.stand is None:
             return walls
         return Faced(walls, tuple(self.stand[k, i] for k, _wall in enumerate(walls.each)))
 
     def load(self, method, walls, share, i, k):
-        """Particle i into lane k, as it starts the frame, or as a halt left it."""
+        """Load particle i into lane k, as it starts the frame, or as a halt left it."""
         self.particle[k] = i
         if share.counters is not None:
             share.counters.load(share.state, self, i, k)
         state, lane, remaining = share.state, self.lane(k), 0.0
         if state.contacts is not None:
             remaining = state.contacts.remaining[i]
-            # Where nothing lasts none of these arrays is written: their memory is not even there.
+            # Where no contact lasts these arrays are never written, and so take no memory.
             if remaining > 0.0:
                 state.contacts.remaining[i] = 0.0
         if state.late is not None:
@@ -114,7 +114,7 @@ class Lanes(NamedTuple):
 
     @outlined
     def _pick_up(self, halted, i, k):
-        """Particle i into lane k as a halt left it, if one did; whether one did."""
+        """Load particle i into lane k as a halt left it; whether one did."""
         first, last = 0, halted.particle.size
         while first < last:
             middle = (first + last) // 2
@@ -131,14 +131,14 @@ class Lanes(NamedTuple):
 
     @outlined
     def leave(self, live):
-        """The live lanes, between two passes: what one pass leaves for the next."""
+        """Copy the live lanes, between two passes, to `left_behind`."""
         for k in range(live):
             copy_lane(self.rows, k, self.left_behind, k, Flying.ROWS)
             for s in range(self.impulse.shape[0]):
                 self.left_behind[Flying.ROWS + s, k] = self.impulse[s, k]
 
     def retire(self, method, walls, share, k):
-        """Lane k back into its particle, which has arrived or goes on along a wall."""
+        """Write lane k back to the arrays of its particle, which has arrived or goes on along a wall."""
         state, lane, i = share.state, self.lane(k), index(self.particle[k])
         put(state.position, 0, i, lane.r)
         put(state.velocity, 0, i, lane.v)

@@ -1,4 +1,4 @@
-"""The part of a frame that one thread advances: the particles that it draws, and what it keeps of them."""
+"""The part of a frame that one thread advances: the particles that it draws, and where it writes."""
 
 from typing import Any, NamedTuple
 
@@ -11,15 +11,15 @@ from .watching.watchers import Watchers
 
 
 class Draws(NamedTuple):
-    """The source of the particles of a block: draw k is of those from k size to (k + 1) size, for one thread alone.
+    """The source of the particles of a thread. Draw k has the particles from k size to (k + 1) size, for one thread.
 
-    A thread draws when a lane is free, so its lanes are full until there are no more: shares of fixed size, each with
-    its own end, cost 14 % with 512 particles a share and 3 % with 4096, and leave a thread idle while the other has
-    the last one.
+    A thread draws when a lane is free, so its lanes are full until no particles are left. (Rejected: blocks of a fixed
+    size, each done before the next. They cost 14 % with 512 particles and 3 % with 4096, and leave a thread idle while
+    another one does the last.)
     """
 
-    ticket: Array  # (1,) how many of `order` are drawn, by all threads
-    order: Array  # int64, the draws
+    ticket: Array  # (1,) how many of `order` all threads have drawn
+    order: Array  # int64, the numbers of the draws
     size: int
     mine: Array  # int64, the draws of this thread, in order
 
@@ -50,13 +50,13 @@ class Share(NamedTuple):
     state: Any  # `state.State`
     phase: Array  # (N,) int8, whether each flies, slides on one wall or on two, or has arrived
     pending: Array  # (PHASES,) int64, how many particles are left to other kernels, by their phase
-    halted: Any  # `arrays.Halted`
+    halted: Any  # `lane_arrays.Halted`
     draws: Draws
     halt: Array  # (1,) int64, passes after which to return
     span: float  # in the method's unit
     seed: int  # of random numbers
-    first: int  # the number of particle 0 in the whole run, for them
-    moment: float  # at which the frame ends [s]
+    first: int  # the number of particle 0 in the whole run, for its random numbers
+    moment: float  # the end of the frame [s]
     watchers: Watchers = Watchers()
 
     @property
@@ -75,14 +75,14 @@ class Share(NamedTuple):
         return self.watchers.counters
 
     def note_stay(self, i, time):
-        """Count a time in which walls hold particle i [s]: as that of the first of them, or of the one it has met."""
+        """Count a time [s] in which walls hold particle i, for the first of them, or else for the wall that it met."""
         if self.counts is not None:
             contacts = self.state.contacts
             first = contacts.walls[0, i]
             self.counts.stay(select(first >= 0.0, first, contacts.met[i]), time)
 
     def note_hops(self, wall, time):
-        """Take a time [s] that is of hops from that in which a wall holds a particle."""
+        """Subtract a time [s] of hops from the time in which a wall holds a particle."""
         if self.counts is not None:
             self.counts.stay(max(wall, 0.0), -time)
 
@@ -92,9 +92,9 @@ class Share(NamedTuple):
         self.pending[phase] += 1
 
     def following(self, phase, place):
-        """The `ThreadPlace` of the first particle from this one on that is in a phase, of another draw if need be.
+        """The `ThreadPlace` of the first particle in a phase, from a place on; draws if need be.
 
-        Counts those in other phases, which other kernels advance.
+        Counts the particles in other phases, which other kernels advance.
         """
         draws, phases, pending = self.draws, self.phase, self.pending
         i, stop, drawn = place
@@ -115,6 +115,6 @@ class Share(NamedTuple):
 
 
 def take(draws: Draws, some: int) -> Array:
-    """The next `some` draws of all threads, for one."""
+    """The next `some` draws, for the calling thread alone."""
     first = min(some * next_of(draws.ticket), draws.order.size)
     return draws.order[first : first + some]

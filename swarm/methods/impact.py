@@ -42,12 +42,12 @@ class Impact(base.Method):
         shortest_flight: a particle that comes back to the same wall sooner than this [s] (grazing, chattering, resting)
             slides along it instead. None: 1e-4 of its own crossing time. Every other flight is exact, however short, so
             that a wedge of 1e-4 rad takes its 31415 impacts.
-        sliding_tolerance: relative error of a crossing of a particle that slides, from 1e-13 to 1e-3. The steps of each
-            particle follow from it: some 150 a crossing, and 1/4 power of it more or fewer.
-        dt: the step of bodies [s], above 0, which is cut at impacts and frames; None for particles, which need none.
-        order: of bodies between impacts: 2, or 4 by Suzuki's composition of five steps.
-        contact_start: where the contact step begins, which must be above 0 for "centred". "impact": at the impact, as
-            in the paper. "centred": h/2 before it.
+        sliding_tolerance: relative error of a crossing of a particle that slides, from 1e-13 to 1e-3. The number of
+            steps in a crossing follows from it: some 150 for 1e-9, and proportional to its power -1/4.
+        dt: the step of bodies [s], above 0, which is cut at impacts and frames; None for particles, which have none.
+        order: the order of the steps of bodies between impacts: 2, or 4 by Suzuki's composition of five steps.
+        contact_start: where the contact step begins. "impact": at the impact, as in the paper. "centred": h/2 before
+            it; contact_step must be above 0 then.
 
     A centred step takes the particle from r* - (h/2) v0 to r* + (h/2) v1, with r* where it meets the wall, and v1 is
     the same reflection about D(r0, r1) of these two ends. As n.(r1 - r0) = 0, it ends at the gap at which it begins.
@@ -64,8 +64,8 @@ class Impact(base.Method):
     three walls that move carries it in steps of their motion. An impulse of less than 1e-12 of the speed is no impact.
 
     Particles with a radius meet at instants too, and neither slide nor rest. Where a contact would last they bounce, so
-    high that a flight from a wall back to it takes t_c (`contact_duration` of `Pairs`; without losses 1e-7 crossings
-    or so). A ball that has met another one in the last t_c loses no energy. The energy that such a bounce gives,
+    high that a flight from a wall back to it takes t_c (`contact_duration` of `Pairs`; without losses some 1e-7 of a
+    crossing). A ball that has met another one in the last t_c loses no energy. The energy that such a bounce gives,
     m (a t_c)^2/8 with the acceleration a back to the wall, is a negative part of the dissipated energy, and the next
     impact takes it. So a lasting contact costs at least an impact in t_c: for grains that rest on each other for long
     use `Penalty`. Walls may move, have a mass, come and go, be open or hot, or have laws. A ball leaves where its point
@@ -74,12 +74,12 @@ class Impact(base.Method):
     Raises:
         SceneError: an argument is out of its range.
 
-    Conserves: the energy to round-off that does not grow (each particle knows its energy); never leaves the walls by
-    more than round-off. With restitution, friction and thermal walls the energy with what was dissipated and less the
-    heat of the walls.
+    Conserves: the energy, to round-off that does not grow, since the energy of each particle is kept; no particle is
+    outside by more than round-off. With restitution, friction and thermal walls it conserves the energy plus what was
+    dissipated less the heat of the walls.
     Order: exact for contact_step = 0, otherwise first order in h at an impact (`python -m bench order`); sliding is of
     fourth order, and where three walls or a cusp hold a particle of second, without friction.
-    Cost: one square root and one division a flight of a sphere; see `python -m bench throughput` and `bench contacts`.
+    Cost: one square root and one division for a flight in a sphere; `python -m bench throughput`, `bench contacts`.
     Source: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0; Suzuki, Phys. Lett. A 146 (1990) 319.
 
     >>> Impact(contact_step=-1.0)

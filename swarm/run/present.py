@@ -1,4 +1,4 @@
-"""The particles of a run that are there at a frame: all, or where some come during the run the first ones."""
+"""The particles of a run that are there at a frame: all, or, in a run with sources, the first ones."""
 
 import math
 from typing import Any
@@ -12,12 +12,12 @@ from ..state import Floats, State
 
 
 class Presence:
-    """The particles of the start and those born by the end of a frame. No others are in a draw of a kernel or in a sum.
+    """The particles of the start, and those born by the end of a frame: kernels draw, and sums count, these alone.
 
     Args:
         births: when particles are born, or None if all are in the scene from the start.
-        state: the start, which says what energy each particle from a source brings in.
-        size: particles of a draw.
+        state: the state at the start, with the energy that each particle of a source brings in.
+        size: the number of particles in a draw.
 
     Attributes:
         count: the number of these particles.
@@ -31,17 +31,17 @@ class Presence:
             self._energy = np.where(births.source >= 0, state.mass * state.energy, 0.0)
 
     def reach(self, moment: float) -> None:
-        """Those of the frame that ends at a moment [s]."""
+        """Set the particles of the frame that ends at a moment [s]."""
         if self._births is not None:
             self.count = self._births.there(moment)
             self.order = np.arange(math.ceil(self.count / self._size))
 
     def of(self, array: NDArray[Any]) -> NDArray[Any]:
-        """Their part of an array (N,)."""
+        """The part of an array (N,) of these particles."""
         return array if self._births is None else array[: self.count]
 
     def seen(self, state: State) -> State:
-        """The state as observers know it: its masses are of them alone, and when they start is no matter."""
+        """The state that observers take: with the masses of these particles alone, which give their number."""
         if self._births is None and state.starts is None:
             return state
         return state._replace(mass=self.of(state.mass), starts=None)
@@ -65,7 +65,7 @@ class Presence:
         return {"born": born.astype(np.int64), **brought}
 
     def flying(self, state: State) -> State:
-        """The state as kernels know it: they ask when particles start only where a wall lets some wait."""
+        """The state that kernels take: with the times of starts only where a law may let particles wait."""
         return state if state.starts is None or state.absorbed is not None else state._replace(starts=None)
 
 

@@ -1,4 +1,4 @@
-"""The turns that particles take from kernel to kernel of a frame, and those in which no time passes."""
+"""The turns of particles from kernel to kernel of a frame, and the end of turns in which no time passes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from .watch import Watch
 # So often a particle may go from one kernel to another without time passing. A wedge, a cusp and a chatter stay in the
 # kernel of flights; ordinary contacts take two or three such turns.
 MOST = 1000
-# The turn in which they are looked at first: few frames have so many.
+# The turn of the first look at particles for which no time passes: few frames have so many turns.
 _FIRST = 10
 # (status, particle, what a halt left in the lanes)
 End = tuple[int, int, Halted | None]
@@ -28,9 +28,9 @@ class Turns:
         self._particles, self._left = np.empty(0, np.int64), np.empty(0)
 
     def end(self, watch: Watch) -> End | None:
-        """The end of the turns before the next one: by a halt, or by a particle for which no time passes; or None.
+        """The end of the turns, by a halt or by a particle for which no time passes; None: the next turn may begin.
 
-        Each turn of few passes asks for the halt, since many of them are passes too.
+        Turns count as passes for a halt, as many turns may have few passes each.
         """
         if watch.is_over(self._count):
             return int(Status.INTERRUPTED), 0, None
@@ -40,10 +40,10 @@ class Turns:
         return None
 
     def _still(self) -> NDArray[np.int64]:
-        """The particles for which no time has passed since this was asked last, in `MOST` turns.
+        """The particles for which no time has passed since the last call, in `MOST` turns.
 
-        In each turn every particle that has not arrived goes from one kernel to another. So nothing in a kernel counts
-        that, and no number of a particle.
+        In each turn every particle that has not arrived goes from one kernel to another, so no kernel can count the
+        turns of a particle.
         """
         assert self._contacts is not None
         size, drawn = self._draws.size, self._draws.mine[: self._drawn]
@@ -58,7 +58,7 @@ class Turns:
 
 
 def left_behind(before: Halted, phase: NDArray[np.int8], now: list[Halted]) -> Halted:
-    """The particles that halts have left in the lanes: `now`, and `before` what no lane has taken since."""
+    """The particles that halts have left in lanes: those `now`, and those `before` that no lane has taken since."""
     picked_up = np.concatenate([np.flatnonzero(phase != FLYING), *(remaining.particle for remaining in now)])
     waiting = ~np.isin(before.particle, picked_up)
     parts = [Halted(before.particle[waiting], before.rows[:, waiting]), *now]

@@ -9,26 +9,26 @@ import numpy as np
 from ..lanes.block import NEVER
 from ..lanes.table import LANES
 
-# Flights of the caller's thread in its first frame, compiled and in plain Python, after which it is free again: 0.1 s
-# or so of dear ones. Then their number is doubled as long as they take less than the second time [s], and halved where
-# they take more than the first: whatever a flight costs, a short frame never meets them.
+# The flights of the caller's thread in its first frame, compiled and in plain Python, after which it is free: 0.1 s or
+# so of expensive ones. Then their number is doubled where they take less than the second time [s], and halved where
+# they take more than the first: so a short frame is over before its thread has done so many, whatever a flight costs.
 _FLIGHTS, _PLAIN_FLIGHTS, _LONG, _SHORT = 1 << 16, 1 << 10, 0.05, 0.025
-# A guard looks so often whether the caller's thread computes for as long as the second time [s]; it begins in a run
-# that is so old, since to start it takes a tenth of the shortest runs, and ends after so many looks at an idle thread.
+# A guard looks so often whether the caller's thread has computed for as long as the second time [s]. It begins when the
+# run is so old [s], as its start takes a tenth of the shortest runs, and ends after so many looks at an idle thread.
 _GLANCE, _FREED, _YOUNG, _IDLE = 0.1, 0.25, 0.1, 10
 
 
 class Watch:
     """The halt of the kernels of a frame.
 
-    Python hands a signal to the main thread alone, between two of its instructions. So a thread that may be this one
-    computes for a few passes only, and then leaves the frame to others and watches them. Where these passes are dearer
-    than those of the frames before, as of particles that come to rest where walls move, a guard frees it: a thread that
-    looks at the clock alone.
-    (Rejected: a thread that learns of signals. It would only by a descriptor, which asyncio uses.)
+    Python hands a signal to the main thread alone, between two of its instructions. So the caller's thread, which may
+    be the main one, computes for a few passes only; then it leaves the frame to others and waits for them. Where these
+    passes take longer than those of the frames before, as where particles come to rest on walls that move, a guard
+    frees it: a thread that looks at the clock.
+    (Rejected: a thread that receives signals. It needs the wakeup descriptor, which asyncio uses.)
 
     Attributes:
-        passes: (1,) what kernels ask: after so many passes they return.
+        passes: (1,) the number of passes after which kernels return.
     """
 
     def __init__(self, particles: int) -> None:
@@ -50,9 +50,12 @@ class Watch:
         np.minimum(self.passes, passes, out=self.passes)
 
     def begin(self, latest: float, helps: bool, plain: bool) -> None:
-        """Kernels begin, halted at the time `latest` [s of time.monotonic].
+        """Set the halt before kernels begin.
 
-        `helps`: the caller's thread computes; `plain`: in plain Python.
+        Args:
+            latest: when they are halted [s of time.monotonic].
+            helps: whether the caller's thread computes too.
+            plain: whether kernels run in plain Python.
         """
         self._latest, self._plain = latest, plain
         self._reset()
@@ -65,13 +68,13 @@ class Watch:
                 self._guard.start()
 
     def is_over(self, turns: int) -> bool:
-        """Whether a thread that has called kernels so often ends: many calls of a few passes each are passes too."""
+        """Whether a thread ends after so many calls of kernels, which count as passes."""
         if time.monotonic() >= self._latest:
             self.halt()
         return bool(turns >= self.passes[0])
 
     def is_freed(self, seconds: float) -> bool:
-        """Whether kernels have returned after so many seconds only since the caller's thread is to be free."""
+        """Whether kernels returned, after so many seconds, only to free the caller's thread."""
         alone = self._alone[self._plain]
         if self._asked <= alone:
             return False
@@ -82,25 +85,25 @@ class Watch:
         return True
 
     def _free_in_time(self) -> None:
-        """Free the caller's thread where it computes for long, or beyond the time at which kernels are halted."""
+        """Free the caller's thread if it computes for too long, or beyond the time at which kernels are halted."""
         idle = 0
         while idle < _IDLE:
             time.sleep(_GLANCE)
             since = self._since
             idle = idle + 1 if since == math.inf else 0
             is_late = time.perf_counter() - since > _FREED or (since < math.inf and time.monotonic() >= self._latest)
-            # What is asked for comes sooner, and counts.
+            # A halt that was asked for comes sooner.
             if is_late and self._asked == NEVER:
                 np.minimum(self.passes, 0, out=self.passes)
         self._guard = None
 
     def end(self) -> None:
-        """The frame is done, or cut short."""
+        """Reset the halt after a frame, which is done or cut short."""
         self._asked = NEVER
         self._reset()
 
     def _reset(self) -> None:
-        """Halted as was asked, also by a signal that comes just now."""
+        """Set the halt that was asked for, also by a signal that comes at this moment."""
         self._since = math.inf
         self.passes[0] = NEVER
         np.minimum(self.passes, self._asked, out=self.passes)

@@ -1,4 +1,4 @@
-"""All walls of a scene at once, and what is asked of one of them by its number."""
+"""All walls of a scene in one record, and the methods of one of them by its number."""
 
 import math
 from collections.abc import Iterable
@@ -28,11 +28,11 @@ class Field(Record):
 
 
 class Listed(Field):
-    """A field of walls that are surfaces of their own: each has a row of what it gives."""
+    """A field made of listed surfaces: each of its walls has a row of impulse and heat."""
 
 
 class Following(Record):
-    """A wall that moves with the one before it: both are of one surface."""
+    """A wall that moves with the wall before it, as both are of one surface."""
 
     body: Any
 
@@ -42,7 +42,7 @@ class Following(Record):
 
 
 def _with_number(every, number):
-    """That one of the `numbered` walls which has a number, or the last one."""
+    """The one of the `numbered` walls that has this number, or the last one, as a tuple of one."""
     for k, (first, wall) in enumerate(every):
         if number < first + wall.count() if isinstance(wall, Field) else number == first:
             return every[k : k + 1]
@@ -50,7 +50,7 @@ def _with_number(every, number):
 
 
 def _alike(every):
-    """The `numbered` walls, those that are alike and follow one another together."""
+    """The `numbered` walls in groups of those that follow one another and are of one kind."""
     found: tuple[Any, ...] = ()
     for one in every:
         joins = len(found) > 0 and not isinstance(one[1], Field) and is_alike(found[-1][-1][1], one[1])
@@ -68,11 +68,11 @@ class Touched(Record):
 class Walls(Record):
     """The walls of a scene: its fields, those that are `Listed` last, all other walls, and then those of its unions.
 
-    What is asked of one wall is a method too, with the number of the wall before the other arguments.
+    Methods of one wall (`_ASKED`) are methods here too, with the number of the wall before the other arguments.
     """
 
     each: tuple[Any, ...]
-    # Of each union its rooms, of each room its walls, of each of these 1/the steepness of its level. See rooms.py.
+    # For each union, for each of its rooms, for each wall of the room: 1/the steepness of its level. See rooms.py.
     unions: tuple[Any, ...] = ()
     slack: Any = None  # a distance that is round-off where rooms meet [m]
     inset: Any = None  # where rooms touch, how far inside of its wall what meets one is put [m]
@@ -81,7 +81,7 @@ class Walls(Record):
 
         def __getattr__(self, name: str) -> Any: ...
 
-    # Whether some move other than uniformly, or as a field.
+    # Whether some move in a motion that is not uniform, or are a field that moves.
     accelerate = False
 
     def grown(self, radius):
@@ -89,11 +89,11 @@ class Walls(Record):
         return self._replace(each=tuple(wall.grown(radius) for wall in self.each))
 
     def foot(self, number, r, radius):
-        """Where a ball touches a wall that is grown by its radius: it escapes where that is in an opening."""
+        """The point at which a ball with its centre at r touches a wall; `self` are the walls grown by its radius."""
         return r + radius * self.unit_normal(number, r)
 
     def at(self, remaining):
-        """The walls when so much of the frame is left [s]: themselves, where none moves."""
+        """The walls when so much of the frame is left [s]; where none moves, the same walls."""
         return self
 
     def during(self, remaining, after):
@@ -105,7 +105,7 @@ class Walls(Record):
         return any(wall.in_steps for wall in self.each)
 
     def are_polynomial(self):
-        """Whether all of these walls are asked for the level along a straight flight once."""
+        """Whether lanes keep the level along a straight flight to each of these walls."""
         return all(wall.kept > 0 for wall in self.each if wall.in_steps)
 
     def aim(self):
@@ -115,7 +115,7 @@ class Walls(Record):
     # --- Their numbers and rows ---
 
     def numbered(self):
-        """(number of the first, wall or field) of each."""
+        """(number, wall) of each wall, and (number of its first wall, field) of each field."""
         found: tuple[Any, ...] = ()
         number = 0.0
         for wall in self.each:
@@ -124,7 +124,7 @@ class Walls(Record):
         return found
 
     def total(self):
-        """How many walls there are, with those of the fields."""
+        """The number of walls, with all members of the fields."""
         return self.count_in_fields() + float(sum(not isinstance(wall, Field) for wall in self.each))
 
     def fields(self):
@@ -136,16 +136,16 @@ class Walls(Record):
         return self._replace(each=tuple(wall for wall in self.each if not isinstance(wall, Field)))
 
     def alone(self, each):
-        """Some of the walls, with no unions."""
+        """A record with these walls alone, without unions."""
         return self._replace(each=each, unions=(), slack=None, inset=None)
 
     def shared(self):
-        """`numbered` of the walls that are in no union: all particles keep to them."""
+        """`numbered` of the walls that are in no union: these hold for all particles."""
         every = self.numbered()
         return every[: len(every) - sum(len(room) for union in self.unions for room in union)]
 
     def joined(self):
-        """Of each union its rooms, of each room its walls as (number, wall, 1/the steepness of its level)."""
+        """The rooms of each union, and their walls: (number, wall, 1/the steepness of its level) each."""
         every = self.numbered()
         k = len(self.shared())
         found: tuple[Any, ...] = ()
@@ -170,17 +170,17 @@ class Walls(Record):
         return rows
 
     def row(self, number):
-        """The row in which it is booked what this wall gives: a field has one."""
+        """The row of the impulse and heat of this wall; the members of a field share one."""
         stops = tuple(first + wall.count() for first, wall in self.fields() if not isinstance(wall, Listed))
         row = int(number - stops[-1]) + len(stops) if stops else int(number)
         for k, stop in reversed(tuple(enumerate(stops))):
             row = select(number < stop, k, row)
         return row
 
-    # --- Near a point: all that are in no field, of a field those in the cell of the point, of a union one room's ---
+    # --- Near a point: walls of no field, members in the cell of the point, and walls of one room of each union ---
 
     def numbers_near(self, r):
-        """The numbers of the walls near a point, in an array of the function that asks."""
+        """The numbers of the walls near a point, in an array of the calling function."""
         near = len(self.shared()) - len(self.fields())
         for rooms in self.joined():
             near = self.count_in_owner(rooms, r) + near
@@ -209,7 +209,7 @@ class Walls(Record):
 
     @outlined
     def count_in_owner(self, rooms, r):
-        """The number of walls of the room of a union that is asked for those near a point."""
+        """The number of walls of the room of a union to which a point belongs."""
         owner, count = owner_of(self, rooms, r), 0
         for i, room in enumerate(rooms):
             count = select(i == owner, len(room), count)
@@ -217,14 +217,14 @@ class Walls(Record):
 
     @outlined
     def first_in_owner(self, rooms, r):
-        """The number of the first of these walls."""
+        """The number of the first wall of that room."""
         owner, first = owner_of(self, rooms, r), 0.0
         for i, room in enumerate(rooms):
             first = select(i == owner, room[0][0], first)
         return first
 
     def until_others(self, r, v):
-        """When a straight flight may meet a wall that is not near its start."""
+        """The time from which on a straight flight may meet walls that are not near its start."""
         soonest = math.inf
         for _number, field in reversed(self.fields()):
             soonest = min(field.members.until_next_cell(r, v), soonest)
@@ -235,13 +235,13 @@ class Walls(Record):
     def of(self, number, neutral, ask, *given):
         """ask(wall, *given) of the wall with this number.
 
-        Of any other number it is that of the last wall: a caller that has no wall ignores it. `neutral` is any value of
-        its type.
+        For any other number the answer is that of the last wall; a caller without a wall ignores it. `neutral` is any
+        value of the type of the answer, for a scene without walls.
         """
         answer, every = None, self.numbered()
         # A kernel may know the number of a wall, but not how many a field has before it.
         knows = is_known(number) and len(every) > 1 and is_known(every[-1][0])
-        # Those that are alike are asked once: a kernel for many walls of one kind is not much longer than for one.
+        # Walls of one kind are asked once, so that a kernel for many of them is little longer than for one.
         for alike in reversed(_alike(_with_number(every, number) if knows else every)):
             first, one = alike[-1]
             if isinstance(one, Field):
@@ -257,7 +257,7 @@ class Walls(Record):
     # --- Of all ---
 
     def shortest_time_scale(self):
-        """The shortest pace of all walls."""
+        """The shortest `time_scale` of all walls [s]."""
         shortest = math.inf
         for wall in reversed(self.each):
             one = wall.members if isinstance(wall, Field) else wall
@@ -270,7 +270,7 @@ class Walls(Record):
         return max((0, *(wall.chord_sweeps for wall in each)))
 
     def keeps(self, number, r):
-        """Whether a step along the wall with this number that ends at a place on it ends where that wall is."""
+        """Whether the wall with this number is there at a place at which a step along it ends."""
         found = True
         for first, field in self.fields():
             found = field.members.keeps(number - first, r) & found
@@ -315,7 +315,7 @@ class Walls(Record):
         return found
 
 
-# What is asked of one wall by its number, and any value of the type of the answer.
+# The methods of one wall by its number, and any value of the type of the answer.
 _ASKED = {
     **dict.fromkeys(("velocity", "acceleration", "carry", "mean_velocity", "displacement", "swept"), ZERO),
     **dict.fromkeys(("unit_normal", "project", "push", "discrete_gradient", "step_normal", "chord_normal"), ZERO),

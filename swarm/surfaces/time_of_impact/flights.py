@@ -13,9 +13,9 @@ from .straight import Looked, Straight
 
 
 class Hit(NamedTuple):
-    """Time of a hit and the wall's number.
+    """The time of a hit and the number of the wall.
 
-    The number is -1 where the flight is surely free until then, and what comes after is not known yet.
+    The number is -1 where the flight is surely free until that time, and has to be searched further from there.
     """
 
     time: float
@@ -29,12 +29,12 @@ NEVER = Hit(math.inf, 0.0)
 
 
 def of_flights(falls):
-    """The methods of a wall that free flights ask for, with gravity or without."""
+    """The names of the methods of a wall that free flights need; `falls`: under gravity."""
     return ("falling_hit" if falls else "first_hit",)
 
 
 def of_steps(falls):
-    """The same for whole steps, some of which are jumped over."""
+    """The names of those that whole steps need, some of which are skipped by a bound."""
     # The loops of a fall are compiled for every method.
     free = ("safe_time", "falling_hit") if falls else ("first_hit",)
     return *free, "inner", "level_of"
@@ -75,14 +75,14 @@ def union_hit(walls, rooms, hits, gravity, flight, stops=False):
 
 
 def soonest(hit, number, later):
-    """The sooner one of a hit with a field that has so many walls before it and that with a later wall."""
+    """The sooner of two hits: with a field that begins at this number, and with a later wall."""
     first = hit.time <= later.time
     wall = select(hit.wall < 0.0, -1.0, hit.wall + number)
     return Hit(select(first, hit.time, later.time), select(first, wall, later.wall))
 
 
 def sooner(time, found, number, later):
-    """The sooner one of the hit with the wall of this number and that with a later wall."""
+    """The sooner of two hits: with the wall of this number, and with a later wall."""
     sooner = later.time < time
     return Hit(select(sooner, later.time, time), select(sooner, later.wall, select(found, number, -1.0)))
 
