@@ -1,4 +1,4 @@
-"""Scene files: TOML to a job. A scene file is data: nothing in it is executed."""
+"""Scene files: from TOML to a `Job`. A scene file is data: nothing in it is executed."""
 
 import dataclasses
 import tomllib
@@ -32,13 +32,13 @@ _SCENE = ("gravity", "period", "plane", "pairs")
 _TABLES = (*_SCENE, "particles", "body", "source", "counter", "surface", "method", "run")
 SWEEP = "sweep"
 _SAVED = {"checkpoint": 60.0}
-# Keys of [run] that name a file to write, and the options of swarm run that do.
+# Keys of [run] that name a file to write -> the options of `swarm run` for the same file.
 OUTPUTS = {"trajectory": "-o", "recording": "--record", "impacts": "--impacts"}
 
 
 @dataclass(frozen=True)
 class ParticlesTable(Validated):
-    """[particles]: their number, speed and mass, or the file that holds them; `fill` and `pack` check what is left."""
+    """[particles]: their number, speed and mass, or the file that holds them; `fill` and `pack` check the rest."""
 
     count: Count | None = None
     speed: Magnitude | None = None
@@ -89,7 +89,7 @@ class BodiesFile:
 
 @dataclass(frozen=True)
 class Job:
-    """The run that a scene file describes, checked; `text` is the file itself, `named` the files that it names."""
+    """The checked run of a scene file; `text` is the text of the file, `named` the files that it names."""
 
     scene: Scene
     method: Method
@@ -100,7 +100,7 @@ class Job:
     named: tuple[Path, ...] = ()
 
     def inputs(self) -> dict[str, Path | None]:
-        """The files that are read, by what they are: none of them can be an output."""
+        """What a file is -> the file, for all files that are read: none of them can be an output."""
         files: dict[str, Path | None] = {"scene file": self.path, "file of the start": self.start_file()}
         files |= {f"file that the scene reads, {one.name}": one for one in self.named}
         return files | {f"module {name} of --plugins": file for name, file in plugins.files().items()}
@@ -108,7 +108,7 @@ class Job:
     def require_within(self, names: Iterable[str]) -> None:
         """Raise a SceneError if one of these outputs of [run] is not in the folder of the file, links followed.
 
-        A scene file may come from others: what it names alone is written beside it, and nowhere else.
+        A scene file may come from someone else: the outputs that it alone names are written beside it only.
         """
         folder = self.path.parent.resolve()
         for name in names:
@@ -120,12 +120,12 @@ class Job:
                 )
 
     def start_file(self) -> Path | None:
-        """The file that holds the particles or bodies, or None."""
+        """The file of the particles or bodies at the start, or None."""
         name = getattr(self.source, "source", None)
         return None if name is None else self.path.parent / name
 
     def located(self, error: SceneError) -> SceneError:
-        """An error, with the row of the file that holds the particle that it is about."""
+        """The error, with the row of the .csv file of its particle if it is about one."""
         file = self.start_file()
         if error.particle is None or file is None or file.suffix.lower() != ".csv":
             return error
@@ -153,7 +153,7 @@ class Job:
 
 
 def _read(file: Path, table: ParticlesTable | BodiesFile) -> "Particles | Bodies":
-    """The particles or bodies that a file holds."""
+    """Read the particles or bodies of a file."""
     if file.suffix.lower() == ".csv":
         return Particles.from_csv(file)
     from .files.trajectory import load  # h5py only where it is used
@@ -177,7 +177,7 @@ def read(path: str | Path, plugins: Iterable[str] = ()) -> Job:
 
     Args:
         path: the file.
-        plugins: the modules with code that it may name, as "module:Name", for laws, surfaces, methods and observables.
+        plugins: modules with laws, surfaces, methods and observables, which the file may name as "module:Name".
 
     Raises:
         SceneError: the file cannot be read, is not TOML, a key is unknown, missing or out of its range, or it names
@@ -202,7 +202,7 @@ def _read_job(path: Path) -> Job:
 
 
 def text_of(path: Path) -> str:
-    """The text of a scene file; a SceneError if it cannot be read."""
+    """The text of a scene file; raises a `SceneError` if it cannot be read."""
     try:
         # Editors on Windows begin a file with a byte order mark.
         return path.read_text(encoding="utf-8-sig")
@@ -213,7 +213,7 @@ def text_of(path: Path) -> str:
 
 
 def document_of(text: str, path: Path) -> dict[str, Any]:
-    """The tables of a scene file; a SceneError if its text is not TOML."""
+    """The tables of a scene file; raises a `SceneError` if its text is not TOML."""
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -223,13 +223,13 @@ def document_of(text: str, path: Path) -> dict[str, Any]:
 
 
 def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None = None) -> Job:
-    """The job of the tables of a scene file; files that it names are beside `path`.
+    """The job of the tables of a scene file.
 
     Args:
         document: the tables.
-        text: the file itself.
-        path: its path.
-        scene: that of its tables, where it is known; None: it is made.
+        text: the text of the file.
+        path: its path; the files that it names are relative to its folder.
+        scene: the scene of its tables if it has been made before; None: it is made.
 
     Raises:
         SceneError: a key is unknown, missing or out of its range; the sentence begins with the key.
@@ -264,7 +264,7 @@ def _start_of(document: dict[str, Any]) -> "ParticlesTable | BodiesFile | Made |
 
 
 def _with_bodies(surfaces: Any, path: Path) -> Any:
-    """The tables of the surfaces, with the bodies of those that take them from a file."""
+    """The tables of the surfaces, with the arrays of fields that take their solids from a file."""
     if not isinstance(surfaces, list):
         return surfaces
     return [_bodies_of(table, f"surface[{i}]", path) for i, table in enumerate(surfaces)]
@@ -300,7 +300,7 @@ def _bodies_of(table: Any, where: str, path: Path) -> Any:
 
 
 def _named_files(document: dict[str, Any], path: Path) -> Iterator[Path]:
-    """The files that texts of the document name, but those to write; of a trajectory also its shards."""
+    """The existing files that a text of the document names, except outputs; with a trajectory also its shards."""
     run = document.get("run")
     read = {key: value for key, value in run.items() if key not in OUTPUTS} if isinstance(run, dict) else {}
     places: list[Any] = [{**document, "run": read}]
@@ -314,7 +314,7 @@ def _named_files(document: dict[str, Any], path: Path) -> Iterator[Path]:
 
 
 def _run(table: Any, path: Path) -> RunOptions:
-    """[run]; a run from a file saves checkpoints even where it does not say so. Its files are beside the scene file."""
+    """The options of [run]: with checkpoints by default, and files relative to the folder of the scene file."""
     if not isinstance(table, dict):
         return tables.convert(table, RunOptions, "run")
     table, own = {**_SAVED, **table}, table.get("observables")

@@ -1,4 +1,4 @@
-"""The run of a scene file, from Python and from the command line: its outputs, checked, and the call `swarm.run`."""
+"""The run of a scene file: `swarm.run`, and the checks of outputs that the command line shares."""
 
 import dataclasses
 import os
@@ -14,7 +14,7 @@ from ..run.result import Result
 from ..run.simulation import carry_out
 from ..scene_file import OUTPUTS, Job, read
 
-# Keywords of `simulate` that a scene file has as tables of its own.
+# Keywords of `simulate` that are tables of a scene file, not keys of [run].
 _TABLES = ("sources", "counters")
 # How Python names an output, for sentences.
 _IN_PYTHON = {"trajectory": "output={!r}", "recording": "recording={!r}", "impacts": "impacts={!r}"}
@@ -31,8 +31,8 @@ def run(
 
     Args:
         path: the scene file, TOML.
-        output: the trajectory to write; None: that which the file names in [run], or no file at all.
-        plugins: the modules with code that the file may name, as "module:Name": laws, surfaces, methods, observables.
+        output: the trajectory to write; None: the one that the file names in [run], if any.
+        plugins: modules with laws, surfaces, methods and observables, which the file may name as "module:Name".
         options: keywords of `simulate`, such as until, every, threads or progress, in place of the keys of [run].
 
     Returns:
@@ -73,7 +73,7 @@ def run(
     if output is not None:
         given["trajectory"] = paths.target_of("trajectory", output)
     elif job.run.trajectory is None and not given.get("resume"):
-        # Nothing is written: nothing to go on with.
+        # Without a trajectory there is nothing to resume.
         given.setdefault("checkpoint", None)
     chosen = dataclasses.replace(job.run, **given)
     alone = named_alone(job, trajectory=output, recording=options.get("recording"), impacts=options.get("impacts"))
@@ -85,7 +85,7 @@ def run(
 
 
 def named_alone(job: Job, **given: Any) -> list[str]:
-    """The outputs that the scene file names and the caller does not, in the folder of the file."""
+    """The names of the outputs that the scene file names and the caller does not; these must be in its folder."""
     alone = [name for name, file in given.items() if file is None and getattr(job.run, name) is not None]
     job.require_within(alone)
     return alone
@@ -94,8 +94,15 @@ def named_alone(job: Job, **given: Any) -> list[str]:
 def check_outputs(job: Job, options: RunOptions, alone: list[str], allow: str, named: dict[str, str]) -> None:
     """Raise a SceneError if an output cannot be written, or may not be replaced.
 
-    What the scene file names alone is not overwritten: the option to overwrite is meant for files of the caller. The
-    sentence says how these are `allow`ed, with the name of an output as the caller gives it, of `named`.
+    An output that the scene file alone names is never overwritten, as the option to overwrite is for those that the
+    caller names.
+
+    Args:
+        job: the scene file.
+        options: the options of the run.
+        alone: the names of the outputs that the scene file alone names.
+        allow: for the sentence of the error, how to overwrite an output; {} is the output as the caller gives it.
+        named: name of an output -> how the caller gives it; {} is its path.
     """
     paths.check_distinct({**options.files(), "recording": options.recording}, job.inputs())
     going_on = options.trajectory is not None and paths.checkpoint_of(options.trajectory).exists()

@@ -1,4 +1,4 @@
-"""The command line: the commands, and what their errors and signals become."""
+"""The command line: the commands, and the exit codes of errors and signals."""
 
 import sys
 
@@ -89,7 +89,7 @@ app.add(
 
 
 def main() -> None:
-    """Run the command line; its exit codes: `_CODES`."""
+    """Run the command line. Its exit codes are `_CODES`."""
     try:
         app()
     except SwarmError as error:

@@ -1,4 +1,4 @@
-"""Commands from functions: the annotation of a parameter has its type, its names on the command line, and its help."""
+"""Commands made of functions: a parameter is annotated with its type, its names on the command line, and its help."""
 
 import inspect
 from collections.abc import Callable
@@ -11,26 +11,26 @@ _INTERRUPTED = 130
 
 
 class Option:
-    """An option by its names; without names, that of the parameter."""
+    """An option with these names; without any, its name is that of the parameter."""
 
     def __init__(self, *names: str, **more: Any) -> None:
         self.names, self.more = names, more
 
     def parameter(self, name: str, kind: Any, default: Any) -> click.Parameter:
-        """It as click has it; an option without a default is needed."""
+        """The option of click for a parameter of a function; required if the parameter has no default."""
         more = {"required": True} if default is inspect.Parameter.empty else {"default": default}
         more |= {"is_flag": True} if kind is bool else {"type": _type_of(kind), "multiple": kind == list[str]}
         return click.Option([*(self.names or [f"--{name}"]), name], **more, **self.more)
 
 
 class Positional:
-    """An argument, which is needed."""
+    """A required argument."""
 
     def __init__(self, metavar: str, help: str) -> None:
         self.metavar, self.help = metavar, help
 
     def parameter(self, name: str, kind: Any, default: Any) -> click.Parameter:
-        """It as click has it."""
+        """The argument of click for a parameter of a function."""
         return click.Argument([name], type=_type_of(kind), metavar=self.metavar, help=self.help)
 
 
@@ -39,7 +39,7 @@ def _type_of(kind: Any) -> Any:
 
 
 class _Interruptible(click.Command):
-    """A command that an interrupt which it lets through ends as a shell expects."""
+    """A command that ends with the exit code 130 at an interrupt, as a shell expects."""
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
@@ -52,7 +52,7 @@ class Group(click.Group):
     """Commands in the order in which they are added."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Their names."""
+        """The names of the commands."""
         return list(self.commands)
 
     def add(self, function: Callable[..., None], epilog: str, short_help: str | None = None) -> None:

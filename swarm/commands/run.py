@@ -14,7 +14,7 @@ from ..errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .options import Option, Positional
 from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
 
-# Behind the reason why a run has stopped.
+# Follows the reason why a run has stopped.
 _COMPILED = ", after a compilation that was under way"
 
 
@@ -55,7 +55,7 @@ def run(  # noqa: PLR0913  one argument an option
 ) -> None:
     """Simulate a scene file and write its trajectory."""
     began = time.monotonic()
-    # An exception in the middle of an import may be lost; nothing is open yet.
+    # An exception during an import may be lost. No file is open yet.
     with interrupt.importing():
         from .. import scene_file as files
         from ..authoring.file_run import check_outputs, named_alone
@@ -91,7 +91,7 @@ def run(  # noqa: PLR0913  one argument an option
                 cluster=cluster,
                 shards=shards,
             )
-            # Before particles are made and kernels compiled.
+            # Outputs are checked before particles are made and kernels compiled.
             allow = "overwrite it by naming it on the command line: {} --overwrite"
             check_outputs(
                 job, options, alone, allow, {name: f"{option} {{}}" for name, option in files.OUTPUTS.items()}
@@ -104,7 +104,7 @@ def run(  # noqa: PLR0913  one argument an option
             raise job.located(error) from None
     except (KeyboardInterrupt, WallTimeError) as stop:
         status = "walltime" if isinstance(stop, WallTimeError) else "interrupted"
-        # The files are closed: a second signal may end the process here.
+        # All files are closed, so a second signal may end the process.
         with interrupt.at_once():
             has_frames = target.exists() and (resumes or paths.identity(target) != before)
             reason = REASONS[status] + (_COMPILED * bool(getattr(stop, "compiled", 0.0)))
@@ -127,7 +127,7 @@ def run(  # noqa: PLR0913  one argument an option
 
 
 def _stopped(reason: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:
-    """Print how to resume a run that was stopped; the command, or None if there is nothing to resume from."""
+    """Print how to resume a run that was stopped. Returns that command, or None if it cannot be resumed."""
     from ..files import paths
 
     if not (has_frames or (on_cluster and paths.checkpoint_of(target).exists())):

@@ -1,4 +1,4 @@
-"""Parts of several commands: arguments, output, and the command that goes on with what was stopped."""
+"""What several commands share: arguments, output, and the command that resumes a run."""
 
 import itertools
 import shlex
@@ -16,19 +16,19 @@ Plugins = Annotated[
 ]
 Quiet = Annotated[bool, Option("--quiet", help="No progress bar and no summary.")]
 
-# Exit codes of what is stopped: that of a shell for SIGINT; EX_TEMPFAIL of sysexits.h, "try again later", where the
-# wall time is over, by which a chain of jobs knows that another one is needed.
+# Exit codes of runs that are stopped. 130 is that of a shell for SIGINT. 75 is EX_TEMPFAIL of sysexits.h, "try again
+# later": the wall time is over, and a chain of jobs needs another one.
 EXIT_CODES = {"interrupted": 130, "walltime": 75}
 REASONS = {"interrupted": "interrupted", "walltime": "the wall time limit is reached"}
 
 
 def written(path: Path) -> None:
-    """Print where a file is, and its size."""
+    """Print the path and the size of a file that was written."""
     print(f"written to {path} ({path.stat().st_size / 1e6:.1f} MB)")
 
 
 def command_again() -> str:
-    """This command as it goes on with what it began, without the options that do not apply to that."""
+    """The command line that resumes this run: this one with --resume, without the options that do not go with it."""
     again = [
         word
         for before, word in itertools.pairwise(["", *sys.argv[1:]])

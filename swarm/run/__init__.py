@@ -1,4 +1,4 @@
-"""The run of a scene file; and a package: frames, threads.
+"""The function `swarm.run`, which carries out a scene file; and the package of runs.
 
     swarm.run(path, output=None, *, plugins=(), **options) -> swarm.Result
 
@@ -16,7 +16,7 @@ from typing import Any
 
 
 class _Called(ModuleType):
-    """This package, which may be called: a function of its name would hide its modules, or be hidden by them."""
+    """This package as a callable. A function named `run` would hide its modules, or be hidden by them."""
 
     def __call__(self, path: Any, output: Any = None, *, plugins: Any = (), **options: Any) -> Any:
         """Carry out the run of a scene file; see the function of `authoring.file_run`."""
@@ -25,7 +25,7 @@ class _Called(ModuleType):
         return wing("authoring.file_run").run(path, output, plugins=plugins, **options)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its name, as any module is pickled with code that a cluster is sent."""
+        """Pickle by name, as any other module that code for a cluster refers to."""
         return pkgutil.resolve_name, (self.__name__,)
 
 
