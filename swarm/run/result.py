@@ -42,16 +42,16 @@ class Result:
             and "max_penetration" into a wall [m]; "momentum" and "angular_momentum" (frames, 3), "impulse" and
             "wall_heat" (frames, surfaces). Where a surface is a union or an intersection also "part_impulse" and
             "part_heat" (frames, parts), of each of `scene.parts`. Where walls move also "wall_work" (frames, surfaces)
-            [J] and "wall_position" (frames, surfaces, 3) [m] and "wall_orientation" (frames, surfaces, 4), quaternions
-            (w, x, y, z): the point xi of the surface as given is at position + orientation xi. Where walls react also
-            "wall_energy" (frames, surfaces) [J], which "total_energy" includes, "wall_velocity" [m/s] and "wall_spin"
-            [rad/s] (frames, surfaces, 3). Of bodies also "link_error", the "work" of anchors that move [J], and
-            "cavity_impulse" (frames, cavities) on the cavities that points carry [N s]. With member_impacts=True
-            "member_impacts" (frames, members) of all members of surface 0, then of surface 1, and so on. Where
-            particles may slide also "member_residence" [s], the time for which they slid, rested or, by a law, waited
-            there; at an edge it counts for the wall that they were on before, and a wait counts as a whole when it
-            begins. Where walls heat or absorb particles also "member_heat" [J] and "member_absorbed". Where laws of
-            walls return a `Leave` also "absorbed" (frames, surfaces), how many each has absorbed so far.
+            [J] and, except in runs of bodies, "wall_position" (frames, surfaces, 3) [m] and "wall_orientation" (frames,
+            surfaces, 4), quaternions (w, x, y, z): the point xi of the surface as given is at position + orientation
+            xi. Where walls react also "wall_energy" (frames, surfaces) [J], which "total_energy" includes,
+            "wall_velocity" [m/s] and "wall_spin" [rad/s] (frames, surfaces, 3). Of bodies also "link_error", the "work"
+            of anchors that move [J], and "cavity_impulse" (frames, cavities) on the cavities that points carry [N s].
+            With member_impacts=True "member_impacts" (frames, members) of all members of surface 0, then of surface 1,
+            and so on. Where particles may slide also "member_residence" [s], the time for which they slid, rested or,
+            by a law, waited there; at an edge it counts for the wall that they were on before, and a wait counts as a
+            whole when it begins. Where walls heat or absorb particles also "member_heat" [J] and "member_absorbed".
+            Where laws of walls return a `Leave` also "absorbed" (frames, surfaces), how many each has absorbed so far.
             With counters "crossings" (frames, counters, 2), how many have crossed each since 0 s, out of its admissible
             side and back; what they carried, "crossed_momentum" (frames, counters, 2, 3) [kg m/s] and "crossed_energy"
             (frames, counters, 2) [J]; and "crossed_slowness", the sum of 1/|v_n| [s/m]. A flux is a difference between
