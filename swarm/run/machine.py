@@ -105,7 +105,7 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
                 seen |= tally.seen(run.state.absorbed, task.is_shard) if tally else {}
                 run.require_admissible(seen, moment)
                 read = functools.partial(getattr, run.state)
-                seen |= _measured(task, measures, number, read, moment)
+                seen |= measures.of(number, moment, _snapshot_of(task, read, moment)) if measures else {}
                 # The file of a shard has its sums; the observables of the run are made of those of all shards.
                 if task.is_shard:
                     seen |= {} if task.is_coupled else {CHUNK_SUMS: run.chunk_sums()}
@@ -153,11 +153,6 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
         compilations.calls = run.calls
         session.restore(run)
         yield run, writer_of(task, session, recorder, watched.log), show, watched, measures
-
-
-def _measured(task: Task, measures: Measures, number: int, read: Read, moment: float) -> dict[str, Any]:
-    """The user-defined observables of a frame."""
-    return measures.of(number, moment, _snapshot_of(task, read, moment)) if measures else {}
 
 
 def _measures_of(task: Task, session: Session) -> Measures:

@@ -143,7 +143,7 @@ def test_foams_that_no_grain_may_meet_are_refused_in_a_sentence():
 @pytest.mark.parametrize(
     ("union", "words"),
     [
-        (swarm.Union([BIN.parts[0], swarm.Torus(0.02, 0.005)]), "made of a Torus, and edges of rooms are known"),
+        (swarm.Union([BIN.parts[0], swarm.Torus(0.02, 0.005)]), "made of a Torus, and balls meet edges of rooms made"),
         (
             swarm.Union([BIN.parts[0], swarm.Cylinder(0.01, length=0.2, restitution=0.5)]),
             "the parts differ in restitution, while an edge belongs to both",

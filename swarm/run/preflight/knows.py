@@ -202,12 +202,6 @@ def _fields(asked: Asked) -> Found:
     yield from ({"i": i, "got": asked.scene.surfaces[i]} for i in asked.scene.compiled().fields())
 
 
-def _in_fixed_steps_beside_motions(asked: Asked) -> Found:
-    """Fields, where walls move, in steps of fixed length."""
-    if asked.scene.moves() and not _takes_rooms(asked):
-        yield from _fields(asked)
-
-
 def _sheets(asked: Asked) -> Found:
     yield from (one for one in _faces(asked) if getattr(one["got"], "open", False))
 
@@ -467,7 +461,9 @@ CAPABILITIES = (
         (SOFT_BODIES, PAPER_BODIES): _listed("bodies and soft walls", "use Impact(dt=...)"),
         (BASELINE, OTHER_POINTS): _listed("{method}", _TO_EXACT),
     }),
-    Capability("many walls as one in fixed steps beside motions", _in_fixed_steps_beside_motions, {
+    Capability("many walls as one in fixed steps beside motions", _where(
+        lambda asked: asked.scene.moves() and not _takes_rooms(asked), _fields
+    ), {
         (PAPER,): Refusal(
             "surfaces[{i}] must not be {kind} with adaptive = False where walls move, got {got!r:.200}: loops that do "
             "not converge take too long there", "use Penalty or Impact",

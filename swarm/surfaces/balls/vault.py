@@ -111,7 +111,7 @@ def no_balls_in(union: Any) -> str | None:
         name = type(surface).__name__
         if surface.is_solid() or not isinstance(surface, _KINDS):
             known = ", ".join(kind.__name__ for kind in _KINDS)
-            return f"{begin}one is made of a {name}, and edges of rooms are known to balls of the insides of {known}"
+            return f"{begin}one is made of a {name}, and balls meet edges of rooms made of the insides of {known} alone"
     for what in (*_LAWS, *_CHANGES):
         if len({repr(getattr(surface, what)) for surface in surfaces}) > 1:
             return f"{begin}the parts differ in {what}, while an edge belongs to both: give the {what} to the whole"
