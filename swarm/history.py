@@ -19,7 +19,7 @@ from .methods import AugmentedLagrangian, Impact, Method, Penalty
 from .methods.base import check_surfaces
 from .particles import Particles
 from .run.options import RunOptions
-from .run.preflight.knows import Asked, require_known
+from .run.preflight.knows import Asked, require_supported
 from .scene import Scene
 from .state import Floats
 from .surfaces.lowered import lowered
@@ -101,7 +101,7 @@ def contact_history(
     particle = Particles(position, velocity, mass)
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")
-    require_known(Asked(scene, particle, method, RunOptions(until=1.0)))
+    require_supported(Asked(scene, particle, method, RunOptions(until=1.0)))
     mass = float(particle.mass[0])
     check_surfaces(method, scene)
     method.check(scene, particle)

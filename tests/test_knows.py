@@ -103,15 +103,15 @@ def test_names_of_capabilities_differ():
 
 def test_the_first_sentence_is_raised_and_what_is_supported_is_not():
     warm = swarm.Scene([swarm.Sphere(0.5, temperature=300.0)])
-    knows.require_known(asked(warm, POINT, IMPACT))
+    knows.require_supported(asked(warm, POINT, IMPACT))
     with pytest.raises(
         swarm.SceneError, match=r"^surfaces\[0\].temperature must be None with Verlet, got 300; use Impact$"
     ):
-        knows.require_known(asked(warm, POINT, swarm.Verlet(1e-3, 1e3)))
-    knows.require_known(asked(warm, BALL, PENALTY))
+        knows.require_supported(asked(warm, POINT, swarm.Verlet(1e-3, 1e3)))
+    knows.require_supported(asked(warm, BALL, PENALTY))
     heavy = swarm.Scene([swarm.Sphere(0.5, mass=2.0)])
     with pytest.raises(swarm.SceneError, match=r"^surfaces\[0\].mass .* with particles that have a radius and Penalty"):
-        knows.require_known(asked(heavy, BALL, PENALTY))
+        knows.require_supported(asked(heavy, BALL, PENALTY))
 
 
 def test_the_guide_shows_the_table():

@@ -19,7 +19,7 @@ from ..state import Floats
 from ..surfaces.plane import require_start
 from ..surfaces.time_of_impact import flights
 from .options import RunOptions
-from .preflight.knows import Asked, require_known
+from .preflight.knows import Asked, require_supported
 from .preflight.starts import require_inside
 from .starting_state import Seeding
 
@@ -76,7 +76,7 @@ def bounce(scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float =
     particle = Particles(position, velocity, mass)
     if len(particle) != 1:
         raise SceneError(f"position must be three numbers, got shape {particle.position.shape}")
-    require_known(Asked(scene, particle, Impact(), RunOptions(until=1.0)))
+    require_supported(Asked(scene, particle, Impact(), RunOptions(until=1.0)))
     _require_simple(scene)
     require_start(scene, particle)
     require_inside(scene, particle)

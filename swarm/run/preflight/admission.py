@@ -21,7 +21,7 @@ from ..impacts import require_logged
 from ..options import RunOptions, Task
 from . import workload
 from .counting import require_compiled, require_counters
-from .knows import Asked, require_known
+from .knows import Asked, require_supported
 from .softness import depths_at_start
 from .starts import require_inside
 
@@ -49,7 +49,7 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
         if not isinstance(value, allowed) and not (name == "particles" and value is None and options.sources):
             instead = "; None goes with sources=[...]" if value is None and name == "particles" else ""
             raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}{instead}")
-    require_known(Asked(scene, particles, method, options))
+    require_supported(Asked(scene, particles, method, options))
     if isinstance(particles, TiedParticles):
         _require_motions(scene, options.times.until)
         task: Task = engines.wing("bodies.admission").task_of(scene, particles, method, options)

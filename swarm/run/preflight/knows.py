@@ -2,7 +2,7 @@
 
 The particles of a run, its method, and whether impacts move a wall determine its engine. A capability is something that
 a run may ask for: a law of a wall, a source, a period. `CAPABILITIES` has a `Refusal` for each pair of an engine and a
-capability that is not supported; all other pairs are. `require_known` raises the first one that applies to a run,
+capability that is not supported; all other pairs are. `require_supported` raises the first one that applies to a run,
 before anything is compiled.
 """
 
@@ -781,7 +781,7 @@ def _refused_by(engine: str) -> list[tuple[Capability, str]]:
 _REFUSED = {engine: _refused_by(engine) for engine in (*ENGINES, OTHER_POINTS, OTHER_BALLS, OTHER_BODIES)}
 
 
-def require_known(asked: Asked) -> None:
+def require_supported(asked: Asked) -> None:
     """Raise a `SceneError` for the first capability that a run asks for and its engine does not support."""
     method = asked.method
     fields = {"method": type(method).__name__, "whole": method, "step": getattr(method, "contact_step", 0.0)}
