@@ -28,7 +28,7 @@ from .surfaces.time_of_impact import flights
 
 @dataclass(frozen=True)
 class ContactHistory:
-    """Arrays with one entry a sweep; of several surfaces the first four have a column each.
+    """Arrays with one entry for each sweep; with several surfaces the first four have the shape (sweeps, surfaces).
 
     Attributes, which are keys too (`history["multiplier"]`):
         multiplier: lambda during the sweep (sweeps,) [N for a = 1].

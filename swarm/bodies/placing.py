@@ -23,8 +23,8 @@ _INSTEAD = "swarm.Bodies(body, position, velocity)"
 def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float = 0.0, seed: int = 0) -> Bodies:
     """n copies of a body at random, uniform over the places and orientations at which it is within the walls.
 
-    The copies do not notice each other. Within means that all contact points are; where there are solids, so are points
-    of the links and of the sides of the faces.
+    Copies may overlap, as bodies do not meet one another. Within means that all contact points are; where there are
+    solids, so are points of the links and of the sides of the faces.
 
     Args:
         scene: its volume must be bounded.

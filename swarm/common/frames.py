@@ -39,9 +39,10 @@ class Frame:
     reads them during its call. Of bodies the particles are all points, of a trajectory those that it keeps.
 
     Attributes:
-        number, time: of the frame, from 0 on, and [s].
+        number: the number of the frame, from 0 on.
+        time: its time [s].
         until: the end of the run [s].
-        observables: those of this frame, by their names; in a function of `observables` not yet there.
+        observables: name -> value, in this frame; not available in a function of `observables`.
         written: number of frames in the trajectory.
 
     >>> import swarm

@@ -47,8 +47,8 @@ def pack(
     """Balls that fill a part of the admissible volume of a scene, up to 0.6 of it, in a plane 0.8.
 
     They begin smaller at random places, as in `fill`, and grow while they fly, collide, and keep within the walls as
-    they are at 0 s (Lubachevsky and Stillinger's way). The places are random, but no equilibrium: let them fly for some
-    collisions where that matters.
+    they are at 0 s (the method of Lubachevsky and Stillinger). The places are random but not in equilibrium: let the
+    balls fly for some collisions where that matters.
 
     Args:
         scene: its volume must be bounded.

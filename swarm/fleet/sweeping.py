@@ -99,8 +99,8 @@ def sweep(  # noqa: PLR0913  the keywords are the public interface
         "run.until" = {linspace = [1.0, 2.0, 5]}    # or geomspace
 
     Every run is an ordinary one, with its trajectory STEM.h5, its checkpoint, and STEM.json, which notes its end; the
-    stem is a digest of its scene, so that lists can be made longer later. A run that fails is a row with its sentence
-    and stops no other. The scripts of callers need no `if __name__ == "__main__"`.
+    stem is a digest of its scene, so that lists can be made longer later. A run that fails has its error
+    in its row, and does not stop the others. Scripts need no `if __name__ == "__main__"`.
 
     Args:
         path: the sweep file.

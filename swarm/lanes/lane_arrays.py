@@ -148,7 +148,7 @@ class Lanes(NamedTuple):
         for s in range(booked(walls)):
             state.impulse[s, i] += self.impulse[s, k] * state.mass[i]
         if method.dissipates:
-            # Each particle knows its energy: what it has lost is accounted for with it.
+            # The energy of each particle is kept, so what it has lost is accounted for with it.
             now = 0.5 * lane.twice
             if method.laws.loses:
                 work = 0.0
@@ -228,6 +228,6 @@ def booked(walls):
 
 
 def speed2_scale(state, i):
-    """The square of the speed that a particle's energy scale is that of."""
+    """Twice the energy scale of a particle per mass, the square of a speed."""
     scale = state.inverse_scale[i]
     return select(scale > 0.0, 2.0 / select(scale > 0.0, scale, 1.0), 1.0)

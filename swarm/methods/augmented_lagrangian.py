@@ -91,8 +91,8 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     observable "sweeps".
     Laws of walls, openings and doors are those of `Penalty`: laws act where a contact ends.
     In unions of several rooms, and in foams, a step that is cut at an impact takes the walls of the room that it is in.
-    Walls may move in fixed steps, which are those of the frame of each wall; steps that are cut at
-    impacts, and exact impacts in their place, know walls at rest only.
+    Walls may move in fixed steps, which are taken in the frame of each wall; steps that are cut at
+    impacts, and exact impacts in their place, need walls at rest.
     Source: García Orden & Ortega 2007, eqs. (6)-(9), and the composite form of contact/discrete_gradient.py.
 
     >>> AugmentedLagrangian(dt=0.025, penalty=1e4, exponent=1.0, gradient="mean-value")

@@ -1,17 +1,20 @@
-"""The contract of a method: every function that the loops over lanes ask of one, required or derived.
+"""The contract of a method: every function that the loops over lanes call, required or derived.
 
-A method is a record for kernels, derived from `MethodNumbers`. A pass is a free flight followed by at
-most one contact. Its parts are scalar, branch-free functions of one lane, and the lanes loop over each part separately:
-short loops keep more lanes in the processor's window than one long loop (measured on Zen 3: 7.8 instead of 10.3 ns an
-impact in an ellipsoid). What is rare and needs loops and branches is left to `hard_pass`.
+A method is a record for kernels, derived from `MethodNumbers`. A pass is a free flight followed by at most one contact.
+Its parts are scalar, branch-free functions of one lane, and the lanes loop over each part separately: short loops keep
+more lanes in the processor's window than one long loop (measured on Zen 3: 7.8 instead of 10.3 ns an impact in an
+ellipsoid). Contacts that are rare and need loops and branches are left to `hard_pass`.
 
 Required are
     constants and own       what a lane keeps of its particle for the whole frame,
-    land or flight          the way to the next contact: from the first hit, which is found before, or by itself,
+    land or flight          the way to the next contact: `land` is given the first hit, `flight` finds the contact,
     contact                 the contact in lanes.
-A method has `hard_pass` too if its `flight` or `contact` leaves contacts to it; one with an unknown in its contact has
-`guess`, `improve` and `most_sweeps`, one that is too long for a loop `turn`, and one with a multiplier the three
-functions of Uzawa's loop. examples/own_method.py is a complete method.
+Others are needed by some methods:
+    hard_pass                       if `flight` or `contact` leaves contacts to it,
+    guess, improve, most_sweeps     if a contact has an unknown,
+    turn                            if one loop for all of a contact would be too long,
+    first_multiplier, next_multiplier, multiplier_sweeps    if it has a multiplier.
+examples/own_method.py is a complete method.
 """
 
 from typing import Any, NamedTuple
@@ -24,15 +27,15 @@ from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec
 
-# A wall's number this low asks for `hard_pass`: HARD - wall is the wall.
+# The number of a wall up to this one leaves the contact to `hard_pass`: the wall is HARD - number.
 HARD = -2.0
 NOT_TURNED = ReflectedVelocity(ZERO, 0.0)
 
 
 class Lane(NamedTuple):
-    """One particle under way: what is left of its frame in the method's unit, its impacts in it, what it keeps.
+    """One particle under way: `remaining` of the frame in the method's unit, the `hits` in it, the record `own`.
 
-    `flown` is how long the flight was that ended at the contact, of a method that `asks_flown`.
+    `flown` is the duration of the flight before the contact, in a method that `asks_flown`.
     """
 
     r: Vec
@@ -64,7 +67,7 @@ NO_RECORD = LoopRecord(0.0, 0.0, 0.0)
 
 
 class Sweep(NamedTuple):
-    """Lambda, what its sweep missed by, of this sweep of the loop or of the one before."""
+    """A sweep of the loop: lambda, and by how much the sweep missed."""
 
     multiplier: float
     miss: float
@@ -73,10 +76,10 @@ class Sweep(NamedTuple):
 class Contact(NamedTuple):
     """The result of a contact of a lane, with the normal impulse per mass that the wall gave, and new impacts.
 
-    Where walls have a restitution or laws, twice_energy is twice the energy per mass that is left. What a method itself
-    loses is in no book: losses are for a `WallLaw`. Where a method `holds`
-    particles on walls, `lasts` says that another kernel decides what follows, at this wall. Where walls move, `work` is
-    what this wall gave by its motion, per mass.
+    Where walls have a restitution or laws, `twice_energy` is twice the energy per mass that is left. No observable
+    counts what a method itself loses: losses are for a `WallLaw`. In a method that `holds` particles on walls, `lasts`
+    is whether another kernel decides what follows at this wall. Where walls move, `work` is the work of this wall per
+    mass.
     """
 
     r: Vec
@@ -96,7 +99,7 @@ def wall_of(asked):
 
 
 def refused(lane, status):
-    """A contact that is not taken, for this reason: a result of `hard_pass`."""
+    """(a contact that changes nothing, the status that says why): a result of `hard_pass`."""
     return Contact(lane.r, lane.v, lane.remaining, 0.0, 0.0, 0.0, 0.0, False), status
 
 
@@ -105,15 +108,15 @@ class MethodNumbers(Record):
 
     @classmethod
     def gives(cls, name):
-        """Whether a method has a definition of its own."""
+        """Whether the class of a method overrides a method of `MethodNumbers`."""
         return getattr(cls, name) is not getattr(MethodNumbers, name)
 
     # --- What a lane keeps ---
 
     def constants(self, mass, energy, scale2):
-        """Three numbers of one particle that hold for the whole run but for what walls do; `own` gives them names.
+        """Three numbers of one particle, which only walls change during a run; `own` gives them names.
 
-        `scale2` is the square of the speed that its energy scale is that of.
+        `energy` is its energy per mass, and `scale2` twice its energy scale per mass, the square of a speed.
         """
         raise NotImplementedError
 
@@ -123,7 +126,7 @@ class MethodNumbers(Record):
 
     @property
     def dissipates(self):
-        """Whether contacts change the energy: then the first constant is twice the energy per mass, and changes."""
+        """Whether contacts change the energy; the first constant is then twice the energy per mass."""
         return False
 
     @property
@@ -132,14 +135,14 @@ class MethodNumbers(Record):
         return False
 
     def instant(self, v):
-        """A time [s] in which a particle of this velocity gets nowhere; 0 where the method does not say."""
+        """A time [s] in which a particle with this velocity hardly moves; 0 if the method does not say."""
         return 0.0
 
     # Whether a particle moves during a contact: then counters look at contacts too. A constant for the compiler.
     contacts_take_time = False
 
     def seconds(self, remaining):
-        """A part of a frame [s], given in the method's unit."""
+        """A part of a frame in seconds, from one in the method's unit."""
         return remaining
 
     @property
@@ -149,51 +152,51 @@ class MethodNumbers(Record):
 
     @property
     def laws_at_ends(self):
-        """The `Laws` of its walls that act where a contact ends, of a method of contacts that take time; or None."""
+        """The `Laws` that act where a contact ends, in a method with contacts that take time; else None."""
         return
 
     @property
     def sliding_tolerance(self):
-        """The relative error of a crossing, of a particle that slides."""
+        """The relative error of a crossing by a particle that slides."""
         return 0.0
 
     def walls_of(self, walls, remaining):
-        """The walls of a scene as `contact` takes them, with so much of the frame left: those at this instant.
+        """The walls that `contact` takes: those at the instant with so much of the frame left.
 
-        A method of steps takes all there are, to ask them over its step.
+        A method with steps overrides it, and takes the walls over its step.
         """
         return walls.at(remaining)
 
     @property
     def steps_into_walls(self):
-        """Whether it finds its contacts by steps into walls: then it is decided before each which walls are open."""
+        """Whether it finds its contacts by steps into walls; before each step it is decided which walls are open."""
         return False
 
     def touched(self, walls, gravity, lane):
-        """The wall that the next step of such a method touches, as the `FlightEnd` has it."""
+        """The wall that the next step of such a method touches, as `FlightEnd.wall`."""
         return -1.0
 
     def at_start(self, walls, remaining):
         """The walls at the start of that step, with so much of the frame left in the method's unit."""
         return walls.at(remaining)
 
-    # Whether `contact` asks other walls than the one that was met: a constant for the compiler.
+    # Whether `contact` depends on other walls than the one that was met: a constant for the compiler.
     looks_around = False
 
     # --- Flight ---
 
-    # Whether contacts ask how long the flight before them was: a constant for the compiler.
+    # Whether contacts depend on the duration of the flight before them: a constant for the compiler.
     asks_flown = False
 
     def flight(self, walls, gravity, lane, hit=None):
-        """The `FlightEnd` to the next contact, or to the end, of a method that finds its contacts by itself.
+        """The `FlightEnd` at the next contact, or at the end of the frame, in a method that finds its contacts.
 
-        `hit` is its first hit, a `flights.Hit`, where it is known.
+        `hit` is the first hit, a `flights.Hit`, where that is known.
         """
         return FlightEnd(lane.r, lane.v, lane.remaining, -1.0)
 
     def land(self, walls, gravity, lane, hit):
-        """The `FlightEnd` to the first hit, a `flights.Hit` that is found before, or to the end of the frame."""
+        """The `FlightEnd` at the first `hit`, a `flights.Hit`, or at the end of the frame."""
         return FlightEnd(lane.r, lane.v, lane.remaining, -1.0)
 
     @property
@@ -202,7 +205,7 @@ class MethodNumbers(Record):
         return self.gives("land")
 
     def landed_on(self, walls):
-        """The walls with the first hits that `land` takes; None where the method finds its contacts by itself."""
+        """The walls with the first hits for `land`; None in a method that has `flight`."""
         return walls if self.lands else None
 
     # --- The unknown of a contact ---
@@ -212,7 +215,7 @@ class MethodNumbers(Record):
         return 0.0, False
 
     def improve(self, walls, gravity, lane, wall, solution, multiplier):
-        """One sweep of the solve: (kappa, unsolved, LoopRecord). A lane that is solved stays as it is, bit by bit."""
+        """One sweep of the solve: (kappa, unsolved, LoopRecord). A lane that is solved keeps its bits."""
         return solution.kappa, False, NO_RECORD
 
     def most_sweeps(self, walls):
@@ -221,11 +224,11 @@ class MethodNumbers(Record):
 
     @property
     def solves(self):
-        """None where contacts have a closed form: then nothing that solves for an unknown is compiled."""
+        """The method itself if it has a `guess`, else None: contacts have a closed form, and no solver is compiled."""
         return self if self.gives("guess") else None
 
     def turn(self, walls, gravity, lane, wall, kappa):
-        """The `ReflectedVelocity`, for `contact`, where one loop of both would be too long."""
+        """The `ReflectedVelocity` that `contact` is given, where one loop for both would be too long."""
         return NOT_TURNED
 
     @property
@@ -236,11 +239,11 @@ class MethodNumbers(Record):
     # --- Uzawa's loop (8) around it ---
 
     def first_multiplier(self, walls, gravity, lane, wall, kappa):
-        """The multiplier that the loop starts from, kappa for it, and the acceleration of the loop."""
+        """(the multiplier that the loop starts from, its kappa, the acceleration of the loop)."""
         return 0.0, kappa, 0.0
 
     def next_multiplier(self, lane, acceleration, multiplier, record, before):
-        """The multiplier after a sweep, its miss, and whether to go on; `before` is the last `Sweep`."""
+        """(the multiplier after a sweep, its miss, whether the loop goes on); `before` is the last `Sweep`."""
         return 0.0, 0.0, False
 
     @property
@@ -253,8 +256,8 @@ class MethodNumbers(Record):
     def contact(self, walls, gravity, lane, wall, solution):
         """The `Contact` with this wall.
 
-        A wall that is HARD already passes through and nothing else changes; to become hard, return `HARD - wall`. A
-        solution that is unsolved was not found, or its multiplier did not converge.
+        A wall that is HARD already is returned as it is, and nothing else changes. To leave the contact to `hard_pass`,
+        return `HARD - wall`. A solution that is unsolved was not found, or its multiplier did not converge.
         """
         raise NotImplementedError
 

@@ -47,8 +47,8 @@ class Penalty(fixed_step.SoftWalls):
     a step may go a twentieth of the shortest period.
 
     Laws of walls: `restitution`, `friction`, `temperature` and `laws` act on points where a contact ends. They make of
-    it what they make of an impact on a rigid wall, and what they take or give is booked. Friction is that of the whole
-    impulse of a contact. A contact that a weight makes last is rubbed each time that it swings back.
+    it what they make of an impact on a rigid wall, and what they take or give is booked. Friction acts on the whole
+    impulse of a contact; in a contact that gravity makes last it acts each time that the particle swings back.
 
     Openings: a step decides at its start whether the wall is open at the foot of the point on it. Doors are at whole
     steps. What a contact stores with a wall that opens, or goes, is in "dissipated_energy".

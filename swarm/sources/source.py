@@ -56,8 +56,8 @@ class Source(Validated):
     resumes and shards. The particles that come are numbered behind those of the start, in the order in which they come.
 
     Births are in the half-open interval from `start`, included, to `stop`, excluded, as walls are `present`: of two
-    sources of which one begins when the other stops, no birth is of both. The end of a run is no end of a source: a
-    frame has all births up to its time, and at it, so it is the same whenever the run ends. With a method of fixed
+    sources of which one begins when the other stops, no birth is of both. A source does not end with the run: a
+    frame has all births up to its time, and at it, so it does not depend on the end of the run. With a method of fixed
     steps particles come at the end of the step in which their birth falls.
 
     Args:

@@ -68,20 +68,22 @@ class Surface(Validated):
         rolling: the resistance to rolling of particles with a radius, of `Penalty`, 0 or more: an angular impulse
             against the angular velocity across the normal, of at most this times the radius times the normal impulse.
         temperature: k_B T of a thermal wall [J], as in `fill`, 0 or more; None: the wall exchanges no heat.
-        accommodation: in [0, 1], with which probability a particle leaves a thermal wall with a velocity of the wall's
-            temperature (diffusely), instead of specularly.
+        accommodation: in [0, 1], the probability that a particle leaves a thermal wall diffusely, with a velocity of
+            the wall's temperature, and not specularly.
         laws: `WallLaw`s in their order, such as `Lambert`, `Absorb`, `CercignaniLampis`, `Sticky` or user-defined laws.
             They give the velocity with which a particle leaves.
-        motion: None, `Translation`, `Oscillation`, `Rotation`, `Path` or a sum of them, with what is given being where
-            the wall is before it moves. Its laws act on the velocity relative to the wall.
-        mass: of a wall that impacts move [kg], above 0; None: nothing does. It moves without turning: along its
-            `motion` if that is a `Guide`, else freely, with the velocity of a `Translation` at the start.
-        inertia: of a wall that impacts turn about the axis of its `Rotation`, with that rate at the start [kg m^2],
-            above 0. With a mass as well it is a pendulum with its weight at its `center`; without, on the axis.
-        openings: surfaces without openings, laws and motion, inside which the wall is not there (with side "outside":
-            outside of which; of many bodies, such as `Spheres`: in each of them). A particle that reaches the wall
-            there has escaped, and stays as it is then. Of a wall at rest, or of one with a mass, with which they move.
-            An `Opening` is open for some times only.
+        motion: None, `Translation`, `Oscillation`, `Rotation`, `Path` or a sum of them, from where the surface is given.
+            The laws of the wall act on the velocity relative to it.
+        mass: the mass of a wall that impacts move [kg], above 0; None: impacts do not move it. It moves without
+            turning: along its `motion` if that is a `Guide`, else freely, with the velocity of a `Translation` at the
+            start.
+        inertia: the moment of inertia of a wall that impacts turn about the axis of its `Rotation` [kg m^2], above 0;
+            the rate is that at the start. With a mass too it is a pendulum with its weight at its `center`, without one
+            the weight is on the axis.
+        openings: surfaces without openings, laws and motion; inside each of them the wall is not there (with side
+            "outside": outside of it; of many bodies, such as `Spheres`: in each body). A particle that reaches the wall
+            there has escaped, and keeps its place and velocity. Only a wall at rest, or one with a mass, has openings;
+            they move with it. An `Opening` is open for some times only.
         present: pairs (t0, t1) [s] that ascend, from 0 s on: the wall is there from t0 on, and no longer from t1 on,
             which is infinite in the last pair if it stays. None: it is always there.
     """

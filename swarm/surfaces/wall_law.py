@@ -21,7 +21,7 @@ BOOKS = ("heat", "dissipated")
 
 
 class Leave(Record):
-    """The leave of a particle from a wall, where a law says more of it than the velocity.
+    """How a particle leaves a wall, for a law that returns more than a velocity.
 
     A particle that does not stay is absorbed: it ends where it is, and gives the wall its normal momentum. One that
     waits stays on the wall, and then leaves with this velocity, which it has in all files from the impact on.
@@ -59,8 +59,8 @@ class WallLaw(Record):
     law of this wall meanwhile.
 
     What a law changes of the energy is heat that the wall gives, in the observable "wall_heat"; with `book =
-    "dissipated"` in the class it is lost, in "dissipated_energy". A square of a speed,
-    relative to the wall, that it changes by less than 1e-12 of it is kept to the last digit.
+    "dissipated"` in the class it is lost, in "dissipated_energy". A law that changes the square of the speed relative
+    to the wall by less than 1e-12 of it keeps the speed to the last digit.
 
     Raises:
         SceneError: by the surface: no `leave`, a field that is no finite number, a velocity into the wall in a trial.

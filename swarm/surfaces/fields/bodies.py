@@ -29,7 +29,7 @@ class Spheres(Many):
 
     Solid ones may overlap one another, and reach through other walls. With side="inside" particles are in any of them,
     and go on from one into another where both overlap: bubbles of a foam, pores; the only surface of a scene.
-    Particles with a radius meet a foam with `Penalty`, where no three bubbles meet at a point.
+    Particles with a radius meet a foam of at most 64 bubbles.
 
     In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius.
 
